@@ -1,0 +1,54 @@
+"""flyball: rigid-body mechanisms, described once, analysed in every way an engineer asks for."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Mechanism": "mechanism",
+    "Body": "model.body",
+    "Frame": "model.body",
+    "Driver": "model.body",
+    "Initial": "model.body",
+    "Box": "model.shapes",
+    "Sphere": "model.shapes",
+    "Cylinder": "model.shapes",
+    "Capsule": "model.shapes",
+    "Cone": "model.shapes",
+    "Ellipsoid": "model.shapes",
+    "load": "files",
+    "load_result": "files",
+    "Result": "results.result",
+    "FlyballError": "errors",
+    "ModelError": "errors",
+    "UnitError": "errors",
+    "ExpressionError": "errors",
+    "AnalysisError": "errors",
+    "AssemblyError": "errors",
+    "SimulationError": "errors",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Public names are imported when first asked for: joints and forces from the folders that hold them."""
+    if name in _HOME:
+        return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    if not name.startswith("_"):
+        for room in ("joints", "forces"):
+            module = importlib.import_module(f".{room}", __name__)
+            if hasattr(module, name) and isinstance(getattr(module, name), type):
+                return getattr(module, name)
+    raise AttributeError(f"module 'flyball' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    from .model.element import Element
+
+    for room in ("joints", "forces"):
+        importlib.import_module(f".{room}", __name__)
+    elements = [k for k, c in Element.registry.items() if c.category in ("joints", "forces") and hasattr(c, "drawn")]
+    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
+    return sorted({*_HOME, *elements, "__version__"} - abstract)

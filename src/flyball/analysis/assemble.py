@@ -1,0 +1,248 @@
+"""Assembly: from rough guesses to positions and velocities that fulfil every constraint.
+
+Positions by damped Gauss-Newton with steps of least weighted size, first on residuals that are true angles (they lead
+from far away, and never to an antiparallel joint), then on the rows of the motion. Velocities by the least change in
+kinetic energy. What fulfils the constraints already is left alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import AssemblyError
+from ..model.expressions import number
+from ..model.model import Model
+from ..system.tables import G_VALUE, NU
+from .compiled import Compiled, compiled
+
+CLOSED = 1e-10
+RESTARTS = 12
+ITERATIONS = 200
+
+
+@dataclass
+class Assembly:
+    """A consistent start: the compiled mechanism, its state, and what assembly had to change."""
+
+    compiled: Compiled
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
+    iterations: int = 0
+
+    @property
+    def y(self) -> np.ndarray:
+        """State vector with work and turn states zero."""
+        return np.r_[self.q, self.v, np.zeros(len(self.compiled.structure.states))]
+
+
+def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
+    """Find positions and velocities that fulfil all constraints at time t, near those described.
+
+    Raises
+    ------
+    AssemblyError
+        If no closed position, or no consistent velocity, is found; the message names the joints that disagree and by
+        how much.
+    """
+    plain = compiled(model, parameters=parameters)
+    q, v = plain.values.q.copy(), plain.values.v.copy()
+    env = {**model.environment(), **(parameters or {})}
+    values = {i.name: number(i.value, env, "", i.title) for i in model.initial if i.value is not None}
+    rates = {i.name: number(i.rate, env, "", i.title) for i in model.initial if i.rate is not None}
+    holds = [i for i in model.initial if i.name in values]
+    near = compiled(model, parameters=parameters, holds=holds, held=values) if holds else plain
+    start = q.copy()
+    count = 0
+    if _misfit(near, t, q, v) > CLOSED or _by_frames(model):
+        far = compiled(model, parameters=parameters, far=True, holds=holds, held=values)
+        if _misfit(far, t, q, v) > 1e-6:
+            q, count = _close(far, t, q, v)
+        q, more = _newton(near, t, q, v)
+        count += more
+        if _misfit(near, t, q, v) > CLOSED or _misfit(far, t, q, v) > 1e-6:
+            raise _disagreement(far, t, q, v)
+    v = _velocities(model, plain, parameters, t, q, v, rates)
+    return Assembly(plain, t, q, v, _moved(plain, start, q), count)
+
+
+def _by_frames(model: Model) -> bool:
+    """Whether some joint is given by frames, so that nothing says it is drawn closed."""
+    return any(j.at is None for j in model.joints)
+
+
+def _misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
+    c.at(t, q, v)
+    g = c.work.row[G_VALUE]
+    return float(np.abs(g).max(initial=0.0)) if np.isfinite(g).all() else np.inf
+
+
+def _weights(c: Compiled) -> np.ndarray:
+    """Inverse weights of the velocities: metres against radians; bodies that must not move have none."""
+    s = c.structure
+    L = c.values.length
+    w = np.ones(s.nv)
+    for name, b in s.place.items():
+        if b < 0:
+            continue
+        v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
+        k = {3: 2, 6: 3}.get(int(n), 0)
+        w[v0 + k : v0 + n] = 1.0 / L**2
+        if s.model[name].fixed:
+            w[v0 : v0 + n] = 0.0
+    return w
+
+
+def _step(c: Compiled, g: np.ndarray, w: np.ndarray, damping: float) -> np.ndarray:
+    """Least weighted step with G d = -g, damped: d = -W G^T (G W G^T + damping)^-1 g."""
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    G = c.sparse_jacobian()
+    A = (G @ sp.diags(w) @ G.T).tocsc()
+    scale = A.diagonal().max(initial=0.0) or 1.0
+    if A.shape[0] <= 300:
+        x = np.linalg.lstsq(A.toarray() + damping * scale * np.eye(A.shape[0]), -g, rcond=1e-13)[0]
+    else:
+        x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(-g)
+    return w * (G.T @ x)
+
+
+def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+    from ..system.tree import retract
+
+    new = q.copy()
+    retract(c.values.system, new, d)
+    return new
+
+
+def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
+    """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
+    w = _weights(c)
+    limit = np.where(w < 1.0, 0.7, 0.7 * c.values.length) if c.values.length else 1.0
+    size = _misfit(c, t, q, v)
+    g = c.work.row[G_VALUE].copy()
+    damping = 0.0
+    norm = float(g @ g)
+    for k in range(ITERATIONS):
+        if size < 1e-13:
+            return q, k
+        c.at(t, q, v)
+        d = _step(c, g, w, damping)
+        over = np.abs(d / limit).max(initial=0.0)
+        d = d / over if over > 1.0 else d
+        new = _moved_by(c, q, d)
+        new_size = _misfit(c, t, new, v)
+        trial = c.work.row[G_VALUE].copy()
+        new_norm = float(trial @ trial)
+        if np.isfinite(new_size) and new_norm < norm:
+            gain = 1.0 - new_norm / norm
+            q, g, size, norm = new, trial, new_size, new_norm
+            damping = 0.0 if damping < 1e-12 else damping / 10
+            if gain < 1e-9:
+                return q, k
+        else:
+            damping = max(10 * damping, 1e-8)
+            if damping > 1e4 or size < 1e-11:
+                return q, k
+    return q, ITERATIONS
+
+
+def _close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
+    """Close from far: Newton from the guess, then from shaken guesses when it is caught short of closed."""
+    w = _weights(c)
+    best, count = _newton(c, t, q, v)
+    least = _misfit(c, t, best, v)
+    random = np.random.default_rng(0)
+    for k in range(RESTARTS):
+        if least < 1e-9:
+            break
+        shake = random.normal(size=len(w)) * np.sqrt(w) * c.values.length * 0.05 * 1.5**k
+        trial, more = _newton(c, t, _moved_by(c, best if k % 2 == 0 else q, shake), v)
+        count += more
+        misfit = _misfit(c, t, trial, v)
+        if misfit < 1e-9:
+            # closed from a shaken start: come back as near to the guess as the constraints allow
+            return trial, count
+        if misfit < least:
+            best, least = trial, misfit
+    return best, count
+
+
+def _disagreement(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> AssemblyError:
+    """The error that says which elements cannot be fulfilled together, worst first."""
+    _misfit(c, t, q, v)
+    g = c.work.row[G_VALUE]
+    gaps: dict[str, tuple[float, float, str]] = {}
+    for name, rows in c.structure.slices.items():
+        part = g[rows]
+        if not len(part) or np.abs(part).max() < 1e-9:
+            continue
+        units = [_unit(c, k) for k in range(rows.start, rows.stop)]
+        metres = np.sqrt(sum(x * x for x, u in zip(part, units, strict=True) if u == "m"))
+        radians = np.sqrt(sum(x * x for x, u in zip(part, units, strict=True) if u != "m"))
+        text = " and ".join(
+            x for x in (f"{metres:.4g} m" if metres > 1e-9 else "", f"{np.degrees(radians):.4g} deg" if radians > 1e-9 else "") if x
+        )
+        gaps[name] = (float(metres), float(radians), text)
+    worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / c.values.length, gaps[k][1]))
+    shown = "; ".join(f"{k} is {gaps[k][2]} from closed" for k in worst[:8])
+    return AssemblyError(
+        f"{c.structure.model.name!r} cannot be assembled at t = {t:g} s: no position fulfils all constraints. "
+        f"At the best position found {shown or 'rows disagree'}. Check lengths and the points of these joints, "
+        f"the drivers, and initial values, or give a better guess",
+        gaps={k: gaps[k][:2] for k in worst},
+    )
+
+
+def _unit(c: Compiled, row: int) -> str:
+    return next(x.formula.measure for x in c.structure.terms if x.row == row)
+
+
+def _velocities(
+    model: Model, plain: Compiled, parameters: Mapping | None, t: float, q: np.ndarray, v: np.ndarray, rates: dict
+) -> np.ndarray:
+    """Velocities nearest to v (in kinetic energy) with G v = nu and the rates asked for."""
+    holds = [i for i in model.initial if i.name in rates]
+    c = compiled(model, parameters=parameters, holds=holds, held={}) if holds else plain
+    if not len(c.values.system.row_i):
+        return v
+    c.at(t, q, v)
+    nu = c.work.row[NU].copy()
+    for i in holds:
+        nu[c.structure.slices[i.name]] = rates[i.name]
+    G = c.sparse_jacobian()
+    r = nu - G @ v
+    size = max(1.0, float(np.abs(v).max(initial=0.0)), float(np.abs(nu).max(initial=0.0)))
+    if np.abs(r).max() < 1e-13 * size:
+        return v
+    w = _weights(c)
+    w = np.where(w > 0, 1.0 / c.inertias(), 0.0)
+    for _ in range(4):
+        v = v + _step(c, -(nu - G @ v), w, 0.0)
+    r = nu - G @ v
+    if np.abs(r).max() > 1e-9 * size:
+        bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]
+        raise AssemblyError(
+            f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {', '.join(bad)} disagree. "
+            f"Check drivers, initial rates and bodies that are fixed",
+            gaps={k: float(np.abs(r[c.structure.slices[k]]).max()) for k in bad},
+        )
+    return v
+
+
+def _moved(c: Compiled, before: np.ndarray, after: np.ndarray) -> dict[str, float]:
+    out = {}
+    for name, b in c.structure.place.items():
+        if b < 0 or c.structure.tables["body_i"][b, 5] < 3:
+            continue
+        q0 = c.structure.tables["body_i"][b, 2]
+        k = 2 if c.structure.model.planar else 3
+        d = float(np.linalg.norm(after[q0 : q0 + k] - before[q0 : q0 + k]))
+        if d > 1e-12:
+            out[name] = d
+    return out

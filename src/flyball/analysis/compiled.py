@@ -1,0 +1,92 @@
+"""A mechanism made ready for analyses: structure, values, scratch, and how its arrays are read back by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model.body import Initial
+from ..model.model import Model
+from ..system.motion import NONE
+from ..system.structure import Structure, structure
+from ..system.tables import INERTIA, MASS, STABILIZE, Work
+from ..system.values import Values, values, work
+from .entry import POSITION, evaluate
+
+
+@dataclass
+class Compiled:
+    """A compiled mechanism with scratch of its own."""
+
+    values: Values
+    work: Work
+
+
+    @property
+    def structure(self) -> Structure:
+        """The integers."""
+        return self.values.structure
+
+    @property
+    def y(self) -> np.ndarray:
+        """The drawn state, work and turn states zero."""
+        s = self.structure
+        return np.r_[self.values.q, self.values.v, np.zeros(len(s.states))]
+
+    def at(self, t: float, q: np.ndarray, v: np.ndarray, level: int = POSITION) -> tuple[int, np.ndarray]:
+        """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy)."""
+        y = np.r_[q, v, np.zeros(len(self.structure.states))]
+        dy = np.zeros_like(y)
+        return evaluate(self.values.system, self.work, float(t), y, dy, level), dy
+
+    def jacobian(self) -> np.ndarray:
+        """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
+        S = self.values.system
+        G = np.zeros((len(S.row_i), self.structure.nv))
+        rows = np.repeat(np.arange(len(S.row_i)), np.diff(S.row_p))
+        G[rows, S.col_i] = self.work.G
+        return G
+
+    def sparse_jacobian(self):
+        """Sparse copy of the constraint Jacobian last evaluated."""
+        import scipy.sparse as sp
+
+        S = self.values.system
+        return sp.csr_matrix((self.work.G.copy(), S.col_i, S.row_p), shape=(len(S.row_i), self.structure.nv))
+
+    def mass(self):
+        """Sparse mass matrix of absolute coordinates, (nv, nv)."""
+        import scipy.sparse as sp
+
+        S = self.values.system
+        blocks = []
+        for b in range(len(S.body_i)):
+            n = int(S.body_i[b, 5])
+            J = S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3)
+            k = 2 if n == 3 else 3
+            blocks.append(sp.block_diag([S.body_x[b, MASS] * np.eye(k), J[2:, 2:] if n == 3 else J]))
+        return sp.block_diag(blocks, format="csr")
+
+    def inertias(self) -> np.ndarray:
+        """Diagonal of the mass matrix, with a small part of the body's size where there is no inertia."""
+        M = self.mass().diagonal()
+        return np.maximum(M, 1e-9 * M.max())
+
+
+def compiled(
+    model: Model,
+    *,
+    parameters: Mapping[str, float] | None = None,
+    far: bool = False,
+    holds: Sequence[Initial] = (),
+    held: Mapping[str, float] | None = None,
+    tree: Sequence[str] = (),
+) -> Compiled:
+    """Compile a mechanism (see ``structure`` and ``values``)."""
+    s = structure(model, far=far, holds=holds, tree=tree)
+    x = values(s, parameters, held)
+    w = work(s, x.system)
+    w.option[STABILIZE] = NONE
+    return Compiled(x, w)

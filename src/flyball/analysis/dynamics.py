@@ -1,0 +1,263 @@
+"""Motion in time: the compiled loop, called in chunks, and what it hands out made into a ``Result``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import ModelError, SimulationError
+from ..model.model import Model
+from ..numerics.integrators import explicit as ex
+from ..numerics.integrators.tableaux import tableau
+from ..results.health import Health
+from ..results.records import initial_turns
+from ..results.result import Result
+from ..system import motion
+from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
+from .assemble import Assembly, assemble
+from .entry import simulate as kernel
+from .mobility import mobility
+
+STABILIZATION = {
+    "projection": motion.STAGES,
+    "projection-steps": motion.STEPS,
+    "baumgarte": motion.BAUMGARTE,
+    "none": motion.NONE,
+}
+SLICE = 0.05  # seconds that a call of the compiled loop should take
+
+
+@dataclass(frozen=True)
+class Options:
+    """Choices of a simulation, as kept in the result.
+
+    ``method``: an explicit Runge-Kutta pair. ``stabilization``: ``projection`` (states and stages are kept on the
+    constraints), ``projection-steps`` (states only), ``baumgarte`` with its two rates [1/s], or ``none``.
+    """
+
+    rtol: float = 1e-8
+    atol: float = 1e-10
+    method: str = "dop853"
+    stabilization: str = "projection"
+    alpha: float = 10.0
+    beta: float = 10.0
+    max_step: float = np.inf
+    max_steps: int = 100_000_000
+
+    def __post_init__(self) -> None:
+        for name in ("rtol", "atol", "max_step"):
+            if not getattr(self, name) > 0.0:
+                raise ModelError(f"{name} must be greater than 0, got {getattr(self, name)}")
+        if self.stabilization not in STABILIZATION:
+            known = ", ".join(STABILIZATION)
+            raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
+        try:
+            tableau(self.method)
+        except ValueError as error:
+            raise ModelError(str(error)) from None
+
+
+def simulate(
+    model: Model,
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    outputs: int | Sequence[float] = 501,
+    parameters: Mapping[str, float] | None = None,
+    start: Result | None = None,
+    progress: Callable[[float], None] | None = None,
+    **options: object,
+) -> Result:
+    """Integrate the equations of motion from ``t_start`` to ``t_end``.
+
+    Parameters
+    ----------
+    model : Model
+    t_end, t_start : float [s]
+    outputs : int or sequence of float
+        Number of evenly spaced output times, or the times [s] themselves.
+    parameters : mapping, optional
+        Values of parameters in SI units, in place of the model's.
+    start : Result, optional
+        Go on from the last state of this result (``t_start`` is then its last time).
+    progress : callable, optional
+        Called with the fraction done about twenty times a second.
+    **options
+        Fields of `Options`.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    AssemblyError
+        If the start cannot be made consistent.
+    SimulationError
+        If the integration cannot go on; its ``result`` holds the motion up to then.
+    """
+    chosen = _options(options)
+    begin = time.perf_counter()
+    t_start = t_start if start is None else float(start.t[-1])
+    times = output_times(t_start, t_end, outputs)
+    a = assemble(model, t=t_start, parameters=parameters)
+    y = a.y
+    if start is not None:
+        y = start.state_at_end(a.compiled)
+        a = Assembly(a.compiled, t_start, y[: a.compiled.structure.nq], y[a.compiled.structure.nq :][: a.compiled.structure.nv])
+    else:
+        initial_turns(a.compiled.values, y)
+    clock = _clock(a, t_start, float(t_end), times, y, chosen)
+    rows, interrupted = _run(a, clock, tableau(chosen.method), progress)
+    return _finish(model, a, clock, rows, interrupted, chosen, time.perf_counter() - begin)
+
+
+def _options(options: Mapping[str, object]) -> Options:
+    import dataclasses
+
+    known = [f.name for f in dataclasses.fields(Options)]
+    for name in options:
+        if name not in known:
+            raise ModelError(f"simulate has no option {name!r}; it has {', '.join(known)}")
+    return Options(**options)  # type: ignore[arg-type]
+
+
+def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -> np.ndarray:
+    """Ascending output times within the interval.
+
+    Raises
+    ------
+    ModelError
+        If the interval is empty or not finite, or the times are not ascending within it.
+    """
+    if not (np.isfinite(t_start) and np.isfinite(t_end)):
+        raise ModelError(f"start and end time must be finite, got {t_start} and {t_end}")
+    if not t_end > t_start:
+        raise ModelError(f"the end time {t_end:g} s must be later than the start time {t_start:g} s")
+    if isinstance(outputs, (int, np.integer)):
+        if outputs < 2:
+            raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
+        return np.linspace(t_start, t_end, int(outputs))
+    times = np.asarray(outputs, float)
+    if times.ndim != 1 or not len(times) or not (np.diff(times) > 0).all():
+        raise ModelError("outputs must be a number of times, or times in ascending order")
+    if times[0] < t_start or times[-1] > t_end:
+        raise ModelError(f"output times must lie between {t_start:g} s and {t_end:g} s")
+    return times
+
+
+def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray, o: Options) -> ex.Clock:
+    """Everything the compiled loop needs to start, and the choices of the solve."""
+    s, W = a.compiled.structure, a.compiled.work
+    real, count = np.zeros(9), np.zeros(7, np.int64)
+    real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
+    real[ex.H_MAX] = min(o.max_step, t_end - t)
+    real[ex.LARGEST] = max(abs(t), abs(t_end))
+    count[ex.QUOTA] = 50
+    count[ex.CONTROLLED] = s.nq + s.nv
+    Y = np.zeros((3, len(y)))
+    Y[0] = y
+    W.option[STABILIZE] = STABILIZATION[o.stabilization]
+    W.option[ALPHA], W.option[BETA] = o.alpha, o.beta
+    loose = o.atol + o.rtol * a.compiled.values.length
+    W.option[TOL_G] = min(1e-9, max(1e-12, 1e-3 * loose))
+    W.option[TOL_V] = min(1e-8, max(1e-11, 1e-2 * loose))
+    return ex.Clock(real, count, times, Y, np.zeros((len(tableau(o.method).c), len(y))))
+
+
+def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None) -> tuple[np.ndarray, bool]:
+    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
+    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+    width = 1 + len(a.y) + s.nv + len(S.row_i)
+    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
+    rows = []
+    first = clock.real[ex.T]
+    try:
+        while True:
+            begin = time.perf_counter()
+            before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
+            used = kernel(S, W, method, clock, buffer)
+            rows.append(buffer[:used].copy())
+            if progress is not None:
+                progress((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))
+            if clock.count[ex.STATUS] != ex.RUNNING:
+                return np.concatenate(rows), False
+            took = time.perf_counter() - begin
+            done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
+            clock.count[ex.QUOTA] = int(np.clip(max(done, 1) * SLICE / max(took, 1e-6), 1, 100_000))
+    except KeyboardInterrupt:
+        return np.concatenate(rows) if rows else np.zeros((0, width)), True
+
+
+def _finish(
+    model: Model, a: Assembly, clock: ex.Clock, rows: np.ndarray, interrupted: bool, o: Options, seconds: float
+) -> Result:
+    """Result and health; a failed run raises with its partial result."""
+    s, W = a.compiled.structure, a.compiled.work
+    status = int(clock.count[ex.STATUS])
+    t = float(clock.real[ex.T])
+    message = "reached the end"
+    if interrupted:
+        message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+    elif status != ex.DONE:
+        message = _reason(a, clock, status, t)
+    m = mobility(model, a)
+    health = Health(
+        success=status == ex.DONE and not interrupted,
+        message=message,
+        violation=float(W.option[WORST_G]),
+        velocity_violation=float(W.option[WORST_V]),
+        steps=int(clock.count[ex.ACCEPTED]),
+        rejected=int(clock.count[ex.REJECTED]),
+        evaluations=int(W.info[EVALUATIONS]),
+        factorisations=int(W.info[FACTORISATIONS]),
+        seconds=seconds,
+        freedoms=m.freedoms,
+        redundant=m.redundant,
+        undetermined=m.undetermined,
+        options={k: getattr(o, k) for k in o.__dataclass_fields__},
+    )
+    cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
+    t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
+    result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
+    result.final = (t, clock.y[0].copy())
+    if len(result.t):
+        health.energy_drift = result.energy.drift
+    if status not in (ex.DONE, ex.RUNNING):
+        raise SimulationError(message, result, t)
+    return result
+
+
+def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
+    """Why the integration cannot go on, in words."""
+    name = a.compiled.structure.model.name
+    kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
+    if status == ex.NOT_FINITE or not np.isfinite(clock.K[0]).all() or not np.isfinite(clock.y[0]).all():
+        i = int(np.argmin(np.isfinite(clock.K[0])))
+        return (
+            f"{name!r}: the equations of motion are not finite at t = {t:.6g} s, first at {_component(a, i)}. "
+            f"Look for a law that divides by zero, or two points of a spring that coincide. {kept}"
+        )
+    rows = a.compiled.structure.rows
+    k = int(a.compiled.work.info[1])
+    where = f" near {rows[k].element.title}" if rows else ""
+    h = clock.real[ex.H]
+    return (
+        f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {h:.3g} s{where}. "
+        f"The mechanism may lock there (a driver asks for more than its links allow), or a force changes too "
+        f"abruptly. {kept}"
+    )
+
+
+def _component(a: Assembly, i: int) -> str:
+    """Name of the body that a component of the state belongs to."""
+    s = a.compiled.structure
+    for name, b in s.place.items():
+        if b >= 0:
+            _, _, q0, v0, nq, nv = s.tables["body_i"][b]
+            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
+                return f"body {name!r}"
+    return "a measured quantity"

@@ -1,0 +1,27 @@
+"""n . (p_M - p_F) = c with n fixed in F: the displacement of M along an axis of F.
+
+With n across the axis it is half of a straight-line follower (Hahn's BB3); with n along it, a sliding coordinate.
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from ..math.vec import cross, dot, mv, sub
+
+KIND = 1
+
+
+@formula
+def row(par, F, M):
+    """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
+
+    g = n.d - c, gdot = n.u + w_F.(n x d), with d = p_M - p_F, u = v_M - v_F and ndot = w_F x n.
+    """
+    n = mv(F[1], (par[0], par[1], par[2]))
+    d = sub(M[0], F[0])
+    u = sub(M[3], F[3])
+    o = 0.0 * par[0]
+    arm = cross(n, d)
+    n1 = cross(F[2], n)
+    bias = dot(n, sub(M[5], F[5])) + dot(F[4], arm) + 2.0 * dot(n1, u) + dot(cross(F[2], n1), d)
+    return dot(n, d) - par[6], n, (o, o, o), arm, bias

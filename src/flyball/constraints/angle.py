@@ -1,0 +1,45 @@
+"""The angle of M's x axis about F's z axis, counted from F's x axis: the coordinate of a revolute joint.
+
+Exact also off the constraint (M's x axis out of F's plane): theta = atan2(s, c), c = m.x, s = m.y.
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from ..math.scalar import atan2, rounded
+from ..math.vec import add, col, cross, dot, neg, scale, sub
+
+KIND = 4
+
+
+@formula
+def row(par, F, M):
+    """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
+
+    thetadot = n.(w_M - w_F), n = m x u / (c^2 + s^2), u = c y - s x.
+    """
+    m = col(M[1], 0)
+    x = col(F[1], 0)
+    y = col(F[1], 1)
+    w = sub(M[2], F[2])
+    c = dot(m, x)
+    s = dot(m, y)
+    r = c * c + s * s
+    u = sub(scale(c, y), scale(s, x))
+    mu = cross(m, u)
+    n = scale(1.0 / r, mu)
+    c1 = dot(w, cross(m, x))
+    s1 = dot(w, cross(m, y))
+    u1 = add(sub(scale(c1, y), scale(s1, x)), cross(F[2], u))
+    mu1 = add(cross(cross(M[2], m), u), cross(m, u1))
+    r1 = 2.0 * (c * c1 + s * s1)
+    n1 = scale(1.0 / r, sub(mu1, scale(r1, n)))
+    o = 0.0 * par[0]
+    bias = dot(n, sub(M[4], F[4])) + dot(n1, w)
+    return atan2(s, c) - par[6], (o, o, o), n, neg(n), bias
+
+
+@formula
+def unwrapped(theta, hint):
+    """theta plus the whole turns that bring it next to ``hint``."""
+    return theta + 6.283185307179586 * rounded((hint - theta) / 6.283185307179586)

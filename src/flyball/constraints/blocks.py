@@ -1,0 +1,91 @@
+"""Building blocks of joints: named groups of scalar rows (after Hahn, *Rigid Body Dynamics of Mechanisms*, BB1 to BB5).
+
+A joint is a tuple of these. Each row also says which axes it speaks of, so that in the plane those that are fulfilled
+anyway fall away, and which row stands in for it while a joint is still far from closed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from . import alignment, along, angle, coincident, distance, perpendicular
+
+_UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+_ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One scalar term: the kind of its formula, its parameters, the axes it speaks of, its stand-in for assembly."""
+
+    kind: int
+    par: tuple[float, ...]
+    axes: str = ""
+    world: bool = False  # axes of the world, not of the joint
+    far: Row | None = None
+    measure: str = "m"  # unit of its value
+
+
+def _row(kind: int, a: str, b: str = "", **more) -> Row:
+    par = (*_UNIT[a], *(_UNIT[b] if b else _ZERO), 0.0, 1.0)
+    return Row(kind, par, a + b, **more)
+
+
+def _third(a: str, b: str) -> str:
+    return next(c for c in "xyz" if c not in a + b)
+
+
+def _perpendicular(m: str, f: str, far_kind: int | None = None) -> Row:
+    """Axis m of M at right angles to axis f of F."""
+    par = (*_UNIT[f], *_UNIT[m], 0.0, 1.0)
+    far = None if far_kind is None else _row(far_kind, _third(m, f), measure="rad")
+    return Row(perpendicular.KIND, par, m + f, far=far, measure="rad")
+
+
+COMMON_POINT = tuple(_row(coincident.KIND, a, world=True) for a in "xyz")
+"""BB1: the origins of F and M coincide."""
+
+PARALLEL_AXES = (
+    _perpendicular("z", "x", alignment.KIND_AXIS),
+    _perpendicular("z", "y", alignment.KIND_AXIS),
+)
+"""BB2: the z axes of F and M are parallel, and point the same way."""
+
+STRAIGHT_LINE = (_row(along.KIND, "x"), _row(along.KIND, "y"))
+"""BB3: the origin of M stays on the z axis of F."""
+
+SAME_AXES = (
+    _perpendicular("z", "x", alignment.KIND_FULL),
+    _perpendicular("z", "y", alignment.KIND_FULL),
+    _perpendicular("x", "y", alignment.KIND_FULL),
+)
+"""BB2 + BB4: the axes of F and M are parallel, all three."""
+
+CROSSED_AXES = (_perpendicular("z", "z"),)
+"""BB4: the z axes of F and M are at right angles."""
+
+CONSTANT_DISTANCE = (Row(distance.KIND, (0.0,) * 7 + (1.0,)),)
+"""BB5: the origins of F and M keep their distance (the length is parameter 6)."""
+
+ANGLE = Row(angle.KIND, (0.0,) * 7 + (1.0,), measure="rad")
+"""Coordinate: angle of M's x axis about F's z axis."""
+
+SLIDE = _row(along.KIND, "z")
+"""Coordinate: displacement of M along F's z axis."""
+
+
+def point_coordinate(axis: str) -> Row:
+    """Coordinate: world component of the way from F to M."""
+    return _row(coincident.KIND, axis, world=True)
+
+
+FORMULAS = {
+    coincident.KIND: coincident.row,
+    along.KIND: along.row,
+    perpendicular.KIND: perpendicular.row,
+    distance.KIND: distance.row,
+    angle.KIND: angle.row,
+    alignment.KIND_AXIS: alignment.axis_row,
+    alignment.KIND_FULL: alignment.full_row,
+}
+"""The formula of each kind of term, for use outside compiled loops."""

@@ -1,0 +1,43 @@
+"""The errors a user can meet. Each message names the element, the value, the rule and a remedy."""
+
+from __future__ import annotations
+
+
+class FlyballError(Exception):
+    """Any error raised by flyball on purpose."""
+
+
+class ModelError(FlyballError, ValueError):
+    """The description of a mechanism is wrong."""
+
+
+class UnitError(ModelError):
+    """A quantity has a unit that does not exist or does not fit what is wanted."""
+
+
+class ExpressionError(ModelError):
+    """An expression cannot be read, or uses a name that is not known."""
+
+
+class AnalysisError(FlyballError):
+    """An analysis cannot be done or cannot go on."""
+
+
+class AssemblyError(AnalysisError):
+    """No position or velocity fulfils all constraints.
+
+    ``gaps`` holds, for each element that disagrees, how far it is from closed.
+    """
+
+    def __init__(self, message: str, gaps: dict | None = None) -> None:
+        super().__init__(message)
+        self.gaps = gaps or {}
+
+
+class SimulationError(AnalysisError):
+    """An integration cannot go on. ``result`` holds what was computed up to then, ``t`` the time it stopped."""
+
+    def __init__(self, message: str, result: object = None, t: float = float("nan")) -> None:
+        super().__init__(message)
+        self.result = result
+        self.t = t

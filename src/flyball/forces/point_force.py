@@ -1,0 +1,69 @@
+"""A force on a body at one of its points, from outside."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, ClassVar, Literal
+
+from .._jit import formula
+from ..math.vec import mv
+from ..model.element import LawOf, Number, Numbers, Point, element
+from ..model.force import BodyForce
+
+KIND = 3
+
+
+@formula
+def inputs(par, F, M, turns):
+    """Nothing is measured."""
+    return 0.0 * M[0][0], 0.0 * M[0][0]
+
+
+@formula
+def in_world(par, F, M, laws):
+    """The laws as components along the world's axes, or along the body's where par[0] says so."""
+    if par[0] > 0.5:
+        return mv(M[1], laws)
+    return laws
+
+
+@formula
+def wrench(par, F, M, laws, values):
+    """The force at M's origin."""
+    o = 0.0 * par[0]
+    return in_world(par, F, M, laws), (o, o, o)
+
+
+@element
+class PointForce(BodyForce):
+    """A given force on a body.
+
+    Parameters
+    ----------
+    name : str
+    body : str
+        Body it acts on, or a frame fixed on it, at whose origin it acts.
+    force : two or three laws [N]
+        Components, each a number or an expression of ``t`` and parameters.
+    at : point [m]
+        Where it acts, in world coordinates of the drawn configuration; the centre of mass if not given.
+    axes : ``"world"`` or ``"body"``
+        Whose axes the components are along; in the body's axes the force turns with the body.
+    """
+
+    force: Annotated[Numbers, LawOf("N")]
+    at: Point | None = None
+    axes: Literal["world", "body"] = "world"
+
+    kind: ClassVar[int] = KIND
+    inputs: ClassVar = staticmethod(inputs)
+    wrench: ClassVar = staticmethod(wrench)
+    drawn: ClassVar[str] = "arrow"
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return (1.0 if self.axes == "body" else 0.0,)
+
+    def laws(self) -> tuple[Number | None, ...]:
+        """The components."""
+        return tuple(self.force)

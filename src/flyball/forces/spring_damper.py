@@ -1,0 +1,88 @@
+"""Spring, damper and actuator between two points."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, ClassVar
+
+from .._jit import formula
+from ..math.vec import dot, neg, norm, scale, sub
+from ..model.element import Damping, Law, LawOf, Length, Number, Stiffness, element, nonnegative
+from ..model.force import TwoPointForce
+
+KIND = 0
+
+
+@formula
+def inputs(par, F, M, turns):
+    """Length and its rate."""
+    d = sub(M[0], F[0])
+    length = norm(d)
+    return length, dot(d, sub(M[3], F[3])) / length
+
+
+@formula
+def wrench(par, F, M, laws, values):
+    """Force on M that pulls it towards F: k (length - free length) + c rate + actuator force."""
+    length, rate = values
+    s = par[0] * (length - par[2]) + par[1] * rate + laws[0]
+    e = scale(1.0 / length, sub(M[0], F[0]))
+    o = 0.0 * par[0]
+    return neg(scale(s, e)), (o, o, o)
+
+
+@formula
+def energy(par, F, M, turns):
+    """Potential energy k (length - free length)^2 / 2 [J]."""
+    x = inputs(par, F, M, turns)[0] - par[2]
+    return 0.5 * par[0] * x * x
+
+
+@element
+class SpringDamper(TwoPointForce):
+    """Spring, damper and actuator between a point of one body and a point of another.
+
+    The tension k (l - l0) + c ldot + F pulls the two points together where it is positive.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Bodies or frames whose points it joins, ``"ground"`` too.
+    at : pair of points [m]
+        The two points, in world coordinates of the drawn configuration. Not given: the origins of the frames.
+    stiffness : number [N/m]
+    damping : number [N s/m]
+    length : number [m]
+        Length at which the spring carries nothing; the drawn length if not given.
+    force : law [N]
+        Added tension, an expression of ``t``, ``length``, ``rate`` and parameters.
+    """
+
+    stiffness: Stiffness = 0.0
+    damping: Damping = 0.0
+    length: Length | None = None
+    force: Annotated[Law | None, LawOf("N", ("length", "rate"))] = None
+
+    kind: ClassVar[int] = KIND
+    inputs: ClassVar = staticmethod(inputs)
+    wrench: ClassVar = staticmethod(wrench)
+    energy: ClassVar = staticmethod(energy)
+    outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "force": "N"}
+    drawn: ClassVar[str] = "spring"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Stiffness, damping and free length must not be negative."""
+        nonnegative(self, n, "stiffness", "damping", "length")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return (n.stiffness, n.damping, separation if n.length is None else n.length)
+
+    def laws(self) -> tuple[Number | None, ...]:
+        """Expressions that the formulas see."""
+        return (self.force,)
+
+    def conservative(self) -> bool:
+        """Whether its energy is all that it ever takes or gives."""
+        return self.force is None and self.damping == 0.0

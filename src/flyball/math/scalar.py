@@ -1,0 +1,289 @@
+"""Scalar functions for every kind of number a formula meets.
+
+The same call works on floats, complex numbers, NumPy arrays (a formula over time), SymPy expressions (SymPy is
+imported only then) and, through overloads, inside compiled code for real and complex numbers.
+
+Outside its domain a real function gives nan or inf, as in C, and never raises: a solver checks its state once a step
+and reports, it must not be torn out of the middle of one. Complex numbers follow the principal branches of `cmath`;
+functions that are not analytic (`atan2`, `absolute`, `sign`, `rounded`, `minimum`, `maximum`) decide on the real parts
+and carry the derivative in the imaginary part, so that a complex step gives their exact derivative.
+"""
+
+from __future__ import annotations
+
+import cmath
+import math
+import operator
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from .._jit import formula, on_numba
+
+Function = Callable[..., Any]
+
+_NUMBERS = (float, int, complex)
+_ANALYTIC: dict[Function, str] = {}
+
+
+def _quietly(ufunc: Function, *args: Any) -> Any:
+    """Value of a ufunc without warnings; a Python number for numbers."""
+    with np.errstate(all="ignore"):
+        value = ufunc(*args)
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _on_array(function: Function, ufunc: Function, *args: Any) -> Any:
+    """Value on arrays; arrays of objects (symbols) go element by element."""
+    if any(np.asarray(a).dtype == object for a in args):
+        return np.frompyfunc(function, len(args), 1)(*args)
+    return _quietly(ufunc, *args)
+
+
+def _has_array(*args: Any) -> bool:
+    return any(isinstance(a, np.ndarray | np.generic) for a in args)
+
+
+def _analytic(name: str, ufunc: Function, meaning: str) -> Function:
+    """One analytic function of one argument, by its name in `math`, `cmath` and SymPy."""
+    real, complex_ = getattr(math, name), getattr(cmath, name)
+
+    def function(x):
+        try:
+            if isinstance(x, float | int):
+                return real(x)
+            if isinstance(x, complex):
+                return complex_(x)
+        except (ValueError, OverflowError):
+            return _quietly(ufunc, x)
+        if _has_array(x):
+            return _on_array(function, ufunc, x)
+        import sympy
+
+        return getattr(sympy, name)(x)
+
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = meaning
+    _ANALYTIC[function] = name
+    return function
+
+
+sqrt = _analytic("sqrt", np.sqrt, "Square root; nan for a negative real.")
+sin = _analytic("sin", np.sin, "Sine of an angle [rad].")
+cos = _analytic("cos", np.cos, "Cosine of an angle [rad].")
+tan = _analytic("tan", np.tan, "Tangent of an angle [rad].")
+asin = _analytic("asin", np.arcsin, "Angle [rad] in [-pi/2, pi/2] of a sine; nan for a real outside [-1, 1].")
+acos = _analytic("acos", np.arccos, "Angle [rad] in [0, pi] of a cosine; nan for a real outside [-1, 1].")
+atan = _analytic("atan", np.arctan, "Angle [rad] in (-pi/2, pi/2) of a tangent.")
+exp = _analytic("exp", np.exp, "Exponential; inf on overflow.")
+log = _analytic("log", np.log, "Natural logarithm; -inf at zero, nan for a negative real.")
+sinh = _analytic("sinh", np.sinh, "Hyperbolic sine.")
+cosh = _analytic("cosh", np.cosh, "Hyperbolic cosine.")
+tanh = _analytic("tanh", np.tanh, "Hyperbolic tangent.")
+
+
+def atan2(y, x):
+    """Angle [rad] in (-pi, pi] of the point (x, y); complex numbers carry its first derivative."""
+    if isinstance(y, float | int) and isinstance(x, float | int):
+        return math.atan2(y, x)
+    if isinstance(y, _NUMBERS) and isinstance(x, _NUMBERS):
+        turned, square = x.real * y.imag - y.real * x.imag, x.real * x.real + y.real * y.real
+        return complex(math.atan2(y.real, x.real), divide(turned, square) if turned else 0.0)
+    if _has_array(y, x):
+        if np.iscomplexobj(y) or np.iscomplexobj(x):
+            return np.vectorize(atan2, otypes=[complex])(y, x)
+        return _on_array(atan2, np.arctan2, y, x)
+    import sympy
+
+    return sympy.atan2(y, x)
+
+
+def absolute(x):
+    """Absolute value: x or -x by the sign of its real part."""
+    if isinstance(x, _NUMBERS):
+        return -x if x.real < 0 else x
+    if _has_array(x):
+        return _on_array(absolute, lambda x: np.where(x.real < 0, -x, x)[()], x)
+    import sympy
+
+    return sympy.Abs(x)
+
+
+def sign(x):
+    """-1, 0 or 1 by the real part; nan for nan."""
+    if isinstance(x, float | int):
+        return x if x != x else float((x > 0) - (x < 0))
+    if isinstance(x, complex):
+        return complex(sign(x.real))
+    if _has_array(x):
+        return _on_array(sign, lambda x: np.sign(x.real) + 0 * x, x)
+    import sympy
+
+    return sympy.sign(x)
+
+
+def rounded(x):
+    """The whole number nearest to the real part (upwards from halves), without a derivative."""
+    if isinstance(x, float | int):
+        return math.floor(x + 0.5) * 1.0 if math.isfinite(x) else x * 1.0
+    if isinstance(x, complex):
+        return complex(rounded(x.real))
+    if _has_array(x):
+        return _on_array(rounded, lambda x: np.floor(x.real + 0.5) + 0 * x, x)
+    import sympy
+
+    return sympy.floor(x + sympy.Rational(1, 2))
+
+
+def minimum(a, b):
+    """The argument with the smaller real part (the first of equals); nan if either is nan."""
+    if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS):
+        return a if a.real <= b.real or a != a else b
+    if _has_array(a, b):
+        return _on_array(minimum, lambda a, b: np.where((np.real(a) <= np.real(b)) | (a != a), a, b)[()], a, b)
+    import sympy
+
+    return sympy.Min(a, b)
+
+
+def maximum(a, b):
+    """The argument with the larger real part (the first of equals); nan if either is nan."""
+    if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS):
+        return a if a.real >= b.real or a != a else b
+    if _has_array(a, b):
+        return _on_array(maximum, lambda a, b: np.where((np.real(a) >= np.real(b)) | (a != a), a, b)[()], a, b)
+    import sympy
+
+    return sympy.Max(a, b)
+
+
+def divide(a, b):
+    """a / b; inf or nan where b is zero, as in C."""
+    if isinstance(b, _NUMBERS):
+        if b != 0 or not isinstance(a, _NUMBERS):
+            return a / b
+        return _quietly(np.divide, a, b)
+    if _has_array(a, b):
+        return _on_array(operator.truediv, np.divide, a, b)
+    return a / b
+
+
+def power(a, b):
+    """a ** b; nan for a negative base with a broken exponent, inf for zero with a negative one, as in C."""
+    if isinstance(a, float | int) and isinstance(b, float | int):
+        try:
+            return math.pow(a, b)
+        except (ValueError, OverflowError):
+            return _quietly(np.power, float(a), float(b))
+    if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS):
+        return _complex_power(complex(a), complex(b))
+    if _has_array(a, b):
+        if np.iscomplexobj(a) or np.iscomplexobj(b):
+            return np.vectorize(power, otypes=[complex])(a, b)
+        return _on_array(power, lambda a, b: np.power(a + 0.0, b), a, b)
+    return a**b
+
+
+@formula
+def integer_power(x, n):
+    """x ** n for an integer n, by repeated squaring: the same products for every kind of number."""
+    m = n if n >= 0 else -n
+    value, square = 1, x
+    while m > 0:
+        if m % 2 == 1:
+            value = value * square
+        square = square * square
+        m = m // 2
+    return value if n >= 0 else divide(1, value)
+
+
+@formula
+def _complex_power(a, b):
+    """a ** b for complex numbers near the real axis: the value of the real function and its derivative."""
+    if b.imag == 0 and b.real == math.floor(b.real) and -64 <= b.real <= 64:
+        return integer_power(a, int(b.real))
+    if a.real < 0:
+        return complex(math.nan, math.nan)
+    if a == 0:
+        return complex(power(0.0, b.real), 0.0)
+    return exp(b * log(a))
+
+
+@formula
+def cubic_step(s):
+    """Smooth step from 0 (s <= 0) to 1 (s >= 1) with continuous slope: s^2 (3 - 2 s) between."""
+    s = minimum(maximum(s, 0.0), 1.0)
+    return s * s * (3.0 - 2.0 * s)
+
+
+@formula
+def quintic_step(s):
+    """Smooth step from 0 (s <= 0) to 1 (s >= 1) with continuous curvature: s^3 (10 - 15 s + 6 s^2) between."""
+    s = minimum(maximum(s, 0.0), 1.0)
+    return s * s * s * (10.0 + s * (6.0 * s - 15.0))
+
+
+@on_numba
+def _register() -> None:
+    """Tell the compiler what these functions are for real and complex numbers."""
+    from numba import types
+    from numba.extending import overload
+
+    options = {"error_model": "numpy"}
+
+    def analytic(function: Function, name: str) -> None:
+        real, complex_ = getattr(math, name), getattr(cmath, name)
+
+        @overload(function, jit_options=options)
+        def choose(x):
+            return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
+
+    for function, name in _ANALYTIC.items():
+        analytic(function, name)
+
+    def either(function: Function, real: Function, complex_: Function) -> None:
+        """Overload a function of two numbers, of which one or both may be complex."""
+
+        @overload(function, jit_options=options)
+        def choose(a, b):
+            return complex_ if isinstance(a, types.Complex) or isinstance(b, types.Complex) else real
+
+    def complex_atan2(y, x):
+        turned, square = x.real * y.imag - y.real * x.imag, x.real * x.real + y.real * y.real
+        return complex(math.atan2(y.real, x.real), turned / square if turned != 0.0 else 0.0)
+
+    @overload(atan2, jit_options=options)
+    def choose_atan2(y, x):
+        is_complex = isinstance(y, types.Complex) or isinstance(x, types.Complex)
+        return complex_atan2 if is_complex else (lambda y, x: math.atan2(y, x))
+
+    @overload(absolute, jit_options=options)
+    def choose_absolute(x):
+        return lambda x: -x if x.real < 0 else x
+
+    @overload(sign, jit_options=options)
+    def choose_sign(x):
+        if isinstance(x, types.Complex):
+            return lambda x: complex(sign(x.real), 0.0)
+        return lambda x: x * 1.0 if x != x else float((x > 0) - (x < 0))
+
+    @overload(rounded, jit_options=options)
+    def choose_rounded(x):
+        if isinstance(x, types.Complex):
+            return lambda x: complex(np.floor(x.real + 0.5), 0.0)
+        return lambda x: np.floor(x + 0.5)
+
+    def smaller(a, b):
+        return a if a.real <= b.real or a != a else b
+
+    def larger(a, b):
+        return a if a.real >= b.real or a != a else b
+
+    def quotient(a, b):
+        return a / b
+
+    either(minimum, smaller, smaller)
+    either(maximum, larger, larger)
+    either(divide, quotient, quotient)
+    either(power, lambda a, b: math.pow(a, b), lambda a, b: _complex_power(complex(a), complex(b)))

@@ -1,0 +1,164 @@
+"""Three-vectors, 3 x 3 matrices (row by row) and quaternions (scalar first) as plain tuples.
+
+Tuples of numbers, not small arrays: the compiler keeps them in registers, and the same source runs on complex
+numbers, on arrays over time and on symbols.
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from .scalar import sqrt
+
+
+@formula
+def cross(a, b):
+    """a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@formula
+def dot(a, b):
+    """a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@formula
+def add(a, b):
+    """a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@formula
+def sub(a, b):
+    """a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@formula
+def scale(s, a):
+    """s a."""
+    return (s * a[0], s * a[1], s * a[2])
+
+
+@formula
+def neg(a):
+    """-a."""
+    return (-a[0], -a[1], -a[2])
+
+
+@formula
+def norm(a):
+    """Length of a; analytic, so that it carries complex steps (NumPy's norm does not)."""
+    return sqrt(dot(a, a))
+
+
+@formula
+def mv(R, a):
+    """R a."""
+    return (
+        R[0] * a[0] + R[1] * a[1] + R[2] * a[2],
+        R[3] * a[0] + R[4] * a[1] + R[5] * a[2],
+        R[6] * a[0] + R[7] * a[1] + R[8] * a[2],
+    )
+
+
+@formula
+def mtv(R, a):
+    """R^T a."""
+    return (
+        R[0] * a[0] + R[3] * a[1] + R[6] * a[2],
+        R[1] * a[0] + R[4] * a[1] + R[7] * a[2],
+        R[2] * a[0] + R[5] * a[1] + R[8] * a[2],
+    )
+
+
+@formula
+def mm(A, B):
+    """A B."""
+    return (
+        A[0] * B[0] + A[1] * B[3] + A[2] * B[6],
+        A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
+        A[0] * B[2] + A[1] * B[5] + A[2] * B[8],
+        A[3] * B[0] + A[4] * B[3] + A[5] * B[6],
+        A[3] * B[1] + A[4] * B[4] + A[5] * B[7],
+        A[3] * B[2] + A[4] * B[5] + A[5] * B[8],
+        A[6] * B[0] + A[7] * B[3] + A[8] * B[6],
+        A[6] * B[1] + A[7] * B[4] + A[8] * B[7],
+        A[6] * B[2] + A[7] * B[5] + A[8] * B[8],
+    )
+
+
+@formula
+def transpose(R):
+    """R^T."""
+    return (R[0], R[3], R[6], R[1], R[4], R[7], R[2], R[5], R[8])
+
+
+@formula
+def col(R, i):
+    """Column i of R: the i-th axis of the frame in world components."""
+    return (R[i], R[3 + i], R[6 + i])
+
+
+@formula
+def load3(A, k, o):
+    """Three neighbours of row k of a table, from column o."""
+    return (A[k, o], A[k, o + 1], A[k, o + 2])
+
+
+@formula
+def load9(A, k, o):
+    """Nine neighbours of row k of a table, from column o: a matrix row by row."""
+    return (
+        A[k, o],
+        A[k, o + 1],
+        A[k, o + 2],
+        A[k, o + 3],
+        A[k, o + 4],
+        A[k, o + 5],
+        A[k, o + 6],
+        A[k, o + 7],
+        A[k, o + 8],
+    )
+
+
+@formula
+def put3(A, k, o, a):
+    """Write a three-vector into row k of a table, from column o."""
+    A[k, o] = a[0]
+    A[k, o + 1] = a[1]
+    A[k, o + 2] = a[2]
+
+
+@formula
+def put9(A, k, o, a):
+    """Write a matrix into row k of a table, from column o."""
+    for i in range(9):
+        A[k, o + i] = a[i]
+
+
+@formula
+def quaternion_matrix(w, x, y, z):
+    """Rotation matrix of a unit quaternion (scalar first), columns = turned axes."""
+    return (
+        1 - 2 * (y * y + z * z),
+        2 * (x * y - w * z),
+        2 * (x * z + w * y),
+        2 * (x * y + w * z),
+        1 - 2 * (x * x + z * z),
+        2 * (y * z - w * x),
+        2 * (x * z - w * y),
+        2 * (y * z + w * x),
+        1 - 2 * (x * x + y * y),
+    )
+
+
+@formula
+def quaternion_product(a, b):
+    """Hamilton product a b: first turn by b, then by a."""
+    return (
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    )

@@ -1,0 +1,44 @@
+"""``Mechanism``: the description with every analysis as a method."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from .model.model import Model
+
+if TYPE_CHECKING:
+    from .analysis.assemble import Assembly
+    from .analysis.check import Report
+    from .results.result import Result
+
+
+class Mechanism(Model):
+    """A mechanism: described once, then asked anything. See `Model` for what it takes.
+
+    Nothing that an analysis finds is stored in it, so sweeps are loops.
+    """
+
+    def simulate(self, t_end: float, **options: Any) -> Result:
+        """Motion from ``t_start`` (0) to ``t_end``; see `flyball.analysis.dynamics.simulate` for the options."""
+        from .analysis.dynamics import simulate
+
+        return simulate(self, t_end, **options)
+
+    def assemble(self, **options: Any) -> Assembly:
+        """Consistent positions and velocities near those described."""
+        from .analysis.assemble import assemble
+
+        return assemble(self, **options)
+
+    def check(self) -> Report:
+        """Freedoms, redundancies, assembly and mass properties, without simulating."""
+        from .analysis.check import check
+
+        return check(self)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write the description to a TOML file; `flyball.load` reads it back exactly."""
+        from .model.io import save
+
+        save(self, path)

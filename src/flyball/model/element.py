@@ -1,0 +1,226 @@
+"""What every described thing shares: a name, frozen validated fields, numbers with units or expressions.
+
+Fields carry their dimension in their type, so that one walk turns whatever the user wrote (number, unit string,
+expression of parameters) into SI floats, and complains with the element's and the field's name.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import typing
+from collections.abc import Callable, Mapping
+from dataclasses import KW_ONLY, dataclass, field
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform
+
+import pydantic
+from pydantic import BeforeValidator, ConfigDict, ValidationError
+
+from ..errors import ModelError
+from .expressions import number
+
+T = TypeVar("T", bound=type)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """Dimension of a field, as an SI unit."""
+
+    dimension: str
+
+
+@dataclass(frozen=True)
+class LawOf:
+    """A field that is an expression of time and measured inputs; its value has this dimension."""
+
+    dimension: str
+    inputs: tuple[str, ...] = ()
+
+
+def _plain(value: Any) -> Any:
+    """NumPy scalars and arrays become Python numbers and lists; a bool is no number."""
+    if isinstance(value, bool):
+        raise ValueError("a truth value is not a number")
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    if isinstance(value, (list, tuple)):
+        return tuple(_plain(v) for v in value)
+    return value
+
+
+Number = Annotated[float | str, BeforeValidator(_plain)]
+"""A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
+Numbers = Annotated[tuple[float | str, ...], BeforeValidator(_plain)]
+Law = Number
+
+Length = Annotated[Number, Unit("m")]
+Angle = Annotated[Number, Unit("rad")]
+Mass = Annotated[Number, Unit("kg")]
+Density = Annotated[Number, Unit("kg/m^3")]
+Stiffness = Annotated[Number, Unit("N/m")]
+Damping = Annotated[Number, Unit("N*s/m")]
+Point = Annotated[Numbers, Unit("m")]
+PointPair = Annotated[tuple[Numbers, Numbers], Unit("m")]
+Direction = Annotated[Numbers, Unit("")]
+Directions = Annotated[tuple[Numbers, Numbers], Unit("")]
+Velocity = Annotated[Numbers, Unit("m/s")]
+AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(_plain), Unit("rad/s")]
+
+
+@dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
+def element(cls: T) -> T:
+    """Make a class of frozen, validated fields; its own fields are keyword-only."""
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    made = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
+    original = made.__init__
+
+    def __init__(self: Any, *args: Any, **kwargs: Any) -> None:
+        try:
+            original(self, *args, **kwargs)
+        except ValidationError as error:
+            raise ModelError(_explain(cls.__name__, made, args, kwargs, error)) from None
+        except TypeError as error:
+            raise ModelError(f"{cls.__name__}: {error}") from None
+
+    __init__.__doc__ = original.__doc__
+    __init__.__signature__ = _signature(made)  # type: ignore[attr-defined]
+    made.__init__ = __init__  # type: ignore[misc]
+    return typing.cast(T, made)
+
+
+def _signature(cls: type) -> Any:
+    import inspect
+
+    return inspect.signature(cls)
+
+
+def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error: ValidationError) -> str:
+    """One line for each wrong field: element, field, value, rule, and the fields there are."""
+    known = [f.name for f in dataclasses.fields(cls)]
+    name = kwargs.get("name", args[0] if args else None)
+    who = f"{kind} {name!r}" if isinstance(name, str) else kind
+    lines = []
+    for e in error.errors():
+        place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
+        where = place[0] if place else ""
+        where = known[int(where)] if where.isdigit() and int(where) < len(known) else where
+        if e["type"] == "unexpected_keyword_argument":
+            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
+        elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
+            lines.append(f"field {where!r} is missing")
+        else:
+            message = e["msg"].removeprefix("Value error, ")
+            lines.append(f"field {where!r}: {message} (got {e['input']!r})")
+    return f"{who}: " + "; ".join(dict.fromkeys(lines))
+
+
+def _is_branch(place: str) -> bool:
+    """Names that pydantic gives to the members of a union."""
+    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none")
+
+
+def _did_you_mean(word: str, known: list[str]) -> str:
+    import difflib
+
+    close = difflib.get_close_matches(word, known, 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+@dataclass(frozen=True)
+class Element:
+    """A named part of a mechanism."""
+
+    name: str
+    _: KW_ONLY
+
+    category: ClassVar[str] = "elements"
+    registry: ClassVar[dict[str, type[Element]]] = {}
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        super().__init_subclass__(**kwargs)
+        Element.registry[cls.__name__] = cls
+
+    @property
+    def title(self) -> str:
+        """Kind and name, for messages."""
+        return f"{type(self).__name__} {self.name!r}"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
+
+
+@lru_cache(maxsize=None)
+def fields_with(cls: type, marker: type) -> dict[str, Any]:
+    """Fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
+    hints = typing.get_type_hints(cls, include_extras=True)
+    found = {}
+    for f in dataclasses.fields(cls):
+        for m in _markers(hints[f.name]):
+            if isinstance(m, marker):
+                found[f.name] = m
+    return found
+
+
+def _markers(hint: Any) -> list[Any]:
+    out = list(getattr(hint, "__metadata__", ()))
+    for a in typing.get_args(hint):
+        out += _markers(a) if not isinstance(a, (str, Unit, LawOf)) else []
+    return out
+
+
+def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
+    """The element's fields with every number in SI floats; laws and other fields as they are written."""
+    n = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
+    for name, unit in fields_with(type(e), Unit).items():
+        setattr(n, name, _numbers(getattr(e, name), env, unit.dimension, e, name))
+    return n
+
+
+def _numbers(value: Any, env: Mapping[str, float], dimension: str, e: Element, name: str) -> Any:
+    if value is None:
+        return None
+    if isinstance(value, (tuple, list)):
+        return tuple(_numbers(v, env, dimension, e, name) for v in value)
+    if type(value) is float and value - value == 0.0:
+        return value
+    return number(value, env, dimension, f"{name} of {e.title}")
+
+
+def written(e: Element) -> dict[str, Any]:
+    """The fields that differ from their defaults, as plain data: what a model file holds."""
+    out: dict[str, Any] = {}
+    for f in dataclasses.fields(e):
+        value = getattr(e, f.name)
+        if f.default is not dataclasses.MISSING and value == f.default:
+            continue
+        if value is not None:
+            out[f.name] = _data(value)
+    return out
+
+
+def _data(value: Any) -> Any:
+    if isinstance(value, (tuple, list)):
+        return [_data(v) for v in value]
+    if isinstance(value, Element):
+        return {"type": type(value).__name__, **written(value)}
+    return value
+
+
+def positive(e: Element, n: SimpleNamespace, *names: str, why: str = "") -> None:
+    """Refuse resolved fields that are not greater than zero."""
+    _compare(e, n, names, lambda x: x > 0, "greater than 0", why)
+
+
+def nonnegative(e: Element, n: SimpleNamespace, *names: str, why: str = "") -> None:
+    """Refuse resolved fields that are negative."""
+    _compare(e, n, names, lambda x: x >= 0, "zero or greater", why)
+
+
+def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Callable, rule: str, why: str) -> None:
+    units = fields_with(type(e), Unit)
+    for name in names:
+        x = getattr(n, name)
+        if x is not None and not good(x.real):
+            unit = units[name].dimension
+            raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")

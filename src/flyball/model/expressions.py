@@ -1,0 +1,284 @@
+"""What a user may write where a number is wanted: a number, a quantity ("30 deg"), an expression ("2*k").
+
+Expressions are read with Python's own grammar into a small tree of known operations; nothing is ever executed.
+The same tree is evaluated here on numbers, arrays and symbols, and compiled for laws of time in `system.laws`.
+"""
+
+from __future__ import annotations
+
+import keyword
+import operator
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from numbers import Complex, Integral, Real
+from typing import Any
+
+import numpy as np
+
+from ..errors import ExpressionError, ModelError, UnitError
+from ..math import scalar
+from .grammar import CONSTANTS, FUNCTIONS, Node, did_you_mean, read, refuse
+from .units import is_unit, split_quantity, to_si
+
+
+@dataclass(frozen=True)
+class Expression:
+    """A formula of named quantities, such as "speed*t + sin(2*pi*t)"; equal if the text is equal."""
+
+    text: str
+    tree: Node = field(repr=False, compare=False)
+
+    @classmethod
+    def parse(cls, text: str) -> Expression:
+        """Read an expression.
+
+        Raises
+        ------
+        ExpressionError
+            If the text is not an expression of the known operators, functions and constants.
+        """
+        return cls(*read(text))
+
+    @classmethod
+    def constant(cls, value: float) -> Expression:
+        """The expression that is one number."""
+        return cls(repr(float(value)), Node("number", value=float(value)))
+
+    @cached_property
+    def names(self) -> frozenset[str]:
+        """Names of parameters and inputs used."""
+        return frozenset(node.value for node in self.tree.walk() if node.kind == "name")
+
+    def require(self, known: Collection[str]) -> None:
+        """Raise `ExpressionError`, with the place and the nearest known names, if a name used is not known."""
+        if self.names <= set(known):
+            return
+        node = next(n for n in self.tree.walk() if n.kind == "name" and n.value not in known)
+        name = node.value
+        guess = did_you_mean(name, [*known, *FUNCTIONS])
+        if name == "t":
+            remedy = "time t is known only in laws of drivers and forces"
+        elif guess:
+            remedy = guess.strip()
+        elif is_unit(name):
+            remedy = f"a unit follows a single number, as in '2 {name}'; give the quantity a parameter's name"
+        else:
+            remedy = f"define a parameter '{name}', or correct the name"
+        listed = f"known names: {', '.join(sorted(known)) or 'none'}; {remedy}"
+        refuse(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
+
+    def evaluate(self, env: Mapping[str, Any]) -> Any:
+        """Value with the names in `env`: numbers (real or complex), arrays, or SymPy symbols.
+
+        Out of a function's domain the value is nan or inf, not an error. Raises `ExpressionError` for unknown names.
+        """
+        self.require(env.keys())
+        return _evaluate(self.tree, env)
+
+    def __str__(self) -> str:
+        return self.text
+
+
+def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str) -> Any:
+    """Turn what a user wrote into a number in SI units.
+
+    Parameters
+    ----------
+    value
+        A number (taken as SI), a quantity ("5 mm"), or an expression of the parameters ("2*length").
+    env
+        Values of the parameters; complex values or symbols give a complex or symbolic result.
+    dimension
+        SI unit wanted, e.g. "m", "rad", "N*m*s/rad", "1"; None for any. An expression is taken as being in it.
+    where
+        What the number is, for messages: "mass of body 'crank'".
+
+    Raises
+    ------
+    UnitError, ExpressionError, ModelError
+        With a message that begins with `where`.
+    """
+    try:
+        result = _number(value, env, dimension)
+    except ModelError as error:
+        raise type(error)(f"{where}: {error}") from None
+    if isinstance(result, Complex) and not (result - result == 0):
+        advice = "check for division by zero and roots or logarithms of negative numbers"
+        problem = f"'{value}' gives {result}" if isinstance(value, str | Expression) else f"the value is {value}"
+        raise ModelError(f"{where}: {problem}, a finite number is wanted; {advice}")
+    return result
+
+
+def law_expression(value: Any, dimension: str | None, where: str) -> Expression:
+    """Turn what a user wrote as a law into an expression: a number, a quantity ("120 rpm") or a formula of t."""
+    try:
+        if isinstance(value, Expression):
+            return value
+        if isinstance(value, str) and split_quantity(value) is None:
+            return Expression.parse(value)
+    except ModelError as error:
+        raise type(error)(f"{where}: {error}") from None
+    return Expression.constant(number(value, {}, dimension, where))
+
+
+def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
+    """Values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
+
+    Raises
+    ------
+    ExpressionError
+        If parameters depend on each other in a circle, or a name is not allowed or not known.
+    UnitError
+        If a quantity has no known unit.
+    """
+    for name in parameters:
+        _check_parameter_name(name)
+    formulas: dict[str, Expression] = {}
+    values: dict[str, Any] = {}
+    for name, value in parameters.items():
+        if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None):
+            formulas[name] = law_expression(value, None, f"parameter '{name}'")
+        else:
+            values[name] = number(value, {}, None, f"parameter '{name}'")
+    for name, formula in formulas.items():
+        try:
+            formula.require(parameters.keys())
+        except ExpressionError as error:
+            raise ExpressionError(f"parameter '{name}': {error}") from None
+    for name in _in_order(formulas):
+        values[name] = number(formulas[name], values, None, f"parameter '{name}'")
+    return {name: values[name] for name in parameters}
+
+
+def folded(node: Node, text: str) -> Node:
+    """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
+    args = tuple(folded(arg, text) for arg in node.args)
+    if node.kind in _UNFOLDED or any(arg.kind != "number" for arg in args):
+        return replace(node, args=args)
+    value = float(OPERATIONS[node.kind](*(float(arg.value) for arg in args)))
+    if value - value != 0.0:
+        problem = f"this part is {value}, which is not a finite number"
+        refuse(text, node.start, node.stop, problem, "check divisions by zero, roots, and the ends of steps")
+    return Node("number", (), value, node.start, node.stop)
+
+
+def is_number_text(text: str) -> bool:
+    """Whether a text is a number, with or without a unit, rather than an expression."""
+    return split_quantity(text) is not None
+
+
+def _number(value: Any, env: Mapping[str, Any], dimension: str | None) -> Any:
+    if isinstance(value, bool | np.bool_):
+        raise ModelError(f"{value} is true or false, a number is wanted; write 1 or 0 if you mean that")
+    if isinstance(value, Real):
+        return float(value)
+    if isinstance(value, Complex):
+        return complex(value)
+    if isinstance(value, Expression):
+        result = value.evaluate(env)
+        return float(result) if isinstance(result, Integral) else result
+    if not isinstance(value, str):
+        raise ModelError(
+            f"{value!r} ({type(value).__name__}) is not a number; write a number, a quantity such as '5 mm', "
+            "or an expression of parameters"
+        )
+    parts = split_quantity(value)
+    if parts is None:
+        return _number(Expression.parse(value), env, dimension)
+    try:
+        return to_si(value, dimension)
+    except UnitError as error:
+        if parts[1] in env or parts[1] in FUNCTIONS or parts[1] in CONSTANTS:
+            raise UnitError(f"{error}; if you mean a product, write '{parts[0]}*{parts[1]}'") from None
+        raise
+
+
+def _in_order(formulas: Mapping[str, Expression]) -> list[str]:
+    """Names sorted so that each comes after those it uses."""
+    order: dict[str, None] = {}
+    for first in formulas:
+        path = [first]
+        while path:
+            missing = sorted(n for n in formulas[path[-1]].names if n in formulas and n not in order)
+            if not missing:
+                order[path.pop()] = None
+            elif missing[0] in path:
+                circle = " -> ".join([*path[path.index(missing[0]) :], missing[0]])
+                raise ExpressionError(
+                    f"parameters depend on each other in a circle: {circle}; give one of them a value"
+                )
+            else:
+                path.append(missing[0])
+    return list(order)
+
+
+def _check_parameter_name(name: Any) -> None:
+    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
+        reason = "is a word of the expression language" if keyword.iskeyword(name) else "is not a plain name"
+        raise ExpressionError(f"parameter {name!r}: {reason}; use letters, digits and _, e.g. 'spring_rate'")
+    kind = "a function" if name in FUNCTIONS else "a constant" if name in CONSTANTS else "time"
+    if name in FUNCTIONS or name in CONSTANTS or name == "t":
+        raise ExpressionError(f"parameter '{name}': the name is taken, it means {kind}; rename it, e.g. '{name}_0'")
+
+
+def _evaluate(node: Node, env: Mapping[str, Any]) -> Any:
+    if node.kind == "number":
+        return node.value
+    if node.kind == "name":
+        return env[node.value]
+    args = [_evaluate(arg, env) for arg in node.args]
+    return OPERATIONS[node.kind](*args)
+
+
+def _fold(function: Any) -> Any:
+    def folded(*args: Any) -> Any:
+        value = args[0]
+        for arg in args[1:]:
+            value = function(value, arg)
+        return value
+
+    return folded
+
+
+def _real(x: Any) -> Any:
+    return x.real if isinstance(x, Complex | np.ndarray) else x
+
+
+def _where(condition: Any, a: Any, b: Any) -> Any:
+    if isinstance(condition, bool | np.bool_):
+        return a if condition else b
+    if isinstance(condition, np.ndarray):
+        return np.where(condition, a, b)
+    import sympy
+
+    return sympy.Piecewise((a, condition), (b, True))
+
+
+def _step(shape: Any) -> Any:
+    return lambda x, x0, y0, x1, y1: y0 + (y1 - y0) * shape(scalar.divide(x - x0, x1 - x0))
+
+
+OPERATIONS = {
+    **{name: getattr(scalar, name) for name, arguments in FUNCTIONS.items() if hasattr(scalar, name)},
+    "abs": scalar.absolute,
+    "min": _fold(scalar.minimum),
+    "max": _fold(scalar.maximum),
+    "where": _where,
+    "step": _step(scalar.cubic_step),
+    "step5": _step(scalar.quintic_step),
+    "cubic": scalar.cubic_step,
+    "quintic": scalar.quintic_step,
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "/": scalar.divide,
+    "**": scalar.power,
+    "neg": operator.neg,
+    "<": lambda a, b: _real(a) < _real(b),
+    "<=": lambda a, b: _real(a) <= _real(b),
+    "and": _fold(operator.and_),
+    "or": _fold(operator.or_),
+    "not": lambda a: not a if isinstance(a, bool) else ~a,
+}
+_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not"})

@@ -1,0 +1,186 @@
+"""Reading of formulas: text to a tree of known operations, by Python's own grammar. Nothing is ever executed."""
+
+from __future__ import annotations
+
+import ast
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, NoReturn
+
+from ..errors import ExpressionError, ModelError
+
+CONSTANTS = {"pi": math.pi, "e": math.e}
+
+# Functions a user may call, and the names of their arguments.
+FUNCTIONS = {
+    **{name: ("x",) for name in "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs sign".split()},
+    "atan2": ("y", "x"),
+    "min": ("a", "b", "..."),
+    "max": ("a", "b", "..."),
+    "where": ("condition", "a", "b"),
+    "step": ("x", "x0", "y0", "x1", "y1"),
+    "step5": ("x", "x0", "y0", "x1", "y1"),
+}
+
+_BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**"}
+_COMPARE = {ast.Lt: ("<", False), ast.LtE: ("<=", False), ast.Gt: ("<", True), ast.GtE: ("<=", True)}
+_CONDITIONS = ("<", "<=", "and", "or", "not")
+_DEEPEST = 200
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation of an expression: what, on what, and from where to where it stands in the text."""
+
+    kind: str
+    args: tuple[Node, ...] = ()
+    value: Any = None
+    start: int = 0
+    stop: int = 0
+
+    def walk(self) -> Iterator[Node]:
+        """This node and all below it."""
+        yield self
+        for arg in self.args:
+            yield from arg.walk()
+
+
+def read(text: str) -> tuple[str, Node]:
+    """The text on one line, and its tree; `ExpressionError` if it is not a formula."""
+    text = "".join(" " if c.isspace() else c for c in text).strip()
+    if not text:
+        raise ExpressionError("the expression is empty; write a number, a quantity such as '5 mm', or a formula")
+    try:
+        return text, _Reader(text).read(ast.parse(text, mode="eval").body)
+    except SyntaxError as error:
+        start = (error.offset or 1) - 1
+        refuse(text, start, start + 1, f"cannot read the expression ({error.msg})", _remedy(text))
+    except (RecursionError, MemoryError, ValueError) as error:
+        if isinstance(error, ModelError):
+            raise
+        raise ExpressionError(f"'{text[:60]}...' is nested too deep; split it into parameters") from None
+
+
+class _Reader:
+    """Turns Python's syntax tree into nodes, refusing all that is no formula."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self.depth = 0
+
+    def read(self, node: ast.AST, *, condition: bool = False) -> Node:
+        self.depth += 1
+        if self.depth > _DEEPEST:
+            raise ExpressionError(f"'{self.text[:60]}...' is nested too deep; split it into parameters")
+        read = getattr(self, f"read_{type(node).__name__}", None)
+        if read is None:
+            what = f"'{ast.unparse(node)}' is not allowed in an expression"
+            choice = "for a choice write where(condition, a, b)" if isinstance(node, ast.IfExp) else _ALLOWED
+            self.refuse(node, what, choice)
+        made = read(node)
+        self.depth -= 1
+        if condition != (made.kind in _CONDITIONS):
+            if condition:
+                self.refuse(node, "the first argument of where is not a condition", "compare, as in where(t < 1, a, b)")
+            self.refuse(node, "a comparison is no number", "use it as the condition of where(condition, a, b)")
+        return made
+
+    def made(self, node: ast.AST, kind: str, args: Iterable[Node] = (), value: Any = None) -> Node:
+        return Node(kind, tuple(args), value, *self.span(node))
+
+    def span(self, node: ast.AST) -> tuple[int, int]:
+        """Where a node stands, in characters (Python counts bytes)."""
+        data = self.text.encode()
+        start, stop = node.col_offset, node.end_col_offset
+        return len(data[:start].decode()), len(data[:stop].decode())
+
+    def refuse(self, node: ast.AST, problem: str, remedy: str) -> NoReturn:
+        refuse(self.text, *self.span(node), problem, remedy)
+
+    def read_Constant(self, node: ast.Constant) -> Node:
+        value = node.value
+        if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < 1e300:
+            self.refuse(node, f"{value!r} is not a finite real number", _ALLOWED)
+        exact = isinstance(value, int) and value < 2**53
+        return self.made(node, "number", value=value if exact else float(value))
+
+    def read_Name(self, node: ast.Name) -> Node:
+        if node.id in FUNCTIONS:
+            example = f"{node.id}({', '.join(FUNCTIONS[node.id])})"
+            self.refuse(node, f"'{node.id}' is a function", f"give its arguments: {example}")
+        if node.id in CONSTANTS:
+            return self.made(node, "number", value=CONSTANTS[node.id])
+        return self.made(node, "name", value=node.id)
+
+    def read_UnaryOp(self, node: ast.UnaryOp) -> Node:
+        if isinstance(node.op, ast.Not):
+            return self.made(node, "not", [self.read(node.operand, condition=True)])
+        if isinstance(node.op, ast.UAdd):
+            return self.read(node.operand)
+        if not isinstance(node.op, ast.USub):
+            self.refuse(node, f"the operator of '{ast.unparse(node)}' is not known", _ALLOWED)
+        return self.made(node, "neg", [self.read(node.operand)])
+
+    def read_BinOp(self, node: ast.BinOp) -> Node:
+        if type(node.op) not in _BINARY:
+            between = self.span(node.left)[1], self.span(node.right)[0]
+            symbol = self.text[slice(*between)].strip(" ()")
+            remedy = "powers are written with **, as in x**2" if isinstance(node.op, ast.BitXor) else _ALLOWED
+            start = self.text.index(symbol, between[0])
+            refuse(self.text, start, start + len(symbol), f"the operator '{symbol}' is not known", remedy)
+        return self.made(node, _BINARY[type(node.op)], [self.read(node.left), self.read(node.right)])
+
+    def read_Compare(self, node: ast.Compare) -> Node:
+        terms = [self.read(term) for term in (node.left, *node.comparators)]
+        parts = []
+        for op, a, b in zip(node.ops, terms, terms[1:], strict=False):
+            if type(op) not in _COMPARE:
+                self.refuse(node, "only <, <=, > and >= can compare", "numbers are seldom exactly equal: use a range")
+            kind, swapped = _COMPARE[type(op)]
+            parts.append(self.made(node, kind, (b, a) if swapped else (a, b)))
+        return parts[0] if len(parts) == 1 else self.made(node, "and", parts)
+
+    def read_BoolOp(self, node: ast.BoolOp) -> Node:
+        parts = [self.read(value, condition=True) for value in node.values]
+        return self.made(node, "and" if isinstance(node.op, ast.And) else "or", parts)
+
+    def read_Call(self, node: ast.Call) -> Node:
+        name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
+        if name not in FUNCTIONS:
+            guess = did_you_mean(name, FUNCTIONS)
+            product = "" if guess else f"a product is written {name}*(...); "
+            known = f"{guess}{product}known functions: {', '.join(sorted(FUNCTIONS))}"
+            self.refuse(node.func, f"unknown function '{name}'", known)
+        wanted, given = FUNCTIONS[name], len(node.args)
+        if node.keywords or (given < 2 if wanted[-1] == "..." else given != len(wanted)):
+            call = f"{name}({', '.join(wanted)})"
+            self.refuse(node, f"wrong arguments: {given} given", f"write {call}, without names")
+        return self.made(
+            node, name, [self.read(a, condition=name == "where" and i == 0) for i, a in enumerate(node.args)]
+        )
+
+
+_ALLOWED = "allowed are numbers, names, + - * / **, parentheses and functions such as sin(x)"
+
+
+def refuse(text: str, start: int, stop: int, problem: str, remedy: str) -> NoReturn:
+    """Raise `ExpressionError` with the text (of long ones the part that matters) and a caret under the place."""
+    first, last = max(0, start - 60), max(start, 60) + 40
+    shown = ("..." if first else "") + text[first:last].rstrip() + ("..." if last < len(text) else "")
+    start, stop = (x - first + (3 if first else 0) for x in (start, min(stop, last)))
+    pointer = " " * start + "^" * max(1, stop - start)
+    raise ExpressionError(f"{problem}\n    {shown}\n    {pointer}\n{remedy}")
+
+
+def _remedy(text: str) -> str:
+    if any(a.isdigit() and b.isalpha() for a, b in zip(text, text[1:], strict=False)):
+        return "write every multiplication, as in 2*x; a unit can follow a single number only ('5 mm')"
+    return _ALLOWED + "; a unit can follow a single number only ('5 mm'): give the quantity a parameter's name"
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """The question after the nearest known names, or nothing."""
+    close = difflib.get_close_matches(name, list(known), n=2, cutoff=0.6)
+    return f"did you mean {' or '.join(repr(c) for c in close)}? " if close else ""

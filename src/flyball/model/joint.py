@@ -1,0 +1,97 @@
+"""What every joint declares: building blocks, relative coordinates, and how its frames lie when it is drawn."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+
+from ..constraints.blocks import Row
+from ..errors import ModelError
+from .element import Direction, Element, Point
+from .geometry import triad, vector
+
+WorldFrame = tuple[np.ndarray, np.ndarray]
+
+SAME = np.eye(3)
+Z_TO_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+"""Turn of a frame whose x axis becomes the z axis of the frame it starts from."""
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A relative coordinate: the formula that measures it, between which frames of the joint, with which sign."""
+
+    row: Row
+    frames: str = "FM"
+    turn_F: tuple = ()
+    turn_M: tuple = ()
+    sign: float = 1.0
+    offset: str = ""  # the field that gives its value in the drawn configuration
+
+    @property
+    def unit(self) -> str:
+        """Unit of its value."""
+        return self.row.measure
+
+
+@dataclass(frozen=True)
+class Joint(Element):
+    """Rows of constraint between a frame F on ``body_i`` and a frame M on ``body_j``.
+
+    A joint is data: a subclass states its ``blocks`` and ``coordinates`` and is finished.
+    """
+
+    body_i: str
+    body_j: str
+    _: KW_ONLY
+    at: Point | None = None
+    axis: Direction | None = None
+
+    category: ClassVar[str] = "joints"
+    blocks: ClassVar[tuple[Row, ...]] = ()
+    coordinates: ClassVar[dict[str, Coordinate]] = {}
+    planar_normal: ClassVar[str] = "z"  # joint axis that points out of the plane; "" if it cannot be planar
+    spatial: ClassVar[bool] = True
+    needs_axis: ClassVar[bool] = False
+    drawn: ClassVar[str] = "fixed"  # symbol in pictures
+
+    def rows(self, planar: bool) -> list[Row]:
+        """The rows that count: in the plane, those that speak of the normal are fulfilled anyway."""
+        if not planar:
+            return list(self.blocks)
+        return [r for r in self.blocks if ("z" if r.world else self.planar_normal) not in r.axes]
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by ``at``."""
+        p = vector(n.at, planar, f"'at' of {self.title}")
+        R = self.orientation(n.axis, planar)
+        return (p, R), (p, R)
+
+    def orientation(self, axis: tuple[float, ...] | None, planar: bool) -> np.ndarray:
+        """Axes of the joint frame: z along the joint's axis; in the plane one axis is the normal."""
+        if axis is None:
+            if self.needs_axis and (not planar or self.planar_normal != "z"):
+                example = "(1, 0)" if planar else "(0, 0, 1)"
+                raise ModelError(f"{self.title}: give its axis in world coordinates, for instance axis={example}")
+            return np.eye(3)
+        a = vector(axis, planar and self.planar_normal != "z", f"axis of {self.title}", direction=True)
+        if planar and self.planar_normal == "z":
+            if abs(a[0]) + abs(a[1]) > 1e-12:
+                raise ModelError(f"{self.title}: in a planar mechanism its axis is the normal; leave axis out")
+            return np.eye(3)
+        if planar:
+            normal = np.array([0.0, 0.0, 1.0])
+            return np.column_stack([np.cross(normal, a), normal, a])
+        return triad(a)
+
+    def offset(self, n: SimpleNamespace, coordinate: str) -> float:
+        """Value of a coordinate in the drawn configuration."""
+        name = self.coordinates[coordinate].offset
+        return getattr(n, name) if name else 0.0
+
+    def parameter(self, n: SimpleNamespace, row: Row, separation: float) -> float:
+        """Constant that the row's value is compared with (a length, for instance)."""
+        return 0.0

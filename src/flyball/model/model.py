@@ -1,0 +1,228 @@
+"""The description of a mechanism: named parts, checked as they are added. No numerics."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError
+from .body import GROUND, Body, Driver, Frame, Initial
+from .element import Element, Number, _plain, resolve
+from .expressions import number, resolve_parameters
+from .force import BodyForce, Force, JointForce, TwoPointForce
+from .geometry import vector
+from .inertia import mass_properties
+from .joint import Joint
+
+CATEGORIES = ("bodies", "frames", "joints", "forces", "drivers", "initial")
+RESERVED = (GROUND, "energy", "t", "time")
+
+
+class Model:
+    """A mechanism as described.
+
+    Parameters
+    ----------
+    name : str
+    planar : bool
+        Whether everything moves in the x-y plane (three velocities a body) or in space (six).
+    gravity : vector [m/s^2]
+        Acceleration of gravity in world axes; none if not given.
+    parameters : dict
+        Named numbers, usable in every expression of the mechanism.
+    """
+
+    def __init__(
+        self,
+        name: str = "mechanism",
+        *,
+        planar: bool = False,
+        gravity: Any = None,
+        parameters: dict[str, Number] | None = None,
+    ) -> None:
+        if not isinstance(name, str):
+            raise ModelError(f"the name of a mechanism is a text, not {name!r}")
+        self.name = name
+        self.planar = bool(planar)
+        self.parameters = {k: _plain(v) for k, v in (parameters or {}).items()}
+        self.environment()
+        self.gravity = tuple(_plain(gravity)) if gravity is not None else (0.0,) * (2 if planar else 3)
+        self.gravity_vector()
+        self.bodies: list[Body] = []
+        self.frames: list[Frame] = []
+        self.joints: list[Joint] = []
+        self.forces: list[Force] = []
+        self.drivers: list[Driver] = []
+        self.initial: list[Initial] = []
+        self._names: dict[str, Element] = {}
+
+    def environment(self) -> dict[str, float]:
+        """Values of the parameters in SI units."""
+        return resolve_parameters(self.parameters)
+
+    def gravity_vector(self) -> np.ndarray:
+        """Acceleration of gravity [m/s^2], three components."""
+        env = self.environment()
+        what = f"gravity of {self.name!r}"
+        return vector([number(x, env, "m/s^2", what) for x in self.gravity], self.planar, what)
+
+    def elements(self) -> Iterator[Element]:
+        """Every part, category by category, in the order they were added."""
+        for category in CATEGORIES:
+            yield from getattr(self, category)
+
+    def __eq__(self, other: object) -> bool:
+        """Equal if every part, parameter and setting is."""
+        if not isinstance(other, Model):
+            return NotImplemented
+        same = ("name", "planar", "gravity", "parameters", *CATEGORIES)
+        return all(getattr(self, k) == getattr(other, k) for k in same)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def __getitem__(self, name: str) -> Element:
+        """The part with that name."""
+        if name not in self._names:
+            raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(name, self._names)}")
+        return self._names[name]
+
+    def add(self, *elements: Element) -> Any:
+        """Add parts and check them against what is there. Returns the (last) part added.
+
+        Raises
+        ------
+        ModelError
+            If a name is taken, a body or joint it refers to is unknown, or a number makes no sense.
+        """
+        last = None
+        for e in elements:
+            if not isinstance(e, Element) or e.category not in CATEGORIES:
+                raise ModelError(f"cannot add {e!r}: it is no body, frame, joint, force, driver or initial condition")
+            self._check_name(e)
+            self._check_references(e)
+            self.validate(e, self.environment())
+            getattr(self, e.category).append(e)
+            if not isinstance(e, Initial):
+                self._names[e.name] = e
+            last = e
+        return last
+
+    def _check_name(self, e: Element) -> None:
+        if isinstance(e, Initial):
+            if any(i.name == e.name for i in self.initial):
+                raise ModelError(f"{e.title}: there is an initial condition for {e.name!r} already")
+            return
+        if not e.name or "." in e.name or e.name != e.name.strip():
+            raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
+        if e.name in RESERVED:
+            raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
+        if e.name in self._names:
+            raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
+
+    def _check_references(self, e: Element) -> None:
+        if isinstance(e, (Joint, TwoPointForce)):
+            carriers = [self.carrier(name, e) for name in (e.body_i, e.body_j)]
+            if carriers[0] == carriers[1]:
+                raise ModelError(f"{e.title}: both its ends are on {carriers[0]!r}; it must join two different bodies")
+        elif isinstance(e, Frame):
+            if e.body != GROUND:
+                self.body(e.body, e)
+        elif isinstance(e, BodyForce):
+            if self.carrier(e.body, e) == GROUND:
+                raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
+        elif isinstance(e, JointForce):
+            self.joint(e.joint, e, "angle")
+        elif isinstance(e, (Driver, Initial)):
+            self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
+
+    def body(self, name: str, e: Element) -> Body:
+        """The body of that name, as asked for by e."""
+        found = self._names.get(name)
+        if not isinstance(found, Body):
+            names = [b.name for b in self.bodies]
+            raise ModelError(f"{e.title}: there is no body named {name!r}{suggest(name, names)}; {listing(names)}")
+        return found
+
+    def carrier(self, name: str, e: Element) -> str:
+        """Name of the body (or ground) that carries what e attaches to."""
+        found = self._names.get(name)
+        if isinstance(found, Frame):
+            return found.body
+        return name if name == GROUND else self.body(name, e).name
+
+    def joint(self, name: str, e: Element, coordinate: str) -> Joint:
+        """The joint of that name, which must have the coordinate, as asked for by e."""
+        found = self._names.get(name)
+        if not isinstance(found, Joint):
+            names = [j.name for j in self.joints]
+            raise ModelError(f"{e.title}: there is no joint named {name!r}{suggest(name, names)}; {listing(names)}")
+        if coordinate not in found.coordinates:
+            has = ", ".join(found.coordinates) or "none"
+            raise ModelError(f"{e.title}: {found.title} has no coordinate {coordinate!r}; it has {has}")
+        return found
+
+    def coordinate(self, text: str, e: Element) -> tuple[Element | str, str]:
+        """(joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
+        owner, _, what = text.partition(".")
+        found = self._names.get(owner)
+        if isinstance(found, (Body, Frame)):
+            axes = "xy" if self.planar else "xyz"
+            if what not in tuple(axes):
+                raise ModelError(f"{e.title}: {owner!r} has the coordinates {', '.join(axes)}, not {what!r}")
+            return found, what
+        if not what:
+            raise ModelError(f"{e.title}: {text!r} is no coordinate; write joint.coordinate, for instance 'A.angle'")
+        return self.joint(owner, e, what), what
+
+    def validate(self, e: Element, env: dict[str, float]) -> None:
+        """Resolve the element's numbers and refuse those that make no sense."""
+        n = resolve(e, env)
+        e.check(n)
+        if isinstance(e, Body):
+            self._check_body(e, n, env)
+        elif isinstance(e, Joint):
+            self._check_joint(e, n)
+        elif isinstance(e, TwoPointForce) and n.at is not None:
+            e.world_points(n, self.planar)
+
+    def _check_body(self, e: Body, n: Any, env: dict[str, float]) -> None:
+        mass_properties(e, n, env, self.planar)
+        vector(n.position, self.planar, f"position of {e.title}")
+        vector(n.velocity, self.planar, f"velocity of {e.title}")
+        if self.planar and n.orientation is not None:
+            raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
+        if not self.planar and n.angle != 0.0:
+            raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
+        if isinstance(n.angular_velocity, tuple) == self.planar and n.angular_velocity is not None:
+            wanted = "one number" if self.planar else "three components"
+            raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {n.angular_velocity}")
+        e.rotation(n)
+
+    def _check_joint(self, e: Joint, n: Any) -> None:
+        if self.planar and not e.planar_normal:
+            raise ModelError(f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism")
+        if not self.planar and not e.spatial:
+            raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use Prismatic")
+        if n.at is not None:
+            e.world_frames(n, self.planar)
+        elif all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
+            raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
+
+
+def suggest(name: str, known: Any) -> str:
+    """' (did you mean ...?)' where something close is known."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def listing(names: list[str]) -> str:
+    """What there is, for messages."""
+    if not names:
+        return "there is none yet; add it first"
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"known: {shown}"
+
+

@@ -1,0 +1,161 @@
+"""Text with units ("30 deg", "5 mm", "2 kN/m") to numbers in SI units, through pint.
+
+Angles are kept apart from plain numbers here, which pint does not do: "5 deg" is no length, and "50 Hz" (1/s) is no
+angular speed (rad/s), a mistake of 2 pi that nobody sees.
+"""
+
+from __future__ import annotations
+
+import re
+from functools import lru_cache
+from typing import Any
+
+from ..errors import UnitError
+
+_NUMBER = r"[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_QUANTITY = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>(?:1\s*/\s*)?[^\W\d_].*|[°%µ].*|)\s*", re.DOTALL)
+_UNIT = re.compile(r"[\w\s°%µ²³·*/^().-]{1,60}")
+_TOWER = re.compile(r"\d{3,}|(?:\*\*|\^)[\s(+-]*[\d.]+[\s)]*(?:\*\*|\^)")
+
+# For each SI unit: what the quantity is called, and a value as a user would write it.
+_KINDS = {
+    "1": ("a plain number", "0.5"),
+    "m": ("a length", "5 mm"),
+    "rad": ("an angle", "30 deg"),
+    "s": ("a time", "20 ms"),
+    "kg": ("a mass", "250 g"),
+    "m/s": ("a speed", "20 mm/s"),
+    "rad/s": ("an angular speed", "120 rpm"),
+    "m/s^2": ("an acceleration", "9.81 m/s^2"),
+    "rad/s^2": ("an angular acceleration", "10 deg/s^2"),
+    "kg*m^2": ("a moment of inertia", "3 kg*cm^2"),
+    "kg/m^3": ("a density", "7.85 g/cm^3"),
+    "N": ("a force", "2 kN"),
+    "N*m": ("a torque", "3 N*m"),
+    "N/m": ("a stiffness", "2 kN/m"),
+    "N*m/rad": ("a torsional stiffness", "5 N*m/rad"),
+    "N*s/m": ("a damping", "10 N*s/m"),
+    "N*m*s/rad": ("a torsional damping", "0.1 N*m*s/rad"),
+    "J": ("an energy", "2 kJ"),
+    "W": ("a power", "2 kW"),
+    "Pa": ("a pressure", "2 MPa"),
+}
+
+_SYMBOLS = "m mm cm km g kg s ms min h N mN kN MN Nm rad deg rpm rev turn Hz kHz Pa kPa MPa GPa J kJ W kW in ft lbf K"
+
+
+def split_quantity(text: str) -> tuple[str, str] | None:
+    """Number and unit of a text such as "30 deg" (unit "" for a plain number), or None if it is something else."""
+    match = _QUANTITY.fullmatch(text)
+    return (match["number"].replace(" ", ""), match["unit"].strip()) if match else None
+
+
+@lru_cache(maxsize=4096)
+def to_si(text: str, dimension: str | None) -> float:
+    """Value of a quantity in SI units.
+
+    Parameters
+    ----------
+    text
+        A number with a unit ("30 deg"), or without one ("0.5": taken as SI already).
+    dimension
+        The SI unit wanted, e.g. "m", "rad", "N*m/rad", "1" or "" for a plain number; None accepts any unit. "per radian" may
+        be left out of a compound unit ("5 N*m" as a torsional stiffness), an angle itself may not ("50 Hz" for rad/s).
+
+    Raises
+    ------
+    UnitError
+        If the unit is unknown, of the wrong kind, or has an offset (temperatures in degC).
+    """
+    parts = split_quantity(text)
+    if parts is None:
+        raise UnitError(f"'{text}' is not a number with a unit; write {_example(dimension)}")
+    number, unit = parts
+    value = float(number)
+    if unit:
+        factor, found = _unit(text, unit, dimension)
+        if dimension is not None:
+            _check_kind(text, unit, found, dimension)
+        value *= factor
+    if value - value != 0.0:
+        raise UnitError(f"'{text}' is not a finite number; write {_example(dimension)}")
+    return value
+
+
+def is_unit(text: str) -> bool:
+    """Whether the text is a unit that is known ("mm", "kN/m")."""
+    try:
+        _unit(text, text, None)
+    except UnitError:
+        return False
+    return True
+
+
+@lru_cache(maxsize=1)
+def _registry() -> Any:
+    import pint
+
+    registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry.define("@alias turn = rev")
+    registry.define("@alias ohm = Ohm")
+    # pint reads Nm as "number of ... metre"; everyone who writes it means a torque.
+    registry.define("newton_meter = newton * meter = Nm")
+    return registry
+
+
+@lru_cache(maxsize=512)
+def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tuple[str, float], ...]]:
+    """SI factor of a unit and the powers of its base units, sorted."""
+    import pint
+
+    registry = _registry()
+    if not _UNIT.fullmatch(unit) or _TOWER.search(unit):
+        raise UnitError(f"'{text}': '{unit}' is not a unit; write {_example(dimension)}")
+    try:
+        parsed = registry.parse_units(unit)
+        zero = registry.Quantity(0.0, parsed).to_base_units().magnitude
+        base = registry.Quantity(1.0, parsed).to_base_units()
+    except pint.UndefinedUnitError:
+        raise UnitError(f"'{text}': unknown unit '{unit}'{_hint(unit)}; write {_example(dimension)}") from None
+    except Exception as error:  # pint's own parser fails with many kinds of error on text that is no unit
+        raise UnitError(f"'{text}': cannot read the unit '{unit}' ({error}); write {_example(dimension)}") from None
+    if zero != 0.0:
+        raise UnitError(
+            f"'{text}': '{unit}' has an offset or a logarithmic scale, so its factor to SI is not defined; "
+            f"convert it yourself (temperatures: to K) or write {_example(dimension)}"
+        )
+    powers = {name: power for name, power in base.unit_items() if power != 0}
+    return float(base.magnitude), tuple(sorted(powers.items()))
+
+
+def _check_kind(text: str, unit: str, found: tuple[tuple[str, float], ...], dimension: str) -> None:
+    wanted = dict(_unit(dimension, dimension, None)[1]) if dimension not in ("", "1") else {}
+    powers = dict(found)
+    angle, wanted_angle = powers.pop("radian", 0), wanted.pop("radian", 0)
+    if powers == wanted and (angle == wanted_angle or (angle == 0 and wanted_angle < 0)):
+        return
+    name = _KINDS.get(dimension or "1", ("a quantity", ""))[0]
+    units = "*".join(f"{n}^{p:g}" if p != 1 else n for n, p in found) or "no unit"
+    remedy = ""
+    if powers == wanted:
+        turns = angle == 0 and wanted_angle > 0 and "second" in powers
+        remedy = " (Hz and 1/s count no angle: write rpm or rev/s)" if turns else " (the angle does not fit)"
+    raise UnitError(
+        f"'{text}': expected {name} [{dimension or '1'}], found '{unit}' ({units}){remedy}; write {_example(dimension)}"
+    )
+
+
+def _example(dimension: str | None) -> str:
+    if dimension is None:
+        return "for example '5 mm' or '2 kN/m'"
+    if dimension in ("", "1"):
+        return "for example '0.5'"
+    example = _KINDS.get(dimension, ("", f"2 {dimension}"))[1]
+    return f"for example '{example}', or a number in {dimension}"
+
+
+def _hint(unit: str) -> str:
+    """Suggestion for a unit whose only fault is its capitals ("KG", "RPM")."""
+    right = {symbol.lower(): symbol for symbol in _SYMBOLS.split()}
+    words = [right[w.lower()] for w in re.findall(r"[^\W\d]+", unit) if right.get(w.lower(), w) != w]
+    return f" (did you mean {', '.join(repr(w) for w in words)}?)" if words else ""

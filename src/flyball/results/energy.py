@@ -1,0 +1,91 @@
+"""Energy over time, and the balance that it has to keep."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..math.vec import dot, load9, mtv, mv
+from ..system.tables import INERTIA, MASS
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+class Energy:
+    """Energies of a motion [J]: kinetic, potential (gravity and springs), and the work done from outside."""
+
+    def __init__(self, result: Result) -> None:
+        self._result = result
+
+    @cached_property
+    def kinetic(self) -> np.ndarray:
+        """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
+        r, S = self._result.records, self._result.values.system
+        total = np.zeros(len(self._result.t))
+        for b in range(len(S.body_i)):
+            _, R, w, v, _, _ = r.body(b)
+            w_B = mtv(R, w)
+            total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
+        return total
+
+    @cached_property
+    def gravity(self) -> np.ndarray:
+        """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
+        r, S = self._result.records, self._result.values.system
+        total = np.zeros(len(self._result.t))
+        for b in range(len(S.body_i)):
+            total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
+        return total
+
+    @cached_property
+    def elastic(self) -> np.ndarray:
+        """Energy stored in springs."""
+        return sum((self._result[f.name].energy for f in self._result.model.forces), np.zeros(len(self._result.t)))
+
+    @property
+    def potential(self) -> np.ndarray:
+        """Gravity and springs."""
+        return self.gravity + self.elastic
+
+    @property
+    def total(self) -> np.ndarray:
+        """Kinetic and potential."""
+        return self.kinetic + self.potential
+
+    @cached_property
+    def work(self) -> dict[str, np.ndarray]:
+        """Work that each damper, actuator, motor, given force and driver has put in since the start.
+
+        What a spring inside the same element stores is not counted: it is in the potential energy.
+        """
+        out = {}
+        r = self._result
+        for name in r.values.structure.states:
+            if name.endswith(".work"):
+                element = r[name.removesuffix(".work")]
+                stored = element.energy if hasattr(type(element), "energy") else np.zeros(1)
+                out[element.element.name] = element.work + stored - stored[0]
+        return out
+
+    @cached_property
+    def balance(self) -> np.ndarray:
+        """Total energy less all work put in less the total at the start: zero for an exact motion."""
+        if not len(self._result.t):
+            return np.zeros(0)
+        put_in = sum(self.work.values(), np.zeros(len(self._result.t)))
+        residue = self.total - put_in
+        return residue - residue[0]
+
+    @property
+    def drift(self) -> float:
+        """Largest deviation from the balance [J]."""
+        return float(np.abs(self.balance).max(initial=0.0))
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Named curves."""
+        return {k: ("J", getattr(self, k)) for k in ("kinetic", "potential", "total", "balance")}
+
+

@@ -1,0 +1,160 @@
+"""A motion, read by name."""
+
+from __future__ import annotations
+
+import os
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.model import Model, suggest
+from ..system.values import Values
+from .energy import Energy
+from .health import Health
+from .records import Records
+from .views import View, view
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+
+class Result:
+    """Motion of a mechanism at the output times, with reactions, energies and a health report.
+
+    ``result["crank"]`` is the part of that name; ``result["crank.x"]`` one of its curves. All in SI units and radians,
+    times along the first axis.
+
+    Attributes
+    ----------
+    t : ndarray (n,) [s]
+    q, v, vdot : ndarray
+        Coordinates, velocities and accelerations of the compiled mechanism.
+    multipliers : ndarray
+        One for each constraint row.
+    states : ndarray
+        Work of accounted elements and turned angles.
+    health : Health
+    energy : Energy
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        values: Values,
+        t: np.ndarray,
+        q: np.ndarray,
+        v: np.ndarray,
+        states: np.ndarray,
+        vdot: np.ndarray,
+        multipliers: np.ndarray,
+        health: Health,
+    ) -> None:
+        self.model, self.values, self.health = model, values, health
+        self.t, self.q, self.v, self.states, self.vdot, self.multipliers = t, q, v, states, vdot, multipliers
+        self.final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
+        self.energy = Energy(self)
+
+    @property
+    def planar(self) -> bool:
+        """Whether the mechanism moves in the plane."""
+        return self.model.planar
+
+    @cached_property
+    def records(self) -> Records:
+        """Kinematics of every body and frame at the output times."""
+        return Records(self.values, self.q, self.v, self.vdot)
+
+    def __getitem__(self, name: str) -> Any:
+        """A part by its name, or one of its curves by ``"part.curve"``."""
+        if "." in name:
+            return self.channel(name)[1]
+        if name == "energy":
+            return self.energy
+        return self._view(name)
+
+    def _view(self, name: str) -> View:
+        views = self.__dict__.setdefault("_views", {})
+        if name not in views:
+            views[name] = view(self, self.model[name])
+        return views[name]
+
+    def channel(self, name: str) -> tuple[str, np.ndarray]:
+        """(unit, values) of a curve such as ``"slider.x"``.
+
+        Raises
+        ------
+        ModelError
+            If there is no such part or curve; the message lists what there is.
+        """
+        owner, _, what = name.partition(".")
+        curves = self[owner].channels()
+        if what not in curves:
+            raise ModelError(f"{owner!r} has no curve {what!r}{suggest(what, curves)}; it has {', '.join(curves)}")
+        return curves[what]
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Every named curve: ``"part.curve"`` -> (unit, values)."""
+        out = {}
+        for e in self.model.elements():
+            if e.category != "initial":
+                out |= {f"{e.name}.{k}": c for k, c in self[e.name].channels().items()}
+        return out | {f"energy.{k}": c for k, c in self.energy.channels().items()}
+
+    def state_at_end(self, compiled: Any) -> np.ndarray:
+        """State vector to go on from."""
+        if len(self.final[1]) == len(compiled.y):
+            return self.final[1].copy()
+        return np.r_[self.q[-1], self.v[-1], self.states[-1]]
+
+    def to_xarray(self) -> xarray.Dataset:
+        """All curves as a labelled dataset with units."""
+        from .files import to_xarray
+
+        return to_xarray(self)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """All curves as a data frame, time as index, units in ``attrs["units"]``."""
+        from .files import to_dataframe
+
+        return to_dataframe(self)
+
+    def to_csv(self, path: str | os.PathLike) -> None:
+        """All curves as a table; the header holds names and units."""
+        from .files import to_csv
+
+        to_csv(self, path)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Everything, the model included, as one NetCDF file; ``flyball.load_result`` reads it back."""
+        from .files import save
+
+        save(self, path)
+
+    def plot(self, *names: str, path: str | os.PathLike | None = None) -> Any:
+        """Plot curves over time; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.plots import plot
+
+        return plot(self, *names, path=path)
+
+    def html(self) -> str:
+        """The animation page as text."""
+        from ..view.animate import animation
+
+        return animation(self)
+
+    def to_html(self, path: str | os.PathLike) -> None:
+        """Write the animation page: one file that opens offline in any browser."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self.html())
+
+    def _repr_html_(self) -> str:
+        from ..view.notebook import iframe
+
+        return iframe(self.html())
+
+    def __repr__(self) -> str:
+        span = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
+        return f"<Result of {self.model.name!r}: {span}>\n{self.health}"

@@ -1,0 +1,390 @@
+"""Laws of time and measured quantities: expressions as bytecode, evaluated inside compiled loops.
+
+A program is ``[count, depth, operation, operand, operation, operand, ...]`` in a shared list of integers, run on a
+stack of numbers. Its constants are slots of one table, parameters first, so that a new value of a parameter is a new
+number in the table and nothing is compiled again. There are two readers of the same program: `evaluate` gives the
+value, `evaluate_jet` the value and its first two derivatives by time. Each carries the row of one derivative order
+through the operations by the chain rule; what a function's value and slopes are is said once, in `value` and `slopes`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from .._jit import formula
+from ..errors import ExpressionError
+from ..math.scalar import (
+    absolute,
+    acos,
+    asin,
+    atan,
+    atan2,
+    cos,
+    cosh,
+    cubic_step,
+    divide,
+    exp,
+    integer_power,
+    log,
+    maximum,
+    minimum,
+    power,
+    quintic_step,
+    sign,
+    sin,
+    sinh,
+    sqrt,
+    tan,
+    tanh,
+)
+from ..model.expressions import Expression, folded
+from ..model.grammar import Node
+
+CONSTANT, INPUT, CALL, WHOLE_POWER, WHERE, FREEZE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER = range(11)
+ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(11, 16)
+NEGATE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN, CUBIC, QUINTIC, NOT = range(18)
+
+_UNARY = {
+    **dict(zip("neg sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs sign".split(), range(15), strict=True)),
+    "cubic": CUBIC,
+    "quintic": QUINTIC,
+    "not": NOT,
+}
+_BINARY = {
+    **{"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "**": POWER, "atan2": ATAN2},
+    **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
+}
+_LARGEST_WHOLE_POWER = 64
+
+
+def compile_law(
+    expression: Expression, inputs: Sequence[str], parameters: Sequence[str], code: list[int], const: list[float]
+) -> tuple[int, int]:
+    """Append the program of a law to the shared tables.
+
+    Parameters
+    ----------
+    expression
+        The law, of the names in `inputs` and `parameters`.
+    inputs
+        Names of the measured quantities; the first is always "t", time [s].
+    parameters
+        Names of the parameters; their values are the first entries of `const`, in this order.
+    code, const
+        Tables that are appended to. A literal that is in `const` already is used again.
+
+    Returns
+    -------
+    at, depth
+        Start of the program in `code`, and the rows of stack it needs.
+
+    Raises
+    ------
+    ExpressionError
+        If a name is not known or means both an input and a parameter, or a constant part has no finite value.
+    """
+    if not inputs or inputs[0] != "t" or len(const) < len(parameters):
+        raise ValueError("the first input is 't', and const begins with one value for each parameter")
+    twice = sorted(expression.names & set(inputs) & set(parameters))
+    if twice:
+        raise ExpressionError(
+            f"'{expression}': '{twice[0]}' is an input of this law and also a parameter; rename the parameter"
+        )
+    expression.require([*inputs, *parameters])
+    writer = _Writer(expression, inputs, parameters, const)
+    writer.write(folded(_expand(expression.tree, inputs), expression.text))
+    at = len(code)
+    code += [len(writer.program) // 2, writer.deepest, *writer.program]
+    return at, writer.deepest
+
+
+@formula
+def evaluate(code, const, at, stack, x):
+    """Value of the law that starts at `at`, for the inputs x = (t, ...), all of one type; `stack` is scratch."""
+    top = -1
+    for i in range(at + 2, at + 2 + 2 * code[at], 2):
+        operation = code[i]
+        operand = code[i + 1]
+        if operation == CONSTANT:
+            top += 1
+            stack[top, 0] = const[operand]
+        elif operation == INPUT:
+            top += 1
+            stack[top, 0] = x[operand]
+        elif operation == CALL:
+            stack[top, 0] = value(operand, stack[top, 0])
+        elif operation == WHOLE_POWER:
+            stack[top, 0] = integer_power(stack[top, 0], operand)
+        elif operation == WHERE:
+            top -= 2
+            stack[top, 0] = stack[top + 1, 0] if stack[top, 0].real > 0.5 else stack[top + 2, 0]
+        elif operation >= ADD:
+            top -= 1
+            stack[top, 0] = combined(operation, stack[top, 0], stack[top + 1, 0])
+    return stack[0, 0]
+
+
+@formula
+def evaluate_jet(code, const, at, stack, t):
+    """Value, first and second time derivative of a law of time alone; `stack` is scratch of 3 columns."""
+    top = -1
+    for i in range(at + 2, at + 2 + 2 * code[at], 2):
+        operation = code[i]
+        operand = code[i + 1]
+        if operation == CONSTANT:
+            top += 1
+            put(stack, top, const[operand], 0.0, 0.0)
+        elif operation == INPUT:
+            top += 1
+            put(stack, top, t, 1.0, 0.0)
+        elif operation == CALL or operation == WHOLE_POWER:
+            v = stack[top, 0]
+            if operation == CALL:
+                f = value(operand, v)
+                f1, f2 = slopes(operand, v, f)
+            else:
+                f = integer_power(v, operand)
+                f1, f2 = power_slopes(v, operand)
+            put(stack, top, f, f1 * stack[top, 1], f2 * stack[top, 1] * stack[top, 1] + f1 * stack[top, 2])
+        elif operation == WHERE:
+            top -= 2
+            k = top + 1 if stack[top, 0].real > 0.5 else top + 2
+            put(stack, top, stack[k, 0], stack[k, 1], stack[k, 2])
+        elif operation == FREEZE:
+            put(stack, top, stack[top, 0], 0.0, 0.0)
+        else:
+            top -= 1
+            combine_jets(operation, stack, top)
+    return stack[0, 0], stack[0, 1], stack[0, 2]
+
+
+@formula
+def put(stack, k, f, f1, f2):
+    """Write one row of the stack."""
+    stack[k, 0] = f
+    stack[k, 1] = f1
+    stack[k, 2] = f2
+
+
+@formula
+def value(function, x):
+    """f(x) of a function of one argument."""
+    if function == NEGATE:
+        return -x
+    if function == SIN:
+        return sin(x)
+    if function == COS:
+        return cos(x)
+    if function == TAN:
+        return tan(x)
+    if function == ASIN:
+        return asin(x)
+    if function == ACOS:
+        return acos(x)
+    if function == ATAN:
+        return atan(x)
+    if function == SINH:
+        return sinh(x)
+    if function == COSH:
+        return cosh(x)
+    if function == TANH:
+        return tanh(x)
+    if function == EXP:
+        return exp(x)
+    if function == LOG:
+        return log(x)
+    if function == SQRT:
+        return sqrt(x)
+    if function == ABS:
+        return absolute(x)
+    if function == SIGN:
+        return sign(x)
+    if function == CUBIC:
+        return cubic_step(x)
+    if function == QUINTIC:
+        return quintic_step(x)
+    return 1.0 - x
+
+
+@formula
+def slopes(function, x, f):
+    """f'(x) and f''(x), given f = f(x). At a kink the slopes are those of the branch that gives the value."""
+    if function == NEGATE or function == NOT:
+        return -1.0, 0.0
+    if function == SIN:
+        return cos(x), -f
+    if function == COS:
+        return -sin(x), -f
+    if function == TAN:
+        return 1.0 + f * f, 2.0 * f * (1.0 + f * f)
+    if function == ASIN or function == ACOS:
+        d = divide(1.0 if function == ASIN else -1.0, sqrt((1.0 - x) * (1.0 + x)))
+        return d, x * d * d * (d if function == ASIN else -d)
+    if function == ATAN:
+        d = divide(1.0, 1.0 + x * x)
+        return d, -2.0 * x * d * d
+    if function == SINH:
+        return cosh(x), f
+    if function == COSH:
+        return sinh(x), f
+    if function == TANH:
+        return 1.0 - f * f, -2.0 * f * (1.0 - f * f)
+    if function == EXP:
+        return f, f
+    if function == LOG:
+        d = divide(1.0, x)
+        return d, -d * d
+    if function == SQRT:
+        d = divide(0.5, f)
+        return d, divide(-0.5 * d, x)
+    if function == ABS:
+        return (-1.0 if x.real < 0.0 else 1.0), 0.0
+    if (function == CUBIC or function == QUINTIC) and x.real > 0.0 and x.real < 1.0:
+        y = x * (1.0 - x)
+        if function == CUBIC:
+            return 6.0 * y, 6.0 - 12.0 * x
+        return 30.0 * y * y, 60.0 * y * (1.0 - 2.0 * x)
+    return 0.0, 0.0
+
+
+@formula
+def power_slopes(x, b):
+    """First and second derivative of x ** b by x; a derivative that is zero everywhere is so at x = 0 too."""
+    f1 = 0.0 * x
+    f2 = 0.0 * x
+    if b != 0.0:
+        f1 = b * power(x, b - 1.0)
+        if b != 1.0:
+            f2 = b * (b - 1.0) * power(x, b - 2.0)
+    return f1, f2
+
+
+@formula
+def combined(operation, a, b):
+    """Value of an operation on two arguments."""
+    if operation == ADD:
+        return a + b
+    if operation == SUBTRACT:
+        return a - b
+    if operation == MULTIPLY:
+        return a * b
+    if operation == DIVIDE:
+        return divide(a, b)
+    if operation == POWER:
+        return power(a, b)
+    if operation == ATAN2:
+        return atan2(a, b)
+    if operation == MINIMUM:
+        return minimum(a, b)
+    if operation == MAXIMUM:
+        return maximum(a, b)
+    if operation == LESS:
+        return 1.0 if a.real < b.real else 0.0
+    return 1.0 if a.real <= b.real else 0.0
+
+
+@formula
+def combine_jets(operation, stack, k):
+    """Put the operation's value and derivatives, of rows k and k + 1, in row k."""
+    a, a1, a2 = stack[k, 0], stack[k, 1], stack[k, 2]
+    b, b1, b2 = stack[k + 1, 0], stack[k + 1, 1], stack[k + 1, 2]
+    f = combined(operation, a, b)
+    if operation == ADD:
+        put(stack, k, f, a1 + b1, a2 + b2)
+    elif operation == SUBTRACT:
+        put(stack, k, f, a1 - b1, a2 - b2)
+    elif operation == MULTIPLY:
+        put(stack, k, f, a1 * b + a * b1, a2 * b + 2.0 * a1 * b1 + a * b2)
+    elif operation == DIVIDE:
+        f1 = divide(a1 - f * b1, b)
+        put(stack, k, f, f1, divide(a2 - 2.0 * f1 * b1 - f * b2, b))
+    elif operation == POWER:  # the exponent does not depend on time
+        f1, f2 = power_slopes(a, b)
+        put(stack, k, f, f1 * a1, f2 * a1 * a1 + f1 * a2)
+    elif operation == ATAN2:
+        r = a * a + b * b
+        f1 = divide(b * a1 - a * b1, r)
+        put(stack, k, f, f1, divide(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
+    elif operation == MINIMUM or operation == MAXIMUM:
+        first = a.real <= b.real if operation == MINIMUM else a.real >= b.real
+        put(stack, k, f, a1 if first else b1, a2 if first else b2)
+    else:
+        put(stack, k, f, 0.0, 0.0)
+
+
+class _Writer:
+    """Writes the program of one law."""
+
+    def __init__(
+        self, expression: Expression, inputs: Sequence[str], parameters: Sequence[str], const: list[float]
+    ) -> None:
+        self.expression = expression
+        self.inputs = {name: k for k, name in enumerate(inputs)}
+        self.parameters = {name: k for k, name in enumerate(parameters)}
+        self.const = const
+        self.program: list[int] = []
+        self.depth = self.deepest = 0
+
+    def emit(self, operation: int, operand: int, grown: int) -> None:
+        self.program += [operation, operand]
+        self.depth += grown
+        self.deepest = max(self.deepest, self.depth)
+
+    def write(self, node: Node, frozen: bool = False) -> None:
+        """Write a node after its arguments; `frozen` means that a constant part around it is already marked."""
+        constant = frozen or not any(n.kind == "name" and n.value in self.inputs for n in node.walk())
+        if node.kind == "number":
+            return self.emit(CONSTANT, self.slot(float(node.value)), 1)
+        if node.kind == "name" and node.value in self.inputs:
+            return self.emit(INPUT, self.inputs[node.value], 1)
+        if node.kind == "name":
+            return self.emit(CONSTANT, self.parameters[node.value], 1)
+        self.write_operation(node, constant)
+        if constant and not frozen:
+            # Parts without an input have no derivatives, not even where a function's own slope is infinite.
+            self.emit(FREEZE, 0, 0)
+
+    def write_operation(self, node: Node, constant: bool) -> None:
+        for arg in node.args:
+            if not (node.kind == "**" and arg is node.args[1] and _is_whole(arg)):
+                self.write(arg, constant)
+        if node.kind == "**" and _is_whole(node.args[1]):
+            self.emit(WHOLE_POWER, int(node.args[1].value), 0)
+        elif node.kind in _UNARY:
+            self.emit(CALL, _UNARY[node.kind], 0)
+        elif node.kind == "where":
+            self.emit(WHERE, 0, -2)
+        else:
+            for _ in node.args[1:]:
+                self.emit(_BINARY[node.kind], 0, -1)
+
+    def slot(self, literal: float) -> int:
+        """Place of a literal in the table of constants."""
+        first = len(self.parameters)
+        if literal not in self.const[first:]:
+            self.const.append(literal)
+        return self.const.index(literal, first)
+
+
+_SHAPES = {"step": "cubic", "step5": "quintic"}
+
+
+def _is_whole(node: Node) -> bool:
+    """Whether an exponent is a small whole number, written out."""
+    return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= _LARGEST_WHOLE_POWER
+
+
+def _expand(node: Node, inputs: Collection[str]) -> Node:
+    """Write steps and powers with a varying exponent in terms of simpler operations."""
+
+    def made(kind: str, *args: Node) -> Node:
+        return Node(kind, args, None, node.start, node.stop)
+
+    args = tuple(_expand(arg, inputs) for arg in node.args)
+    if node.kind in _SHAPES:
+        x, x0, y0, x1, y1 = args
+        shape = made(_SHAPES[node.kind], made("/", made("-", x, x0), made("-", x1, x0)))
+        return made("+", y0, made("*", made("-", y1, y0), shape))
+    if node.kind == "**" and any(n.kind == "name" and n.value in inputs for n in args[1].walk()):
+        return made("exp", made("*", made("log", args[0]), args[1]))
+    return Node(node.kind, args, node.value, node.start, node.stop)

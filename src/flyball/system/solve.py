@@ -1,0 +1,205 @@
+"""The one solve: [M G^T; G 0] [x; -lam] = [f; gamma], redundant and singular rows included.
+
+Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
+quasi-definite matrix [M G^T; G -delta]. Either is regularised by a small part of each row's own diagonal entry, and
+refined against the true equations until the residual of G x = gamma passes or stops falling (a proximal-point
+iteration: redundant rows cost nothing, and of all multipliers it finds those with least sum of S_kk lam_k^2).
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from ..math.vec import load9, mv
+from ..numerics.ldl import ldl_factor, ldl_solve
+from .mass import mass_entries
+from .rows import row_times
+from .tables import (
+    DIAGONAL,
+    EXCESS,
+    FACTORISATIONS,
+    INVERSE,
+    LENGTH,
+    MASS,
+    NV,
+    R1,
+    REGULARISE,
+    SEMIDEFINITE,
+    SOLVES,
+    V0,
+    V1,
+    V2,
+)
+
+PASS = 1e-13
+REFINEMENTS = 8
+
+
+@formula
+def inverse_mass(S, b, x, at, out, to):
+    """out[to:] = M_b^-1 x[at:] for a body with constant mass block."""
+    m = 1.0 / S.body_x[b, MASS]
+    if S.body_i[b, NV] == 3:
+        out[to] = m * x[at]
+        out[to + 1] = m * x[at + 1]
+        out[to + 2] = S.body_x[b, INVERSE + 8] * x[at + 2]
+    else:
+        r = mv(load9(S.body_x, b, INVERSE), (x[at + 3], x[at + 4], x[at + 5]))
+        for i in range(3):
+            out[to + i] = m * x[at + i]
+            out[to + 3 + i] = r[i]
+
+
+@formula
+def factor(S, W):
+    """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
+    W.info[FACTORISATIONS] += 1
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
+    if S.mass_i.shape[0] == 0:
+        return factor_schur(S, W)
+    return factor_kkt(S, W)
+
+
+@formula
+def factor_schur(S, W):
+    """S = G M^-1 G^T, block by block."""
+    for e in range(S.block_i.shape[0]):
+        at = S.block_i[e, 1]
+        inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+    for e in range(S.pair_i.shape[0]):
+        i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
+        s = W.G[i] * W.H[j]
+        for k in range(1, length):
+            s += W.G[i + k] * W.H[j + k]
+        W.A[place] += s
+    regularise = 1.0 + S.glob[REGULARISE]
+    for k in range(S.row_i.shape[0]):
+        place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
+        W.row[DIAGONAL, k] = W.A[place]
+        W.A[place] *= regularise
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def factor_kkt(S, W):
+    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta."""
+    nv = W.vel.shape[1]
+    mass_entries(S, W)
+    for e in range(S.mass_i.shape[0]):
+        W.A[S.mass_i[e, 2]] += W.M[e]
+    for e in range(S.pair_i.shape[0]):
+        W.A[S.pair_i[e, 3]] += W.G[S.pair_i[e, 0]]
+    for k in range(S.row_i.shape[0]):
+        s = 0.0 * W.row[DIAGONAL, k]
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            d = S.ldl.Ap[S.ldl.perm[S.col_i[e]] + 1] - 1
+            s += W.G[e] * W.G[e] / W.A[d]
+        W.row[DIAGONAL, k] = s
+    for k in range(S.row_i.shape[0]):
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * W.row[DIAGONAL, k]
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def solve(S, W, f, gamma, x, lam):
+    """Solve for x and lam with the factor in W; ``f`` and ``gamma`` are kept.
+
+    Where M is semidefinite, M + E is factored in its place and the refinement takes E out again.
+    """
+    W.info[SOLVES] += 1
+    dx = W.vel[V1]
+    rhs = W.vel[V2]
+    for d in range(x.shape[0]):
+        x[d] = 0.0
+        rhs[d] = f[d]
+    for k in range(lam.shape[0]):
+        lam[k] = 0.0
+        W.row[R1, k] = gamma[k]
+    one_pass(S, W, rhs, dx, x, lam)
+    last = 1e300
+    for _ in range(REFINEMENTS):
+        worst = residual(S, W, gamma, x)
+        if S.glob[SEMIDEFINITE] > 0.0:
+            m = excess(S, dx, rhs, x)
+            worst = m if m > worst else worst
+        if not worst > PASS or worst > 0.2 * last:
+            break
+        last = worst
+        one_pass(S, W, rhs, dx, x, lam)
+    return last
+
+
+@formula
+def one_pass(S, W, rhs, dx, x, lam):
+    """Add to x and lam one solve for ``rhs`` and the residual in W.row[R1]; the step is left in dx, rhs is cleared."""
+    r = W.row[R1]
+    z = W.D[2]
+    nv = x.shape[0]
+    if S.mass_i.shape[0] == 0:
+        for b in range(S.body_i.shape[0]):
+            inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
+        for k in range(r.shape[0]):
+            z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx)
+        ldl_solve(S.ldl, W.L, W.D[0], z)
+        for k in range(r.shape[0]):
+            mu = z[S.ldl.perm[k]]
+            lam[k] += mu
+            for e in range(S.row_p[k], S.row_p[k + 1]):
+                dx[S.col_i[e]] += W.H[e] * mu
+    else:
+        for d in range(nv):
+            z[S.ldl.perm[d]] = rhs[d]
+        for k in range(r.shape[0]):
+            z[S.ldl.perm[nv + k]] = r[k]
+        ldl_solve(S.ldl, W.L, W.D[0], z)
+        for d in range(nv):
+            dx[d] = z[S.ldl.perm[d]]
+        for k in range(r.shape[0]):
+            lam[k] -= z[S.ldl.perm[nv + k]]
+    for d in range(nv):
+        x[d] += dx[d]
+        rhs[d] = 0.0
+
+
+@formula
+def residual(S, W, gamma, x):
+    """r = gamma - G x into W.row[R1]; returns its largest entry relative to what was subtracted."""
+    worst = 0.0
+    size = 1e-300
+    for k in range(gamma.shape[0]):
+        s = gamma[k]
+        a = magnitude(gamma[k])
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            p = W.G[e] * x[S.col_i[e]]
+            s -= p
+            a += magnitude(p)
+        W.row[R1, k] = s
+        worst = max(worst, magnitude(s))
+        size = max(size, a)
+    return worst / size
+
+
+@formula
+def excess(S, dx, rhs, x):
+    """rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
+    worst = 0.0
+    size = 1e-300
+    for b in range(S.body_i.shape[0]):
+        v0 = S.body_i[b, V0]
+        if S.body_i[b, NV] == 3:
+            rhs[v0 + 2] = S.body_x[b, EXCESS + 8] * dx[v0 + 2]
+            worst = max(worst, magnitude(rhs[v0 + 2]))
+        else:
+            t = mv(load9(S.body_x, b, EXCESS), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
+            for i in range(3):
+                rhs[v0 + 3 + i] = t[i]
+                worst = max(worst, magnitude(t[i]))
+        for i in range(2):
+            size = max(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
+    return worst / size
+
+
+@formula
+def magnitude(a):
+    """|Re a|: sizes decide when to stop, they carry no derivative."""
+    return a.real if a.real > 0.0 else -a.real

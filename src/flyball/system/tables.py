@@ -1,0 +1,90 @@
+"""The compiled mechanism: a few constant arrays, and the scratch arrays of one run.
+
+Uniform tables, one row per element, sorted by kind; every loop of the house runs over these. Integers hold structure
+(who touches whom, where an entry goes), floats hold values: changing a parameter changes floats only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..numerics.ldl import Pattern
+
+# columns of System.body_i
+PARENT, TREE, Q0, V0, NQ, NV = range(6)
+# columns of System.body_x
+MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
+BODY_WIDTH = 52
+# columns of System.term_i
+TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END = range(5)
+# columns of System.row_i
+ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
+# columns of System.force_i
+FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_TURNS = 0, 1, 2, 5, 6
+# rows of Work.row, each (nr,)
+G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL = range(8)
+# rows of Work.vel, each (nv,)
+F_APPLIED, X_SOLVED, V1, V2, V3, V4 = range(6)
+# entries of Work.option
+STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V = range(7)
+# entries of Work.info
+STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS = range(6)
+
+# entries of System.glob after the three of gravity
+REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
+
+TERM_KINDS = 7
+
+
+class System(NamedTuple):
+    """A mechanism in arrays. Nothing in it changes during an analysis."""
+
+    body_i: np.ndarray  # (nb, 6): parent, tree joint kind, first q, first v, number of q, of v
+    body_x: np.ndarray  # (nb, 52): mass, inertia about the centre of mass, its inverse, regularisation; tree joint frames
+    frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
+    frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
+    term_i: np.ndarray  # (nt, 5): row, frame F, frame M, first and last+1 segment
+    term_x: np.ndarray  # (nt, 8): parameters of the formula, the last one the coefficient in the row
+    seg_i: np.ndarray  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
+    row_i: np.ndarray  # (nr, 3): law or -1, wrapped angle or not, work state or -1
+    row_p: np.ndarray  # (nr + 1,): first entry of each row in Work.G
+    col_i: np.ndarray  # (nG,): velocity of each entry of Work.G
+    force_i: np.ndarray  # (nk, 7): frame F, frame M, three laws or -1, state of its work or -1, of its turns or -1
+    force_x: np.ndarray  # (nk, 8): parameters of the formula
+    angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
+    kinds: np.ndarray  # first row of each kind: terms, then forces
+    code: np.ndarray  # bytecode of the laws
+    const: np.ndarray  # parameters, then literals of the laws
+    glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism
+    mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; empty where M is constant and block diagonal
+    pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
+    block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row
+    ldl: Pattern  # the sparse factor
+
+
+class Work(NamedTuple):
+    """Scratch of one run on one thread: nothing is allocated inside the loops."""
+
+    BK: np.ndarray  # (nb, 24): kinematics of the bodies
+    FK: np.ndarray  # (nf, 24): kinematics of the frames
+    X: np.ndarray  # (nv, 6): world twist column of each velocity, at its body's reference point
+    O: np.ndarray  # (nb, 3): that reference point
+    FB: np.ndarray  # (nb, 6): force on each body, torque about its centre of mass
+    IC: np.ndarray  # (nb, 10): composite inertias
+    M: np.ndarray  # (nM,): mass matrix entries
+    G: np.ndarray  # (nG,): constraint Jacobian
+    H: np.ndarray  # (nG,): M^-1 G^T
+    row: np.ndarray  # (8, nr)
+    vel: np.ndarray  # (6, nv)
+    A: np.ndarray  # matrix to be factored
+    L: np.ndarray  # its factor
+    D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
+    stack: np.ndarray  # law evaluation
+    y: np.ndarray  # (3, ny): states in the making
+    option: np.ndarray  # (7,): choices of the analysis, largest violations reported
+    info: np.ndarray  # (6,): status, guilty row, counters
+
+
+# kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24

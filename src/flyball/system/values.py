@@ -1,0 +1,274 @@
+"""Structure + parameter values -> floats: the System's tables and the drawn state.
+
+Runs again for every change of a parameter; nothing is compiled and no description is validated here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..model.body import GROUND, Body, Frame
+from ..model.element import resolve
+from ..model.force import BodyForce, Force, JointForce, TwoPointForce
+from ..model.geometry import matrix_to_quaternion, vector
+from ..model.inertia import mass_properties
+from ..model.joint import Joint
+from .structure import FrameSpec, Structure
+from .tables import (
+    BODY_P,
+    BODY_R,
+    BODY_WIDTH,
+    EXCESS,
+    INERTIA,
+    INVERSE,
+    MASS,
+    TREE_P,
+    TREE_R,
+    System,
+    Work,
+)
+from .tree import FREE, PLANAR, REVOLUTE
+
+REGULARISATION = 1e-10
+THIN = 1e-9  # principal inertias below this part of the body's size count as none
+STAND_IN = 1e-6  # what is put in their place while factoring
+
+
+@dataclass
+class Values:
+    """A compiled mechanism: the System, the drawn state, and the numbers of every element."""
+
+    structure: Structure
+    system: System
+    q: np.ndarray
+    v: np.ndarray
+    numbers: dict[str, SimpleNamespace]
+    bodies: dict[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
+    length: float  # a typical length of the mechanism [m]
+    poses: Poses  # where frames are when it is drawn
+
+
+def values(s: Structure, parameters: Mapping[str, float] | None = None, holds: Mapping[str, float] | None = None) -> Values:
+    """Numbers of a mechanism.
+
+    Parameters
+    ----------
+    s : Structure
+    parameters : mapping, optional
+        Values in SI units in place of the model's own.
+    holds : mapping, optional
+        Values of the coordinates that are held (see ``structure``).
+    """
+    model = s.model
+    env = {**model.environment(), **(parameters or {})}
+    numbers = {e.name: resolve(e, env) for e in model.elements()}
+    bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
+    for b in model.bodies:
+        bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
+    pose = Poses(s, numbers, bodies)
+    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)])
+    length = _length(s, frame_x, bodies)
+    body_x, semidefinite = _body_x(s, bodies, frame_x, length)
+    if s.tree:
+        _tree_frames(s, pose, bodies, body_x)
+    const = np.array(s.const or [0.0], float)
+    const[: len(model.parameters)] = [env[k] for k in model.parameters]
+    glob = np.r_[model.gravity_vector(), REGULARISATION, semidefinite, length]
+    t = s.tables
+    system = System(
+        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], _term_x(s, pose, numbers, holds or {}), t["seg_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"], t["kinds"],
+        t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
+    )  # fmt: skip
+    q, v = _drawn_state(s, bodies, pose)
+    return Values(s, system, q, v, numbers, bodies, length, pose)
+
+
+def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
+    m = mass_properties(b, n, env, planar)
+    R = b.rotation(n)
+    p = vector(n.position, planar, b.name)
+    w = np.zeros(3)
+    if n.angular_velocity is not None:
+        w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
+    arm = R @ m.com
+    v = vector(n.velocity, planar, b.name) + np.cross(w, arm)
+    return SimpleNamespace(p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, c=p + arm, v=v, w=w, angle=n.angle)
+
+
+class Poses:
+    """Where the frames of elements are when the mechanism is drawn."""
+
+    def __init__(self, s: Structure, numbers: dict[str, SimpleNamespace], bodies: dict[str, SimpleNamespace]) -> None:
+        self.s, self.numbers, self.bodies = s, numbers, bodies
+        self.model = s.model
+
+    def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
+        """Position from the body's centre of mass and rotation, in body axes."""
+        if f.element is None:
+            return np.zeros(3), np.eye(3)
+        p, R, name = self.world(f)
+        b = self.bodies[name]
+        return b.R.T @ (p - b.c), b.R.T @ R
+
+    def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
+        """Position, rotation and carrier of a frame in the drawn configuration."""
+        e = f.element
+        n = self.numbers[e.name]
+        if isinstance(e, (Body, Frame)):
+            return *self.named(e.name), e.body if isinstance(e, Frame) else e.name
+        if isinstance(e, BodyForce):
+            name = self.model.carrier(e.body, e)
+            p, R = self.named(e.body)
+            if isinstance(self.model[e.body], Body):
+                at = getattr(n, "at", None)
+                p = self.bodies[name].c if at is None else vector(at, self.model.planar, e.title)
+            return p, R, name
+        name = self.model.carrier(e.body_i if f.role == "F" else e.body_j, e)
+        if n.at is None:
+            p, R = self.named(e.body_i if f.role == "F" else e.body_j)
+        elif isinstance(e, TwoPointForce):
+            p, R = e.world_points(n, self.model.planar)[f.role == "M"], np.eye(3)
+        else:
+            p, R = e.world_frames(n, self.model.planar)[f.role == "M"]
+        if f.coordinate:
+            R = R @ np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}"))
+        return p, R, name
+
+    def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Drawn pose of a body's reference frame or of a named frame."""
+        if name in self.bodies:
+            return self.bodies[name].p, self.bodies[name].R
+        e = self.model[name]
+        n = self.numbers[name]
+        b = self.bodies[e.body]
+        return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
+
+    def separation(self, e: object) -> float:
+        """Drawn distance between the origins of an element's two frames."""
+        a, b = (self.world(FrameSpec(0, e, role))[0] for role in "FM")
+        return np.sqrt(((b - a) ** 2).sum())
+
+
+def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> float:
+    """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
+    moving = s.tables["frame_i"] >= 0
+    reach = np.sqrt((frame_x[moving, :3] ** 2).sum(axis=1)).max(initial=0.0).real
+    centres = np.array([b.c for k, b in bodies.items() if k != GROUND]).real
+    spread = np.sqrt(((centres - centres.mean(axis=0)) ** 2).sum(axis=1)).max()
+    return float(max(reach, spread)) or 1.0
+
+
+def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> tuple[np.ndarray, float]:
+    """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
+    body_x = np.zeros((len(s.order), BODY_WIDTH))
+    semidefinite = 0.0
+    of_body = [np.abs(frame_x[s.tables["frame_i"] == b, :3]).max(initial=0.0) for b in range(len(s.order))]
+    for name, b in s.place.items():
+        if b < 0:
+            continue
+        d = bodies[name]
+        J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
+        size = max(np.trace(d.inertia), d.mass * of_body[b] ** 2) or d.mass * length**2
+        w, V = np.linalg.eigh(J)
+        used = np.array([False, False, True]) if s.model.planar else np.array([True] * 3)
+        if s.model.planar:
+            w, V = np.diag(J), np.eye(3)
+        weak = used & (w < THIN * size)
+        more = np.where(weak, STAND_IN * size - w, 0.0)
+        inverse = (V * np.where(used, 1.0 / np.where(used, w + more, 1.0), 0.0)) @ V.T
+        more = (V * more) @ V.T
+        if weak.any():
+            semidefinite = 1.0
+        body_x[b, MASS] = d.mass
+        for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
+            body_x[b, at : at + 9] = A.ravel()
+    return body_x, semidefinite
+
+
+def _tree_frames(s: Structure, pose: Poses, bodies: dict, body_x: np.ndarray) -> None:
+    """Frames of the tree joints: on the parent, and the child's centre of mass seen from the joint."""
+    for name in s.tree:
+        joint = s.model[name]
+        child = s.place[s.model.carrier(joint.body_j, joint)]
+        p, R = pose.local(FrameSpec(0, joint, "F"))
+        body_x[child, TREE_P : TREE_P + 3], body_x[child, TREE_R : TREE_R + 9] = p, R.ravel()
+        p, R = pose.local(FrameSpec(0, joint, "M"))
+        body_x[child, BODY_P : BODY_P + 3], body_x[child, BODY_R : BODY_R + 9] = -R.T @ p, R.T.ravel()
+
+
+def _term_x(s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, float]) -> np.ndarray:
+    """Parameters of the terms: axes from the declaration, constants from the numbers."""
+    x = np.zeros((len(s.terms), 8))
+    for k, t in enumerate(s.terms):
+        x[k] = t.formula.par
+        x[k, 7] = t.sign * t.formula.par[7]
+        e = t.element
+        if isinstance(e, Joint):
+            separation = pose.separation(e) if hasattr(e, "length") else 0.0
+            x[k, 6] = e.parameter(numbers[e.name], t.formula, separation)
+        else:
+            owner, what = s.model.coordinate(getattr(e, "coordinate", e.name), e)
+            offset = owner.offset(numbers[owner.name], what) if isinstance(owner, Joint) else 0.0
+            x[k, 6] = t.sign * (holds.get(e.name, 0.0) - offset)
+    return x
+
+
+def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:
+    x = np.zeros((len(s.forces), 8))
+    for k, e in enumerate(s.forces):
+        separation = pose.separation(e) if isinstance(e, TwoPointForce) else 0.0
+        par = e.parameters(numbers[e.name], separation)
+        x[k, : len(par)] = par
+        if isinstance(e, JointForce):
+            joint = s.model[e.joint]
+            x[k, 7] = joint.offset(numbers[joint.name], "angle")
+    return x
+
+
+def _drawn_state(s: Structure, bodies: dict, pose: Poses) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and velocities of the drawn configuration."""
+    q, v = np.zeros(s.nq), np.zeros(s.nv)
+    for name, b in s.place.items():
+        if b < 0:
+            continue
+        d = bodies[name]
+        _, kind, q0, v0 = s.tables["body_i"][b, :4]
+        if kind == FREE:
+            q[q0 : q0 + 7] = np.r_[d.c, matrix_to_quaternion(d.R)]
+            v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
+        elif kind == PLANAR:
+            q[q0 : q0 + 3] = d.c[0], d.c[1], d.angle
+            v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
+        elif kind == REVOLUTE:
+            joint = next(s.model[j] for j in s.tree if s.model.carrier(s.model[j].body_j, s.model[j]) == name)
+            F, M = (pose.world(FrameSpec(0, joint, role)) for role in "FM")
+            x = F[1].T @ M[1][:, 0]
+            q[q0] = np.arctan2(x[1], x[0])
+            w = bodies[F[2]].w if F[2] != GROUND else np.zeros(3)
+            v[v0] = F[1][:, 2] @ (d.w - w)
+    return q, v
+
+
+def work(s: Structure, system: System, dtype: type = float) -> Work:
+    """Scratch arrays for one run."""
+    nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
+    n, ny = len(system.ldl.perm), s.nq + nv + len(s.states)
+
+    def z(*shape: int) -> np.ndarray:
+        return np.zeros(shape, dtype)
+
+    W = Work(
+        z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
+        z(len(system.col_i)), z(8, nr), z(6, nv), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
+        z(s.depth + 1, 3), z(3, ny), np.zeros(7), np.zeros(6, np.int64),
+    )  # fmt: skip
+    from .kinematics import ground_frames
+
+    ground_frames(system, W)
+    return W

@@ -1,0 +1,154 @@
+// Plots of channels over time, with one time cursor through all of them; pointing at a time goes there.
+import uPlot from "uplot";
+import { mixed } from "./data.js";
+import { element, shortNumber } from "./format.js";
+import { CURVES } from "./theme.js";
+
+const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
+const LOWEST = 132; // px
+const HIGHEST = 250;
+const MOST = CURVES.length; // curves in one plot
+
+/** Channels that share a plot: those of one unit, or each for itself. */
+export function grouped(channels, together) {
+  const groups = [];
+  for (const channel of channels) {
+    const home = together && groups.find((group) => group[0].unit === channel.unit && group.length < MOST);
+    if (home) home.push(channel);
+    else groups.push([channel]);
+  }
+  return groups;
+}
+
+const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+const gapped = (values) => (values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : null)));
+
+/** A constant curve still gets some room above and below, and one in the noise is not blown up. */
+function valueRange(_, low, high) {
+  if (low === null) return [0, 1];
+  const span = high - low;
+  const floor = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
+  if (span > floor) return [low - 0.08 * span, high + 0.08 * span];
+  const room = Math.abs(low) > 0 ? 0.1 * Math.abs(low) : 1;
+  return [low - room, high + room];
+}
+
+class Plot {
+  /** One plot with its own head line, cursor and markers. */
+  constructor(parent, channels, times, onSeek) {
+    Object.assign(this, { channels, times });
+    this.values = channels.map(() => element("output", { className: "value" }));
+    const names = channels.map((channel, k) => {
+      const swatch = element("span", { className: "swatch" });
+      swatch.style.background = CURVES[k];
+      const name = element("span", { className: "name", textContent: channel.name, title: channel.name });
+      return element("span", { className: "curve" }, swatch, name, this.values[k]);
+    });
+    const unit = element("span", { className: "unit", textContent: channels[0].unit ? `[${channels[0].unit}]` : "" });
+    const head = element("div", { className: "plot-head" }, element("div", { className: "curves" }, ...names), unit);
+    this.box = element("div", { className: "plot-box" });
+    const label = `Plot of ${channels.map((channel) => channel.name).join(", ")} over time`;
+    this.root = element("figure", { className: "plot", aria: { role: "group", label } }, head, this.box);
+    parent.append(this.root);
+    this.chart = new uPlot(this.#options(), [times, ...channels.map((channel) => gapped(channel.values))], this.box);
+    this.#addCursor(onSeek);
+  }
+
+  #options() {
+    const axis = { stroke: () => css("--muted"), font: FONT, grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false } };
+    const labels = (_, splits) => splits.map((value) => (value === null ? "" : shortNumber(value)));
+    return {
+      width: 300,
+      height: 150,
+      padding: [8, 12, 0, 0],
+      cursor: { show: false },
+      legend: { show: false },
+      scales: { x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) }, y: { range: valueRange } },
+      axes: [
+        { ...axis, size: 22, gap: 4, space: 56, values: labels },
+        { ...axis, size: 54, gap: 6, space: 26, values: labels },
+      ],
+      series: [{}, ...this.channels.map((_, k) => ({ stroke: CURVES[k], width: 1.6, points: { show: this.times.length === 1 } }))],
+    };
+  }
+
+  #addCursor(onSeek) {
+    const { over } = this.chart;
+    this.cursor = element("div", { className: "cursor" });
+    this.markers = this.channels.map((_, k) => {
+      const marker = element("div", { className: "marker" });
+      marker.style.background = CURVES[k];
+      return marker;
+    });
+    over.append(this.cursor, ...this.markers);
+    const seek = (event) => {
+      const { left, width } = over.getBoundingClientRect();
+      onSeek(this.chart.posToVal(Math.min(Math.max(event.clientX - left, 0), width), "x"));
+    };
+    over.addEventListener("pointerdown", (event) => {
+      if (event.button !== 0) return;
+      over.setPointerCapture(event.pointerId);
+      seek(event);
+    });
+    over.addEventListener("pointermove", (event) => over.hasPointerCapture(event.pointerId) && seek(event));
+  }
+
+  resize(width, height) {
+    this.chart.setSize({ width, height });
+  }
+
+  /** Move the cursor to a time, which lies at a given place among the samples. */
+  seek(time, frame) {
+    const { chart, cursor, markers, values, channels } = this;
+    const x = chart.valToPos(time, "x");
+    cursor.style.transform = `translateX(${x}px)`;
+    channels.forEach((channel, k) => {
+      const value = mixed(channel.values, frame);
+      values[k].textContent = shortNumber(value);
+      markers[k].hidden = !Number.isFinite(value);
+      if (!markers[k].hidden) markers[k].style.transform = `translate(${x}px, ${chart.valToPos(value, "y")}px)`;
+    });
+  }
+
+  destroy() {
+    this.chart.destroy();
+    this.root.remove();
+  }
+}
+
+export class Plots {
+  /** All plots in an element; `onSeek(time)` is called when the user points at a time. */
+  constructor(box, times, onSeek) {
+    Object.assign(this, { box, times, onSeek, plots: [], last: null });
+    this.empty = element("p", { className: "empty", textContent: "No channel is shown. Choose some above." });
+    new ResizeObserver(() => this.resize()).observe(box);
+  }
+
+  /** Show these channels and no others. */
+  show(channels, together) {
+    const groups = grouped(channels, together);
+    for (const plot of this.plots) plot.destroy();
+    this.plots = groups.map((group) => new Plot(this.box, group, this.times, this.onSeek));
+    if (groups.length) this.empty.remove();
+    else this.box.append(this.empty);
+    this.resize();
+  }
+
+  resize() {
+    const { clientWidth, clientHeight } = this.box;
+    if (!clientWidth || !this.plots.length) return;
+    const heads = this.plots.reduce((sum, plot) => sum + plot.root.firstChild.offsetHeight + 10, 0);
+    const each = Math.floor((clientHeight - heads) / this.plots.length);
+    for (const plot of this.plots) plot.resize(plot.box.clientWidth, Math.min(Math.max(each, LOWEST), HIGHEST));
+    if (this.last) this.seek(...this.last);
+  }
+
+  seek(time, frame) {
+    this.last = [time, frame];
+    for (const plot of this.plots) plot.seek(time, frame);
+  }
+
+  retheme() {
+    for (const plot of this.plots) plot.chart.redraw(false, true);
+  }
+}

@@ -1,0 +1,88 @@
+// Solids of spatial bodies: one geometry for each kind of shape, edges softened so that they catch the light.
+import * as THREE from "three";
+
+const ROUND = 48;
+
+/** A turned part along z from its profile of (radius, z) pairs, going up. */
+function turned(profile) {
+  const points = profile.map(([radius, z]) => new THREE.Vector2(Math.max(radius, 0), z));
+  return new THREE.LatheGeometry(points, ROUND).rotateX(Math.PI / 2);
+}
+
+/** A cylinder along z with chamfered rims; corners are doubled, so that faces stay flat. */
+export function cylinderGeometry(radius, length, soft = 0.08) {
+  const c = Math.min(radius, length) * soft;
+  const h = length / 2;
+  const corners = [[0, -h], [radius - c, -h], [radius, c - h], [radius, h - c], [radius - c, h], [0, h]];
+  const profile = corners.flatMap((corner, k) => (k === 0 || k === corners.length - 1 ? [corner] : [corner, corner]));
+  return turned(profile);
+}
+
+function plateGeometry(outline, thickness) {
+  const shape = new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y)));
+  const bevel = thickness * 0.12;
+  const geometry = new THREE.ExtrudeGeometry(shape, {
+    depth: thickness - 2 * bevel, bevelThickness: bevel, bevelSize: bevel, bevelOffset: -bevel, bevelSegments: 2,
+  });
+  return geometry.translate(0, 0, bevel - thickness / 2);
+}
+
+const MAKERS = {
+  box: ([x, y, z]) => new THREE.RoundedBoxGeometry(x, y, z, 3, 0.06 * Math.min(x, y, z)),
+  sphere: ([radius]) => new THREE.SphereGeometry(radius, ROUND, 32).rotateX(Math.PI / 2),
+  cylinder: ([radius, length]) => cylinderGeometry(radius, length),
+  capsule: ([radius, length]) => new THREE.CapsuleGeometry(radius, length, 12, 36).rotateX(Math.PI / 2),
+  cone: ([radius, height]) => new THREE.ConeGeometry(radius, height, ROUND).rotateX(Math.PI / 2),
+  ellipsoid: ([a, b, c]) => new THREE.SphereGeometry(1, ROUND, 32).rotateX(Math.PI / 2).scale(a, b, c),
+};
+
+/** The geometry of a shape, in the shape's own axes. */
+export function solidGeometry({ kind, size, outline }) {
+  return kind === "plate" ? plateGeometry(outline, size[0]) : MAKERS[kind](size);
+}
+
+/** Put an object where its shape says it sits on the body. */
+export function placed(object, shape) {
+  const [w, x, y, z] = shape.quaternion;
+  object.position.set(...shape.position);
+  object.quaternion.set(x, y, z, w);
+  return object;
+}
+
+/** A small dark dimple near the rim of a wheel: without it one could not see the wheel turn. */
+function spinMarks({ kind, size }, material) {
+  if (kind !== "cylinder" || size[0] < 0.8 * size[1]) return [];
+  const geometry = new THREE.CylinderGeometry(0.09 * size[0], 0.09 * size[0], 1.03 * size[1], 20).rotateX(Math.PI / 2);
+  const mark = new THREE.Mesh(geometry.translate(0.72 * size[0], 0, 0), material);
+  return [mark];
+}
+
+/** A spatial body: a group of lit meshes. */
+export function solidBody(body, colour) {
+  const group = new THREE.Group();
+  const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.48, metalness: 0.08 });
+  const dark = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.7 });
+  dark.color.multiplyScalar(0.3);
+  for (const shape of body.shapes) {
+    const holder = placed(new THREE.Group(), shape);
+    holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
+    group.add(holder);
+  }
+  group.traverse((object) => Object.assign(object, { castShadow: true, receiveShadow: true }));
+  return { group, retheme() {}, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
+}
+
+/** Points that enclose a shape, in the body's axes: the corners of its box. */
+export function cornersOf(shape) {
+  const geometry = solidGeometry(shape);
+  geometry.computeBoundingBox();
+  const { min, max } = geometry.boundingBox;
+  const frame = placed(new THREE.Group(), shape);
+  frame.updateMatrix();
+  const corners = [];
+  for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) {
+    corners.push(new THREE.Vector3(x, y, z).applyMatrix4(frame.matrix));
+  }
+  geometry.dispose();
+  return corners;
+}
