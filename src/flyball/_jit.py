@@ -42,7 +42,7 @@ def formula(function: F) -> F:
     def register() -> None:
         from numba.extending import register_jitable
 
-        register_jitable(error_model="numpy")(function)
+        register_jitable(error_model="numpy", _nrt=False, no_cfunc_wrapper=True)(function)
 
     on_numba(register)
     return function
@@ -70,14 +70,20 @@ class Kernel:
             start_numba()
             from numba import config, njit
 
-            made = njit(error_model="numpy", nogil=True)(self.function)
+            made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(self.function)
             if not config.DISABLE_JIT:
                 made._cache = _cache_class()(self.function)
             self._dispatcher = made
         return self._dispatcher
 
     def __call__(self, *args: Any) -> Any:
-        return (self._dispatcher or self.dispatcher)(*args)
+        if self._dispatcher is None or not getattr(self._dispatcher, "signatures", True):
+            start_numba()
+            from ._link import optimise_once
+
+            with _lock, optimise_once(self.function.__qualname__):
+                return self.dispatcher(*args)
+        return self._dispatcher(*args)
 
 
 def start_numba() -> None:

@@ -52,8 +52,8 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
     plain = compiled(model, parameters=parameters)
     q, v = plain.values.q.copy(), plain.values.v.copy()
     env = {**model.environment(), **(parameters or {})}
-    values = {i.name: number(i.value, env, "", i.title) for i in model.initial if i.value is not None}
-    rates = {i.name: number(i.rate, env, "", i.title) for i in model.initial if i.rate is not None}
+    values = {i.name: number(i.value, env, None, i.title) for i in model.initial if i.value is not None}
+    rates = {i.name: number(i.rate, env, None, i.title) for i in model.initial if i.rate is not None}
     holds = [i for i in model.initial if i.name in values]
     near = compiled(model, parameters=parameters, holds=holds, held=values) if holds else plain
     start = q.copy()

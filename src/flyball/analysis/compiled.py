@@ -35,11 +35,10 @@ class Compiled:
         s = self.structure
         return np.r_[self.values.q, self.values.v, np.zeros(len(s.states))]
 
-    def at(self, t: float, q: np.ndarray, v: np.ndarray, level: int = POSITION) -> tuple[int, np.ndarray]:
+    def at(self, t: float, q: np.ndarray, v: np.ndarray, task: int = POSITION) -> tuple[int, np.ndarray]:
         """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy)."""
         y = np.r_[q, v, np.zeros(len(self.structure.states))]
-        dy = np.zeros_like(y)
-        return evaluate(self.values.system, self.work, float(t), y, dy, level), dy
+        return evaluate(self.values.system, self.work, float(t), y, task)
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""

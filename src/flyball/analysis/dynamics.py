@@ -18,7 +18,7 @@ from ..results.result import Result
 from ..system import motion
 from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
 from .assemble import Assembly, assemble
-from .entry import simulate as kernel
+from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
 
 STABILIZATION = {
@@ -179,7 +179,7 @@ def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None
         while True:
             begin = time.perf_counter()
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
-            used = kernel(S, W, method, clock, buffer)
+            used = motion_kernel(S, W, method, clock, buffer, INTEGRATE)
             rows.append(buffer[:used].copy())
             if progress is not None:
                 progress((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))

@@ -104,9 +104,9 @@ def _sparse(G) -> tuple[int, np.ndarray, None]:
 
 
 def _factor_entry():
-    from .entry import factor_matrix
+    from .entry import factor_kernel
 
-    return factor_matrix
+    return factor_kernel
 
 
 def _check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:

@@ -37,7 +37,7 @@ def _quietly(ufunc: Function, *args: Any) -> Any:
 def _on_array(function: Function, ufunc: Function, *args: Any) -> Any:
     """Value on arrays; arrays of objects (symbols) go element by element."""
     if any(np.asarray(a).dtype == object for a in args):
-        return np.frompyfunc(function, len(args), 1)(*args)
+        return _quietly(np.frompyfunc(function, len(args), 1), *args)
     return _quietly(ufunc, *args)
 
 
@@ -113,7 +113,7 @@ def absolute(x):
 def sign(x):
     """-1, 0 or 1 by the real part; nan for nan."""
     if isinstance(x, float | int):
-        return x if x != x else float((x > 0) - (x < 0))
+        return x if x != x else float(x > 0) - float(x < 0)
     if isinstance(x, complex):
         return complex(sign(x.real))
     if _has_array(x):
@@ -211,16 +211,14 @@ def _complex_power(a, b):
 
 
 @formula
-def cubic_step(s):
-    """Smooth step from 0 (s <= 0) to 1 (s >= 1) with continuous slope: s^2 (3 - 2 s) between."""
-    s = minimum(maximum(s, 0.0), 1.0)
+def cubic_rise(s):
+    """Rise from 0 (s = 0) to 1 (s = 1) with zero slope at both ends: s^2 (3 - 2 s)."""
     return s * s * (3.0 - 2.0 * s)
 
 
 @formula
-def quintic_step(s):
-    """Smooth step from 0 (s <= 0) to 1 (s >= 1) with continuous curvature: s^3 (10 - 15 s + 6 s^2) between."""
-    s = minimum(maximum(s, 0.0), 1.0)
+def quintic_rise(s):
+    """Rise from 0 (s = 0) to 1 (s = 1) with zero slope and curvature at both ends: s^3 (10 - 15 s + 6 s^2)."""
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
 
 

@@ -256,7 +256,11 @@ def _where(condition: Any, a: Any, b: Any) -> Any:
 
 
 def _step(shape: Any) -> Any:
-    return lambda x, x0, y0, x1, y1: y0 + (y1 - y0) * shape(scalar.divide(x - x0, x1 - x0))
+    def step(x: Any, x0: Any, y0: Any, x1: Any, y1: Any) -> Any:
+        s = scalar.minimum(scalar.maximum(scalar.divide(x - x0, x1 - x0), 0.0), 1.0)
+        return y0 + (y1 - y0) * shape(s)
+
+    return step
 
 
 OPERATIONS = {
@@ -265,10 +269,10 @@ OPERATIONS = {
     "min": _fold(scalar.minimum),
     "max": _fold(scalar.maximum),
     "where": _where,
-    "step": _step(scalar.cubic_step),
-    "step5": _step(scalar.quintic_step),
-    "cubic": scalar.cubic_step,
-    "quintic": scalar.quintic_step,
+    "step": _step(scalar.cubic_rise),
+    "step5": _step(scalar.quintic_rise),
+    "cubic": scalar.cubic_rise,
+    "quintic": scalar.quintic_rise,
     "+": operator.add,
     "-": operator.sub,
     "*": operator.mul,

@@ -7,6 +7,7 @@ import difflib
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any, NoReturn
 
 from ..errors import ExpressionError, ModelError
@@ -175,7 +176,7 @@ def refuse(text: str, start: int, stop: int, problem: str, remedy: str) -> NoRet
 
 
 def _remedy(text: str) -> str:
-    if any(a.isdigit() and b.isalpha() for a, b in zip(text, text[1:], strict=False)):
+    if any(a.isdigit() and b.isalpha() for a, b in pairwise(text)):
         return "write every multiplication, as in 2*x; a unit can follow a single number only ('5 mm')"
     return _ALLOWED + "; a unit can follow a single number only ('5 mm'): give the quantity a parameter's name"
 

@@ -59,8 +59,9 @@ def to_si(text: str, dimension: str | None) -> float:
     text
         A number with a unit ("30 deg"), or without one ("0.5": taken as SI already).
     dimension
-        The SI unit wanted, e.g. "m", "rad", "N*m/rad", "1" or "" for a plain number; None accepts any unit. "per radian" may
-        be left out of a compound unit ("5 N*m" as a torsional stiffness), an angle itself may not ("50 Hz" for rad/s).
+        The SI unit wanted, e.g. "m", "rad", "N*m/rad", "1" or "" for a plain number; None accepts any unit. "per
+        radian" may be left out of a compound unit ("5 N*m" as a torsional stiffness), an angle itself may not ("50 Hz"
+        for rad/s).
 
     Raises
     ------

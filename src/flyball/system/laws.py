@@ -21,7 +21,7 @@ from ..math.scalar import (
     atan2,
     cos,
     cosh,
-    cubic_step,
+    cubic_rise,
     divide,
     exp,
     integer_power,
@@ -29,7 +29,7 @@ from ..math.scalar import (
     maximum,
     minimum,
     power,
-    quintic_step,
+    quintic_rise,
     sign,
     sin,
     sinh,
@@ -200,9 +200,9 @@ def value(function, x):
     if function == SIGN:
         return sign(x)
     if function == CUBIC:
-        return cubic_step(x)
+        return cubic_rise(x)
     if function == QUINTIC:
-        return quintic_step(x)
+        return quintic_rise(x)
     return 1.0 - x
 
 
@@ -219,7 +219,7 @@ def slopes(function, x, f):
         return 1.0 + f * f, 2.0 * f * (1.0 + f * f)
     if function == ASIN or function == ACOS:
         d = divide(1.0 if function == ASIN else -1.0, sqrt((1.0 - x) * (1.0 + x)))
-        return d, x * d * d * (d if function == ASIN else -d)
+        return d, x * d * d * d
     if function == ATAN:
         d = divide(1.0, 1.0 + x * x)
         return d, -2.0 * x * d * d
@@ -239,10 +239,10 @@ def slopes(function, x, f):
         return d, divide(-0.5 * d, x)
     if function == ABS:
         return (-1.0 if x.real < 0.0 else 1.0), 0.0
-    if (function == CUBIC or function == QUINTIC) and x.real > 0.0 and x.real < 1.0:
+    if function == CUBIC:
+        return 6.0 * x * (1.0 - x), 6.0 - 12.0 * x
+    if function == QUINTIC:
         y = x * (1.0 - x)
-        if function == CUBIC:
-            return 6.0 * y, 6.0 - 12.0 * x
         return 30.0 * y * y, 60.0 * y * (1.0 - 2.0 * x)
     return 0.0, 0.0
 
@@ -383,7 +383,9 @@ def _expand(node: Node, inputs: Collection[str]) -> Node:
     args = tuple(_expand(arg, inputs) for arg in node.args)
     if node.kind in _SHAPES:
         x, x0, y0, x1, y1 = args
-        shape = made(_SHAPES[node.kind], made("/", made("-", x, x0), made("-", x1, x0)))
+        s = made("/", made("-", x, x0), made("-", x1, x0))
+        s = made("min", made("max", s, Node("number", value=0.0)), Node("number", value=1.0))
+        shape = made(_SHAPES[node.kind], s)
         return made("+", y0, made("*", made("-", y1, y0), shape))
     if node.kind == "**" and any(n.kind == "name" and n.value in inputs for n in args[1].walk()):
         return made("exp", made("*", made("log", args[0]), args[1]))

@@ -56,7 +56,7 @@ function keys(clock) {
   document.addEventListener("keydown", (event) => {
     const { target, key } = event;
     const typing = target.matches?.("input:not([type=range]), select, textarea, summary");
-    const pressing = key === " " && target.matches?.("button") && target.name !== "play";
+    const pressing = key === " " && target.matches?.("button");
     if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !actions[key]) return;
     event.preventDefault();
     if (key !== " ") clock.play(false);

@@ -33,7 +33,11 @@ export function rounded(points, radius) {
     const to = corner.clone().lerp(after, cut / (corner.distanceTo(after) || 1));
     return [0, 0.2, 0.4, 0.6, 0.8, 1].map((s) => {
       const middle = corner.clone();
-      return from.clone().multiplyScalar((1 - s) ** 2).addScaledVector(middle, 2 * s * (1 - s)).addScaledVector(to, s * s);
+      return from
+        .clone()
+        .multiplyScalar((1 - s) ** 2)
+        .addScaledVector(middle, 2 * s * (1 - s))
+        .addScaledVector(to, s * s);
     });
   });
 }
@@ -93,7 +97,9 @@ export function stroke(points, { color, width, order, closed = false, ...rest })
 }
 
 function fill(outline, material, order) {
-  return Object.assign(new THREE.Mesh(new THREE.ShapeGeometry(new THREE.Shape(outline)), material), { renderOrder: order });
+  return Object.assign(new THREE.Mesh(new THREE.ShapeGeometry(new THREE.Shape(outline)), material), {
+    renderOrder: order,
+  });
 }
 
 /** A planar body. All outlines lie under all fills, so that overlapping shapes read as one. */
@@ -111,7 +117,15 @@ export function flatBody(body, colour, index) {
     shade.add(fill(outline, dusk, ORDER.shadow));
     if (looksRound(shape)) {
       const [x, y] = shape.position;
-      edges.push(stroke([{ x, y }, { x: x + 0.82 * shape.size[0], y }], { color: colour, width: 1.6, order: order + 2 }));
+      edges.push(
+        stroke(
+          [
+            { x, y },
+            { x: x + 0.82 * shape.size[0], y },
+          ],
+          { color: colour, width: 1.6, order: order + 2 },
+        ),
+      );
       group.add(edges.at(-1));
     }
   }
@@ -119,6 +133,6 @@ export function flatBody(body, colour, index) {
     for (const edge of edges) edge.material.color.copy(outlineColour(colour, theme));
     dusk.opacity = theme.flatShadow;
   };
-  const glow = (on) => paint.color.set(colour).lerp(new THREE.Color("#ffffff"), on ? 0.35 : 0);
+  const glow = (on) => paint.color.set(colour).lerp(new THREE.Color("#ffffff"), on ? 0.18 : 0);
   return { group, shade, retheme, glow };
 }

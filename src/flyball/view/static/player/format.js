@@ -1,6 +1,11 @@
 // Numbers for people.
 
-const PREFIXES = [[1e3, "km"], [1, "m"], [1e-3, "mm"], [1e-6, "µm"]];
+const PREFIXES = [
+  [1e3, "km"],
+  [1, "m"],
+  [1e-3, "mm"],
+  [1e-6, "µm"],
+];
 
 /** Four digits, with a power of ten only where it is needed. */
 export function shortNumber(value) {

@@ -18,8 +18,20 @@ function bodyPoints(body, planar) {
 /** Symbols reach a little around their joint. */
 function jointPoints(joint, unit, planar) {
   const reach = 0.1 * unit;
-  const around = planar ? [[1, 1, 0], [-1, 1, 0], [1, -1.2, 0], [-1, -1.2, 0]] : [[0.6, 0.6, 0.6], [-0.6, -0.6, -1.2]];
-  return around.map(([x, y, z]) => new THREE.Vector3(...joint.position).add(new THREE.Vector3(x, y, z).multiplyScalar(reach)));
+  const around = planar
+    ? [
+        [1, 1, 0],
+        [-1, 1, 0],
+        [1, -1.2, 0],
+        [-1, -1.2, 0],
+      ]
+    : [
+        [0.6, 0.6, 0.6],
+        [-0.6, -0.6, -1.2],
+      ];
+  return around.map(([x, y, z]) =>
+    new THREE.Vector3(...joint.position).add(new THREE.Vector3(x, y, z).multiplyScalar(reach)),
+  );
 }
 
 /** Points that enclose the motion over all times. */
@@ -41,7 +53,8 @@ export function motionPoints(recording, unit) {
       for (const point of own.get(body.name)) points.push(point.clone().applyMatrix4(pose.matrix));
       if (!own.get(body.name).length) points.push(pose.position.clone());
     }
-    for (const { a, b } of lines) points.push(pointAt(a, frame, new THREE.Vector3()), pointAt(b, frame, new THREE.Vector3()));
+    for (const { a, b } of lines)
+      points.push(pointAt(a, frame, new THREE.Vector3()), pointAt(b, frame, new THREE.Vector3()));
   }
   const finite = points.filter((point) => Number.isFinite(point.x + point.y + point.z));
   return finite.length ? finite : [new THREE.Vector3(-unit, -unit, -unit), new THREE.Vector3(unit, unit, unit)];
@@ -66,7 +79,7 @@ export function fitFlat(points, width, height, inset) {
   const scale = Math.min(across / (x1 - x0 || 1e-9), down / (y1 - y0 || 1e-9), 1e7);
   const x = (x0 + x1) / 2 + (inset.right - inset.left) / 2 / scale;
   const y = (y0 + y1) / 2 + (inset.top - inset.bottom) / 2 / scale;
-  return { x, y, scale };
+  return { x, y, scale, size: scale };
 }
 
 /**
@@ -96,5 +109,6 @@ export function fitSpace(points, direction, up, tangent, width, height, inset) {
   const depth = Math.min(across.nearest, down.nearest, d0 - 1e-6);
   const position = right.clone().multiplyScalar(across.at(depth)).addScaledVector(above, down.at(depth));
   position.addScaledVector(direction, depth);
-  return { position, target: position.clone().addScaledVector(direction, (d0 + d1) / 2 - depth) };
+  const distance = (d0 + d1) / 2 - depth;
+  return { position, target: position.clone().addScaledVector(direction, distance), size: 1 / distance };
 }

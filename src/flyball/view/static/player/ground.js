@@ -38,8 +38,11 @@ export function makeGrid(half, radius, order) {
     vertexShader: VERTEX,
     fragmentShader: FRAGMENT,
     uniforms: {
-      cell: { value: 1 }, strength: { value: 0.3 }, radius: { value: radius },
-      centre: { value: new THREE.Vector2() }, color: { value: new THREE.Color() },
+      cell: { value: 1 },
+      strength: { value: 0.3 },
+      radius: { value: radius },
+      centre: { value: new THREE.Vector2() },
+      color: { value: new THREE.Color() },
     },
     transparent: true,
     depthWrite: false,
@@ -60,11 +63,18 @@ export function spatialSurroundings(scene, { centre, radius, floor }) {
   key.shadow.bias = -0.0004;
   key.shadow.normalBias = 0.012 * radius;
   const reach = 1.25 * radius;
-  Object.assign(key.shadow.camera, { left: -reach, right: reach, top: reach, bottom: -reach, near: 0.2 * radius, far: 7 * radius });
+  Object.assign(key.shadow.camera, {
+    left: -reach,
+    right: reach,
+    top: reach,
+    bottom: -reach,
+    near: 0.2 * radius,
+    far: 7 * radius,
+  });
   const fillLight = new THREE.DirectionalLight("#dbe8ff", 0.7);
   fillLight.position.copy(centre).add(new THREE.Vector3(2, 1, 0.6).multiplyScalar(radius));
   fillLight.target = key.target;
-  const sky = new THREE.HemisphereLight("#ffffff", "#98a2ad", 1.5);
+  const sky = new THREE.HemisphereLight("#ffffff", "#a9b2bd", 2.0);
   const shadow = new THREE.Mesh(
     new THREE.CircleGeometry(6 * radius, 64),
     new THREE.ShadowMaterial({ opacity: 0.25, depthWrite: false }),

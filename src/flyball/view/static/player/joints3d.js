@@ -20,6 +20,8 @@ const PARTS = {
   fixed: (u) => [new THREE.RoundedBoxGeometry(0.06 * u, 0.06 * u, 0.06 * u, 2, 0.007 * u)],
 };
 
+const nearer = { polygonOffset: true, polygonOffsetFactor: -1, polygonOffsetUnits: -1 }; // wins where faces coincide
+
 function flange(u, at) {
   return cylinderGeometry(0.036 * u, 0.016 * u).translate(0, 0, at * u);
 }
@@ -35,10 +37,10 @@ function stand(u) {
 /** The symbol of a joint; it is to be added to the body the joint rides on (or to the world). */
 export function solidJoint(joint, recording, unit) {
   const group = new THREE.Group();
-  const dark = new THREE.MeshStandardMaterial({ color: "#3a4450", roughness: 0.35, metalness: 0.45 });
+  const dark = new THREE.MeshStandardMaterial({ color: "#3a4450", roughness: 0.35, metalness: 0.4, ...nearer });
   const grey = new THREE.MeshStandardMaterial({ color: "#8d97a3", roughness: 0.7, flatShading: true });
   const slides = joint.kind === "prismatic" || joint.kind === "cylindrical";
-  const travel = (slides && sliderTravel(joint, recording, unit)) || [0, 0];
+  const travel = (slides && sliderTravel(joint, recording, unit)?.range) || [0, 0];
   const margin = joint.kind === "cylindrical" ? 0.12 * unit : 0.1 * unit;
   const symbol = new THREE.Group();
   for (const part of PARTS[joint.kind](unit, [travel[0] - margin, travel[1] + margin])) {
@@ -49,6 +51,6 @@ export function solidJoint(joint, recording, unit) {
   if (joint.body === "ground") for (const part of stand(unit)) group.add(new THREE.Mesh(part, grey));
   group.position.set(...joint.position);
   group.traverse((object) => Object.assign(object, { castShadow: true, receiveShadow: true }));
-  const retheme = (theme) => dark.color.set(theme.symbol).multiplyScalar(0.8);
+  const retheme = (theme) => dark.color.set(theme.metal);
   return { group, retheme };
 }

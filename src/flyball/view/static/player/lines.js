@@ -45,7 +45,7 @@ class Look {
       : new THREE.CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2);
     geometry.translate(0, 0, 0.5);
     const parts = [[this.mesh(geometry, this.material(tone), level), 0]];
-    if (this.planar && tone !== "rope") parts.push([this.mesh(geometry, this.material("ink"), level - 1), this.rim]);
+    if (this.planar && tone !== "rope") parts.push([this.mesh(geometry, this.material("rim"), level - 1), this.rim]);
     for (const [mesh] of parts) parent.add(mesh);
     return (from, to) => {
       for (const [mesh, rim] of parts) {
@@ -64,10 +64,11 @@ class Look {
 function spring(look, parent, radius, [shortest, longest]) {
   const { turns, wire } = coilFor(shortest, longest, radius);
   const coils = [[new Coil(turns, radius, wire), look.material("steel"), 0]];
-  if (look.planar) coils.push([new Coil(turns, radius, wire + 1.2 * look.rim), look.material("ink"), -1]);
+  if (look.planar) coils.push([new Coil(turns, radius, wire + 1.2 * look.rim), look.material("rim"), -1]);
   for (const [coil, material, level] of coils) {
     // In the plane the coil alone uses depth, so that its turns pass before and behind each other.
-    if (look.planar) Object.assign(material, { depthTest: true, depthWrite: true, side: level ? THREE.BackSide : THREE.FrontSide });
+    if (look.planar)
+      Object.assign(material, { depthTest: true, depthWrite: true, side: level ? THREE.BackSide : THREE.FrontSide });
     parent.add(look.mesh(coil.geometry, material, level + 2));
   }
   return (length) => coils.forEach(([coil]) => coil.update(length));
@@ -78,13 +79,13 @@ function damper(look, parent, radius, [shortest, longest]) {
   const start = 0.12 * housing;
   const stub = look.bar(parent, 0.3 * radius, "steel");
   const rod = look.bar(parent, 0.3 * radius, "steel", 3);
-  const tube = look.bar(parent, radius, "symbol", 5);
+  const tube = look.bar(parent, radius, "tube", 5);
   const collar = look.bar(parent, 1.12 * radius, "steel", 7);
   return (length) => {
     const end = Math.min(start + housing, 0.9 * length);
     stub(0, start);
     tube(start, end);
-    collar(end - 0.12 * housing, end);
+    collar(end - 0.1 * housing, end + 0.02 * housing);
     rod(end, length);
   };
 }
@@ -92,8 +93,15 @@ function damper(look, parent, radius, [shortest, longest]) {
 function arrow(look, parent, radius) {
   const shaft = look.bar(parent, radius, "force");
   const head = look.planar
-    ? new THREE.ShapeGeometry(new THREE.Shape([[0, 1], [-1, 0], [1, 0]].map(([x, y]) => new THREE.Vector2(x, y))))
-        .rotateX(Math.PI / 2)
+    ? new THREE.ShapeGeometry(
+        new THREE.Shape(
+          [
+            [0, 1],
+            [-1, 0],
+            [1, 0],
+          ].map(([x, y]) => new THREE.Vector2(x, y)),
+        ),
+      ).rotateX(Math.PI / 2)
     : new THREE.ConeGeometry(1, 1, 28).rotateX(Math.PI / 2).translate(0, 0, 0.5);
   const tip = look.mesh(head, look.material("force"), 2);
   parent.add(tip);
@@ -101,7 +109,8 @@ function arrow(look, parent, radius) {
     const reach = Math.min(7 * radius, 0.6 * length);
     shaft(0, length - reach);
     tip.position.z = length - reach;
-    tip.scale.set(2.6 * radius, 2.6 * radius, reach);
+    const width = Math.min(2.6 * radius, 0.42 * reach);
+    tip.scale.set(width, width, reach);
   };
 }
 
@@ -122,13 +131,15 @@ const DRAWERS = {
 /** Round eyes at both ends of a planar line, where it is pinned. */
 function eyes(look, parent, radius) {
   const circle = new THREE.CircleGeometry(1, 32).rotateX(-Math.PI / 2);
-  const pair = ["ink", "steel"].map((tone, k) => [look.material(tone), radius + (k ? 0 : look.rim), 11 + k]);
-  const ends = [0, 1].map(() => pair.map(([material, size, level]) => {
-    const mesh = look.mesh(circle, material, level);
-    mesh.scale.setScalar(size);
-    parent.add(mesh);
-    return mesh;
-  }));
+  const pair = ["rim", "steel"].map((tone, k) => [look.material(tone), radius + (k ? 0 : look.rim), 11 + k]);
+  const ends = [0, 1].map(() =>
+    pair.map(([material, size, level]) => {
+      const mesh = look.mesh(circle, material, level);
+      mesh.scale.setScalar(size);
+      parent.add(mesh);
+      return mesh;
+    }),
+  );
   return (length) => ends[1].forEach((mesh) => (mesh.position.z = length));
 }
 

@@ -20,7 +20,7 @@ export class Mechanism {
     this.bodies = recording.bodies.map((body, k) => this.#body(body, colours[k], k));
     this.lines = recording.lines.map((line, k) => buildLine(line, recording, unit, k));
     this.joints = recording.joints.map((joint, k) => this.#joint(joint, k));
-    this.root.add(...this.lines.map((line) => line.group));
+    for (const line of this.lines) this.root.add(line.group);
     this.seek(recording.t[0]);
   }
 
@@ -80,9 +80,16 @@ export class Mechanism {
       const n = p.length / 3;
       const points = sampleNumbers(n, TRAIL).map((i) => new THREE.Vector3(p[i], p[n + i], p[2 * n + i]));
       const flat = this.recording.planar;
-      body.trail = stroke(points.filter((point) => Number.isFinite(point.x)), {
-        color: body.colour, width: 2, order: flat ? ORDER.trail : 0, depthTest: !flat, opacity: 0.75,
-      });
+      body.trail = stroke(
+        points.filter((point) => Number.isFinite(point.x)),
+        {
+          color: body.colour,
+          width: 2,
+          order: flat ? ORDER.trail : 0,
+          depthTest: !flat,
+          opacity: 0.75,
+        },
+      );
       this.root.add(body.trail);
     }
     body.trail.visible = on;

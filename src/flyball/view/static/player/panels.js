@@ -9,7 +9,11 @@ export function channelPicker(panel, button, channels, shown, onChange) {
   const search = panel.querySelector("input[type=search]");
   const together = panel.querySelector("input[name=together]");
   const list = panel.querySelector(".choices");
-  const report = () => onChange(channels.filter((channel) => chosen.has(channel)), together.checked);
+  const report = () =>
+    onChange(
+      channels.filter((channel) => chosen.has(channel)),
+      together.checked,
+    );
 
   const choice = (channel) => {
     const box = element("input", { type: "checkbox", checked: chosen.has(channel) });
@@ -19,12 +23,25 @@ export function channelPicker(panel, button, channels, shown, onChange) {
       report();
     });
     const name = element("span", { className: "name", textContent: channel.name });
-    return element("label", { className: "choice" }, box, name, element("span", { className: "unit", textContent: channel.unit }));
+    return element(
+      "label",
+      { className: "choice" },
+      box,
+      name,
+      element("span", { className: "unit", textContent: channel.unit }),
+    );
   };
   const fill = () => {
     const words = search.value.toLowerCase().split(/\s+/).filter(Boolean);
-    const found = channels.filter(({ name, unit }) => words.every((word) => `${name} ${unit}`.toLowerCase().includes(word)));
-    const note = found.length > MOST ? `${found.length - MOST} more: narrow the search` : found.length ? "" : "No channel of that name";
+    const found = channels.filter(({ name, unit }) =>
+      words.every((word) => `${name} ${unit}`.toLowerCase().includes(word)),
+    );
+    const note =
+      found.length > MOST
+        ? `${found.length - MOST} more: narrow the search`
+        : found.length
+          ? ""
+          : "No channel of that name";
     list.replaceChildren(...found.slice(0, MOST).map(choice));
     if (note) list.append(element("p", { className: "empty", textContent: note }));
   };
@@ -44,7 +61,10 @@ export function channelPicker(panel, button, channels, shown, onChange) {
     fill();
     report();
   });
-  document.addEventListener("pointerdown", ({ target }) => !panel.hidden && !panel.contains(target) && !button.contains(target) && open(false));
+  document.addEventListener(
+    "pointerdown",
+    ({ target }) => !panel.hidden && !panel.contains(target) && !button.contains(target) && open(false),
+  );
   panel.addEventListener("keydown", (event) => {
     if (event.key !== "Escape") return;
     open(false);
@@ -59,8 +79,19 @@ export function bodyLegend(box, toggle, bodies, { onShow, onTrail, onPoint }) {
     const swatch = element("span", { className: "swatch" });
     swatch.style.background = colour;
     const row = { shown: true, trail: false };
-    const show = element("button", { type: "button", className: "body", title: `Hide or show ${name}`, aria: { pressed: "true" } }, swatch, element("span", { className: "name", textContent: name }));
-    const trail = element("button", { type: "button", className: "trail", title: `Path of the origin of ${name}`, textContent: "path", aria: { pressed: "false" } });
+    const show = element(
+      "button",
+      { type: "button", className: "body", title: `Hide or show ${name}`, aria: { pressed: "true" } },
+      swatch,
+      element("span", { className: "name", textContent: name }),
+    );
+    const trail = element("button", {
+      type: "button",
+      className: "trail",
+      title: `Path of the origin of ${name}`,
+      textContent: "path",
+      aria: { pressed: "false" },
+    });
     show.addEventListener("click", () => {
       row.shown = !row.shown;
       show.setAttribute("aria-pressed", String(row.shown));
@@ -90,7 +121,11 @@ export function bodyLegend(box, toggle, bodies, { onShow, onTrail, onPoint }) {
 export function summary(details, notes) {
   const entries = Object.entries(notes);
   details.hidden = !entries.length;
-  details.querySelector("dl").append(
-    ...entries.map(([term, text]) => element("div", {}, element("dt", { textContent: term }), element("dd", { textContent: text }))),
-  );
+  details
+    .querySelector("dl")
+    .append(
+      ...entries.map(([term, text]) =>
+        element("div", {}, element("dt", { textContent: term }), element("dd", { textContent: text })),
+      ),
+    );
 }

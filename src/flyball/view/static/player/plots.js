@@ -5,8 +5,8 @@ import { element, shortNumber } from "./format.js";
 import { CURVES } from "./theme.js";
 
 const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
-const LOWEST = 132; // px
-const HIGHEST = 250;
+const LOWEST = 92; // px
+const HIGHEST = 320;
 const MOST = CURVES.length; // curves in one plot
 
 /** Channels that share a plot: those of one unit, or each for itself. */
@@ -21,7 +21,8 @@ export function grouped(channels, together) {
 }
 
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-const gapped = (values) => (values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : null)));
+const gapped = (values) =>
+  values.every(Number.isFinite) ? values : Array.from(values, (v) => (Number.isFinite(v) ? v : null));
 
 /** A constant curve still gets some room above and below, and one in the noise is not blown up. */
 function valueRange(_, low, high) {
@@ -55,7 +56,12 @@ class Plot {
   }
 
   #options() {
-    const axis = { stroke: () => css("--muted"), font: FONT, grid: { stroke: () => css("--line"), width: 1 }, ticks: { show: false } };
+    const axis = {
+      stroke: () => css("--muted"),
+      font: FONT,
+      grid: { stroke: () => css("--line"), width: 1 },
+      ticks: { show: false },
+    };
     const labels = (_, splits) => splits.map((value) => (value === null ? "" : shortNumber(value)));
     return {
       width: 300,
@@ -63,12 +69,23 @@ class Plot {
       padding: [8, 12, 0, 0],
       cursor: { show: false },
       legend: { show: false },
-      scales: { x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) }, y: { range: valueRange } },
+      scales: {
+        x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
+        y: { range: valueRange },
+      },
       axes: [
         { ...axis, size: 22, gap: 4, space: 56, values: labels },
-        { ...axis, size: 54, gap: 6, space: 26, values: labels },
+        { ...axis, size: 54, gap: 6, space: 20, values: labels },
       ],
-      series: [{}, ...this.channels.map((_, k) => ({ stroke: CURVES[k], width: 1.6, points: { show: this.times.length === 1 } }))],
+      series: [
+        {},
+        ...this.channels.map((_, k) => ({
+          stroke: CURVES[k],
+          width: 1.6,
+          pxAlign: 0,
+          points: { show: this.times.length === 1 },
+        })),
+      ],
     };
   }
 
@@ -100,7 +117,7 @@ class Plot {
   /** Move the cursor to a time, which lies at a given place among the samples. */
   seek(time, frame) {
     const { chart, cursor, markers, values, channels } = this;
-    const x = chart.valToPos(time, "x");
+    const x = Math.round(chart.valToPos(time, "x"));
     cursor.style.transform = `translateX(${x}px)`;
     channels.forEach((channel, k) => {
       const value = mixed(channel.values, frame);

@@ -6,14 +6,21 @@ const ROUND = 48;
 /** A turned part along z from its profile of (radius, z) pairs, going up. */
 function turned(profile) {
   const points = profile.map(([radius, z]) => new THREE.Vector2(Math.max(radius, 0), z));
-  return new THREE.LatheGeometry(points, ROUND).rotateX(Math.PI / 2);
+  return new THREE.LatheGeometry(points, 72).rotateX(Math.PI / 2);
 }
 
 /** A cylinder along z with chamfered rims; corners are doubled, so that faces stay flat. */
 export function cylinderGeometry(radius, length, soft = 0.08) {
   const c = Math.min(radius, length) * soft;
   const h = length / 2;
-  const corners = [[0, -h], [radius - c, -h], [radius, c - h], [radius, h - c], [radius - c, h], [0, h]];
+  const corners = [
+    [0, -h],
+    [radius - c, -h],
+    [radius, c - h],
+    [radius, h - c],
+    [radius - c, h],
+    [0, h],
+  ];
   const profile = corners.flatMap((corner, k) => (k === 0 || k === corners.length - 1 ? [corner] : [corner, corner]));
   return turned(profile);
 }
@@ -22,7 +29,11 @@ function plateGeometry(outline, thickness) {
   const shape = new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y)));
   const bevel = thickness * 0.12;
   const geometry = new THREE.ExtrudeGeometry(shape, {
-    depth: thickness - 2 * bevel, bevelThickness: bevel, bevelSize: bevel, bevelOffset: -bevel, bevelSegments: 2,
+    depth: thickness - 2 * bevel,
+    bevelThickness: bevel,
+    bevelSize: bevel,
+    bevelOffset: -bevel,
+    bevelSegments: 2,
   });
   return geometry.translate(0, 0, bevel - thickness / 2);
 }
@@ -51,7 +62,7 @@ export function placed(object, shape) {
 
 /** A small dark dimple near the rim of a wheel: without it one could not see the wheel turn. */
 function spinMarks({ kind, size }, material) {
-  if (kind !== "cylinder" || size[0] < 0.8 * size[1]) return [];
+  if (kind !== "cylinder" || size[0] < 1.5 * size[1]) return [];
   const geometry = new THREE.CylinderGeometry(0.09 * size[0], 0.09 * size[0], 1.03 * size[1], 20).rotateX(Math.PI / 2);
   const mark = new THREE.Mesh(geometry.translate(0.72 * size[0], 0, 0), material);
   return [mark];
@@ -80,9 +91,11 @@ export function cornersOf(shape) {
   const frame = placed(new THREE.Group(), shape);
   frame.updateMatrix();
   const corners = [];
-  for (const x of [min.x, max.x]) for (const y of [min.y, max.y]) for (const z of [min.z, max.z]) {
-    corners.push(new THREE.Vector3(x, y, z).applyMatrix4(frame.matrix));
-  }
+  for (const x of [min.x, max.x])
+    for (const y of [min.y, max.y])
+      for (const z of [min.z, max.z]) {
+        corners.push(new THREE.Vector3(x, y, z).applyMatrix4(frame.matrix));
+      }
   geometry.dispose();
   return corners;
 }

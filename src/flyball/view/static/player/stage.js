@@ -33,9 +33,12 @@ function ballAround(points) {
 }
 
 export class Stage {
-  /** A stage in an element with a canvas; `points` enclose all that is ever to be seen. */
-  constructor(element, mechanism, points, inset) {
-    Object.assign(this, { element, mechanism, points, inset, dirty: true, view: "iso", flight: null });
+  /**
+   * A stage in an element with a canvas; `points` enclose all that is ever to be seen, `insets` returns
+   * the margins [px] to keep free: first those that must be, then ways to keep clear of more.
+   */
+  constructor(element, mechanism, points, insets) {
+    Object.assign(this, { element, mechanism, points, insets, dirty: true, view: "iso", flight: null });
     this.planar = mechanism.recording.planar;
     this.ball = ballAround(points);
     this.scene = new THREE.Scene();
@@ -95,11 +98,22 @@ export class Stage {
   resize() {
     const [width, height] = this.size;
     this.renderer?.setSize(width, height, false);
-    if (this.planar) Object.assign(this.camera, { left: -width / 2, right: width / 2, top: height / 2, bottom: -height / 2 });
+    if (this.planar)
+      Object.assign(this.camera, { left: -width / 2, right: width / 2, top: height / 2, bottom: -height / 2 });
     else this.camera.aspect = width / height;
     if (this.view) this.look(this.view);
     else this.camera.updateProjectionMatrix();
     this.dirty = true;
+  }
+
+  /** The better of several ways to keep the picture clear of what lies over it, unless it costs too much size. */
+  #fitted(fit) {
+    const plain = fit(this.insets()[0]);
+    const clear = this.insets()
+      .slice(1)
+      .map(fit)
+      .sort((a, b) => b.size - a.size)[0];
+    return clear && clear.size > 0.72 * plain.size ? clear : plain;
   }
 
   /** Look from a preset; all of the motion is in the picture. */
@@ -107,14 +121,15 @@ export class Stage {
     this.view = view;
     const [width, height] = this.size;
     if (this.planar) {
-      const { x, y, scale } = fitFlat(this.points, width, height, this.inset);
+      const { x, y, scale } = this.#fitted((inset) => fitFlat(this.points, width, height, inset));
       this.controls.target.set(x, y, 0);
       this.camera.position.set(x, y, 500);
       this.camera.zoom = scale;
     } else {
       const direction = new THREE.Vector3(...VIEWS[view]).normalize();
       const up = view === "top" ? new THREE.Vector3(0, 1, 0) : this.camera.up;
-      const goal = fitSpace(this.points, direction, up, TANGENT, width, height, this.inset);
+      const fit = (inset) => fitSpace(this.points, direction, up, TANGENT, width, height, inset);
+      const goal = this.#fitted(fit);
       if (smooth && this.controls.enableDamping) this.flight = this.#flightTo(goal);
       else this.#stand(goal);
     }
@@ -128,7 +143,11 @@ export class Stage {
   }
 
   #flightTo(goal) {
-    return { begin: performance.now(), from: { position: this.camera.position.clone(), target: this.controls.target.clone() }, goal };
+    return {
+      begin: performance.now(),
+      from: { position: this.camera.position.clone(), target: this.controls.target.clone() },
+      goal,
+    };
   }
 
   #fly(now) {
@@ -139,7 +158,10 @@ export class Stage {
     const [a, b] = [arm(from), arm(goal)];
     const target = from.target.clone().lerp(goal.target, u);
     const reach = a.length() + u * (b.length() - a.length());
-    this.#stand({ target, position: a.normalize().lerp(b.normalize(), u).normalize().multiplyScalar(reach).add(target) });
+    this.#stand({
+      target,
+      position: a.normalize().lerp(b.normalize(), u).normalize().multiplyScalar(reach).add(target),
+    });
     if (s === 1) this.flight = null;
     this.dirty = true;
   }

@@ -3,8 +3,18 @@ import * as THREE from "three";
 
 // Neighbours differ in lightness as well as in hue, so that they stay apart for colour-blind eyes and in grey print.
 const PALETTE = [
-  "#2f6fb7", "#e58a2b", "#2a9d83", "#c8465a", "#7d63b8", "#d9b02c",
-  "#58b0d8", "#a2572f", "#d983b4", "#6f8f2f", "#5b6b7c", "#93a8d9",
+  "#2f6fb7",
+  "#e58a2b",
+  "#2a9d83",
+  "#c8465a",
+  "#7d63b8",
+  "#d9b02c",
+  "#58b0d8",
+  "#a2572f",
+  "#d983b4",
+  "#6f8f2f",
+  "#5b6b7c",
+  "#93a8d9",
 ];
 // A ramp of steady lightness change, for chains of many alike bodies.
 const RAMP = ["#28408b", "#2569a5", "#1f8f9f", "#3fae82", "#94bf55", "#e3b93c", "#ec8b45", "#d85a5a", "#a63d72"];
@@ -13,12 +23,36 @@ const GROUND = "#8b96a3";
 
 export const THEMES = {
   light: {
-    ink: "#1d2733", paper: "#ffffff", steel: "#9aa6b3", symbol: "#3c4856", pin: "#ffffff", hatch: "#5c6875",
-    grid: "#7f8fa3", gridStrength: 0.34, force: "#c2263c", rope: "#5a4a3a", shadow: 0.26, flatShadow: 0.13,
+    ink: "#1d2733",
+    rim: "#1d2733",
+    metal: "#6f7c8b",
+    paper: "#ffffff",
+    steel: "#9aa6b3",
+    pin: "#ffffff",
+    hatch: "#5c6875",
+    tube: "#4a5767",
+    grid: "#7f8fa3",
+    gridStrength: 0.34,
+    force: "#c2263c",
+    rope: "#5a4a3a",
+    shadow: 0.26,
+    flatShadow: 0.13,
   },
   dark: {
-    ink: "#eef3f8", paper: "#151a21", steel: "#aeb9c5", symbol: "#8894a2", pin: "#1b222b", hatch: "#93a0ae",
-    grid: "#8fa3ba", gridStrength: 0.26, force: "#ff6b7d", rope: "#cbb79b", shadow: 0.5, flatShadow: 0.35,
+    ink: "#eef3f8",
+    rim: "#0a0e13",
+    metal: "#98a4b2",
+    paper: "#151a21",
+    steel: "#aeb9c5",
+    pin: "#1b222b",
+    hatch: "#93a0ae",
+    tube: "#5b6878",
+    grid: "#8fa3ba",
+    gridStrength: 0.26,
+    force: "#ff6b7d",
+    rope: "#cbb79b",
+    shadow: 0.5,
+    flatShadow: 0.35,
   },
 };
 

@@ -31,7 +31,10 @@ function travelOf(poses, origin, axis, kind, size) {
   return range[1] - range[0] > 1e-4 * size ? { range, miss, first } : null;
 }
 
-/** The stretch of a joint's axis, measured from the joint's point, over which its slider moves; null if none is seen. */
+/**
+ * The body that slides in a joint, its pose relative to the carrier at the start, and the stretch of the joint's axis
+ * (measured from the joint's point) over which its origin moves; null if no body is seen to slide.
+ */
 export function sliderTravel(joint, recording, size) {
   const carrier = recording.bodies.find((body) => body.name === joint.body) ?? null;
   const numbers = sampleNumbers(recording.t.length, SAMPLES);
@@ -39,8 +42,11 @@ export function sliderTravel(joint, recording, size) {
   const axis = new THREE.Vector3(...joint.axis).normalize();
   const found = recording.bodies
     .filter((body) => body !== carrier)
-    .map((body) => travelOf(relativePoses(body, carrier, numbers), origin, axis, joint.kind, size))
-    .filter((travel) => travel && travel.miss < 0.5 * size)
+    .map((body) => {
+      const poses = relativePoses(body, carrier, numbers);
+      return { body, pose: poses[0], ...travelOf(poses, origin, axis, joint.kind, size) };
+    })
+    .filter(({ range, miss }) => range && miss < 0.5 * size)
     .sort((a, b) => a.miss + Math.abs(a.first) - b.miss - Math.abs(b.first));
-  return found.length ? found[0].range : null;
+  return found[0] ?? null;
 }

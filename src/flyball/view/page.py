@@ -1,0 +1,94 @@
+"""The animation page: one recording as one self-contained HTML document that needs no network."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import html
+import re
+from functools import cache
+from importlib.resources import files
+
+from .payload import payload
+from .recording import Recording
+
+# The player's modules, each after those it imports.
+MODULES = (
+    "data",
+    "format",
+    "theme",
+    "solids",
+    "flats",
+    "coil",
+    "lines",
+    "travel",
+    "joints3d",
+    "joints2d",
+    "framing",
+    "ground",
+    "mechanism",
+    "stage",
+    "plots",
+    "panels",
+    "clock",
+    "bar",
+    "overlay",
+    "main",
+)
+
+
+def page(recording: Recording) -> str:
+    """Write a recording as a web page with the moving mechanism, linked plots and a summary.
+
+    Parameters
+    ----------
+    recording : Recording
+        The motion to show.
+
+    Returns
+    -------
+    str
+        One HTML document with everything in it: it can be opened from a file, mailed, or embedded, and asks for
+        nothing else. ``#t=5`` after its address opens it paused at 5 s, ``#t=5&theme=dark`` in the dark theme too.
+
+    Raises
+    ------
+    ValueError
+        If the recording is not complete and consistent; the message names the guilty element.
+    """
+    parts = {
+        "title": html.escape(recording.name),
+        "licences": _static("licences.txt").replace("--", "- -"),
+        "style": _static("uplot.min.css") + _static("page.css"),
+        "player": _player(),
+        "recording": _packed(payload(recording)),
+        "boot": _static("boot.js"),
+    }
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _static("page.html"))
+
+
+@cache
+def _static(name: str) -> str:
+    return files(__package__).joinpath("static", name).read_text(encoding="utf-8")
+
+
+def _packed(data: bytes) -> str:
+    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+
+
+@cache
+def _player() -> str:
+    """The libraries and the player as one gzipped script."""
+    modules = "\n".join(_scoped(name, _static(f"player/{name}.js")) for name in MODULES)
+    head = '"use strict";\nconst THREE = LIB, uPlot = LIB.uPlot;\n'
+    script = f"{_static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
+    return _packed(script.encode())
+
+
+def _scoped(name: str, module: str) -> str:
+    """A module as a function of its own that returns what it exports; only its named imports are understood."""
+    exported = ", ".join(re.findall(r"^export (?:class|const|function) (\w+)", module, flags=re.M))
+    body = re.sub(r'^import (\{[^}]*\}) from "\./(\w+)\.js";', r"const \1 = $\2;", module, flags=re.M)
+    body = re.sub(r"^import .*;\n", "", body, flags=re.M)
+    body = re.sub(r"^export ", "", body, flags=re.M)
+    return f"const ${name} = (() => {{\n{body}\nreturn {{ {exported} }};\n}})();"
