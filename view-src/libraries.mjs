@@ -1,6 +1,5 @@
 // What the animation page takes from its libraries; anything not named here is shaken off.
 export {
-  AmbientLight,
   BackSide,
   Box3,
   BufferAttribute,
@@ -14,11 +13,10 @@ export {
   DoubleSide,
   DynamicDrawUsage,
   ExtrudeGeometry,
+  FrontSide,
   Group,
   HemisphereLight,
   LatheGeometry,
-  LineBasicMaterial,
-  LineSegments,
   MOUSE,
   Matrix4,
   Mesh,
@@ -29,7 +27,6 @@ export {
   PCFShadowMap,
   PerspectiveCamera,
   PlaneGeometry,
-  PMREMGenerator,
   Quaternion,
   Raycaster,
   Scene,
@@ -41,11 +38,9 @@ export {
   TOUCH,
   Vector2,
   Vector3,
-  VSMShadowMap,
   WebGLRenderer,
 } from "three";
 export { OrbitControls } from "three/addons/controls/OrbitControls.js";
-export { RoomEnvironment } from "three/addons/environments/RoomEnvironment.js";
 export { RoundedBoxGeometry } from "three/addons/geometries/RoundedBoxGeometry.js";
 export { Line2 } from "three/addons/lines/Line2.js";
 export { LineGeometry } from "three/addons/lines/LineGeometry.js";

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from dataclasses import replace
+from importlib.resources import files
 
 import numpy as np
 import pytest
 from recordings import planar, spatial
 
-from flyball.view.page import page
+from flyball.view.page import MODULES, page
 from flyball.view.payload import payload
 from flyball.view.recording import RecordedJoint, Shape
 
@@ -59,3 +61,11 @@ def test_what_cannot_be_shown_is_refused(change: object, message: str) -> None:
     recording = planar()
     with pytest.raises(ValueError, match=message):
         page(replace(recording, **change(recording)))
+
+
+def test_the_bundle_holds_all_that_the_player_takes() -> None:
+    static = files("flyball.view").joinpath("static")
+    bundle = static.joinpath("libraries.min.js").read_text(encoding="utf-8")
+    for name in MODULES:
+        for taken in re.findall(r"\bTHREE\.(\w+)", static.joinpath("player", f"{name}.js").read_text(encoding="utf-8")):
+            assert f"{taken}:()=>" in bundle, f"{name}.js takes {taken}: add it to view-src/libraries.mjs and rebuild"

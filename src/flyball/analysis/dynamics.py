@@ -155,6 +155,7 @@ def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray
     real, count = np.zeros(9), np.zeros(7, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
+    real[ex.SCALE] = a.compiled.values.length
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.CONTROLLED] = s.nq + s.nv

@@ -8,5 +8,7 @@ from ..model.force import Force
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
-# every force class that a file of this folder defines is public
-globals().update({k: v for k, v in Force.registry.items() if v.__module__.startswith(f"{__name__}.")})
+ALL = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
+"""Every force element that a file of this folder defines; all are public."""
+
+globals().update({c.__name__: c for c in ALL})

@@ -33,7 +33,9 @@ def _orientation(value: Any) -> Any:
     if hasattr(value, "as_matrix"):
         value = matrix_to_quaternion(np.asarray(value.as_matrix()))
     value = _plain(value)
-    if len(value) == 3 and all(isinstance(row, (tuple, list)) for row in value):
+    if not isinstance(value, (tuple, list)):
+        raise ValueError("give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")
+    if len(value) == 3 and all(isinstance(row, (tuple, list)) and len(row) == 3 for row in value):
         value = matrix_to_quaternion(orientation_matrix(value, "orientation")).tolist()
     return tuple(value)
 

@@ -101,6 +101,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     name = kwargs.get("name", args[0] if args else None)
     who = f"{kind} {name!r}" if isinstance(name, str) else kind
     lines = []
+    wrong: dict[str, list[str]] = {}  # field -> what it may be: a union complains once for each of its members
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
         where = place[0] if place else ""
@@ -109,10 +110,25 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
             lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             lines.append(f"field {where!r} is missing")
+        elif e["type"] in _TYPES:
+            wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:
             message = e["msg"].removeprefix("Value error, ")
             lines.append(f"field {where!r}: {message} (got {e['input']!r})")
+    for where, wanted in wrong.items():
+        value = kwargs.get(where, dict(zip(known, args, strict=False)).get(where))
+        lines.append(f"field {where!r} must be {' or '.join(dict.fromkeys(wanted))}, got {value!r}")
     return f"{who}: " + "; ".join(dict.fromkeys(lines))
+
+
+_TYPES = {
+    "float_type": "a number",
+    "float_parsing": "a number",
+    "string_type": "a text",
+    "tuple_type": "a list",
+    "bool_type": "true or false",
+    "bool_parsing": "true or false",
+}
 
 
 def _is_branch(place: str) -> bool:
@@ -192,7 +208,7 @@ def written(e: Element) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for f in dataclasses.fields(e):
         value = getattr(e, f.name)
-        if f.default is not dataclasses.MISSING and value == f.default:
+        if value == f.default and repr(value) == repr(f.default):  # -0.0 equals 0.0, yet is not the same
             continue
         if value is not None:
             out[f.name] = _data(value)

@@ -87,7 +87,8 @@ def _given(body: Body, n: SimpleNamespace, planar: bool, mass: float, com: np.nd
         J = np.zeros((3, 3), np.result_type(type(n.inertia), float))
         J[2, 2] = n.inertia
     else:
-        a = np.asarray(n.inertia)
+        ragged = isinstance(n.inertia, tuple) and len({isinstance(x, tuple) and len(x) for x in n.inertia}) > 1
+        a = np.zeros(0) if ragged else np.asarray(n.inertia)
         a = np.full(3, a) if a.shape == () and a == 0 else a
         if a.shape not in ((3,), (3, 3)):
             raise ModelError(

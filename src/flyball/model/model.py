@@ -47,9 +47,16 @@ class Model:
             raise ModelError(f"the name of a mechanism is a text, not {name!r}")
         self.name = name
         self.planar = bool(planar)
-        self.parameters = {k: _plain(v) for k, v in (parameters or {}).items()}
+        try:
+            self.parameters = {k: _plain(v) for k, v in (parameters or {}).items()}
+            g = _plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)
+        except (ValueError, TypeError, AttributeError) as error:
+            raise ModelError(f"parameters or gravity of {name!r}: {error}") from None
         self.environment()
-        self.gravity = tuple(_plain(gravity)) if gravity is not None else (0.0,) * (2 if planar else 3)
+        if not isinstance(g, (tuple, list)):
+            example = "(0, -9.81)" if planar else "(0, 0, -9.81)"
+            raise ModelError(f"gravity of {name!r} is a vector, for instance {example}, not {g!r}")
+        self.gravity = tuple(g)
         self.gravity_vector()
         self.bodies: list[Body] = []
         self.frames: list[Frame] = []

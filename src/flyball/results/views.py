@@ -147,7 +147,7 @@ class JointView(View):
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
-        if name.startswith("_"):
+        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
             raise AttributeError(name)
         own = self.element.coordinates
         for ending, k in (("_rate", 1), ("_acceleration", 2)):
@@ -306,7 +306,9 @@ class ForceView(View):
 
     def __getattr__(self, name: str) -> np.ndarray:
         """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint."""
-        if name.startswith("_") or name not in self.element.outputs:
+        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
+            raise AttributeError(name)
+        if name not in self.element.outputs:
             has = ", ".join([*self.element.outputs, "wrench", "energy", "power", "work"])
             raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
         (a, b), force, torque = self._evaluated()

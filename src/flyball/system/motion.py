@@ -42,7 +42,10 @@ from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED = 2
-PASSES = 12
+PASSES = 16
+CLOSED = 1e-9  # a projection that comes to rest above this has failed
+TIGHT_G, TIGHT_V = 1e-13, 1e-12  # violations of accepted and reported states that are left alone
+FAR = 1e3  # a state this far off is given up at once
 
 
 @formula
@@ -70,20 +73,27 @@ def violation(W, out):
 
 @formula
 def drift(S, W, v, out):
-    """Largest |G v - nu| and nu - G v into ``out``."""
+    """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
     worst = 0.0
+    size = 0.0
     for k in range(out.shape[0]):
-        r = W.row[NU, k] - row_times(S, W, k, v)
+        r = W.row[NU, k]
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            p = W.G[e] * v[S.col_i[e]]
+            r -= p
+            size = max(size, magnitude(p))
         out[k] = r
         worst = max(worst, magnitude(r))
-    return worst
+    return worst, size
 
 
 @formula
 def project_state(S, W, t, q, v, tol_g, tol_v):
-    """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there. Returns 0 or NOT_CLOSED.
+    """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
-    Newton along M^-1 G^T; the factor is made anew only while the positions still move a lot.
+    Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. A violation below the
+    tolerance is left alone: near a singular position its correction is rounding divided by a small number, and the
+    accelerations would follow it. Returns (0 or NOT_CLOSED, the violation that was found).
     """
     zero = W.vel[F_APPLIED]
     step = W.vel[V3]
@@ -91,34 +101,34 @@ def project_state(S, W, t, q, v, tol_g, tol_v):
     normalise(S, q)
     place(S, W, t, q, v)
     if r.shape[0] == 0:
-        return 0
+        return 0, 0.0
     for d in range(zero.shape[0]):
         zero[d] = 0.0
     worst = violation(W, r)
+    found = worst
     last = 1e300
     for _ in range(PASSES):
-        if worst <= tol_g:
+        if worst <= tol_g or (worst > 0.7 * last and worst <= CLOSED):
             break
-        if not worst < last:
-            return NOT_CLOSED
         last = worst
-        if factor(S, W) != 0:
-            return NOT_CLOSED
+        if not worst <= FAR or factor(S, W) != 0:
+            return NOT_CLOSED, found
         solve(S, W, zero, r, step, W.row[RESIDUAL])
         retract(S, q, step)
         place(S, W, t, q, v)
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
-    if not worst <= tol_g:
-        return NOT_CLOSED
-    if drift(S, W, v, r) > tol_v:
+    if not worst <= CLOSED:
+        return NOT_CLOSED, found
+    worst, size = drift(S, W, v, r)
+    if worst > tol_v * (1.0 + size):
         if factor(S, W) != 0:
-            return NOT_CLOSED
+            return NOT_CLOSED, found
         solve(S, W, zero, r, step, W.row[RESIDUAL])
         for d in range(step.shape[0]):
             v[d] += step[d]
         place(S, W, t, q, v)
-    return 0
+    return 0, max(found, worst)
 
 
 @formula
@@ -151,7 +161,7 @@ def derivative(t, y, dy, S, W):
     q = p[:nq]
     v = p[nq : nq + nv]
     if W.option[STABILIZE] == STAGES:
-        status = project_state(S, W, t, q, v, W.option[TOL_G], W.option[TOL_V])
+        status, _ = project_state(S, W, t, q, v, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
             return status
     else:
@@ -176,14 +186,14 @@ def derivative(t, y, dy, S, W):
 
 
 @formula
-def project(t, y, S, W, tight):
-    """Project the state y in place; ``tight`` asks for the accuracy of reported states. Returns 0 or a status."""
+def project(t, y, S, W):
+    """Project the state y in place, to rounding. Returns (0 or a status, the violation found)."""
     nq = S.kinds[-2]
     nv = W.vel.shape[1]
     if W.option[STABILIZE] < STEPS:
         normalise(S, y[:nq])
-        return 0
-    return project_state(S, W, t, y[:nq], y[nq : nq + nv], tight, tight * 10.0)
+        return 0, 0.0
+    return project_state(S, W, t, y[:nq], y[nq : nq + nv], TIGHT_G, TIGHT_V)
 
 
 @formula
@@ -192,11 +202,11 @@ def report(t, y, out, S, W):
     nq = S.kinds[-2]
     nv = W.vel.shape[1]
     ny = y.shape[0]
-    status = project(t, y, S, W, 1e-11)
+    status, _ = project(t, y, S, W)
     if status == 0:
         status = derivative(t, y, W.y[1], S, W)
     W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
-    W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2]))
+    W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
     out[0] = t
     for i in range(ny):
         out[1 + i] = y[i]

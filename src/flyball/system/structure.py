@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .. import forces
 from ..constraints import angle
 from ..constraints.blocks import Row, point_coordinate
 from ..errors import ModelError
@@ -24,7 +25,7 @@ from .laws import compile_law
 from .tables import TERM_KINDS
 from .tree import FREE, NQ, NV, PLANAR, REVOLUTE
 
-FORCE_KINDS = max(f.kind for f in Element.registry.values() if issubclass(f, Force) and hasattr(f, "kind")) + 1
+FORCE_KINDS = 1 + max(f.kind for f in forces.ALL)
 
 
 @dataclass(frozen=True)

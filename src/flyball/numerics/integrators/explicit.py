@@ -1,6 +1,6 @@
 """One adaptive loop for every explicit Runge-Kutta pair, with dense output, projection and chunked output.
 
-Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``project(t, y, S, W, tight)`` and
+Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``project(t, y, S, W)`` and
 ``report(t, y, out, S, W)``. It returns when its output buffer is full, its share of steps is done, the end is
 reached, or it cannot go on; the caller calls again with the same ``Clock``. Progress, interrupt and restart are this.
 
@@ -17,7 +17,7 @@ from ..._jit import formula
 from ...math.scalar import sqrt
 
 # entries of Clock.real
-T, H, T_END, RTOL, ATOL, H_MAX, T_REPORTED, H_LAST, LARGEST = range(9)
+T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE = range(9)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED = range(7)
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED = 0, 1, 2, 3, 4
@@ -94,17 +94,13 @@ def attempt(derivative, project, S, W, R, c, h):
         if status != 0:
             return status, 0.0
     combine(y, c.K, R.A[stages], stages, h, new)
-    for i in range(new.shape[0]):
-        c.y[2, i] = new[i]
-    status = project(t + h, new, S, W, 1e-11)
+    status, moved = project(t + h, new, S, W)
     if status != 0:
         return status, 0.0
     status = derivative(t + h, new, c.K[stages], S, W)
     if status != 0:
         return status, 0.0
-    for i in range(n):
-        c.y[2, i] -= new[i]
-    moved = scaled(c, c.y[2], new, n)
+    moved /= c.real[ATOL] + c.real[RTOL] * c.real[SCALE]
     e5 = 0.0
     e3 = 0.0
     for i in range(n):
@@ -184,6 +180,7 @@ def start(derivative, report, S, W, R, c, out, used):
             return UNREPORTED, used
         used += 1
         c.count[NEXT] += 1
+    c.real[GROW] = 10.0
     c.count[STARTED] = 1
     return 0, used
 
@@ -198,7 +195,6 @@ def advance(derivative, project, report, S, W, R, c, out):
         if c.count[STATUS] != RUNNING:
             return used
     exponent = -1.0 / R.order_i[0]
-    grow = 10.0
     steps = 0
     while c.real[T] < c.real[T_END]:
         if used == out.shape[0] or steps >= c.count[QUOTA]:
@@ -218,7 +214,7 @@ def advance(derivative, project, report, S, W, R, c, out):
             c.count[REJECTED] += 1
             shrink = 0.25 if status != 0 or not error < 1e300 else max(0.2, 0.9 * error**exponent)
             c.real[H] = h * shrink
-            grow = 1.0
+            c.real[GROW] = 1.0
             continue
         status, used = write(derivative, report, S, W, R, c, h, out, used)
         if status != 0:
@@ -231,7 +227,7 @@ def advance(derivative, project, report, S, W, R, c, out):
             c.K[0, i] = c.K[R.order_i[1], i]
         c.count[ACCEPTED] += 1
         c.real[T] = c.real[T_END] if h == c.real[T_END] - t else t + h
-        c.real[H] = h * (min(grow, max(0.2, 0.9 * error**exponent)) if error > 0.0 else grow)
-        grow = 10.0
+        c.real[H] = h * (min(c.real[GROW], max(0.2, 0.9 * error**exponent)) if error > 0.0 else c.real[GROW])
+        c.real[GROW] = 10.0
     c.count[STATUS] = DONE
     return used

@@ -79,7 +79,8 @@ export function fitFlat(points, width, height, inset) {
   const scale = Math.min(across / (x1 - x0 || 1e-9), down / (y1 - y0 || 1e-9), 1e7);
   const x = (x0 + x1) / 2 + (inset.right - inset.left) / 2 / scale;
   const y = (y0 + y1) / 2 + (inset.top - inset.bottom) / 2 / scale;
-  return { x, y, scale, size: scale };
+  const project = (p) => [width / 2 + (p.x - x) * scale, height / 2 - (p.y - y) * scale];
+  return { x, y, scale, size: scale, project };
 }
 
 /**
@@ -110,5 +111,10 @@ export function fitSpace(points, direction, up, tangent, width, height, inset) {
   const position = right.clone().multiplyScalar(across.at(depth)).addScaledVector(above, down.at(depth));
   position.addScaledVector(direction, depth);
   const distance = (d0 + d1) / 2 - depth;
-  return { position, target: position.clone().addScaledVector(direction, distance), size: 1 / distance };
+  const project = (point) => {
+    const arm = point.clone().sub(position);
+    const pixels = 1 / (per * arm.dot(direction));
+    return [width / 2 + pixels * arm.dot(right), height / 2 - pixels * arm.dot(above)];
+  };
+  return { position, target: position.clone().addScaledVector(direction, distance), size: 1 / distance, project };
 }

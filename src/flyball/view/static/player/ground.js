@@ -54,7 +54,7 @@ export function makeGrid(half, radius, order) {
 
 /** Light, shadow and ground for a motion inside a ball. */
 export function spatialSurroundings(scene, { centre, radius, floor }) {
-  const key = new THREE.DirectionalLight("#fff6ea", 2.3);
+  const key = new THREE.DirectionalLight("#fff6ea", 2.5);
   key.position.copy(centre).addScaledVector(new THREE.Vector3(-0.45, -0.75, 1.5).normalize(), 3 * radius);
   key.target.position.copy(centre);
   key.castShadow = true;
@@ -71,10 +71,10 @@ export function spatialSurroundings(scene, { centre, radius, floor }) {
     near: 0.2 * radius,
     far: 7 * radius,
   });
-  const fillLight = new THREE.DirectionalLight("#dbe8ff", 0.7);
+  const fillLight = new THREE.DirectionalLight("#dbe8ff", 1.1);
   fillLight.position.copy(centre).add(new THREE.Vector3(2, 1, 0.6).multiplyScalar(radius));
   fillLight.target = key.target;
-  const sky = new THREE.HemisphereLight("#ffffff", "#a9b2bd", 2.0);
+  const sky = new THREE.HemisphereLight("#ffffff", "#b4bcc6", 2.7);
   const shadow = new THREE.Mesh(
     new THREE.CircleGeometry(6 * radius, 64),
     new THREE.ShadowMaterial({ opacity: 0.25, depthWrite: false }),

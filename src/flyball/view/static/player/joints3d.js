@@ -37,7 +37,7 @@ function stand(u) {
 /** The symbol of a joint; it is to be added to the body the joint rides on (or to the world). */
 export function solidJoint(joint, recording, unit) {
   const group = new THREE.Group();
-  const dark = new THREE.MeshStandardMaterial({ color: "#3a4450", roughness: 0.35, metalness: 0.4, ...nearer });
+  const dark = new THREE.MeshStandardMaterial({ color: "#3a4450", roughness: 0.35, metalness: 0.1, ...nearer });
   const grey = new THREE.MeshStandardMaterial({ color: "#8d97a3", roughness: 0.7, flatShading: true });
   const slides = joint.kind === "prismatic" || joint.kind === "cylindrical";
   const travel = (slides && sliderTravel(joint, recording, unit)?.range) || [0, 0];

@@ -26,7 +26,7 @@ class Look {
     const options = { color: "#888888" };
     const material = this.planar
       ? flatMaterial(options)
-      : new THREE.MeshStandardMaterial({ ...options, roughness: 0.38, metalness: tone === "steel" ? 0.35 : 0.1 });
+      : new THREE.MeshStandardMaterial({ ...options, roughness: 0.38, metalness: 0.1 });
     this.paints.push({ material, tone });
     return material;
   }

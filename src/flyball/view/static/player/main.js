@@ -83,19 +83,27 @@ function describe(recording) {
   if (!recording.channels.length) document.body.classList.add("plotless");
 }
 
-/** Margins of the picture: the least, then with the open legend to the left of the motion, or above it. */
-function insets() {
+/** Margins of the picture: the least, the corner that the open legend covers, and ways to keep clear of it. */
+function margins() {
   const list = find(".legend ul");
-  if (list.hidden) return [INSET];
+  if (list.hidden) return { least: INSET, covered: null, ways: [] };
   const [stage, box] = [find(".stage"), list].map((part) => part.getBoundingClientRect());
-  return [INSET, { ...INSET, left: box.right - stage.left + GAP }, { ...INSET, top: box.bottom - stage.top + GAP }];
+  const covered = { right: box.right - stage.left + GAP, bottom: box.bottom - stage.top + GAP };
+  return {
+    least: INSET,
+    covered,
+    ways: [
+      { ...INSET, left: covered.right },
+      { ...INSET, top: covered.bottom },
+    ],
+  };
 }
 
 /** Everything that shows the mechanism, and what sets it to a time. */
 function buildPicture(recording) {
   const unit = symbolUnit(recording);
   const mechanism = new Mechanism(recording, unit);
-  const stage = new Stage(find(".stage"), mechanism, motionPoints(recording, unit), insets);
+  const stage = new Stage(find(".stage"), mechanism, motionPoints(recording, unit), margins);
   const redraw = () => (stage.dirty = true);
   if (!stage.renderer) message("No picture: this browser has WebGL switched off. Plots and the time cursor work.");
   find(".stage").addEventListener("stage-lost", () =>

@@ -75,7 +75,7 @@ class Plot {
       },
       axes: [
         { ...axis, size: 22, gap: 4, space: 56, values: labels },
-        { ...axis, size: 54, gap: 6, space: 20, values: labels },
+        { ...axis, size: 54, gap: 6, space: (_, __, ___, ____, height) => Math.max(16, height / 8), values: labels },
       ],
       series: [
         {},

@@ -34,11 +34,11 @@ function ballAround(points) {
 
 export class Stage {
   /**
-   * A stage in an element with a canvas; `points` enclose all that is ever to be seen, `insets` returns
-   * the margins [px] to keep free: first those that must be, then ways to keep clear of more.
+   * A stage in an element with a canvas; `points` enclose all that is ever to be seen, `margins` returns
+   * those to keep free [px]: the `least`, the corner that is `covered`, and `ways` to keep clear of it.
    */
-  constructor(element, mechanism, points, insets) {
-    Object.assign(this, { element, mechanism, points, insets, dirty: true, view: "iso", flight: null });
+  constructor(element, mechanism, points, margins) {
+    Object.assign(this, { element, mechanism, points, margins, dirty: true, view: "iso", flight: null });
     this.planar = mechanism.recording.planar;
     this.ball = ballAround(points);
     this.scene = new THREE.Scene();
@@ -70,10 +70,6 @@ export class Stage {
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
     this.renderer.toneMapping = THREE.NeutralToneMapping;
-    const studio = new THREE.PMREMGenerator(this.renderer);
-    this.scene.environment = studio.fromScene(new THREE.RoomEnvironment(), 0.04).texture;
-    this.scene.environmentIntensity = 0.35;
-    studio.dispose();
   }
 
   #prepareControls() {
@@ -106,14 +102,14 @@ export class Stage {
     this.dirty = true;
   }
 
-  /** The better of several ways to keep the picture clear of what lies over it, unless it costs too much size. */
+  /** A fit that keeps the motion clear of what lies over the picture, unless that costs too much size. */
   #fitted(fit) {
-    const plain = fit(this.insets()[0]);
-    const clear = this.insets()
-      .slice(1)
-      .map(fit)
-      .sort((a, b) => b.size - a.size)[0];
-    return clear && clear.size > 0.72 * plain.size ? clear : plain;
+    const { least, covered, ways } = this.margins();
+    const plain = fit(least);
+    const hidden = ([x, y]) => covered && x < covered.right && y < covered.bottom;
+    if (!this.points.some((point) => hidden(plain.project(point)))) return plain;
+    const clear = ways.map(fit).sort((a, b) => b.size - a.size)[0];
+    return clear.size > 0.72 * plain.size ? clear : plain;
   }
 
   /** Look from a preset; all of the motion is in the picture. */

@@ -17,7 +17,7 @@ const PALETTE = [
   "#93a8d9",
 ];
 // A ramp of steady lightness change, for chains of many alike bodies.
-const RAMP = ["#28408b", "#2569a5", "#1f8f9f", "#3fae82", "#94bf55", "#e3b93c", "#ec8b45", "#d85a5a", "#a63d72"];
+const RAMP = ["#3a57b5", "#2569a5", "#1f8f9f", "#3fae82", "#94bf55", "#e3b93c", "#ec8b45", "#d85a5a", "#a63d72"];
 export const CURVES = ["#2f7fd1", "#e5862b", "#2aa187", "#d14d62", "#8a6fd0", "#c9a11f", "#4fb0d8", "#b0673f"];
 const GROUND = "#8b96a3";
 

@@ -1,0 +1,215 @@
+"""Model files: a mechanism as TOML, written to be read and compared by people, and read back exactly.
+
+Numbers are written so that they come back bit for bit, and strings ("60 rpm", "2*k") as the user wrote them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import tomllib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, NoReturn, TypeVar
+
+from ..errors import ModelError
+from .body import Body, Driver, Frame, Initial
+from .element import Element, written
+from .force import Force
+from .joint import Joint
+from .model import CATEGORIES, Model, suggest
+
+M = TypeVar("M", bound=Model)
+
+SETTINGS = ("name", "planar", "gravity", "parameters")
+ONE_KIND = {"bodies": Body, "frames": Frame, "drivers": Driver, "initial": Initial}
+MANY_KINDS = {"joints": Joint, "forces": Force}
+WIDTH = 100  # a list of shapes longer than this is written one shape a line
+_HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
+_PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
+
+
+def save(model: Model, path: str | os.PathLike) -> None:
+    """Write a mechanism to a TOML file.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written, or a value of the mechanism has no place in a file.
+    """
+    data = dumps(model).encode()
+    try:
+        Path(path).write_bytes(data)
+    except OSError as error:
+        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
+
+
+def dumps(model: Model) -> str:
+    """The text of the mechanism's TOML file."""
+    lines = [f"name = {_text(model.name)}", f"planar = {_value(model.planar)}", f"gravity = {_value(model.gravity)}"]
+    if model.parameters:
+        lines += ["", "[parameters]"]
+        lines += [f"{_key(k)} = {_value(v)}" for k, v in model.parameters.items()]
+    for category in CATEGORIES:
+        for e in getattr(model, category):
+            lines += ["", f"[[{category}]]"]
+            kind = {"type": type(e).__name__} if category in MANY_KINDS else {}
+            lines += [f"{k} = {_value(v)}" for k, v in (kind | written(e)).items()]
+    text = "\n".join(lines) + "\n"
+    try:
+        text.encode()
+    except UnicodeEncodeError as error:
+        raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
+    return text
+
+
+def _value(value: Any) -> str:
+    """A value in TOML; numbers by ``repr``, which is exact."""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, (int, float)):
+        return repr(value)
+    if isinstance(value, str):
+        return _text(value)
+    if isinstance(value, Mapping):
+        return "{ " + ", ".join(f"{_key(k)} = {_value(v)}" for k, v in value.items()) + " }"
+    if isinstance(value, (list, tuple)):
+        items = [_value(v) for v in value]
+        if any(isinstance(v, Mapping) for v in value) and sum(map(len, items)) > WIDTH:
+            return "[\n" + "".join(f"    {i},\n" for i in items) + "]"
+        return f"[{', '.join(items)}]"
+    raise ModelError(f"{value!r} cannot be written to a model file; use a number or a text")
+
+
+def _text(text: str) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({"a": text}).removeprefix("a = ").removesuffix("\n")
+
+
+def _key(key: str) -> str:
+    import tomli_w
+
+    return tomli_w.dumps({key: 0}).removesuffix(" = 0\n")
+
+
+def load(path: str | os.PathLike, cls: type[M]) -> M:
+    """Read a mechanism of class ``cls`` from a TOML file.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, it is no TOML, or it describes no valid mechanism; the message names the file, the
+        line, and the element.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8-sig")
+    except FileNotFoundError:
+        there = [p.name for p in path.parent.glob("*.toml")] if path.parent.is_dir() else []
+        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}") from None
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
+    except OSError as error:
+        raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
+    return loads(text, cls, os.fspath(path))
+
+
+def loads(text: str, cls: type[M], source: str = "model") -> M:
+    """Read a mechanism of class ``cls`` from the text of a TOML file; ``source`` names it in messages."""
+    data = _parsed(text, source)
+    known = [*SETTINGS, *CATEGORIES]
+    for key, value in data.items():
+        if key not in known:
+            what = "table" if isinstance(value, (Mapping, list)) else "key"
+            raise ModelError(f"{source}: unknown {what} {key!r}{suggest(key, known)}; a model has {', '.join(known)}")
+    model = _settings(data, cls, source)
+    lines = _header_lines(text)
+    for category in CATEGORIES:
+        tables = data.get(category, [])
+        if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
+            raise ModelError(f"{source}: {category!r} must be tables, each headed [[{category}]]")
+        places = lines.get(category, [])
+        for k, table in enumerate(tables):
+            line = f" (line {places[k]})" if len(places) == len(tables) else ""
+            name = f" {table['name']!r}" if isinstance(table.get("name"), str) else ""
+            _add(model, category, table, f"{source}: [[{category}]] {k + 1}{name}{line}")
+    return model
+
+
+def _parsed(text: str, source: str) -> dict[str, Any]:
+    """The file's tables, or an error that shows the faulty line with a caret."""
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise ModelError(f"{source}: its lists are nested too deep") from None
+    except ValueError as error:  # TOMLDecodeError, and numbers of more digits than Python reads
+        message = str(error)
+        place = _PLACE.search(message)
+        if place is None:
+            raise ModelError(f"{source}: {message}") from None
+        lines = text.split("\n")
+        last = max((k for k, x in enumerate(lines, 1) if x.strip()), default=1)
+        line = min(int(place[1]), len(lines)) if place[1] else last
+        shown = lines[line - 1].rstrip("\r").replace("\t", " ")
+        column = int(place[2]) if place[2] else len(shown) + 1
+        margin = f"{line:>6} | "
+        caret = " " * (len(margin) + column - 1) + "^"
+        reason = message[: place.start()]
+        raise ModelError(f"{source}, line {line}: {reason}\n{margin}{shown}\n{caret}") from None
+
+
+def _settings(data: Mapping[str, Any], cls: type[M], source: str) -> M:
+    """The empty mechanism with its name, plane, gravity and parameters."""
+    given = {k: data[k] for k in SETTINGS if k in data}
+    for key, kind, what in (("planar", bool, "true or false"), ("parameters", Mapping, "a table of named numbers")):
+        if key in given and not isinstance(given[key], kind):
+            raise ModelError(f"{source}: {key!r} must be {what}, got {given[key]!r}")
+    for key, value in given.get("parameters", {}).items():
+        if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+            raise ModelError(f"{source}: [parameters] {key!r} must be a number or a text with a unit, got {value!r}")
+    try:
+        return cls(**given)
+    except Exception as error:
+        _refuse(error, source)
+
+
+def _header_lines(text: str) -> dict[str, list[int]]:
+    """Line numbers of the ``[[...]]`` headers, by category."""
+    out: dict[str, list[int]] = {}
+    for k, line in enumerate(text.split("\n"), 1):
+        if match := _HEADER.match(line):
+            out.setdefault(match[1], []).append(k)
+    return out
+
+
+def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
+    fields = dict(table)
+    cls = _kind(category, fields, where) if category in MANY_KINDS else ONE_KIND[category]
+    if "name" not in fields:
+        raise ModelError(f"{where}: it has no name; add name = \"...\"")
+    try:
+        model.add(cls(**fields))
+    except Exception as error:
+        _refuse(error, where)
+
+
+def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
+    """The class that the table's ``type`` names."""
+    import importlib
+
+    importlib.import_module(f"..{category}", __package__)
+    known = sorted(
+        k for k, c in Element.registry.items() if issubclass(c, MANY_KINDS[category]) and c.__module__.count(f".{category}.")
+    )
+    name = fields.pop("type", None)
+    if name not in known:
+        problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
+        raise ModelError(f"{where}: {problem}; {category} are {', '.join(known)}")
+    return Element.registry[name]
+
+
+def _refuse(error: Exception, where: str) -> NoReturn:
+    """The error with the place in the file before it; whatever it was, it becomes a ``ModelError``."""
+    kind = type(error) if isinstance(error, ModelError) else ModelError
+    raise kind(f"{where}: {error}") from None

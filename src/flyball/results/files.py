@@ -1,0 +1,241 @@
+"""Results as labelled datasets, tables and files.
+
+A result file is NetCDF 4. Its root holds the labelled quantities, for other programs; its group ``flyball`` holds what
+the motion was computed with, bit for bit, from which the result is rebuilt without simulating.
+"""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+from collections.abc import Callable
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.model import Model, suggest
+from .health import Health
+from .labels import ENERGIES, TIME, coordinates, labelled
+from .result import Result
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+GROUP = "flyball"
+FORMAT = 1
+ARRAYS = {
+    "t": ("time",),
+    "q": ("time", "nq"),
+    "v": ("time", "nv"),
+    "vdot": ("time", "nv"),
+    "multipliers": ("time", "nr"),
+    "states": ("time", "nz"),
+}
+MOST = 3000  # labelled quantities in a file; HDF5 takes more than a millisecond for each
+SLASH = "\N{DIVISION SLASH}"  # a name must not hold "/" in a NetCDF file
+
+
+def to_xarray(result: Result) -> xarray.Dataset:
+    """All quantities as a dataset: ``ds["crank.position"]`` has the dimensions time and component.
+
+    Units are in each variable's ``attrs["units"]``.
+    """
+    import xarray as xr
+
+    data = {x.name: (x.dims, x.values, _attributes(x.unit, x.note)) for x in labelled(result)}
+    coords: dict[str, Any] = {TIME: (TIME, result.t, {"units": "s"})}
+    return xr.Dataset(data, coords | coordinates(result), attrs=_about(result))
+
+
+def _attributes(unit: str, note: str) -> dict[str, str]:
+    return {"units": unit} | ({"comment": note} if note else {})
+
+
+def _about(result: Result) -> dict[str, str]:
+    from .. import __version__
+
+    return {"title": result.model.name, "source": f"flyball {__version__}", "status": result.health.message}
+
+
+def to_dataframe(result: Result) -> pandas.DataFrame:
+    """All curves as columns ``"slider.x"``; time [s] as index; units in ``attrs["units"]``."""
+    import pandas as pd
+
+    channels = result.channels()
+    frame = pd.DataFrame({k: v for k, (_, v) in channels.items()}, index=pd.Index(result.t, name=TIME))
+    frame.attrs["units"] = {k: unit for k, (unit, _) in channels.items()}
+    return frame
+
+
+def to_csv(result: Result, path: str | os.PathLike) -> None:
+    """All curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
+    channels = result.channels()
+    header = [f"{TIME} [s]", *(f"{k} [{unit}]" for k, (unit, _) in channels.items())]
+    columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
+
+    def write(part: Path) -> None:
+        with open(part, "w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(header)
+            writer.writerows(zip(*columns, strict=True))
+
+    _replaced(path, write)
+
+
+def save(result: Result, path: str | os.PathLike) -> None:
+    """Write everything, the model included, to one NetCDF file."""
+    _replaced(path, lambda part: _write(result, part))
+
+
+def _replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
+    """Write beside the file and put it in place when done: a file that is there is a whole file."""
+    path = Path(path)
+    part = path.with_name(f".{path.name}.part")
+    try:
+        write(part)
+        part.replace(path)
+    except OSError as error:
+        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror or error}") from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _write(result: Result, path: Path) -> None:
+    import h5netcdf
+
+    with h5netcdf.File(path, "w") as file:
+        file.attrs.update(_about(result) | {"Conventions": "CF-1.11"})
+        file.dimensions[TIME] = len(result.t)
+        file.create_variable(TIME, (TIME,), data=result.t).attrs["units"] = "s"
+        for name, labels in coordinates(result).items():
+            file.dimensions[name] = len(labels)
+            file.create_variable(name, (name,), dtype=_text_type(), data=np.array(labels, object))
+        shown = list(labelled(result, MOST))
+        if len(shown) == len(ENERGIES):
+            file.attrs["comment"] = "too many parts to list: read this file with flyball.load_result"
+        for x in shown:
+            made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
+            made.attrs.update(_attributes(x.unit, x.note))
+        _write_solution(result, file.create_group(GROUP))
+
+
+def _text_type() -> Any:
+    import h5py
+
+    return h5py.string_dtype()
+
+
+def _safe(name: str) -> str:
+    return name.replace("/", SLASH).strip() or "_"
+
+
+def _write_solution(result: Result, group: Any) -> None:
+    """The arrays as they are, the model as its file's text, parameters as used, health as JSON."""
+    from .. import __version__
+    from ..model.io import dumps
+
+    s = result.values.structure
+    group.attrs["format"] = FORMAT
+    group.attrs["version"] = __version__
+    texts = {
+        "model": dumps(result.model),
+        "health": json.dumps(result.health.as_dict()),
+        "tree": json.dumps(list(s.tree)),
+        "parameters": json.dumps(list(result.model.parameters)),
+    }
+    for name, text in texts.items():
+        group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
+    for name, (_, *rest) in ARRAYS.items():
+        values = getattr(result, name)
+        for k, dim in enumerate(rest):
+            if dim not in group.dimensions:
+                group.dimensions[dim] = values.shape[k + 1]
+        group.create_variable(name, (TIME, *rest), data=values)
+    numbers = {
+        "parameter_values": result.values.system.const[: len(result.model.parameters)],
+        "final": np.r_[result.final[0], result.final[1]],
+    }
+    for name, values in numbers.items():
+        group.dimensions[f"n_{name}"] = len(values)
+        group.create_variable(name, (f"n_{name}",), data=np.array(values, float))
+
+
+M = TypeVar("M", bound=Model)
+
+
+def load_result(path: str | os.PathLike, cls: type[M]) -> Result:
+    """Rebuild a result, its mechanism being of class ``cls``; nothing is simulated and nothing compiled.
+
+    Raises
+    ------
+    ModelError
+        If there is no such file, or it is no result of flyball.
+    """
+    path = Path(path)
+    if not path.is_file():
+        there = [p.name for p in path.parent.glob("*.nc")] if path.parent.is_dir() else []
+        raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}")
+    stored = _stored(path)
+    return _rebuilt(stored, cls, os.fspath(path))
+
+
+def _stored(path: Path) -> dict[str, Any]:
+    """Texts and arrays of the file's own group."""
+    import h5netcdf
+
+    remedy = "give a file that Result.save or 'flyball run' wrote"
+    try:
+        with h5netcdf.File(path, "r") as file:
+            if GROUP not in file.groups:
+                raise ModelError(f"{path} is no result of flyball (it holds no group {GROUP!r}); {remedy}")
+            group = file.groups[GROUP]
+            if int(group.attrs["format"]) > FORMAT:
+                raise ModelError(f"{path} was written by flyball {group.attrs['version']}, a later version than this")
+            return {k: _read(v) for k, v in group.variables.items()}
+    except (OSError, KeyError) as error:
+        raise ModelError(f"{path} cannot be read as a NetCDF result ({error}); {remedy}") from None
+
+
+def _read(variable: Any) -> Any:
+    if variable.dimensions == ():
+        value = variable[()]
+        return value.decode() if isinstance(value, bytes) else str(value)
+    return np.ascontiguousarray(variable[...])
+
+
+def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
+    from ..model.io import loads
+    from ..system.structure import structure
+    from ..system.values import values
+
+    try:
+        model = loads(stored["model"], cls, where)
+        x = values(
+            structure(model, tree=json.loads(stored["tree"])),
+            dict(zip(json.loads(stored["parameters"]), stored["parameter_values"].tolist(), strict=True)),
+        )
+        arrays = {k: stored[k] for k in ARRAYS}
+        final = stored["final"]
+        health = _health(json.loads(stored["health"]))
+    except KeyError as error:
+        raise ModelError(f"{where} is no complete result of flyball: {error} is missing") from None
+    wanted = {"q": x.structure.nq, "v": x.structure.nv, "multipliers": len(x.structure.rows)}
+    for name, n in wanted.items():
+        if arrays[name].shape[1] != n:
+            raise ModelError(f"{where}: its model has {n} {name}, its motion {arrays[name].shape[1]}; the file is damaged")
+    result = Result(model, x, health=health, **arrays)
+    result.final = (float(final[0]), final[1:])
+    return result
+
+
+def _health(data: dict[str, Any]) -> Health:
+    known = {f.name for f in fields(Health)}
+    data = {k: v for k, v in data.items() if k in known}
+    data["redundant"] = tuple(data["redundant"])
+    data["undetermined"] = {k: tuple(v) for k, v in data["undetermined"].items()}
+    return Health(**data)
