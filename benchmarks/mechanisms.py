@@ -158,4 +158,4 @@ def free_body_exact(t: np.ndarray) -> np.ndarray:
     a1 = np.sqrt((e2 * i3 - l2) / (i1 * (i3 - i1)))
     a2 = np.sqrt((e2 * i3 - l2) / (i2 * (i3 - i2)))
     a3 = np.sqrt((l2 - e2 * i1) / (i3 * (i3 - i1)))
-    return np.stack([a1 * cn, -a2 * sn, a3 * dn], axis=1)
+    return np.stack([a1 * cn, a2 * sn, a3 * dn], axis=1)

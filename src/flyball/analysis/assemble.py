@@ -81,35 +81,40 @@ def _misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
     return float(np.abs(g).max(initial=0.0)) if np.isfinite(g).all() else np.inf
 
 
-def _weights(c: Compiled) -> np.ndarray:
-    """Inverse weights of the velocities: metres against radians; bodies that must not move have none."""
+def _movable(c: Compiled) -> np.ndarray:
+    """1 for velocities of bodies that may move, 0 for those of bodies described as fixed."""
     s = c.structure
-    L = c.values.length
-    w = np.ones(s.nv)
+    out = np.ones(s.nv)
     for name, b in s.place.items():
-        if b < 0:
-            continue
-        v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
+        if b >= 0 and s.model[name].fixed:
+            v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
+            out[v0 : v0 + n] = 0.0
+    return out
+
+
+def _weights(c: Compiled) -> np.ndarray:
+    """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
+    body_i = c.structure.tables["body_i"]
+    w = np.ones(c.structure.nv)
+    for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True):
         k = {3: 2, 6: 3}.get(int(n), 0)
-        w[v0 + k : v0 + n] = 1.0 / L**2
-        if s.model[name].fixed:
-            w[v0 : v0 + n] = 0.0
-    return w
+        w[v0 + k : v0 + n] = 1.0 / c.values.length**2
+    return w * _movable(c)
 
 
-def _step(c: Compiled, g: np.ndarray, w: np.ndarray, damping: float) -> np.ndarray:
-    """Least weighted step with G d = -g, damped: d = -W G^T (G W G^T + damping)^-1 g."""
+def _step(c: Compiled, r: np.ndarray, W, damping: float) -> np.ndarray:
+    """Least step with G d = r, in the metric of the inverse weights W (sparse), damped."""
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
     G = c.sparse_jacobian()
-    A = (G @ sp.diags(w) @ G.T).tocsc()
+    A = (G @ W @ G.T).tocsc()
     scale = A.diagonal().max(initial=0.0) or 1.0
     if A.shape[0] <= 300:
-        x = np.linalg.lstsq(A.toarray() + damping * scale * np.eye(A.shape[0]), -g, rcond=1e-13)[0]
+        x = np.linalg.lstsq(A.toarray() + damping * scale * np.eye(A.shape[0]), r, rcond=1e-13)[0]
     else:
-        x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(-g)
-    return w * (G.T @ x)
+        x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(r)
+    return W @ (G.T @ x)
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -122,8 +127,11 @@ def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
 
 def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
+    import scipy.sparse as sp
+
     w = _weights(c)
-    limit = np.where(w < 1.0, 0.7, 0.7 * c.values.length) if c.values.length else 1.0
+    W = sp.diags(w)
+    limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
     size = _misfit(c, t, q, v)
     g = c.work.row[G_VALUE].copy()
     damping = 0.0
@@ -132,7 +140,7 @@ def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
         if size < 1e-13:
             return q, k
         c.at(t, q, v)
-        d = _step(c, g, w, damping)
+        d = _step(c, -g, W, damping)
         over = np.abs(d / limit).max(initial=0.0)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
@@ -220,10 +228,9 @@ def _velocities(
     size = max(1.0, float(np.abs(v).max(initial=0.0)), float(np.abs(nu).max(initial=0.0)))
     if np.abs(r).max() < 1e-13 * size:
         return v
-    w = _weights(c)
-    w = np.where(w > 0, 1.0 / c.inertias(), 0.0)
+    W = c.inverse_mass(_movable(c))
     for _ in range(4):
-        v = v + _step(c, -(nu - G @ v), w, 0.0)
+        v = v + _step(c, nu - G @ v, W, 0.0)
     r = nu - G @ v
     if np.abs(r).max() > 1e-9 * size:
         bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]

@@ -11,7 +11,7 @@ from ..model.body import Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, MASS, STABILIZE, Work
+from ..system.tables import INERTIA, INVERSE, MASS, STABILIZE, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -68,10 +68,19 @@ class Compiled:
             blocks.append(sp.block_diag([S.body_x[b, MASS] * np.eye(k), J[2:, 2:] if n == 3 else J]))
         return sp.block_diag(blocks, format="csr")
 
-    def inertias(self) -> np.ndarray:
-        """Diagonal of the mass matrix, with a small part of the body's size where there is no inertia."""
-        M = self.mass().diagonal()
-        return np.maximum(M, 1e-9 * M.max())
+    def inverse_mass(self, movable: np.ndarray):
+        """Sparse inverse mass matrix of absolute coordinates, with stand-ins for missing inertias; 0 for the fixed."""
+        import scipy.sparse as sp
+
+        S = self.values.system
+        blocks = []
+        for b in range(len(S.body_i)):
+            n = int(S.body_i[b, 5])
+            J = S.body_x[b, INVERSE : INVERSE + 9].reshape(3, 3)
+            k = 2 if n == 3 else 3
+            blocks.append(sp.block_diag([np.eye(k) / S.body_x[b, MASS], J[2:, 2:] if n == 3 else J]))
+        keep = sp.diags(movable)
+        return (keep @ sp.block_diag(blocks, format="csr") @ keep).tocsr()
 
 
 def compiled(

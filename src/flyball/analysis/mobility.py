@@ -85,7 +85,7 @@ def _dense(G: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
 
 def _sparse(G) -> tuple[int, np.ndarray, None]:
     """The same from a sparse factorisation of G G^T: rows whose pivot vanishes depend on those before."""
-    from ..numerics.ldl import analyse, ldl_factor
+    from ..numerics.ldl import analyse
 
     A = (G @ G.T).tocoo()
     P, place = analyse(A.shape[0], A.row, A.col)

@@ -1,0 +1,1 @@
+"""The few scalar constraint rows that joints are made of."""

@@ -41,5 +41,5 @@ def row(par, F, M):
 
 @formula
 def unwrapped(theta, hint):
-    """theta plus the whole turns that bring it next to ``hint``."""
+    """Theta plus the whole turns that bring it next to ``hint``."""
     return theta + 6.283185307179586 * rounded((hint - theta) / 6.283185307179586)

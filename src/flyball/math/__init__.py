@@ -1,0 +1,1 @@
+"""Vectors, rotations and scalar functions on any kind of number."""

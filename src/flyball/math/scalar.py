@@ -159,7 +159,7 @@ def maximum(a, b):
 
 
 def divide(a, b):
-    """a / b; inf or nan where b is zero, as in C."""
+    """A / b; inf or nan where b is zero, as in C."""
     if isinstance(b, _NUMBERS):
         if b != 0 or not isinstance(a, _NUMBERS):
             return a / b
@@ -170,7 +170,7 @@ def divide(a, b):
 
 
 def power(a, b):
-    """a ** b; nan for a negative base with a broken exponent, inf for zero with a negative one, as in C."""
+    """A ** b; nan for a negative base with a broken exponent, inf for zero with a negative one, as in C."""
     if isinstance(a, float | int) and isinstance(b, float | int):
         try:
             return math.pow(a, b)
@@ -187,7 +187,7 @@ def power(a, b):
 
 @formula
 def integer_power(x, n):
-    """x ** n for an integer n, by repeated squaring: the same products for every kind of number."""
+    """X ** n for an integer n, by repeated squaring: the same products for every kind of number."""
     m = n if n >= 0 else -n
     value, square = 1, x
     while m > 0:
@@ -200,7 +200,7 @@ def integer_power(x, n):
 
 @formula
 def _complex_power(a, b):
-    """a ** b for complex numbers near the real axis: the value of the real function and its derivative."""
+    """A ** b for complex numbers near the real axis: the value of the real function and its derivative."""
     if b.imag == 0 and b.real == math.floor(b.real) and -64 <= b.real <= 64:
         return integer_power(a, int(b.real))
     if a.real < 0:

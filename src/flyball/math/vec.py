@@ -12,31 +12,31 @@ from .scalar import sqrt
 
 @formula
 def cross(a, b):
-    """a x b."""
+    """A x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @formula
 def dot(a, b):
-    """a . b."""
+    """A . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @formula
 def add(a, b):
-    """a + b."""
+    """A + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 @formula
 def sub(a, b):
-    """a - b."""
+    """A - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 @formula
 def scale(s, a):
-    """s a."""
+    """S a."""
     return (s * a[0], s * a[1], s * a[2])
 
 

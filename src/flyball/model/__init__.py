@@ -1,0 +1,1 @@
+"""Descriptions: names, numbers with units, checks. No numerics."""

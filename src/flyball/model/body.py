@@ -15,7 +15,6 @@ from .element import (
     Element,
     Mass,
     Number,
-    Numbers,
     Point,
     Unit,
     Velocity,

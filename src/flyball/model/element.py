@@ -10,7 +10,7 @@ import dataclasses
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import lru_cache
+from functools import cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform
 
@@ -166,7 +166,7 @@ class Element:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
 
-@lru_cache(maxsize=None)
+@cache
 def fields_with(cls: type, marker: type) -> dict[str, Any]:
     """Fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
     hints = typing.get_type_hints(cls, include_extras=True)

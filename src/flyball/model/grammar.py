@@ -16,7 +16,7 @@ CONSTANTS = {"pi": math.pi, "e": math.e}
 
 # Functions a user may call, and the names of their arguments.
 FUNCTIONS = {
-    **{name: ("x",) for name in "sin cos tan asin acos atan sinh cosh tanh exp log sqrt abs sign".split()},
+    **{name: ("x",) for name in ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign"]},
     "atan2": ("y", "x"),
     "min": ("a", "b", "..."),
     "max": ("a", "b", "..."),

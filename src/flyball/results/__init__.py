@@ -1,0 +1,1 @@
+"""Motions read by name, with energies and a health report."""

@@ -13,7 +13,7 @@ from .dispatch import forces, rows
 from .kinematics import bodies, frames
 from .loads import gather, inertial
 from .records import load
-from .rows import parameters, row_times
+from .rows import row_times
 from .solve import factor, magnitude, solve
 from .tables import (
     ALPHA,
@@ -32,10 +32,9 @@ from .tables import (
     STABILIZE,
     TOL_G,
     TOL_V,
+    V3,
     WORST_G,
     WORST_V,
-    V3,
-    V4,
     X_SOLVED,
 )
 from .tree import normalise, rates, retract
@@ -133,7 +132,7 @@ def project_state(S, W, t, q, v, tol_g, tol_v):
 
 @formula
 def accelerations(S, W, t, v, z, work):
-    """vdot into W.vel[X_SOLVED] and lam into W.row[LAM] at the kinematics and rows in W."""
+    """Vdot into W.vel[X_SOLVED] and lam into W.row[LAM] at the kinematics and rows in W."""
     inertial(S, W)
     forces(S, W, t, z, work)
     gather(S, W, W.vel[F_APPLIED])

@@ -163,7 +163,7 @@ def one_pass(S, W, rhs, dx, x, lam):
 
 @formula
 def residual(S, W, gamma, x):
-    """r = gamma - G x into W.row[R1]; returns its largest entry relative to what was subtracted."""
+    """R = gamma - G x into W.row[R1]; returns its largest entry relative to what was subtracted."""
     worst = 0.0
     size = 1e-300
     for k in range(gamma.shape[0]):
@@ -181,7 +181,7 @@ def residual(S, W, gamma, x):
 
 @formula
 def excess(S, dx, rhs, x):
-    """rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
+    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
     worst = 0.0
     size = 1e-300
     for b in range(S.body_i.shape[0]):

@@ -127,7 +127,7 @@ def project(S, W, b, out, at, sign, force, torque, point):
 
 @formula
 def rates(S, q, v, dq):
-    """qdot of every body from its velocities."""
+    """Qdot of every body from its velocities."""
     for b in range(S.body_i.shape[0]):
         kind = S.body_i[b, TREE]
         q0 = S.body_i[b, Q0]
@@ -149,7 +149,7 @@ def rates(S, q, v, dq):
 
 @formula
 def retract(S, q, d):
-    """q (+) d: move every body by the finite step d along its velocities, in place."""
+    """Q (+) d: move every body by the finite step d along its velocities, in place."""
     for b in range(S.body_i.shape[0]):
         kind = S.body_i[b, TREE]
         q0 = S.body_i[b, Q0]

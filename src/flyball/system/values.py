@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 
 from ..model.body import GROUND, Body, Frame
 from ..model.element import resolve
-from ..model.force import BodyForce, Force, JointForce, TwoPointForce
+from ..model.force import BodyForce, JointForce, TwoPointForce
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint

@@ -1,0 +1,1 @@
+"""Plots, the animation page, and what they are made from."""

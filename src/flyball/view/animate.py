@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,7 +49,7 @@ def record(result: Result) -> Recording:
         lines=tuple(_lines(result, every, looks.size)),
         joints=tuple(_joints(result, looks)),
         channels=channels,
-        shown=shown([c.name for c in channels]),
+        shown=shown(result, [c.name for c in channels]),
         size=looks.size,
         notes=dict(result.health.lines()),
     )
@@ -144,14 +145,14 @@ def _telling(names: list[str], result: Result) -> list[str]:
     return [k for k in names if k in chosen]
 
 
-def shown(names: list[str]) -> tuple[str, ...]:
-    """The curves on show when a page opens: what drives or a joint's coordinate, its reaction, the energies."""
-    groups = (
-        [k for k in names if k.endswith(".effort")],
-        [k for k in names if k.endswith((".angle", ".displacement", ".angle_1"))],
-        [k for k in names if k.endswith(".x")],
-        ["energy.kinetic"] * ("energy.kinetic" in names),
-        ["energy.total"] * ("energy.total" in names),
+def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
+    """The curves on show when a page opens: what a driver needs, a joint's coordinate (else a position), energies."""
+    m = result.model
+    wanted = (
+        [f"{d.name}.effort" for d in m.drivers],
+        [f"{j.name}.{k}" for j in m.joints for k in j.coordinates],
+        [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")],
     )
-    first = [g[0] for g in groups if g]
-    return tuple(first[:2] + [k for k in first[2:] if k.startswith("energy")])[:4]
+    groups = [[k for k in group if k in names][:1] for group in wanted]
+    first = [k for group in groups[:2] for k in group] or groups[2]
+    return (*first, *(k for k in ("energy.kinetic", "energy.total") if k in names))

@@ -44,7 +44,6 @@ class Looks:
         reach = {name: self._reach(name) for name in self.points}
         known = [r for r in reach.values() if r > 0.0]
         self.size = float(np.median(known)) if known else x.length
-        self.size = max(self.size, 0.05 * self._travel())
 
     def end(self, name: str, role: str) -> End:
         """Body of an element's frame, and the frame's origin and axes from the body's reference frame."""
@@ -93,13 +92,6 @@ class Looks:
             return float(np.sqrt(6.0 * np.trace(self._mass(name)[1]) / self._mass(name)[2]))
         a = np.array(points)
         return float(np.sqrt(((a[:, None] - a[None]) ** 2).sum(axis=2)).max())
-
-    def _travel(self) -> float:
-        """Extent of the motion of the centres of mass."""
-        r, n = self.result.records, len(self.result.values.system.body_i)
-        p = np.array([[np.ptp(c) for c in r.body(b)[0]] for b in range(n)]) if len(self.result.t) else np.zeros((1, 3))
-        finite = p[np.isfinite(p)]
-        return float(finite.max(initial=0.0))
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """The body's shapes."""

@@ -1,0 +1,1 @@
+"""Integrators: tableaux as data, one loop."""

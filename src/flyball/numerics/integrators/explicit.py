@@ -35,7 +35,7 @@ class Clock(NamedTuple):
 
 @formula
 def combine(y, K, weights, stages, h, out):
-    """out = y + h sum_j weights[j] K[j]."""
+    """Out = y + h sum_j weights[j] K[j]."""
     n = y.shape[0]
     for i in range(n):
         out[i] = 0.0

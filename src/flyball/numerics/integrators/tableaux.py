@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -64,7 +64,7 @@ def _dop853() -> Tableau:
 TABLEAUX = {"dop853": _dop853, "rk45": _rk45}
 
 
-@lru_cache(maxsize=None)
+@cache
 def tableau(name: str) -> Tableau:
     """The method of that name.
 

@@ -1,0 +1,70 @@
+"""What a user waits for: ``import flyball``, and a first motion from the command line, compiled and not yet compiled.
+
+Every figure is a fresh process. The warm cache is one that this script has just filled. Usage: ``python start.py``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any
+
+import timing
+
+ROOT = Path(__file__).resolve().parents[1]
+EXAMPLE = ROOT / "examples" / "slider_crank.toml"
+COLUMNS = {"what": "what", "wall": "wall [s]", "cpu": "CPU [s]"}
+
+
+def spend(command: list[str], cache: Path) -> tuple[float, float]:
+    """(wall, CPU) seconds of a process that keeps its compiled code in ``cache``.
+
+    Raises
+    ------
+    SystemExit
+        If the process fails; the message is what it wrote.
+    """
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    start = time.perf_counter()
+    done = subprocess.run(command, env={**os.environ, "NUMBA_CACHE_DIR": str(cache)}, capture_output=True, text=True)
+    wall = time.perf_counter() - start
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    if done.returncode:
+        raise SystemExit(f"{' '.join(command)}\n{done.stdout}{done.stderr}")
+    return wall, after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+def measure(what: str, command: list[str], cache: Path, repeats: int) -> dict[str, Any]:
+    """The run with least CPU time of ``repeats``."""
+    wall, cpu = min((spend(command, cache) for _ in range(repeats)), key=lambda pair: pair[1])
+    return {"what": what, "wall": wall, "cpu": cpu}
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--repeats", type=int, default=5, help="runs of each warm figure (5)")
+    parser.add_argument("--json", metavar="FILE", help="write the rows")
+    arguments = parser.parse_args()
+    python = [sys.executable]
+    with tempfile.TemporaryDirectory() as folder:
+        cache, out = Path(folder, "cache"), Path(folder, "out")
+        motion = [*python, "-m", "flyball.cli", "run", str(EXAMPLE), "--t-end", "10", "--out", str(out)]
+        rows = [
+            measure("python alone", [*python, "-c", "pass"], cache, arguments.repeats),
+            measure("import flyball", [*python, "-c", "import flyball"], cache, arguments.repeats),
+            measure("slider-crank 10 s, empty cache", motion, cache, 1),
+            measure("slider-crank 10 s, warm cache", motion, cache, arguments.repeats),
+        ]
+    print(timing.table(rows, COLUMNS))
+    timing.write_json(arguments.json, rows)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,214 @@
+"""Is the description sound? Freedoms, redundancy, assembly and mass properties, looked at before any motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..model.body import GROUND
+from ..model.force import BodyForce, JointForce
+from ..model.model import Model
+from ..system.values import Values
+from .assemble import Assembly, assemble
+from .mobility import mobility
+
+FAR = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
+BARELY = 1e-3  # slack of the triangle inequality, as part of the largest moment, below which a body is all but flat
+
+
+@dataclass(frozen=True)
+class BodyReport:
+    """Mass properties of a body as used."""
+
+    mass: float  # [kg]
+    com: tuple[float, ...]  # centre of mass in the reference frame [m]
+    moments: tuple[float, ...]  # principal moments about the centre of mass [kg m^2]; planar: one
+
+
+@dataclass(frozen=True)
+class Report:
+    """What `Mechanism.check` found out."""
+
+    name: str
+    planar: bool
+    bodies: dict[str, BodyReport]
+    joints: int
+    forces: int
+    drivers: int
+    gruebler: int  # freedoms by counting
+    freedoms: int  # freedoms by rank
+    redundant: tuple[str, ...]  # elements whose constraints depend on one another
+    redundancy: int  # how many rows say nothing new
+    undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
+    moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
+    warnings: tuple[str, ...] = field(default=())
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Label and text of what a reader wants to see first."""
+        plane = "planar" if self.planar else "spatial"
+        counts = f"{_count(len(self.bodies), 'body', 'bodies')}, {_count(self.joints, 'joint')}"
+        counts += f", {_count(self.forces, 'force')}, {_count(self.drivers, 'driver')}"
+        out = [("mechanism", f"{self.name} ({plane}): {counts}"), ("freedoms", self._freedoms())]
+        if self.redundant:
+            names = ", ".join(self.redundant[:12]) + (", ..." if len(self.redundant) > 12 else "")
+            out.append(("redundant", f"{_count(self.redundancy, 'constraint')} too many, among {names}"))
+        if self.undetermined:
+            first = list(self.undetermined.items())[:12]
+            text = "; ".join(f"{k}: {', '.join(v)}" for k, v in first) + ("; ..." if len(self.undetermined) > 12 else "")
+            out.append(("reactions not determined", text))
+        out.append(("assembly", self._assembly()))
+        for name, b in list(self.bodies.items())[:30]:
+            moments = ", ".join(f"{x:.4g}" for x in b.moments)
+            com = ", ".join(f"{x:.4g}" for x in b.com)
+            out.append((f"body {name}", f"{b.mass:.4g} kg, centre of mass ({com}) m, inertia {moments} kg m^2"))
+        if len(self.bodies) > 30:
+            out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
+        return out + [("warning", w) for w in self.warnings]
+
+    def _freedoms(self) -> str:
+        text = f"{self.freedoms} at this position"
+        if self.gruebler != self.freedoms:
+            text += f" (counting gives {self.gruebler})"
+        return text
+
+    def _assembly(self) -> str:
+        if not self.moved:
+            return "closed as drawn"
+        worst = max(self.moved, key=self.moved.__getitem__)
+        return f"closed after moving {_count(len(self.moved), 'body', 'bodies')}, {worst} farthest: {self.moved[worst]:.3g} m"
+
+    def __str__(self) -> str:
+        width = max(len(k) for k, _ in self.lines())
+        return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
+
+
+def _count(n: int, one: str, many: str = "") -> str:
+    return f"{n} {one if n == 1 else many or one + 's'}"
+
+
+def check(model: Model) -> Report:
+    """Look a mechanism over without simulating it.
+
+    Parameters
+    ----------
+    model : Model
+
+    Returns
+    -------
+    Report
+
+    Raises
+    ------
+    ModelError
+        If the description is wrong: no bodies, or a body that can move without inertia.
+    AssemblyError
+        If no position or velocity fulfils all constraints.
+    """
+    a = assemble(model)
+    m = mobility(model, a)
+    x = a.compiled.values
+    bodies = {b.name: _body(x, b.name, model.planar) for b in model.bodies}
+    return Report(
+        name=model.name,
+        planar=model.planar,
+        bodies=bodies,
+        joints=len(model.joints),
+        forces=len(model.forces),
+        drivers=len(model.drivers),
+        gruebler=m.gruebler,
+        freedoms=m.freedoms,
+        redundant=m.redundant,
+        redundancy=m.redundancy,
+        undetermined=m.undetermined,
+        moved=a.moved,
+        warnings=tuple(_warnings(model, a, bodies, m.freedoms)),
+    )
+
+
+def _body(x: Values, name: str, planar: bool) -> BodyReport:
+    b = x.bodies[name]
+    moments = [b.inertia[2, 2]] if planar else np.linalg.eigvalsh(b.inertia)
+    com = tuple(float(c) for c in (b.com[:2] if planar else b.com))
+    return BodyReport(float(b.mass), com, tuple(float(j) for j in moments))
+
+
+def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms: int) -> Iterator[str]:
+    for b in model.bodies:
+        yield from _of_inertia(a.compiled.values, b.name, bodies[b.name])
+    held, pushed = _touched(model)
+    for b in model.bodies:
+        if b.name not in held | pushed:
+            yield f"body {b.name!r} has neither a joint nor a force: it moves on its own"
+    if not model.gravity_vector().any():
+        example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
+        yield f"no gravity; if that is not meant, give gravity={example}"
+    if model.drivers and freedoms == 0:
+        yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"
+    elif freedoms == 0:
+        yield "no freedom is left: it is a structure and will not move"
+    used = _names_used(model)
+    for name in model.parameters:
+        if name not in used:
+            yield f"parameter {name!r} is used nowhere"
+
+
+def _touched(model: Model) -> tuple[set[str], set[str]]:
+    """Bodies that some joint or driver holds, and bodies that some force acts on."""
+    held, pushed = set(), set()
+    for e in model.joints:
+        held |= {model.carrier(name, e) for name in (e.body_i, e.body_j)}
+    for e in model.drivers:
+        owner, _ = model.coordinate(e.coordinate, e)
+        held |= {getattr(owner, "body", getattr(owner, "name", ""))}
+    for e in model.forces:
+        if isinstance(e, BodyForce):
+            pushed.add(model.carrier(e.body, e))
+        elif not isinstance(e, JointForce):
+            pushed |= {model.carrier(name, e) for name in (e.body_i, e.body_j)}
+    return held - {GROUND}, pushed - {GROUND}
+
+
+def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
+    """Inertia against the body's size: where joints, forces and shapes attach, how far from the centre of mass."""
+    k = x.structure.place[name]
+    arms = x.system.frame_x[x.system.frame_i == k, :3]
+    size = float(np.sqrt((arms**2).sum(axis=1)).max(initial=0.0))
+    radius = float(np.sqrt(max(b.moments) / b.mass))
+    if size > 0.0 and radius > FAR * size:
+        yield (
+            f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie within {size:.3g} m "
+            f"of its centre of mass; check the unit (kg m^2) and inertia_about"
+        )
+    elif 0.0 < radius < size / FAR:
+        yield (
+            f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie {size:.3g} m "
+            f"from its centre of mass; check the unit (kg m^2)"
+        )
+    if len(b.moments) == 3:
+        p, q, r = b.moments
+        if p > 0.0 and p + q - r < -1e-15 * r:
+            yield f"body {name!r}: its principal moments break the triangle inequality within rounding: {p:g} + {q:g} < {r:g}"
+        elif p > BARELY * r and abs(p + q - r) < BARELY * r and not _flat(x, name):
+            yield f"body {name!r}: its principal moments {p:g}, {q:g}, {r:g} are those of a flat plate (first two add up to the third)"
+
+
+def _flat(x: Values, name: str) -> bool:
+    """Whether its inertia was computed from shapes, so that flatness is meant."""
+    return x.structure.model[name].inertia is None
+
+
+def _names_used(model: Model) -> set[str]:
+    """Every word in every text of the description: parameters that are used are among them."""
+    import re
+
+    from ..model.element import written
+
+    text = repr([written(e) for e in model.elements()]) + repr(model.gravity) + repr(list(model.parameters.values()))
+    return set(re.findall(r"\w+", text))
