@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-import timing  # first: it fixes the thread counts
+import timing  # isort: skip  (before numpy: it fixes the thread counts)
 from mechanisms import flyball_planar, fourbars
 
 T_END, OUTPUTS, REPEATS = 10.0, 401, 5

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-import timing  # first: it fixes the thread counts
+import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 from mechanisms import MOMENTS, SPIN, free_body, free_body_exact, pendulum, pendulum_exact
 

@@ -54,14 +54,18 @@ def fourbars(n: int) -> Planar:
 def fourbars_exact(n: int, t: np.ndarray) -> np.ndarray:
     """Position of the first joint on top, (times, 2), on the branch where the bars stay parallel: one angle."""
     m, k = (n + 1) / 3 + n, GRAVITY * ((n + 1) / 2 + n)
-    s = solve_ivp(lambda _, y: (y[1], k / m * np.sin(y[0])), (0.0, t[-1]), (0.0, 1.0), "DOP853", t, rtol=1e-13, atol=1e-13)
+
+    def rate(_: float, y: np.ndarray) -> tuple[float, float]:
+        return y[1], k / m * np.sin(y[0])
+
+    s = solve_ivp(rate, (0.0, t[-1]), (0.0, 1.0), "DOP853", t, rtol=1e-13, atol=1e-13)
     return np.stack([np.sin(s.y[0]), np.cos(s.y[0])], axis=1)
 
 
 def flyball_planar(p: Planar) -> fb.Mechanism:
     """The same mechanism, described to flyball."""
     m = fb.Mechanism(p.name, planar=True, gravity=(0.0, -GRAVITY))
-    for i, ((x, y, angle), (vx, vy, w)) in enumerate(zip(p.start.tolist(), p.rate.tolist())):
+    for i, ((x, y, angle), (vx, vy, w)) in enumerate(zip(p.start.tolist(), p.rate.tolist(), strict=True)):
         m.add(fb.Body(f"rod{i}", mass=float(p.mass[i]), inertia=float(p.inertia[i]), position=(x, y), angle=angle,
                       velocity=(vx, vy), angular_velocity=w))  # fmt: skip
     for k, (i, at, j, _) in enumerate(p.hinges):

@@ -11,7 +11,7 @@ from mechanisms import GRAVITY, GROUND, Planar
 sys.exudynFast = True  # the wheel's build without range checks; read once, when the package is imported
 
 import exudyn as exu  # noqa: E402
-import exudyn.itemInterface as item  # noqa: E402
+import exudyn.itemInterface as item  # noqa: E402, N813
 
 # label -> (dynamic solver, spectral radius, modified Newton)
 SETTINGS = {
@@ -28,15 +28,18 @@ def build(p: Planar, watched: bool):
     system = exu.SystemContainer().AddSystem()
     ground = system.AddObject(item.ObjectGround(referencePosition=[0, 0, 0]))
     bodies, sensors = [], []
-    for mass, inertia, start, rate in zip(p.mass, p.inertia, p.start, p.rate):
+    for mass, inertia, start, rate in zip(p.mass, p.inertia, p.start, p.rate, strict=True):
         node = system.AddNode(item.NodeRigidBody2D(referenceCoordinates=[0, 0, 0], initialCoordinates=list(start),
                                                    initialVelocities=list(rate)))  # fmt: skip
         body = system.AddObject(item.ObjectRigidBody2D(physicsMass=mass, physicsInertia=inertia, nodeNumber=node))
         marker = system.AddMarker(item.MarkerBodyMass(bodyNumber=body))
         system.AddLoad(item.LoadMassProportional(markerNumber=marker, loadVector=[0, -GRAVITY, 0]))
         bodies.append(body)
-        for what in (exu.OutputVariableType.Coordinates, exu.OutputVariableType.Coordinates_t) if watched else ():
-            sensors.append(system.AddSensor(item.SensorNode(nodeNumber=node, outputVariableType=what, storeInternal=True)))
+        for what in ("Coordinates", "Coordinates_t") if watched else ():
+            kind = getattr(exu.OutputVariableType, what)
+            sensors.append(
+                system.AddSensor(item.SensorNode(nodeNumber=node, outputVariableType=kind, storeInternal=True))
+            )
 
     def marker_at(body, at):
         number = ground if body == GROUND else bodies[body]

@@ -66,7 +66,8 @@ def machine() -> dict[str, Any]:
     }
 
 
-def _text(value: Any) -> str:
+def text(value: Any) -> str:
+    """A cell of a table: three digits of a number with a fraction, nothing for None."""
     if isinstance(value, float):
         return f"{value:.3g}"
     return "" if value is None else str(value)
@@ -81,10 +82,12 @@ def table(rows: Sequence[Mapping[str, Any]], columns: Mapping[str, str]) -> str:
     columns : mapping
         Key of a row -> heading.
     """
-    cells = [list(columns.values())] + [[_text(row.get(key)) for key in columns] for row in rows]
+    cells = [list(columns.values())] + [[text(row.get(key)) for key in columns] for row in rows]
     widths = [max(len(line[i]) for line in cells) for i in range(len(columns))]
-    lines = ["  ".join(text.rjust(w) if i else text.ljust(w) for i, (text, w) in enumerate(zip(line, widths)))
-             for line in cells]
+    lines = [
+        "  ".join(c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(line, widths, strict=True)))
+        for line in cells
+    ]
     return "\n".join([lines[0], "-" * len(lines[0]), *lines[1:]])
 
 

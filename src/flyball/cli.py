@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, cast
 
 import typer
 
@@ -54,7 +54,9 @@ def _version(wanted: bool) -> None:
 
 @app.callback()
 def _options(
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
 ) -> None:
     """Rigid-body mechanisms: run, check and view them."""
 
@@ -71,9 +73,9 @@ def _reported(as_json: bool) -> Iterator[None]:
         _fail("interrupted", "KeyboardInterrupt", INTERRUPTED, as_json)
 
 
-def _fail(message: str, kind: str, code: int, as_json: bool, **more: Any) -> None:
+def _fail(message: str, kind: str, code: int, as_json: bool, more: dict[str, Any] | None = None) -> None:
     if as_json:
-        _print_json({"error": message, "kind": kind, **more})
+        _print_json({"error": message, "kind": kind} | (more or {}))
     else:
         typer.echo(f"error: {message}", err=True)
     raise typer.Exit(code)
@@ -124,7 +126,7 @@ def run(
         except SimulationError as stopped:
             if stopped.result is None:
                 raise
-            result, error = stopped.result, stopped
+            result, error = cast("Result", stopped.result), stopped
         files, notes = _write(result, folder, not no_plots, not no_animation)
         _conclude(result, error, files, notes, as_json, talk)
 
@@ -143,9 +145,12 @@ def _conclude(
         "notes": notes,
     }
     if talk:
-        _table([*result.health.lines(), *(("written", str(f)) for f in files), *(("note", n) for n in notes)])
+        lines = result.health.lines()
+        if error is not None:
+            lines[0] = ("status", f"stopped at t = {error.t:.6g} s")
+        _table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes)])
     if error is not None:
-        _fail(str(error), type(error).__name__, FAILED, as_json, **summary)
+        _fail(str(error), type(error).__name__, FAILED, as_json, summary)
     if as_json:
         _print_json(summary)
     if not result.health.success:

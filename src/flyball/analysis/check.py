@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..model.body import GROUND
-from ..model.force import BodyForce, JointForce
+from ..model.force import BodyForce, TwoPointForce
 from ..model.model import Model
 from ..system.values import Values
 from .assemble import Assembly, assemble
@@ -61,7 +61,9 @@ class Report:
             out.append(("redundant", f"{_count(self.redundancy, 'constraint')} too many, among {names}"))
         if self.undetermined:
             first = list(self.undetermined.items())[:12]
-            text = "; ".join(f"{k}: {', '.join(v)}" for k, v in first) + ("; ..." if len(self.undetermined) > 12 else "")
+            text = "; ".join(f"{k}: {', '.join(v)}" for k, v in first) + (
+                "; ..." if len(self.undetermined) > 12 else ""
+            )
             out.append(("reactions not determined", text))
         out.append(("assembly", self._assembly()))
         for name, b in list(self.bodies.items())[:30]:
@@ -82,7 +84,8 @@ class Report:
         if not self.moved:
             return "closed as drawn"
         worst = max(self.moved, key=self.moved.__getitem__)
-        return f"closed after moving {_count(len(self.moved), 'body', 'bodies')}, {worst} farthest: {self.moved[worst]:.3g} m"
+        count = _count(len(self.moved), "body", "bodies")
+        return f"closed after moving {count}, {worst} farthest: {self.moved[worst]:.3g} m"
 
     def __str__(self) -> str:
         width = max(len(k) for k, _ in self.lines())
@@ -162,16 +165,16 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
 def _touched(model: Model) -> tuple[set[str], set[str]]:
     """Bodies that some joint or driver holds, and bodies that some force acts on."""
     held, pushed = set(), set()
-    for e in model.joints:
-        held |= {model.carrier(name, e) for name in (e.body_i, e.body_j)}
-    for e in model.drivers:
-        owner, _ = model.coordinate(e.coordinate, e)
+    for joint in model.joints:
+        held |= {model.carrier(name, joint) for name in (joint.body_i, joint.body_j)}
+    for driver in model.drivers:
+        owner, _ = model.coordinate(driver.coordinate, driver)
         held |= {getattr(owner, "body", getattr(owner, "name", ""))}
-    for e in model.forces:
-        if isinstance(e, BodyForce):
-            pushed.add(model.carrier(e.body, e))
-        elif not isinstance(e, JointForce):
-            pushed |= {model.carrier(name, e) for name in (e.body_i, e.body_j)}
+    for force in model.forces:
+        if isinstance(force, BodyForce):
+            pushed.add(model.carrier(force.body, force))
+        elif isinstance(force, TwoPointForce):
+            pushed |= {model.carrier(name, force) for name in (force.body_i, force.body_j)}
     return held - {GROUND}, pushed - {GROUND}
 
 
@@ -183,8 +186,8 @@ def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
     radius = float(np.sqrt(max(b.moments) / b.mass))
     if size > 0.0 and radius > FAR * size:
         yield (
-            f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie within {size:.3g} m "
-            f"of its centre of mass; check the unit (kg m^2) and inertia_about"
+            f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie within "
+            f"{size:.3g} m of its centre of mass; check the unit (kg m^2) and inertia_about"
         )
     elif 0.0 < radius < size / FAR:
         yield (
@@ -193,15 +196,16 @@ def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
         )
     if len(b.moments) == 3:
         p, q, r = b.moments
+        numbers = f"body {name!r}: its principal moments {p:g}, {q:g}, {r:g} kg m^2"
         if p > 0.0 and p + q - r < -1e-15 * r:
-            yield f"body {name!r}: its principal moments break the triangle inequality within rounding: {p:g} + {q:g} < {r:g}"
+            yield f"{numbers} break the triangle inequality, though within rounding"
         elif p > BARELY * r and abs(p + q - r) < BARELY * r and not _flat(x, name):
-            yield f"body {name!r}: its principal moments {p:g}, {q:g}, {r:g} are those of a flat plate (first two add up to the third)"
+            yield f"{numbers} are those of a flat plate (the first two add up to the third)"
 
 
 def _flat(x: Values, name: str) -> bool:
     """Whether its inertia was computed from shapes, so that flatness is meant."""
-    return x.structure.model[name].inertia is None
+    return x.numbers[name].inertia is None
 
 
 def _names_used(model: Model) -> set[str]:

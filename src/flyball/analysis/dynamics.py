@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..results.health import Health
 from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
-from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
+from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
 from .assemble import Assembly, assemble
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
@@ -110,6 +111,8 @@ def simulate(
         a = Assembly(a.compiled, t_start, y[: a.compiled.structure.nq], y[a.compiled.structure.nq :][: a.compiled.structure.nv])
     else:
         initial_turns(a.compiled.values, y)
+    if a.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+        mobility(model, a)  # refuses bodies that can move without inertia
     clock = _clock(a, t_start, float(t_end), times, y, chosen)
     rows, interrupted = _run(a, clock, tableau(chosen.method), progress)
     return _finish(model, a, clock, rows, interrupted, chosen, time.perf_counter() - begin)
@@ -164,8 +167,8 @@ def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
     W.option[ALPHA], W.option[BETA] = o.alpha, o.beta
     loose = o.atol + o.rtol * a.compiled.values.length
-    W.option[TOL_G] = min(1e-9, max(1e-12, 1e-3 * loose))
-    W.option[TOL_V] = min(1e-8, max(1e-11, 1e-2 * loose))
+    W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
+    W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
     return ex.Clock(real, count, times, Y, np.zeros((len(tableau(o.method).c), len(y))))
 
 
@@ -205,7 +208,6 @@ def _finish(
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
     elif status != ex.DONE:
         message = _reason(a, clock, status, t)
-    m = mobility(model, a)
     health = Health(
         success=status == ex.DONE and not interrupted,
         message=message,
@@ -216,20 +218,20 @@ def _finish(
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=seconds,
-        freedoms=m.freedoms,
-        redundant=m.redundant,
-        undetermined=m.undetermined,
         options={k: getattr(o, k) for k in o.__dataclass_fields__},
     )
     cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
-    if len(result.t):
-        health.energy_drift = result.energy.drift
+    health.late = {"mobility": partial(mobility, model, a), "energy_drift": partial(_energy_drift, result)}
     if status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t)
     return result
+
+
+def _energy_drift(result: Result) -> float:
+    return result.energy.drift
 
 
 def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:

@@ -8,7 +8,7 @@ from .._jit import kernel
 from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
-from ..system.motion import derivative, place, project, report
+from ..system.motion import arrive, derivative, place, report
 from ..system.tables import System, Work
 
 POSITION, MOTION, INTEGRATE = 0, 1, 2
@@ -28,7 +28,7 @@ def motion_kernel(S, W, R, clock, out, task):
         return 0
     if task == 1:
         return derivative(clock.real[0], y, clock.K[0], S, W)
-    return advance(derivative, project, report, S, W, R, clock, out)
+    return advance(derivative, arrive, report, S, W, R, clock, out)
 
 
 def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:

@@ -187,7 +187,7 @@ def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> N
     fields = dict(table)
     cls = _kind(category, fields, where) if category in MANY_KINDS else ONE_KIND[category]
     if "name" not in fields:
-        raise ModelError(f"{where}: it has no name; add name = \"...\"")
+        raise ModelError(f'{where}: it has no name; add name = "..."')
     try:
         model.add(cls(**fields))
     except Exception as error:
@@ -200,7 +200,9 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
 
     importlib.import_module(f"..{category}", __package__)
     known = sorted(
-        k for k, c in Element.registry.items() if issubclass(c, MANY_KINDS[category]) and c.__module__.count(f".{category}.")
+        k
+        for k, c in Element.registry.items()
+        if issubclass(c, MANY_KINDS[category]) and c.__module__.count(f".{category}.")
     )
     name = fields.pop("type", None)
     if name not in known:

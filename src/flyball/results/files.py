@@ -12,6 +12,7 @@ import os
 from collections.abc import Callable
 from dataclasses import fields
 from pathlib import Path
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -227,15 +228,21 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     wanted = {"q": x.structure.nq, "v": x.structure.nv, "multipliers": len(x.structure.rows)}
     for name, n in wanted.items():
         if arrays[name].shape[1] != n:
-            raise ModelError(f"{where}: its model has {n} {name}, its motion {arrays[name].shape[1]}; the file is damaged")
+            raise ModelError(
+                f"{where}: its model has {n} {name}, its motion {arrays[name].shape[1]}; the file is damaged"
+            )
     result = Result(model, x, health=health, **arrays)
     result.final = (float(final[0]), final[1:])
     return result
 
 
 def _health(data: dict[str, Any]) -> Health:
+    """Health as it was saved; what is found late is already known here."""
     known = {f.name for f in fields(Health)}
-    data = {k: v for k, v in data.items() if k in known}
-    data["redundant"] = tuple(data["redundant"])
-    data["undetermined"] = {k: tuple(v) for k, v in data["undetermined"].items()}
-    return Health(**data)
+    found = SimpleNamespace(
+        freedoms=data["freedoms"],
+        redundant=tuple(data["redundant"]),
+        undetermined={k: tuple(v) for k, v in data["undetermined"].items()},
+    )
+    late = {"mobility": found, "energy_drift": data["energy_drift"]}
+    return Health(**{k: v for k, v in data.items() if k in known}, late=late)

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 
 @dataclass
 class Health:
-    """Figures that tell whether a result can be trusted."""
+    """Figures that tell whether a result can be trusted.
+
+    Those that take time to find (freedoms by rank, undetermined reactions, the energy balance) are found when first
+    asked for.
+    """
 
     success: bool
     message: str
@@ -19,15 +24,39 @@ class Health:
     evaluations: int
     factorisations: int
     seconds: float  # wall time, assembly included [s]
-    freedoms: int
-    redundant: tuple[str, ...] = ()  # joints whose constraints depend on one another
-    undetermined: dict[str, tuple[str, ...]] = field(default_factory=dict)  # joint -> reaction components
-    energy_drift: float = float("nan")  # largest deviation from the energy balance [J]
     options: dict[str, Any] = field(default_factory=dict)
+    late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
+
+    def _found(self, name: str) -> Any:
+        value = self.late[name]
+        if callable(value):
+            value = self.late[name] = value()
+        return value
+
+    @property
+    def freedoms(self) -> int:
+        """Freedoms by rank, at the start."""
+        return self._found("mobility").freedoms
+
+    @property
+    def redundant(self) -> tuple[str, ...]:
+        """Joints whose constraints depend on one another."""
+        return self._found("mobility").redundant
+
+    @property
+    def undetermined(self) -> dict[str, tuple[str, ...]]:
+        """Joint -> reaction components (world axes) that redundancy leaves undetermined."""
+        return self._found("mobility").undetermined
+
+    @property
+    def energy_drift(self) -> float:
+        """Largest deviation from the energy balance [J]."""
+        return self._found("energy_drift")
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self)
+        plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late"}
+        return plain | {k: getattr(self, k) for k in ("freedoms", "redundant", "undetermined", "energy_drift")}
 
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""

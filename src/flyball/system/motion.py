@@ -14,7 +14,7 @@ from .kinematics import bodies, frames
 from .loads import gather, inertial
 from .records import load
 from .rows import row_times
-from .solve import factor, magnitude, solve
+from .solve import factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
     BETA,
@@ -24,6 +24,7 @@ from .tables import (
     GAMMA,
     GUILTY,
     LAM,
+    LENGTH,
     NU,
     PROJECTIONS,
     R2,
@@ -44,6 +45,8 @@ NOT_CLOSED = 2
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-13, 1e-12  # violations of accepted and reported states that are left alone
+SLOW = 0.1  # a Newton step that gains less than this wants a new factor
+STALE = 1e-12  # a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
 
 
@@ -87,12 +90,14 @@ def drift(S, W, v, out):
 
 
 @formula
-def project_state(S, W, t, q, v, tol_g, tol_v):
+def settle(S, W, t, q, v, tol_g, tol_v):
     """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
     Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. A violation below the
     tolerance is left alone: near a singular position its correction is rounding divided by a small number, and the
-    accelerations would follow it. Returns (0 or NOT_CLOSED, the violation that was found).
+    accelerations would follow it. One factor serves as long as it does.
+
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W is good for a solve here).
     """
     zero = W.vel[F_APPLIED]
     step = W.vel[V3]
@@ -100,79 +105,73 @@ def project_state(S, W, t, q, v, tol_g, tol_v):
     normalise(S, q)
     place(S, W, t, q, v)
     if r.shape[0] == 0:
-        return 0, 0.0
+        return 0, 0.0, False
     for d in range(zero.shape[0]):
         zero[d] = 0.0
     worst = violation(W, r)
     found = worst
     last = 1e300
+    factored = False
     for _ in range(PASSES):
         if worst <= tol_g or (worst > 0.7 * last and worst <= CLOSED):
             break
+        if not worst <= FAR:
+            return NOT_CLOSED, found, False
+        if not factored or worst > SLOW * last:
+            if factor(S, W) != 0:
+                return NOT_CLOSED, found, False
+            factored = True
+        else:
+            factored = reuse(S, W)
         last = worst
-        if not worst <= FAR or factor(S, W) != 0:
-            return NOT_CLOSED, found
         solve(S, W, zero, r, step, W.row[RESIDUAL])
         retract(S, q, step)
         place(S, W, t, q, v)
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
-    if not worst <= CLOSED:
-        return NOT_CLOSED, found
+    if not worst <= CLOSED and not worst <= tol_g:
+        return NOT_CLOSED, found, False
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (1.0 + size):
-        if factor(S, W) != 0:
-            return NOT_CLOSED, found
-        solve(S, W, zero, r, step, W.row[RESIDUAL])
+        if factored:
+            factored = reuse(S, W)
+        if not factored or solve(S, W, zero, r, step, W.row[RESIDUAL]) > STALE:
+            if factor(S, W) != 0:
+                return NOT_CLOSED, found, False
+            factored = True
+            solve(S, W, zero, r, step, W.row[RESIDUAL])
         for d in range(step.shape[0]):
             v[d] += step[d]
         place(S, W, t, q, v)
-    return 0, max(found, worst)
+    return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
 
 
 @formula
-def accelerations(S, W, t, v, z, work):
-    """Vdot into W.vel[X_SOLVED] and lam into W.row[LAM] at the kinematics and rows in W."""
+def accelerate(S, W, t, p, dy, factored):
+    """dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
+    nq = S.kinds[-2]
+    nv = W.vel.shape[1]
+    v = p[nq : nq + nv]
+    work = dy[nq + nv :]
     inertial(S, W)
-    forces(S, W, t, z, work)
+    forces(S, W, t, p[nq + nv :], work)
     gather(S, W, W.vel[F_APPLIED])
     if W.option[STABILIZE] == BAUMGARTE:
         a = 2.0 * W.option[ALPHA]
         b = W.option[BETA] * W.option[BETA]
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
-    if S.row_i.shape[0] > 0 or S.mass_i.shape[0] > 0:
+    x = W.vel[X_SOLVED]
+    if factored:
+        factored = reuse(S, W)
+    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM]) > STALE:
         status = factor(S, W)
         if status != 0:
             return status
-    solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], W.vel[X_SOLVED], W.row[LAM])
-    return 0
-
-
-@formula
-def derivative(t, y, dy, S, W):
-    """dy/dt = f(P(y)). ``y`` is left as it is. Returns 0 or a status."""
-    nq = S.kinds[-2]
-    nv = W.vel.shape[1]
-    p = W.y[0]
-    for i in range(y.shape[0]):
-        p[i] = y[i]
-    q = p[:nq]
-    v = p[nq : nq + nv]
-    if W.option[STABILIZE] == STAGES:
-        status, _ = project_state(S, W, t, q, v, W.option[TOL_G], W.option[TOL_V])
-        if status != 0:
-            return status
-    else:
-        normalise(S, q)
-        place(S, W, t, q, v)
-    work = dy[nq + nv :]
-    status = accelerations(S, W, t, v, p[nq + nv :], work)
-    if status != 0:
-        return status
-    rates(S, q, v, dy)
+        solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM])
+    rates(S, p, v, dy)
     for d in range(nv):
-        dy[nq + d] = W.vel[X_SOLVED, d]
+        dy[nq + d] = x[d]
     for k in range(S.row_i.shape[0]):
         if S.row_i[k, ROW_WORK] >= 0:
             work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
@@ -185,27 +184,53 @@ def derivative(t, y, dy, S, W):
 
 
 @formula
-def project(t, y, S, W):
-    """Project the state y in place, to rounding. Returns (0 or a status, the violation found)."""
+def derivative(t, y, dy, S, W):
+    """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
     nq = S.kinds[-2]
-    nv = W.vel.shape[1]
-    if W.option[STABILIZE] < STEPS:
-        normalise(S, y[:nq])
-        return 0, 0.0
-    return project_state(S, W, t, y[:nq], y[nq : nq + nv], TIGHT_G, TIGHT_V)
+    p = W.y[0]
+    for i in range(y.shape[0]):
+        p[i] = y[i]
+    q = p[:nq]
+    v = p[nq : nq + W.vel.shape[1]]
+    factored = False
+    if W.option[STABILIZE] == STAGES:
+        status, _, factored = settle(S, W, t, q, v, W.option[TOL_G], W.option[TOL_V])
+        if status != 0:
+            return status
+    else:
+        normalise(S, q)
+        place(S, W, t, q, v)
+    return accelerate(S, W, t, p, dy, factored)
+
+
+@formula
+def arrive(t, y, dy, S, W):
+    """Project the state y in place, to rounding, and evaluate there. Returns (0 or a status, the relative violation)."""
+    nq = S.kinds[-2]
+    q = y[:nq]
+    v = y[nq : nq + W.vel.shape[1]]
+    found = 0.0
+    factored = False
+    if W.option[STABILIZE] >= STEPS:
+        status, found, factored = settle(S, W, t, q, v, TIGHT_G, TIGHT_V)
+        if status != 0:
+            return status, found
+    else:
+        normalise(S, q)
+        place(S, W, t, q, v)
+    return accelerate(S, W, t, y, dy, factored), found
 
 
 @formula
 def report(t, y, out, S, W):
-    """Write t, the state, vdot and lam to a row of the output, with the state projected first."""
+    """Write t, the state (projected first), vdot and lam to a row of the output."""
     nq = S.kinds[-2]
     nv = W.vel.shape[1]
     ny = y.shape[0]
-    status, _ = project(t, y, S, W)
-    if status == 0:
-        status = derivative(t, y, W.y[1], S, W)
-    W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
-    W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
+    status, _ = arrive(t, y, W.y[1], S, W)
+    if S.row_i.shape[0] > 0:
+        W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
+        W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
     out[0] = t
     for i in range(ny):
         out[1 + i] = y[i]

@@ -61,11 +61,26 @@ def factor(S, W):
 
 
 @formula
-def factor_schur(S, W):
-    """S = G M^-1 G^T, block by block."""
+def turn_rows(S, W):
+    """H = M^-1 G^T for the rows now in W."""
     for e in range(S.block_i.shape[0]):
         at = S.block_i[e, 1]
         inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+
+
+@formula
+def reuse(S, W):
+    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement. Says whether."""
+    if S.mass_i.shape[0] > 0:
+        return False
+    turn_rows(S, W)
+    return True
+
+
+@formula
+def factor_schur(S, W):
+    """S = G M^-1 G^T, block by block."""
+    turn_rows(S, W)
     for e in range(S.pair_i.shape[0]):
         i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
         s = W.G[i] * W.H[j]
@@ -104,7 +119,8 @@ def factor_kkt(S, W):
 def solve(S, W, f, gamma, x, lam):
     """Solve for x and lam with the factor in W; ``f`` and ``gamma`` are kept.
 
-    Where M is semidefinite, M + E is factored in its place and the refinement takes E out again.
+    Where M is semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the
+    residual left, relative to the size of its terms.
     """
     W.info[SOLVES] += 1
     dx = W.vel[V1]
@@ -116,17 +132,18 @@ def solve(S, W, f, gamma, x, lam):
         lam[k] = 0.0
         W.row[R1, k] = gamma[k]
     one_pass(S, W, rhs, dx, x, lam)
+    worst = 0.0
     last = 1e300
     for _ in range(REFINEMENTS):
-        worst = residual(S, W, gamma, x)
+        if lam.shape[0] > 0:
+            worst = residual(S, W, gamma, x)
         if S.glob[SEMIDEFINITE] > 0.0:
-            m = excess(S, dx, rhs, x)
-            worst = m if m > worst else worst
+            worst = max(worst, excess(S, dx, rhs, x))
         if not worst > PASS or worst > 0.2 * last:
             break
         last = worst
         one_pass(S, W, rhs, dx, x, lam)
-    return last
+    return worst
 
 
 @formula

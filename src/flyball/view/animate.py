@@ -16,6 +16,7 @@ from .looks import Looks
 from .recording import Channel, RecordedBody, RecordedJoint, RecordedLine, Recording
 
 if TYPE_CHECKING:
+    from ..model.element import Element
     from ..results.result import Result
 
 FRAMES = 2000  # times in a recording, about
@@ -80,20 +81,24 @@ def _point(result: Result, name: str, role: str, every: np.ndarray) -> np.ndarra
 def _lines(result: Result, every: np.ndarray, size: float) -> list[RecordedLine]:
     """Springs, dampers, links, and the arrows of given forces."""
     out = []
+
+    def between(e: Element, kind: str) -> None:
+        a, b = (_point(result, e.name, role, every) for role in "FM")
+        out.append(RecordedLine(e.name, kind, a, b))
+
     for e in result.model.forces:
         if isinstance(e, TwoPointForce):
             soft = isinstance(e, SpringDamper) and result.values.numbers[e.name].stiffness != 0.0
-            kind = "spring" if soft else "damper"
-            out.append(RecordedLine(e.name, kind, *(_point(result, e.name, role, every) for role in "FM")))
+            between(e, "spring" if soft else "damper")
         elif isinstance(e, PointForce):
             force = result[e.name].wrench[0][every]
             largest = np.sqrt((force**2).sum(axis=1)).max(initial=0.0)
             if 0.0 < largest < np.inf:
                 a = _point(result, e.name, "M", every)
                 out.append(RecordedLine(e.name, "arrow", a, a + force * (0.6 * size / largest)))
-    for e in result.model.joints:
-        if isinstance(e, Distance):
-            out.append(RecordedLine(e.name, "link", *(_point(result, e.name, role, every) for role in "FM")))
+    for joint in result.model.joints:
+        if isinstance(joint, Distance):
+            between(joint, "link")
     return out
 
 
@@ -120,7 +125,9 @@ def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
         for e in _parts(result):
             if len(curves) >= CURVES:
                 break
-            curves |= {f"{e.name}.{k}": c for k, c in result[e.name].channels().items() if _main(f"{e.name}.{k}", result)}
+            curves |= {
+                f"{e.name}.{k}": c for k, c in result[e.name].channels().items() if _main(f"{e.name}.{k}", result)
+            }
         names = list(curves)[:CURVES]
     return tuple(Channel(k, curves[k][0], np.asarray(curves[k][1], float)[every]) for k in names)
 

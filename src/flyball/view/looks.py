@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..joints.distance import Distance
 from ..joints.prismatic import Prismatic
 from ..model.body import GROUND
 from ..model.element import resolve
@@ -16,6 +15,7 @@ from ..model.shapes import Cone, Solid
 from .recording import Shape
 
 if TYPE_CHECKING:
+    from ..model.joint import Joint
     from ..results.result import Result
 
 End = tuple[str, np.ndarray, np.ndarray]
@@ -37,10 +37,14 @@ class Looks:
         x = result.values
         self._names = {b: name for name, b in x.structure.place.items()}
         self._env = dict(zip(result.model.parameters, x.system.const.tolist(), strict=False))
+        self._solids = {b.name: b.solids() for b in result.model.bodies}
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
         self.blocks: dict[str, list[End]] = {b.name: [] for b in result.model.bodies}
-        for e in (*result.model.joints, *(f for f in result.model.forces if isinstance(f, TwoPointForce))):
-            self._attach(e)
+        for joint in result.model.joints:
+            self._attach(joint)
+        for force in result.model.forces:
+            if isinstance(force, TwoPointForce):
+                self._attach(force)
         reach = {name: self._reach(name) for name in self.points}
         known = [r for r in reach.values() if r > 0.0]
         self.size = float(np.median(known)) if known else x.length
@@ -53,14 +57,14 @@ class Looks:
         row = x.system.frame_x[k].real
         return body, row[:3] + x.bodies[body].com.real, row[3:].reshape(3, 3)
 
-    def _attach(self, e: object) -> None:
+    def _attach(self, e: Joint | TwoPointForce) -> None:
         """Note an element's points on its bodies; of a slide, the block on one and the guide's ends on the other."""
         ends = [self.end(e.name, role) for role in "FM"]
         if isinstance(e, Prismatic):
             guide, block = ends if ends[1][0] != GROUND else reversed(ends)
             self.blocks[block[0]].append(block)
             if guide[0] != GROUND:
-                s = np.asarray(getattr(self.result[e.name], "displacement"))
+                s = self.result[e.name].displacement
                 s = s - self.result.values.numbers[e.name].displacement
                 sign = 1.0 if guide is ends[0] else -1.0
                 for d in (s.min(initial=0.0), s.max(initial=0.0)):
@@ -95,7 +99,7 @@ class Looks:
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """The body's shapes."""
-        given = self.result.model[name].solids()
+        given = self._solids[name]
         if given:
             return tuple(_given(s, self._env) for s in given)
         points = self.points[name]
@@ -182,7 +186,9 @@ class Looks:
                 return Shape("cylinder", size, _three(com), _along(V[:, lone]))
         edges = [float(np.sqrt(max(6.0 * (w.sum() - 2.0 * x), 0.0))) for x in w]
         V = V * np.sign(np.linalg.det(V))
-        return Shape("box", tuple(max(x, 0.2 * least) for x in edges), _three(com), tuple(matrix_to_quaternion(V).tolist()))
+        return Shape(
+            "box", tuple(max(x, 0.2 * least) for x in edges), _three(com), tuple(matrix_to_quaternion(V).tolist())
+        )
 
 
 def _given(s: Solid, env: dict[str, float]) -> Shape:

@@ -23,7 +23,7 @@ Curve = tuple[str, str, np.ndarray]  # name, unit, values
 
 # Okabe and Ito's palette, which people with any colour vision can tell apart, darkest first.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#4D4D4D", "#B8A800")
-STYLE = {
+STYLE: dict[str, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 150,
     "figure.facecolor": "white",
@@ -100,8 +100,10 @@ def _curves(result: Result, name: str) -> list[Curve]:
 def _drawing() -> Iterator[None]:
     """Our style, for the time of drawing only."""
     import matplotlib
+    from cycler import cycler
 
-    with matplotlib.rc_context({**STYLE, "axes.prop_cycle": matplotlib.cycler(color=PALETTE)}):
+    style: Any = STYLE | {"axes.prop_cycle": cycler(color=PALETTE)}
+    with matplotlib.rc_context(style):
         yield
 
 

@@ -1,7 +1,7 @@
 """One adaptive loop for every explicit Runge-Kutta pair, with dense output, projection and chunked output.
 
-Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``project(t, y, S, W)`` and
-``report(t, y, out, S, W)``. It returns when its output buffer is full, its share of steps is done, the end is
+Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``arrive(t, y, dy, S, W)``, which also projects y,
+and ``report(t, y, out, S, W)``. It returns when its output buffer is full, its share of steps is done, the end is
 reached, or it cannot go on; the caller calls again with the same ``Clock``. Progress, interrupt and restart are this.
 
 Step control after Hairer, Norsett and Wanner, *Solving Ordinary Differential Equations I* (1993), section II.4.
@@ -20,6 +20,7 @@ from ...math.scalar import sqrt
 T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE = range(9)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED = range(7)
+SAFETY = 0.85
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED = 0, 1, 2, 3, 4
 
 
@@ -81,7 +82,7 @@ def first_step(derivative, S, W, R, c):
 
 
 @formula
-def attempt(derivative, project, S, W, R, c, h):
+def attempt(derivative, arrive, S, W, R, c, h):
     """One step of width h into c.y[1]. Returns (status, error in units of the tolerance)."""
     y = c.y[0]
     new = c.y[1]
@@ -94,13 +95,10 @@ def attempt(derivative, project, S, W, R, c, h):
         if status != 0:
             return status, 0.0
     combine(y, c.K, R.A[stages], stages, h, new)
-    status, moved = project(t + h, new, S, W)
+    status, moved = arrive(t + h, new, c.K[stages], S, W)
     if status != 0:
         return status, 0.0
-    status = derivative(t + h, new, c.K[stages], S, W)
-    if status != 0:
-        return status, 0.0
-    moved /= c.real[ATOL] + c.real[RTOL] * c.real[SCALE]
+    moved /= c.real[RTOL] + c.real[ATOL] / c.real[SCALE]
     e5 = 0.0
     e3 = 0.0
     for i in range(n):
@@ -180,13 +178,13 @@ def start(derivative, report, S, W, R, c, out, used):
             return UNREPORTED, used
         used += 1
         c.count[NEXT] += 1
-    c.real[GROW] = 10.0
+    c.real[GROW] = 6.0
     c.count[STARTED] = 1
     return 0, used
 
 
 @formula
-def advance(derivative, project, report, S, W, R, c, out):
+def advance(derivative, arrive, report, S, W, R, c, out):
     """Go on until done, stuck, the buffer ``out`` is full or the quota of steps is used. Returns rows written."""
     used = 0
     c.count[STATUS] = RUNNING
@@ -208,11 +206,11 @@ def advance(derivative, project, report, S, W, R, c, out):
         if h < 1e-14 * max(abs(t), c.real[LARGEST]):
             c.count[STATUS] = STUCK
             return used
-        status, error = attempt(derivative, project, S, W, R, c, h)
+        status, error = attempt(derivative, arrive, S, W, R, c, h)
         steps += 1
         if status != 0 or not error <= 1.0:
             c.count[REJECTED] += 1
-            shrink = 0.25 if status != 0 or not error < 1e300 else max(0.2, 0.9 * error**exponent)
+            shrink = 0.25 if status != 0 or not error < 1e300 else max(0.2, SAFETY * error**exponent)
             c.real[H] = h * shrink
             c.real[GROW] = 1.0
             continue
@@ -227,7 +225,7 @@ def advance(derivative, project, report, S, W, R, c, out):
             c.K[0, i] = c.K[R.order_i[1], i]
         c.count[ACCEPTED] += 1
         c.real[T] = c.real[T_END] if h == c.real[T_END] - t else t + h
-        c.real[H] = h * (min(c.real[GROW], max(0.2, 0.9 * error**exponent)) if error > 0.0 else c.real[GROW])
-        c.real[GROW] = 10.0
+        c.real[H] = h * (min(c.real[GROW], max(0.2, SAFETY * error**exponent)) if error > 0.0 else c.real[GROW])
+        c.real[GROW] = 6.0
     c.count[STATUS] = DONE
     return used

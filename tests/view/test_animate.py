@@ -1,0 +1,198 @@
+"""The recording of a result: poses, shapes, lines and joints are where the mechanism has them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.results.result import Result
+from flyball.system.structure import structure
+from flyball.system.values import values
+from flyball.view.animate import animation, kept, record
+from flyball.view.payload import check
+from flyball.view.plots import plot, standard_plots
+from flyball.view.recording import Recording, Shape
+from tests.results.made_up import L, R, healthy, slider_crank
+
+
+def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vectors turned by unit quaternions."""
+    w, u = q[..., :1], q[..., 1:]
+    return v + 2 * np.cross(u, np.cross(u, v) + w * v)
+
+
+def ends(shape: Shape) -> np.ndarray:
+    """The two end points of a capsule's line, in the body's axes."""
+    half = turned(np.array(shape.quaternion), np.array([0, 0, shape.size[1] / 2]))
+    return np.array([shape.position - half, shape.position + half])
+
+
+def still(m: fb.Mechanism, n: int = 2) -> Result:
+    """A mechanism as it is drawn."""
+    x = values(structure(m))
+    q = np.tile(x.q, (n, 1))
+    s = x.structure
+    zeros = (np.zeros((n, k)) for k in (s.nv, len(s.states), s.nv, len(s.rows)))
+    return Result(m, x, np.arange(float(n)), q, *zeros, healthy())
+
+
+@pytest.fixture(scope="module")
+def result() -> Result:
+    return slider_crank()
+
+
+@pytest.fixture(scope="module")
+def recording(result: Result) -> Recording:
+    made = record(result)
+    check(made)
+    return made
+
+
+def test_poses_are_those_of_the_reference_frames(result: Result, recording: Recording) -> None:
+    crank = recording.bodies[0]
+    assert np.allclose(crank.p, 0)
+    tip = turned(crank.q, np.array([R, 0, 0])) + crank.p
+    a = result["crank"].angle
+    assert np.allclose(tip, np.stack([R * np.cos(a), R * np.sin(a), 0 * a], 1))
+
+
+def test_links_reach_from_joint_to_joint(result: Result, recording: Recording) -> None:
+    (link,) = recording.bodies[0].shapes
+    assert link.kind == "capsule"
+    assert np.allclose(sorted(ends(link).tolist()), [[0, 0, 0], [R, 0, 0]])
+    rod = recording.bodies[1]
+    plate = rod.shapes[0]  # two pins and the dashpot's eye
+    assert plate.kind == "plate"
+    outline = np.array(plate.outline)
+    for corner in ((-L / 2, 0), (L / 2, 0), (0, 0.1)):
+        assert (outline.min(0) < corner).all()
+        assert (outline.max(0) > corner).all()
+
+
+def test_a_slider_is_a_block_along_its_guide(recording: Recording) -> None:
+    (block,) = recording.bodies[2].shapes
+    assert block.kind == "box"
+    assert np.allclose(np.abs(turned(np.array(block.quaternion), np.array([0, 0, 1.0]))), [1, 0, 0])
+    slide = recording.joints[3]
+    assert (slide.kind, slide.body) == ("prismatic", "ground")
+    assert np.allclose(slide.axis, [1, 0, 0])
+    assert np.allclose(slide.position, [R + L, 0, 0])
+
+
+def test_joints_ride_on_ground_where_they_are_fixed(recording: Recording) -> None:
+    by_name = {j.name: j for j in recording.joints}
+    assert by_name["A"].body == "ground"
+    assert by_name["B"].body == "crank"
+    assert np.allclose(by_name["B"].position, [R, 0, 0])
+    assert all(j.kind == "revolute" for j in recording.joints[:3])
+
+
+def test_springs_dampers_and_forces_are_lines(result: Result, recording: Recording) -> None:
+    by_name = {line.name: line for line in recording.lines}
+    assert {k: line.kind for k, line in by_name.items()} == {"spring": "spring", "dash/pot": "damper", "push": "arrow"}
+    spring = by_name["spring"]
+    assert np.allclose(np.linalg.norm(spring.b - spring.a, axis=1), result["spring"].length)
+    push = by_name["push"]
+    assert np.allclose(push.a[:, 0], result["slider.x"])
+    assert np.allclose((push.b - push.a)[:, 1:], 0)
+
+
+def test_curves_and_notes(result: Result, recording: Recording) -> None:
+    names = [c.name for c in recording.channels]
+    assert len(names) <= 60
+    assert set(recording.shown) <= set(names)
+    assert recording.shown[0] == "motor.effort"
+    assert recording.notes["freedoms"] == "0"
+    assert "slider/crank" in animation(result)
+
+
+def test_given_shapes_are_kept() -> None:
+    m = fb.Mechanism("m")
+    cone = fb.Cone(radius=1, height=2, position=(0, 0, 1), orientation=("180 deg", 0, 0))
+    m.add(fb.Body("b", density=1, position=(5, 0, 0), shape=[cone, fb.Box(edges=(1, 2, 3), position=(1, 0, 0))]))
+    recording = record(still(m))
+    check(recording)
+    drawn, box = recording.bodies[0].shapes
+    assert np.allclose(drawn.position, [0, 0, 0])  # the middle of a cone that hangs from z = 1
+    assert box.size == (1.0, 2.0, 3.0)
+    assert np.allclose(box.position, [1, 0, 0])
+    assert np.allclose(recording.bodies[0].p, [5, 0, 0])
+
+
+def test_bodies_in_space_get_rods_and_solids() -> None:
+    m = fb.Mechanism("m")
+    m.add(fb.Body("free", mass=12, inertia=(5, 10, 13), orientation=(0.3, 0.2, 0.1)))  # a box of 3, 2, 1
+    m.add(fb.Body("top", mass=1, inertia=(0.26, 0.26, 0.5), position=(0, 0, 1)))
+    m.add(fb.Body("rod", mass=1, inertia=(1 / 12, 1 / 12, 0), position=(3, 0, 0.5)))
+    m.add(fb.Body("three", mass=1, inertia=(1, 1, 1), position=(9, 0, 0)))
+    m.add(fb.Spherical("S", "ground", "top", at=(0, 0, 0)), fb.Spherical("T", "ground", "rod", at=(3, 0, 0)))
+    for k, x in enumerate((8, 9, 10)):
+        m.add(fb.Spherical(f"P{k}", "ground", "three", at=(x, k % 2, 0)))
+    m.add(fb.Distance("wire", "free", "top", at=((0, 0, 0), (0, 0, 1))))
+    recording = record(still(m))
+    check(recording)
+    shapes = {b.name: b.shapes for b in recording.bodies}
+    top = {s.kind: s for s in shapes["top"]}
+    assert "capsule" in top
+    (rod,) = shapes["rod"]
+    assert np.allclose(sorted(ends(rod).tolist()), [[0, 0, -0.5], [0, 0, 0.5]])
+    assert [s.kind for s in shapes["three"]] == ["capsule"] * 3
+    assert recording.lines[-1].kind == "link"
+
+
+def test_a_lone_body_looks_like_its_inertia() -> None:
+    m = fb.Mechanism("m")
+    m.add(fb.Body("free", mass=12, inertia=(5, 10, 13)), fb.Body("ball", mass=1, inertia=(0.4, 0.4, 0.4)))
+    m.add(fb.Body("disc", mass=1, inertia=(0.25, 0.25, 0.5)), fb.Body("point", mass=1, inertia=0))
+    box, ball, disc, point = (b.shapes[0] for b in record(still(m)).bodies)
+    assert box.kind == "box"
+    assert np.allclose(sorted(box.size), [1, 2, 3])
+    assert ball.kind == "sphere"
+    assert np.allclose(ball.size, [1])
+    assert disc.kind == "cylinder"
+    assert np.isclose(disc.size[0], 1)
+    assert point.kind == "sphere"
+    assert point.size[0] > 0
+
+
+def test_long_motions_are_thinned_and_big_mechanisms_show_a_selection() -> None:
+    assert (kept(2500) == np.arange(2500)).all()
+    few = kept(100_001)
+    assert len(few) == 2000
+    assert few[0] == 0
+    assert few[-1] == 100_000
+    m = fb.Mechanism("chain", planar=True)
+    for k in range(60):
+        m.add(fb.Body(f"b{k}", mass=1, inertia=1 / 12, position=(k + 0.5, 0)))
+        m.add(fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)))
+    recording = record(still(m))
+    check(recording)
+    assert len(recording.channels) == 60
+    assert recording.size == pytest.approx(1.0)
+    assert np.allclose(sorted(ends(recording.bodies[-1].shapes[0]).tolist()), [[-0.5, 0, 0], [0.5, 0, 0]])
+
+
+def test_plots_are_written(result: Result, tmp_path: Path) -> None:
+    files = standard_plots(result, tmp_path)
+    assert [f.name for f in files] == ["energy.png", "coordinates.png", "paths.png", "reactions.png", "actuation.png"]
+    assert all(f.stat().st_size > 5000 for f in files)
+    figure = plot(result, "slider.x", "rod.y", "motor")
+    assert [ax.get_ylabel() for ax in figure.axes] == ["[m]", "[N m]", "[J]"]
+    assert [line.get_label() for line in figure.axes[0].lines] == ["slider.x", "rod.y"]
+    for suffix in ("svg", "pdf"):
+        assert plot(result, "A", path=tmp_path / f"a.{suffix}") is None
+        assert (tmp_path / f"a.{suffix}").stat().st_size > 1000
+
+
+def test_wrong_plots_are_refused(result: Result, tmp_path: Path) -> None:
+    with pytest.raises(fb.ModelError, match=r"has no curve 'q'; it has x, y"):
+        plot(result, "slider.q")
+    with pytest.raises(fb.ModelError, match=r"did you mean 'slider'"):
+        plot(result, "slidr")
+    with pytest.raises(fb.ModelError, match=r"its suffix must be \.png, \.svg, \.pdf"):
+        plot(result, path=tmp_path / "a.gif")
+    with pytest.raises(fb.ModelError, match="cannot write"):
+        plot(result, path=tmp_path / "no" / "a.png")
