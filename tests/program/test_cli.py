@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import webbrowser
@@ -72,11 +73,10 @@ def test_a_run_that_cannot_go_on_keeps_what_was_computed(here: Path) -> None:
     m.save("stops.toml")
     said = Said("run", "stops.toml", "--t-end", 1, "--no-plots")
     assert said.code == 3
-    assert "not finite at t = 0.5" in said.err
-    assert "rod" in said.err
+    assert re.search(r"^error: 'stops': .* at t = 0\.(49|50)", said.err)
     r = fb.load_result("stops-result/result.nc")
     assert not r.health.success
-    assert 0.4 < r.t[-1] <= 0.5
+    assert 0.4 < r.t[-1] < 0.51
     data = json.loads(Said("run", "stops.toml", "--t-end", 1, "--no-plots", "--no-animation", "--json").out)
     assert data["kind"] == "SimulationError"
     assert not data["success"]
@@ -157,14 +157,16 @@ def test_check_finds_what_is_odd(here: Path) -> None:
     m.add(fb.Body("heavy", mass=1, inertia=1e4, position=(1, 0)), fb.Body("lonely", mass=1, inertia=1))
     m.add(fb.Body("light", mass=1, inertia=1e-6, position=(1, 1)))
     m.add(fb.Revolute("A", "ground", "heavy", at=(0, 0)), fb.Revolute("B", "heavy", "light", at=(1, 2)))
+    m.add(fb.Body("shaped", mass=1, inertia=1, shape=fb.Sphere(radius=1, position=(0.5, 0, 0))))
     report = m.check()
     text = str(report)
-    assert report.freedoms == 5
-    assert report.gruebler == 5
+    assert report.freedoms == 8
+    assert report.gruebler == 8
     assert not report.redundant
     assert "body 'heavy': its inertia is that of a body 100 m across" in text
     assert "body 'light': its inertia is that of a body 0.001 m across" in text
     assert "body 'lonely' has neither a joint nor a force" in text
+    assert "body 'shaped': its inertia is given, its centre of mass (0.5, 0) m is that of its shapes" in text
     assert "no gravity" in text
     assert "parameter 'spare' is used nowhere" in text
 

@@ -11,7 +11,7 @@ from ..model.body import Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, STABILIZE, Work
+from ..system.tables import INERTIA, INVERSE, MASS, PASS, STABILIZE, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -97,4 +97,5 @@ def compiled(
     x = values(s, parameters, held)
     w = work(s, x.system)
     w.option[STABILIZE] = NONE
+    w.option[PASS] = 1e-13
     return Compiled(x, w)

@@ -17,7 +17,7 @@ from ..results.health import Health
 from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
-from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
+from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, PASS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
 from .assemble import Assembly, assemble
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
@@ -169,6 +169,7 @@ def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray
     loose = o.atol + o.rtol * a.compiled.values.length
     W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
     W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
+    W.option[PASS] = min(1e-9, max(1e-13, 1e-2 * o.rtol))
     return ex.Clock(real, count, times, Y, np.zeros((len(tableau(o.method).c), len(y))))
 
 

@@ -26,6 +26,7 @@ from .tables import (
     LAM,
     LENGTH,
     NU,
+    PASS,
     PROJECTIONS,
     R2,
     RESIDUAL,
@@ -46,7 +47,7 @@ PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-13, 1e-12  # violations of accepted and reported states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
-STALE = 1e-12  # a residual above this after refinement wants a new factor
+STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
 
 
@@ -135,7 +136,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     if worst > tol_v * (1.0 + size):
         if factored:
             factored = reuse(S, W)
-        if not factored or solve(S, W, zero, r, step, W.row[RESIDUAL]) > STALE:
+        if not factored or solve(S, W, zero, r, step, W.row[RESIDUAL]) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, False
             factored = True
@@ -164,7 +165,7 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
-    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM]) > STALE:
+    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM]) > STALE * W.option[PASS]:
         status = factor(S, W)
         if status != 0:
             return status

@@ -15,8 +15,8 @@ from ..numerics.ldl import Pattern
 # columns of System.body_i
 PARENT, TREE, Q0, V0, NQ, NV = range(6)
 # columns of System.body_x
-MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
-BODY_WIDTH = 52
+MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R, COMPACT = 0, 1, 10, 19, 28, 31, 40, 43, 52
+BODY_WIDTH = 53
 # columns of System.term_i
 TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END = range(5)
 # columns of System.row_i
@@ -28,7 +28,7 @@ G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL = range(8)
 # rows of Work.vel, each (nv,)
 F_APPLIED, X_SOLVED, V1, V2, V3, V4 = range(6)
 # entries of Work.option
-STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V = range(7)
+STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 # entries of Work.info
 STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS = range(6)
 
@@ -42,7 +42,7 @@ class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
     body_i: np.ndarray  # (nb, 6): parent, tree joint kind, first q, first v, number of q, of v
-    body_x: np.ndarray  # (nb, 52): mass, inertia about the centre of mass, its inverse, regularisation; tree joint frames
+    body_x: np.ndarray  # (nb, 53): mass, inertia about the mass centre, its inverse, stand-in; tree joint frames; compact inertia
     frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
     frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
     term_i: np.ndarray  # (nt, 5): row, frame F, frame M, first and last+1 segment
@@ -83,7 +83,7 @@ class Work(NamedTuple):
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
     stack: np.ndarray  # law evaluation
     y: np.ndarray  # (3, ny): states in the making
-    option: np.ndarray  # (7,): choices of the analysis, largest violations reported
+    option: np.ndarray  # (8,): choices of the analysis, largest violations reported
     info: np.ndarray  # (6,): status, guilty row, counters
 
 

@@ -22,6 +22,7 @@ from .tables import (
     BODY_P,
     BODY_R,
     BODY_WIDTH,
+    COMPACT,
     EXCESS,
     INERTIA,
     INVERSE,
@@ -33,7 +34,7 @@ from .tables import (
 )
 from .tree import FREE, PLANAR, REVOLUTE
 
-REGULARISATION = 1e-10
+REGULARISATION = 1e-6
 THIN = 1e-9  # principal inertias below this part of the body's size count as none
 STAND_IN = 1e-6  # what is put in their place while factoring
 
@@ -173,7 +174,9 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> t
             continue
         d = bodies[name]
         J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = max(np.trace(d.inertia), d.mass * of_body[b] ** 2) or d.mass * length**2
+        size = max(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2) or (
+            d.mass * length**2
+        )
         w, V = np.linalg.eigh(J)
         used = np.array([False, False, True]) if s.model.planar else np.array([True] * 3)
         if s.model.planar:
@@ -185,6 +188,7 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> t
         if weak.any():
             semidefinite = 1.0
         body_x[b, MASS] = d.mass
+        body_x[b, COMPACT] = size
         for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
             body_x[b, at : at + 9] = A.ravel()
     return body_x, semidefinite
@@ -265,7 +269,7 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(8, nr), z(6, nv), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
-        z(s.depth + 1, 3), z(3, ny), np.zeros(7), np.zeros(6, np.int64),
+        z(s.depth + 1, 3), z(3, ny), np.zeros(8), np.zeros(6, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames
 

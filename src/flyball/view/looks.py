@@ -115,10 +115,10 @@ class Looks:
     def _radius(self, length: float) -> float:
         return min(LINK * self.size * (1.0 if self.planar else 0.7), 0.2 * length)
 
-    def _capsule(self, a: np.ndarray, b: np.ndarray) -> Shape:
+    def _capsule(self, a: np.ndarray, b: np.ndarray, slim: float = 1.0) -> Shape:
         d = b - a
         length = float(np.sqrt(d @ d))
-        return Shape("capsule", (self._radius(length), length), _three((a + b) / 2), _along(d))
+        return Shape("capsule", (slim * self._radius(length), length), _three((a + b) / 2), _along(d))
 
     def _links(self, points: list[np.ndarray]) -> list[Shape]:
         """One link between two points (or along a line); else a plate (in the plane) or spokes."""
@@ -162,7 +162,7 @@ class Looks:
         half = float(np.sqrt(3.0 * across / m))
         if along < 0.1 * across and half > 0.6 * d:
             return [self._capsule(p, com + half * e)]
-        return [self._capsule(p, com), self._solid(name)]
+        return [self._capsule(p, com, 0.4 if self.planar else 1.0), self._solid(name)]
 
     def _solid(self, name: str) -> Shape:
         """The homogeneous solid with the body's inertia: ball, cylinder or box; a disc in the plane."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -114,7 +115,17 @@ def _figure(rows: int, width: float = 8.0, each: float = 2.6) -> Figure:
 
     figure = Figure(figsize=(width, 0.7 + each * rows), layout="constrained")
     FigureCanvasAgg(figure)
+    figure._repr_png_ = partial(_png, figure)  # type: ignore[attr-defined]
     return figure
+
+
+def _png(figure: Figure) -> bytes:
+    """The picture as notebooks ask for it."""
+    from io import BytesIO
+
+    data = BytesIO()
+    figure.savefig(data, format="png", dpi=100)
+    return data.getvalue()
 
 
 def _handed_out(figure: Figure, path: str | os.PathLike | None) -> Figure | None:
