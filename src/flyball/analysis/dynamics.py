@@ -17,7 +17,7 @@ from ..results.health import Health
 from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
-from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, PASS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
+from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, GUILTY, PASS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
 from .assemble import Assembly, assemble
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
@@ -46,7 +46,7 @@ class Options:
     alpha: float = 10.0
     beta: float = 10.0
     max_step: float = np.inf
-    max_steps: int = 100_000_000
+    max_steps: int = 10_000_000
 
     def __post_init__(self) -> None:
         for name in ("rtol", "atol", "max_step"):
@@ -155,12 +155,13 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
 def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray, o: Options) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     s, W = a.compiled.structure, a.compiled.work
-    real, count = np.zeros(9), np.zeros(7, np.int64)
+    real, count = np.zeros(9), np.zeros(8, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
+    count[ex.LIMIT] = o.max_steps
     count[ex.CONTROLLED] = s.nq + s.nv
     Y = np.zeros((3, len(y)))
     Y[0] = y
@@ -169,7 +170,7 @@ def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray
     loose = o.atol + o.rtol * a.compiled.values.length
     W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
     W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
-    W.option[PASS] = min(1e-9, max(1e-13, 1e-2 * o.rtol))
+    W.option[PASS] = 1e-13
     return ex.Clock(real, count, times, Y, np.zeros((len(tableau(o.method).c), len(y))))
 
 
@@ -239,19 +240,21 @@ def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
     """Why the integration cannot go on, in words."""
     name = a.compiled.structure.model.name
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
-    if status == ex.NOT_FINITE or not np.isfinite(clock.K[0]).all() or not np.isfinite(clock.y[0]).all():
-        i = int(np.argmin(np.isfinite(clock.K[0])))
+    wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
+    if status == ex.TOO_MANY:
+        return f"{name!r}: max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {t:.6g} s. {kept}"
+    if status == ex.NOT_FINITE or wrong.any():
         return (
-            f"{name!r}: the equations of motion are not finite at t = {t:.6g} s, first at {_component(a, i)}. "
-            f"Look for a law that divides by zero, or two points of a spring that coincide. {kept}"
+            f"{name!r}: the equations of motion are not finite at t = {t:.6g} s, first at "
+            f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
+            f"points of a spring that coincide. {kept}"
         )
     rows = a.compiled.structure.rows
-    k = int(a.compiled.work.info[1])
-    where = f" near {rows[k].element.title}" if rows else ""
-    h = clock.real[ex.H]
+    where = f" near {rows[int(a.compiled.work.info[GUILTY])].element.title}" if rows else ""
     return (
-        f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {h:.3g} s{where}. "
-        f"The mechanism may lock there (a driver asks for more than its links allow), or a force changes too "
+        f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {clock.real[ex.H]:.3g} s"
+        f"{where}. The mechanism may lock there (a driver asks for more than its links allow), pass a singular "
+        f"position that the tolerance asks to resolve (a looser rtol steps over it), or meet a force that changes "
         f"abruptly. {kept}"
     )
 

@@ -8,7 +8,7 @@ from .._jit import kernel
 from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
-from ..system.motion import arrive, derivative, place, report
+from ..system.motion import arrive, derivative, move, place, report
 from ..system.tables import System, Work
 
 POSITION, MOTION, INTEGRATE = 0, 1, 2
@@ -24,7 +24,8 @@ def motion_kernel(S, W, R, clock, out, task):
     y = clock.y[0]
     if task == 0:
         nq = S.kinds[-2]
-        place(S, W, clock.real[0], y[:nq], y[nq : nq + W.vel.shape[1]])
+        place(S, W, clock.real[0], y[:nq])
+        move(S, W, y[nq : nq + W.vel.shape[1]])
         return 0
     if task == 1:
         return derivative(clock.real[0], y, clock.K[0], S, W)
@@ -37,7 +38,7 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
     real[0] = t
     Y = np.zeros((3, len(y)))
     Y[0] = y
-    clock = Clock(real, np.zeros(7, np.int64), np.zeros(0), Y, np.zeros((1, len(y))))
+    clock = Clock(real, np.zeros(8, np.int64), np.zeros(0), Y, np.zeros((1, len(y))))
     return motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task), clock.K[0]
 
 

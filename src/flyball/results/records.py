@@ -11,7 +11,7 @@ from ..math.vec import add, cross, load3, load9, scale, sub
 from ..model.joint import Coordinate, Joint
 from ..system.records import at_rest, carried, load
 from ..system.tables import PARENT, V0
-from ..system.tree import advance, column
+from ..system.tree import column, motion, pose
 from ..system.values import Values
 
 Record = tuple
@@ -27,7 +27,8 @@ class Records:
         nb, nv = len(S.body_i), v.shape[1]
         self.W = SimpleNamespace(BK=np.zeros((nb, 24, self.n)), X=np.zeros((nv, 6, self.n)), O=np.zeros((nb, 3, self.n)))
         for b in range(nb):
-            advance(S, self.W, b, q.T, v.T)
+            pose(S, self.W, b, q.T)
+            motion(S, self.W, b, v.T)
         self._bodies = [self._moving(b, vdot.T) for b in range(nb)]
         self._frames: dict[int, Record] = {}
 

@@ -6,21 +6,36 @@ from .. import forces as F
 from .._jit import formula
 from ..constraints import alignment, along, angle, coincident, distance, perpendicular
 from .loads import each_force
-from .rows import begin, each_term, end
+from .rows import begin, each_bias, each_value, end
+from .tables import GAMMA, NU_DOT
 
 
 @formula
-def rows(S, W, t):
-    """Values, Jacobian, rates and acceleration terms of all constraint rows."""
+def each_kind(S, W, visit):
+    """Visit the terms of every kind with its formula."""
+    visit(S, W, coincident.KIND, coincident.row)
+    visit(S, W, along.KIND, along.row)
+    visit(S, W, perpendicular.KIND, perpendicular.row)
+    visit(S, W, distance.KIND, distance.row)
+    visit(S, W, angle.KIND, angle.row)
+    visit(S, W, alignment.KIND_AXIS, alignment.axis_row)
+    visit(S, W, alignment.KIND_FULL, alignment.full_row)
+
+
+@formula
+def row_values(S, W, t):
+    """Values, Jacobian and rates of all constraint rows, from the poses."""
     begin(S, W, t)
-    each_term(S, W, coincident.KIND, coincident.row)
-    each_term(S, W, along.KIND, along.row)
-    each_term(S, W, perpendicular.KIND, perpendicular.row)
-    each_term(S, W, distance.KIND, distance.row)
-    each_term(S, W, angle.KIND, angle.row)
-    each_term(S, W, alignment.KIND_AXIS, alignment.axis_row)
-    each_term(S, W, alignment.KIND_FULL, alignment.full_row)
+    each_kind(S, W, each_value)
     end(S, W)
+
+
+@formula
+def row_biases(S, W):
+    """gamma of all constraint rows, from poses and velocities."""
+    for k in range(S.row_i.shape[0]):
+        W.row[GAMMA, k] = W.row[NU_DOT, k]
+    each_kind(S, W, each_bias)
 
 
 @formula

@@ -1,30 +1,37 @@
-"""(q, v) -> records of bodies and frames."""
+"""q -> poses, v -> velocities and bias accelerations, of bodies and frames."""
 
 from __future__ import annotations
 
 from .._jit import formula
 from ..math.vec import load3, load9
-from .records import at_rest, carried, load, store
-from .tree import advance
+from .records import at_rest, carried, load, store_motion, store_pose
+from .tree import motion, pose
 
 
 @formula
-def bodies(S, W, q, v):
-    """Records of all bodies, parents first."""
+def poses(S, W, q):
+    """Positions and rotations of all bodies, parents first, and of the frames on them."""
     for b in range(S.body_i.shape[0]):
-        advance(S, W, b, q, v)
+        pose(S, W, b, q)
+    for k in range(S.kinds[-1], S.frame_i.shape[0]):
+        p, R, _, _, _, _ = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        store_pose(W.FK, k, p, R)
 
 
 @formula
-def frames(S, W):
-    """Records of all frames on moving bodies (frames on ground are written once, when the work arrays are made)."""
+def motions(S, W, v):
+    """Velocities and bias accelerations at these poses."""
+    for b in range(S.body_i.shape[0]):
+        motion(S, W, b, v)
     for k in range(S.kinds[-1], S.frame_i.shape[0]):
-        record = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
-        store(W.FK, k, record)
+        _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        store_motion(W.FK, k, w, u, alpha, a)
 
 
 @formula
 def ground_frames(S, W):
-    """Records of the frames on ground."""
+    """Records of the frames on ground, written once."""
     for k in range(S.kinds[-1]):
-        store(W.FK, k, at_rest(load3(S.frame_x, k, 0), load9(S.frame_x, k, 3), 0.0 * S.frame_x[k, 0]))
+        p, R, w, v, alpha, a = at_rest(load3(S.frame_x, k, 0), load9(S.frame_x, k, 3), 0.0 * S.frame_x[k, 0])
+        store_pose(W.FK, k, p, R)
+        store_motion(W.FK, k, w, v, alpha, a)

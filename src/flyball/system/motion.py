@@ -9,8 +9,8 @@ from __future__ import annotations
 from .._jit import formula
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
-from .dispatch import forces, rows
-from .kinematics import bodies, frames
+from .dispatch import forces, row_biases, row_values
+from .kinematics import motions, poses
 from .loads import gather, inertial
 from .records import load
 from .rows import row_times
@@ -45,19 +45,25 @@ NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED = 2
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
-TIGHT_G, TIGHT_V = 1e-13, 1e-12  # violations of accepted and reported states that are left alone
+TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted and reported states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
 
 
 @formula
-def place(S, W, t, q, v):
-    """Kinematics and constraint rows at (t, q, v)."""
+def place(S, W, t, q):
+    """Poses, and the constraint rows as far as they follow from them: g, G, nu."""
     W.info[EVALUATIONS] += 1
-    bodies(S, W, q, v)
-    frames(S, W)
-    rows(S, W, t)
+    poses(S, W, q)
+    row_values(S, W, t)
+
+
+@formula
+def move(S, W, v):
+    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma."""
+    motions(S, W, v)
+    row_biases(S, W)
 
 
 @formula
@@ -94,9 +100,9 @@ def drift(S, W, v, out):
 def settle(S, W, t, q, v, tol_g, tol_v):
     """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
-    Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. A violation below the
-    tolerance is left alone: near a singular position its correction is rounding divided by a small number, and the
-    accelerations would follow it. One factor serves as long as it does.
+    Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. Accepted states are taken
+    down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
+    lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W is good for a solve here).
     """
@@ -104,8 +110,9 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     step = W.vel[V3]
     r = W.row[R2]
     normalise(S, q)
-    place(S, W, t, q, v)
+    place(S, W, t, q)
     if r.shape[0] == 0:
+        move(S, W, v)
         return 0, 0.0, False
     for d in range(zero.shape[0]):
         zero[d] = 0.0
@@ -127,7 +134,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
         last = worst
         solve(S, W, zero, r, step, W.row[RESIDUAL])
         retract(S, q, step)
-        place(S, W, t, q, v)
+        place(S, W, t, q)
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
@@ -143,7 +150,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
             solve(S, W, zero, r, step, W.row[RESIDUAL])
         for d in range(step.shape[0]):
             v[d] += step[d]
-        place(S, W, t, q, v)
+    move(S, W, v)
     return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
 
 
@@ -200,7 +207,8 @@ def derivative(t, y, dy, S, W):
             return status
     else:
         normalise(S, q)
-        place(S, W, t, q, v)
+        place(S, W, t, q)
+        move(S, W, v)
     return accelerate(S, W, t, p, dy, factored)
 
 
@@ -213,12 +221,13 @@ def arrive(t, y, dy, S, W):
     found = 0.0
     factored = False
     if W.option[STABILIZE] >= STEPS:
-        status, found, factored = settle(S, W, t, q, v, TIGHT_G, TIGHT_V)
+        status, found, factored = settle(S, W, t, q, v, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
             return status, found
     else:
         normalise(S, q)
-        place(S, W, t, q, v)
+        place(S, W, t, q)
+        move(S, W, v)
     return accelerate(S, W, t, y, dy, factored), found
 
 

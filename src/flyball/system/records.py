@@ -18,14 +18,19 @@ def load(K, k):
 
 
 @formula
-def store(K, k, record):
-    """Write record k of a table."""
-    put3(K, k, 0, record[0])
-    put9(K, k, 3, record[1])
-    put3(K, k, 12, record[2])
-    put3(K, k, 15, record[3])
-    put3(K, k, 18, record[4])
-    put3(K, k, 21, record[5])
+def store_pose(K, k, p, R):
+    """Write position and rotation of record k."""
+    put3(K, k, 0, p)
+    put9(K, k, 3, R)
+
+
+@formula
+def store_motion(K, k, w, v, alpha, a):
+    """Write velocities and bias accelerations of record k."""
+    put3(K, k, 12, w)
+    put3(K, k, 15, v)
+    put3(K, k, 18, alpha)
+    put3(K, k, 21, a)
 
 
 @formula

@@ -12,7 +12,7 @@ from ..math.scalar import atan2, cos, sin
 from ..math.vec import neg
 from .laws import evaluate_jet
 from .records import load
-from .tables import G_VALUE, GAMMA, NU, ROW_LAW, ROW_WRAP, TERM_F, TERM_M, TERM_ROW, TERM_SEG, TERM_SEG_END
+from .tables import G_VALUE, GAMMA, NU, NU_DOT, ROW_LAW, ROW_WRAP, TERM_F, TERM_M, TERM_ROW, TERM_SEG, TERM_SEG_END
 from .tree import project
 
 COEFFICIENT = 7
@@ -33,31 +33,39 @@ def begin(S, W, t):
             f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t)
             W.row[G_VALUE, k] = -f
             W.row[NU, k] = f1
-            W.row[GAMMA, k] = f2
+            W.row[NU_DOT, k] = f2
         else:
             W.row[G_VALUE, k] = 0.0
             W.row[NU, k] = 0.0
-            W.row[GAMMA, k] = 0.0
+            W.row[NU_DOT, k] = 0.0
     for e in range(W.G.shape[0]):
         W.G[e] = 0.0
 
 
 @formula
-def each_term(S, W, kind, row):
-    """Add every term of one kind to its row: value, Jacobian entries, acceleration bias."""
+def each_value(S, W, kind, row):
+    """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
         F = load(W.FK, S.term_i[k, TERM_F])
         M = load(W.FK, S.term_i[k, TERM_M])
-        g, force, torque_M, torque_F, bias = row(parameters(S.term_x, k), F, M)
+        g, force, torque_M, torque_F, _ = row(parameters(S.term_x, k), F, M)
         c = S.term_x[k, COEFFICIENT]
-        r = S.term_i[k, TERM_ROW]
-        W.row[G_VALUE, r] += c * g
-        W.row[GAMMA, r] -= c * bias
+        W.row[G_VALUE, S.term_i[k, TERM_ROW]] += c * g
         for s in range(S.term_i[k, TERM_SEG], S.term_i[k, TERM_SEG_END]):
             if S.seg_i[s, 1] > 0:
                 project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, force, torque_M, M[0])
             else:
                 project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, neg(force), torque_F, F[0])
+
+
+@formula
+def each_bias(S, W, kind, row):
+    """Take every term's acceleration bias of one kind from its row's gamma."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        _, _, _, _, bias = row(parameters(S.term_x, k), F, M)
+        W.row[GAMMA, S.term_i[k, TERM_ROW]] -= S.term_x[k, COEFFICIENT] * bias
 
 
 @formula

@@ -37,6 +37,7 @@ from .tables import (
 )
 
 REFINEMENTS = 20
+ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
 STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
 
 
@@ -114,7 +115,8 @@ def factor_schur(S, W):
         W.A[place] += s
     natural_size(S, W)
     for k in range(S.row_i.shape[0]):
-        W.A[S.ldl.Ap[S.ldl.perm[k] + 1] - 1] += S.glob[REGULARISE] * W.row[DIAGONAL, k]
+        place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
+        W.A[place] += S.glob[REGULARISE] * W.row[DIAGONAL, k] + ROUNDING * W.A[place]
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 

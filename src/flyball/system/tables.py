@@ -24,7 +24,7 @@ ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
 # columns of System.force_i
 FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_TURNS = 0, 1, 2, 5, 6
 # rows of Work.row, each (nr,)
-G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL = range(8)
+G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
 F_APPLIED, X_SOLVED, V1, V2, V3, V4 = range(6)
 # entries of Work.option
@@ -76,7 +76,7 @@ class Work(NamedTuple):
     M: np.ndarray  # (nM,): mass matrix entries
     G: np.ndarray  # (nG,): constraint Jacobian
     H: np.ndarray  # (nG,): M^-1 G^T
-    row: np.ndarray  # (8, nr)
+    row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (6, nv)
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor

@@ -1,7 +1,7 @@
 """Tree joints: how a body hangs on its parent. The coordinate layer is nothing but numbers that choose among these.
 
 Absolute coordinates are a forest in which every body hangs on ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v).
-A tree joint must say: its motion (``advance``), its world twist columns (``columns``), what a wrench does along them
+A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``column``), what a wrench does along them
 (``project``), the rates of its coordinates (``rates``) and a finite step along its velocities (``retract``).
 """
 
@@ -25,7 +25,7 @@ from ..math.vec import (
     scale,
     sub,
 )
-from .records import at_rest, carried, load, store
+from .records import at_rest, carried, load, store_motion, store_pose
 from .tables import BODY_P, BODY_R, PARENT, Q0, TREE, TREE_P, TREE_R, V0
 
 FREE, PLANAR, REVOLUTE = 0, 1, 2
@@ -34,51 +34,67 @@ NV = (6, 3, 1)
 
 
 @formula
-def advance(S, W, b, q, v):
-    """Kinematic record of body b, its twist columns and reference point, from its parent's record."""
+def pose(S, W, b, q):
+    """Position and rotation of body b, its reference point and what its twist columns need, from its parent's pose."""
     kind = S.body_i[b, TREE]
     q0 = S.body_i[b, Q0]
-    v0 = S.body_i[b, V0]
     o = 0.0 * q[q0]
-    zero = (o, o, o)
     if kind == PLANAR:
         c = cos(q[q0 + 2])
         s = sin(q[q0 + 2])
-        R = (c, -s, o, s, c, o, o, o, o + 1.0)
         p = (q[q0], q[q0 + 1], o)
-        store(W.BK, b, (p, R, (o, o, v[v0 + 2]), (v[v0], v[v0 + 1], o), zero, zero))
+        store_pose(W.BK, b, p, (c, -s, o, s, c, o, o, o, o + 1.0))
         put3(W.O, b, 0, p)
     elif kind == FREE:
-        R = quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6])
         p = (q[q0], q[q0 + 1], q[q0 + 2])
-        w = mv(R, (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
-        store(W.BK, b, (p, R, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero))
+        store_pose(W.BK, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
         put3(W.O, b, 0, p)
     else:
-        revolute(S, W, b, q, v)
+        hinge(S, W, b, q[q0])
 
 
 @formula
-def revolute(S, W, b, q, v):
-    """Turn by q about the z axis of the tree joint's frame on the parent; v = qdot."""
-    q0 = S.body_i[b, Q0]
-    v0 = S.body_i[b, V0]
+def hinge_frame(S, W, b, o):
+    """Record of the tree joint's frame on the parent of body b."""
     parent = S.body_i[b, PARENT]
-    o = 0.0 * q[q0]
     if parent >= 0:
-        F = carried(load(W.BK, parent), load3(S.body_x, b, TREE_P), load9(S.body_x, b, TREE_R))
+        return carried(load(W.BK, parent), load3(S.body_x, b, TREE_P), load9(S.body_x, b, TREE_R))
+    return at_rest(load3(S.body_x, b, TREE_P), load9(S.body_x, b, TREE_R), o)
+
+
+@formula
+def hinge(S, W, b, angle):
+    """REVOLUTE: turn by the angle about the z axis of the tree joint's frame on the parent."""
+    o = 0.0 * angle
+    F = hinge_frame(S, W, b, o)
+    c = cos(angle)
+    s = sin(angle)
+    turned = mm(F[1], (c, -s, o, s, c, o, o, o, o + 1.0))
+    store_pose(W.BK, b, add(F[0], mv(turned, load3(S.body_x, b, BODY_P))), mm(turned, load9(S.body_x, b, BODY_R)))
+    put3(W.O, b, 0, F[0])
+    put3(W.X, S.body_i[b, V0], 0, col(F[1], 2))
+
+
+@formula
+def motion(S, W, b, v):
+    """Velocities and bias accelerations of body b at its pose, from its parent's."""
+    kind = S.body_i[b, TREE]
+    v0 = S.body_i[b, V0]
+    o = 0.0 * v[v0]
+    zero = (o, o, o)
+    if kind == PLANAR:
+        store_motion(W.BK, b, (o, o, v[v0 + 2]), (v[v0], v[v0 + 1], o), zero, zero)
+    elif kind == FREE:
+        w = mv(load9(W.BK, b, 3), (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
+        store_motion(W.BK, b, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero)
     else:
-        F = at_rest(load3(S.body_x, b, TREE_P), load9(S.body_x, b, TREE_R), o)
-    p, R, w, vel, alpha, a = F
-    e = col(R, 2)
-    c = cos(q[q0])
-    s = sin(q[q0])
-    turned = mm(R, (c, -s, o, s, c, o, o, o, o + 1.0))
-    spin = scale(v[v0], e)
-    child = (p, turned, add(w, spin), vel, add(alpha, cross(w, spin)), a)
-    store(W.BK, b, carried(child, load3(S.body_x, b, BODY_P), load9(S.body_x, b, BODY_R)))
-    put3(W.O, b, 0, p)
-    put3(W.X, v0, 0, e)
+        F = hinge_frame(S, W, b, o)
+        spin = scale(v[v0], load3(W.X, v0, 0))
+        w = add(F[2], spin)
+        alpha = add(F[4], cross(F[2], spin))
+        r = sub(load3(W.BK, b, 0), F[0])
+        wr = cross(w, r)
+        store_motion(W.BK, b, w, add(F[3], wr), alpha, add(F[5], add(cross(alpha, r), cross(w, wr))))
 
 
 @formula

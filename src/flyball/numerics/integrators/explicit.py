@@ -19,16 +19,16 @@ from ...math.scalar import sqrt
 # entries of Clock.real
 T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE = range(9)
 # entries of Clock.count
-ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED = range(7)
+ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT = range(8)
 SAFETY = 0.85
-RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED = 0, 1, 2, 3, 4
+RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
 
 
 class Clock(NamedTuple):
     """Everything an interrupted integration needs to go on."""
 
     real: np.ndarray  # (9,)
-    count: np.ndarray  # (7,)
+    count: np.ndarray  # (8,)
     times: np.ndarray  # output times, ascending
     y: np.ndarray  # (3, ny): state, state in the making, interpolated state
     K: np.ndarray  # (stages, ny): derivatives of the stages
@@ -196,6 +196,9 @@ def advance(derivative, arrive, report, S, W, R, c, out):
     steps = 0
     while c.real[T] < c.real[T_END]:
         if used == out.shape[0] or steps >= c.count[QUOTA]:
+            return used
+        if c.count[ACCEPTED] + c.count[REJECTED] >= c.count[LIMIT]:
+            c.count[STATUS] = TOO_MANY
             return used
         t = c.real[T]
         h = min(c.real[H], c.real[H_MAX])
