@@ -52,6 +52,8 @@ def optimise_once(top: str) -> Iterator[None]:
 
 def _link_all(self: Any) -> None:
     """Finalise the kernel's library: take in every library that it needs, however deep, and optimise once."""
+    from llvmlite import binding
+
     seen: dict[int, Any] = {}
     todo = list(self._linking_libraries)
     while todo:
@@ -62,6 +64,10 @@ def _link_all(self: Any) -> None:
     for lib in seen.values():
         self._reload_init.update(lib._reload_init)
         self._final_module.link_in(_shared(lib), preserve=True)
+    for function in self._final_module.functions:
+        # nobody outside calls them: the optimiser may inline them, and drop arguments that they do not use
+        if not function.is_declaration and function.linkage == binding.Linkage.linkonce_odr:
+            function.linkage = "internal"
     full, builder = self._codegen._module_pass_manager()
     full.run(self._final_module, builder)
     self._final_module.verify()

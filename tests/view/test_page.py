@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recordings import NASTY, nasty, planar, spatial
+from tests.view.recordings import NASTY, nasty, planar, spatial
 
 from flyball.view.notebook import iframe
 from flyball.view.page import page

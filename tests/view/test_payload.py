@@ -10,7 +10,7 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from recordings import planar, spatial
+from tests.view.recordings import planar, spatial
 
 from flyball.view.page import MODULES, page
 from flyball.view.payload import payload

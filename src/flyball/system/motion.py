@@ -14,7 +14,7 @@ from .kinematics import motions, poses
 from .loads import gather, inertial
 from .records import load
 from .rows import row_times
-from .solve import factor, magnitude, reuse, solve
+from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
     BETA,
@@ -106,7 +106,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
 
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W is good for a solve here).
     """
-    zero = W.vel[F_APPLIED]
+    none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
     normalise(S, q)
@@ -114,8 +114,6 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     if r.shape[0] == 0:
         move(S, W, v)
         return 0, 0.0, False
-    for d in range(zero.shape[0]):
-        zero[d] = 0.0
     worst = violation(W, r)
     found = worst
     last = 1e300
@@ -132,7 +130,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
         else:
             factored = reuse(S, W)
         last = worst
-        solve(S, W, zero, r, step, W.row[RESIDUAL])
+        solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         retract(S, q, step)
         place(S, W, t, q)
         worst = violation(W, r)
@@ -143,11 +141,11 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     if worst > tol_v * (1.0 + size):
         if factored:
             factored = reuse(S, W)
-        if not factored or solve(S, W, zero, r, step, W.row[RESIDUAL]) > STALE * W.option[PASS]:
+        if not factored or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, False
             factored = True
-            solve(S, W, zero, r, step, W.row[RESIDUAL])
+            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
     move(S, W, v)
@@ -172,11 +170,11 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
-    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM]) > STALE * W.option[PASS]:
+    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]:
         status = factor(S, W)
         if status != 0:
             return status
-        solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM])
+        solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]

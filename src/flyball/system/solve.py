@@ -18,7 +18,6 @@ from ..numerics.ldl import ldl_factor, ldl_solve
 from .mass import mass_entries
 from .rows import row_times
 from .tables import (
-    COMPACT,
     DIAGONAL,
     EXCESS,
     FACTORISATIONS,
@@ -27,6 +26,8 @@ from .tables import (
     MASS,
     NV,
     PASS,
+    PER_COMPACT,
+    PER_MASS,
     R1,
     REGULARISE,
     SEMIDEFINITE,
@@ -44,7 +45,7 @@ STALLED = 0.7  # a refinement that leaves more than this of the residual is the 
 @formula
 def inverse_mass(S, b, x, at, out, to):
     """out[to:] = M_b^-1 x[at:] for a body with constant mass block."""
-    m = 1.0 / S.body_x[b, MASS]
+    m = S.body_x[b, PER_MASS]
     if S.body_i[b, NV] == 3:
         out[to] = m * x[at]
         out[to + 1] = m * x[at + 1]
@@ -91,7 +92,7 @@ def natural_size(S, W):
         else:
             shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1] + W.G[at + 2] * W.G[at + 2]
             turn = W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
-        W.row[DIAGONAL, k] += shift / S.body_x[b, MASS] + turn / S.body_x[b, COMPACT]
+        W.row[DIAGONAL, k] += shift * S.body_x[b, PER_MASS] + turn * S.body_x[b, PER_COMPACT]
 
 
 @formula
@@ -141,8 +142,8 @@ def factor_kkt(S, W):
 
 
 @formula
-def solve(S, W, f, gamma, x, lam):
-    """Solve for x and lam with the factor in W; ``f`` and ``gamma`` are kept.
+def solve(S, W, f, gamma, x, lam, loaded, refinements):
+    """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
 
     Where M is semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the
     residual left, relative to the size of its terms.
@@ -150,45 +151,38 @@ def solve(S, W, f, gamma, x, lam):
     W.info[SOLVES] += 1
     dx = W.vel[V1]
     rhs = W.vel[V2]
+    semidefinite = S.glob[SEMIDEFINITE] > 0.0
     for d in range(x.shape[0]):
         x[d] = 0.0
-        rhs[d] = f[d]
+        rhs[d] = f[d] if loaded else 0.0
     for k in range(lam.shape[0]):
         lam[k] = 0.0
         W.row[R1, k] = gamma[k]
-    one_pass(S, W, rhs, dx, x, lam)
+    one_pass(S, W, rhs, dx, x, lam, loaded or S.mass_i.shape[0] > 0)
     worst = 0.0
     last = 1e300
-    for _ in range(REFINEMENTS):
+    for _ in range(refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
-        if S.glob[SEMIDEFINITE] > 0.0:
+        if semidefinite:
             worst = max(worst, excess(S, dx, rhs, x))
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
-        one_pass(S, W, rhs, dx, x, lam)
+        one_pass(S, W, rhs, dx, x, lam, semidefinite)
     return worst
 
 
 @formula
-def one_pass(S, W, rhs, dx, x, lam):
-    """Add to x and lam one solve for ``rhs`` and the residual in W.row[R1]; the step is left in dx, rhs is cleared."""
+def one_pass(S, W, rhs, dx, x, lam, loaded):
+    """Add to x and lam one solve for the residual in W.row[R1] and, if ``loaded``, for rhs, which is cleared.
+
+    The step is left in dx.
+    """
     r = W.row[R1]
     z = W.D[2]
     nv = x.shape[0]
-    if S.mass_i.shape[0] == 0:
-        for b in range(S.body_i.shape[0]):
-            inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
-        for k in range(r.shape[0]):
-            z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx)
-        ldl_solve(S.ldl, W.L, W.D[0], z)
-        for k in range(r.shape[0]):
-            mu = z[S.ldl.perm[k]]
-            lam[k] += mu
-            for e in range(S.row_p[k], S.row_p[k + 1]):
-                dx[S.col_i[e]] += W.H[e] * mu
-    else:
+    if S.mass_i.shape[0] > 0:
         for d in range(nv):
             z[S.ldl.perm[d]] = rhs[d]
         for k in range(r.shape[0]):
@@ -198,6 +192,23 @@ def one_pass(S, W, rhs, dx, x, lam):
             dx[d] = z[S.ldl.perm[d]]
         for k in range(r.shape[0]):
             lam[k] -= z[S.ldl.perm[nv + k]]
+    else:
+        if loaded:
+            for b in range(S.body_i.shape[0]):
+                inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
+            for k in range(r.shape[0]):
+                z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx)
+        else:
+            for d in range(nv):
+                dx[d] = 0.0
+            for k in range(r.shape[0]):
+                z[S.ldl.perm[k]] = r[k]
+        ldl_solve(S.ldl, W.L, W.D[0], z)
+        for k in range(r.shape[0]):
+            mu = z[S.ldl.perm[k]]
+            lam[k] += mu
+            for e in range(S.row_p[k], S.row_p[k + 1]):
+                dx[S.col_i[e]] += W.H[e] * mu
     for d in range(nv):
         x[d] += dx[d]
         rhs[d] = 0.0

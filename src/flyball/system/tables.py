@@ -15,8 +15,8 @@ from ..numerics.ldl import Pattern
 # columns of System.body_i
 PARENT, TREE, Q0, V0, NQ, NV = range(6)
 # columns of System.body_x
-MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R, COMPACT = 0, 1, 10, 19, 28, 31, 40, 43, 52
-BODY_WIDTH = 53
+MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
+PER_MASS, PER_COMPACT, BODY_WIDTH = 52, 53, 54
 # columns of System.term_i
 TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END = range(5)
 # columns of System.row_i
@@ -42,7 +42,7 @@ class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
     body_i: np.ndarray  # (nb, 6): parent, tree joint kind, first q, first v, number of q, of v
-    body_x: np.ndarray  # (nb, 53): mass, inertia about the mass centre, its inverse, stand-in; tree joint frames; compact inertia
+    body_x: np.ndarray  # (nb, 54): mass properties, their inverses and stand-ins; frames of tree joints
     frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
     frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
     term_i: np.ndarray  # (nt, 5): row, frame F, frame M, first and last+1 segment

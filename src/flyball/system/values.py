@@ -22,11 +22,12 @@ from .tables import (
     BODY_P,
     BODY_R,
     BODY_WIDTH,
-    COMPACT,
     EXCESS,
     INERTIA,
     INVERSE,
     MASS,
+    PER_COMPACT,
+    PER_MASS,
     TREE_P,
     TREE_R,
     System,
@@ -188,7 +189,7 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> t
         if weak.any():
             semidefinite = 1.0
         body_x[b, MASS] = d.mass
-        body_x[b, COMPACT] = size
+        body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
         for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
             body_x[b, at : at + 9] = A.ravel()
     return body_x, semidefinite
