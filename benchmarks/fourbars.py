@@ -14,6 +14,7 @@ from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
+
 from mechanisms import Planar, energy, flyball_planar, fourbars, fourbars_exact, gap, point
 
 T_END, TARGET, SAMPLES, REPEATS = 10.0, 1e-3, 400, 3

@@ -10,6 +10,7 @@ from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
+
 from mechanisms import MOMENTS, SPIN, free_body, free_body_exact, pendulum, pendulum_exact
 
 COLUMNS = {

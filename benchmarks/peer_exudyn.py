@@ -6,12 +6,13 @@ import sys
 import time
 
 import numpy as np
+
 from mechanisms import GRAVITY, GROUND, Planar
 
 sys.exudynFast = True  # the wheel's build without range checks; read once, when the package is imported
 
 import exudyn as exu  # noqa: E402
-import exudyn.itemInterface as item  # noqa: E402, N813
+import exudyn.itemInterface as item  # noqa: E402
 
 # label -> (dynamic solver, spectral radius, modified Newton)
 SETTINGS = {

@@ -10,6 +10,7 @@ import time
 
 import mujoco
 import numpy as np
+
 from mechanisms import GRAVITY, ROD, from_tree
 
 SETTINGS = {"RK4, stiff": ("RK4", 2.0), "RK4, softer (4 steps)": ("RK4", 4.0)}

@@ -9,6 +9,7 @@ import time
 
 import numpy as np
 import pinocchio as pin
+
 from mechanisms import GRAVITY, ROD, from_tree
 
 SETTINGS = {"constraintDynamics, Python RK4": 0.2}  # label -> Baumgarte damping rate times step

@@ -10,7 +10,9 @@ def mechanism(windows: int = 3, speed: float = 1.0) -> fb.Mechanism:
     """N windows, upright; the upper bars start at ``speed`` [m/s]."""
     m = fb.Mechanism(f"{windows} four-bars", planar=True, gravity=(0, -9.81), parameters={"speed": speed})
     for i in range(windows + 1):
-        m.add(fb.Body(f"post {i}", mass=1, inertia=1 / 12, position=(i, 0.5), angle="90 deg", angular_velocity="-speed"))
+        m.add(
+            fb.Body(f"post {i}", mass=1, inertia=1 / 12, position=(i, 0.5), angle="90 deg", angular_velocity="-speed")
+        )
         m.add(fb.Revolute(f"A{i}", "ground", f"post {i}", at=(i, 0)))
     for i in range(windows):
         m.add(fb.Body(f"bar {i}", mass=1, inertia=1 / 12, position=(i + 0.5, 1), velocity=("speed", 0)))

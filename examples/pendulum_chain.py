@@ -16,7 +16,9 @@ def mechanism(links: int = 10) -> fb.Mechanism:
     before = "ground"
     for i in range(links):
         start, middle = i * length, (i + 0.5) * length
-        m.add(fb.Body(f"rod {i}", mass=length, inertia=length**3 / 12, position=(middle * c, middle * s), angle="-30 deg"))
+        m.add(
+            fb.Body(f"rod {i}", mass=length, inertia=length**3 / 12, position=(middle * c, middle * s), angle="-30 deg")
+        )
         m.add(fb.Revolute(f"joint {i}", before, f"rod {i}", at=(start * c, start * s)))
         before = f"rod {i}"
     return m

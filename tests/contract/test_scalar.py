@@ -35,8 +35,8 @@ from flyball.math.scalar import (
     tanh,
 )
 
-ONE = "sqrt sin cos tan asin acos atan exp log sinh cosh tanh absolute sign rounded cubic_rise quintic_rise".split()
-TWO = "atan2 minimum maximum divide power".split()
+ONE = ["sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "absolute", "sign", "rounded", "cubic_rise", "quintic_rise"]
+TWO = ["atan2", "minimum", "maximum", "divide", "power"]
 SHARP = {"sign", "rounded"}
 INSIDE = [0.3, 0.71]
 OUTSIDE = [-1.5, -1.0, -0.0, 0.0, 1.0, 1.5, 800.0, math.inf, -math.inf, math.nan]

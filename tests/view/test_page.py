@@ -8,11 +8,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.view.recordings import NASTY, nasty, planar, spatial
 
 from flyball.view.notebook import iframe
 from flyball.view.page import page
 from flyball.view.recording import Recording
+from tests.view.recordings import NASTY, nasty, planar, spatial
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser can be driven")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")

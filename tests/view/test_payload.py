@@ -10,11 +10,11 @@ from importlib.resources import files
 
 import numpy as np
 import pytest
-from tests.view.recordings import planar, spatial
 
 from flyball.view.page import MODULES, page
 from flyball.view.payload import payload
 from flyball.view.recording import RecordedJoint, Shape
+from tests.view.recordings import planar, spatial
 
 
 def test_numbers_come_back_from_the_block() -> None:

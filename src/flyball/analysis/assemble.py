@@ -194,7 +194,12 @@ def _disagreement(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> Assemb
         metres = np.sqrt(sum(x * x for x, u in zip(part, units, strict=True) if u == "m"))
         radians = np.sqrt(sum(x * x for x, u in zip(part, units, strict=True) if u != "m"))
         text = " and ".join(
-            x for x in (f"{metres:.4g} m" if metres > 1e-9 else "", f"{np.degrees(radians):.4g} deg" if radians > 1e-9 else "") if x
+            x
+            for x in (
+                f"{metres:.4g} m" if metres > 1e-9 else "",
+                f"{np.degrees(radians):.4g} deg" if radians > 1e-9 else "",
+            )
+            if x
         )
         gaps[name] = (float(metres), float(radians), text)
     worst = sorted(gaps, key=lambda k: -max(gaps[k][0] / c.values.length, gaps[k][1]))

@@ -23,7 +23,6 @@ class Compiled:
     values: Values
     work: Work
 
-
     @property
     def structure(self) -> Structure:
         """The integers."""

@@ -17,7 +17,20 @@ from ..results.health import Health
 from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
-from ..system.tables import ALPHA, BETA, EVALUATIONS, FACTORISATIONS, GUILTY, PASS, SEMIDEFINITE, STABILIZE, TOL_G, TOL_V, WORST_G, WORST_V
+from ..system.tables import (
+    ALPHA,
+    BETA,
+    EVALUATIONS,
+    FACTORISATIONS,
+    GUILTY,
+    PASS,
+    SEMIDEFINITE,
+    STABILIZE,
+    TOL_G,
+    TOL_V,
+    WORST_G,
+    WORST_V,
+)
 from .assemble import Assembly, assemble
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
@@ -108,7 +121,9 @@ def simulate(
     y = a.y
     if start is not None:
         y = start.state_at_end(a.compiled)
-        a = Assembly(a.compiled, t_start, y[: a.compiled.structure.nq], y[a.compiled.structure.nq :][: a.compiled.structure.nv])
+        a = Assembly(
+            a.compiled, t_start, y[: a.compiled.structure.nq], y[a.compiled.structure.nq :][: a.compiled.structure.nv]
+        )
     else:
         initial_turns(a.compiled.values, y)
     if a.compiled.values.system.glob[SEMIDEFINITE] > 0.0:

@@ -53,7 +53,7 @@ def mobility(model: Model, a: Assembly) -> Mobility:
     c.at(a.t, a.q, a.v)
     s, S = c.structure, c.values.system
     G = c.sparse_jacobian()
-    nr, nv = G.shape
+    nr, nv = (int(n) for n in G.shape)
     scale = np.ones(nv)
     for v0, n in zip(S.body_i[:, 3], S.body_i[:, 5], strict=True):
         k = {3: 2, 6: 3}.get(int(n), 0)
@@ -66,8 +66,8 @@ def mobility(model: Model, a: Assembly) -> Mobility:
     rank, dependent, motions = _dense(G.toarray()) if max(nr, nv) <= DENSE else _sparse(G)
     if S.glob[SEMIDEFINITE] > 0.0 and motions is not None:
         _check_inertia(model, a, motions * scale[:, None])
-    names = []
-    for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6):
+    names: list[str] = []
+    for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6).tolist():
         if (name := s.rows[k].element.name) not in names:
             names.append(name)
     lam = dependent / np.maximum(size, 1e-300)[:, None]
@@ -155,7 +155,9 @@ def _undetermined(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, t
         free = np.abs(w).max(axis=1) > 1e-6 * largest
         if planar:
             free[[2, 3, 4]] = False
-        text = tuple(x if not planar else x.replace("torque z", "torque") for x, f in zip(labels, free, strict=True) if f)
+        text = tuple(
+            x if not planar else x.replace("torque z", "torque") for x, f in zip(labels, free, strict=True) if f
+        )
         if text:
             out[name] = text
     return out

@@ -29,7 +29,7 @@ class Distance(Joint):
         Length of the link; the drawn distance if not given.
     """
 
-    at: PointPair | None = None
+    at: PointPair | None = None  # type: ignore[assignment]
     length: Length | None = None
 
     blocks: ClassVar = CONSTANT_DISTANCE

@@ -82,7 +82,7 @@ class Body(Element):
     inertia_axes : orientation
         Axes that a spatial ``inertia`` is given in, relative to the reference frame.
     com : point [m]
-        Centre of mass in the reference frame; its origin, or the shapes' centre, if not given.
+        Centre of mass in the reference frame. If not given: the shapes' where they give the inertia, else its origin.
     position : point [m]
         Origin of the reference frame, in the world.
     angle : number [rad]
@@ -166,9 +166,10 @@ class Driver(Element):
     ----------
     name : str
     coordinate : str
-        ``"joint.coordinate"`` such as ``"A.angle"``, or a world coordinate of a body's or frame's origin: ``"slider.x"``.
+        ``"joint.coordinate"`` such as ``"A.angle"``, or a world coordinate of a body's or frame's origin such as
+        ``"slider.x"``.
     law : expression
-        Its value [rad] or [m] as a function of ``t`` and parameters; its derivatives are found exactly.
+        Its value [rad] or [m], a function of ``t`` and parameters; its derivatives are found exactly.
     """
 
     coordinate: str = field(kw_only=False)

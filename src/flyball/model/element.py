@@ -85,7 +85,7 @@ def element(cls: T) -> T:
 
     __init__.__doc__ = original.__doc__
     __init__.__signature__ = _signature(made)  # type: ignore[attr-defined]
-    made.__init__ = __init__  # type: ignore[misc]
+    made.__init__ = __init__  # type: ignore[misc, method-assign]
     return typing.cast(T, made)
 
 
@@ -167,7 +167,7 @@ class Element:
 
 
 @cache
-def fields_with(cls: type, marker: type) -> dict[str, Any]:
+def fields_with(cls: Any, marker: Any) -> dict[str, Any]:
     """Fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
     hints = typing.get_type_hints(cls, include_extras=True)
     found = {}
@@ -188,7 +188,7 @@ def _markers(hint: Any) -> list[Any]:
 def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
     """The element's fields with every number in SI floats; laws and other fields as they are written."""
     n = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
-    for name, unit in fields_with(type(e), Unit).items():
+    for name, unit in fields_with(e.__class__, Unit).items():
         setattr(n, name, _numbers(getattr(e, name), env, unit.dimension, e, name))
     return n
 
@@ -234,7 +234,7 @@ def nonnegative(e: Element, n: SimpleNamespace, *names: str, why: str = "") -> N
 
 
 def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Callable, rule: str, why: str) -> None:
-    units = fields_with(type(e), Unit)
+    units = fields_with(e.__class__, Unit)
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):

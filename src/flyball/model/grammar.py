@@ -16,7 +16,25 @@ CONSTANTS = {"pi": math.pi, "e": math.e}
 
 # Functions a user may call, and the names of their arguments.
 FUNCTIONS = {
-    **{name: ("x",) for name in ["sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign"]},
+    **{
+        name: ("x",)
+        for name in [
+            "sin",
+            "cos",
+            "tan",
+            "asin",
+            "acos",
+            "atan",
+            "sinh",
+            "cosh",
+            "tanh",
+            "exp",
+            "log",
+            "sqrt",
+            "abs",
+            "sign",
+        ]
+    },
     "atan2": ("y", "x"),
     "min": ("a", "b", "..."),
     "max": ("a", "b", "..."),
@@ -91,7 +109,7 @@ class _Reader:
     def made(self, node: ast.AST, kind: str, args: Iterable[Node] = (), value: Any = None) -> Node:
         return Node(kind, tuple(args), value, *self.span(node))
 
-    def span(self, node: ast.AST) -> tuple[int, int]:
+    def span(self, node: Any) -> tuple[int, int]:
         """Where a node stands, in characters (Python counts bytes)."""
         data = self.text.encode()
         start, stop = node.col_offset, node.end_col_offset

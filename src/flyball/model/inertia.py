@@ -50,9 +50,12 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
         raise ModelError(f"{body.title}: its inertia is missing; give {hint}, 0 for a point mass, or a shape")
     if n.mass is None and (n.density is None or not solids):
         raise ModelError(f"{body.title}: its mass is missing; give mass=..., or a shape and a density")
-    shape = _of_solids(solids, n, env) if solids else None
+    shape: Any = _of_solids(solids, n, env) if solids else None
     mass = n.mass if n.mass is not None else shape.mass
-    com = shape.com if shape is not None and n.com is None else vector(n.com or (0, 0, 0), planar, f"com of {body.title}")
+    if n.com is None and n.inertia is None and shape is not None:
+        com = shape.com  # shapes that do not give the inertia are for looks only, and give no centre of mass either
+    else:
+        com = vector(n.com or (0, 0, 0), planar, f"com of {body.title}")
     if n.inertia is None:
         moved = shape.com - com  # a mass of its own scales the shape's inertia; the parallel axis theorem moves it
         inertia = shape.inertia * (mass / shape.mass) + shifted(mass, moved)

@@ -15,8 +15,7 @@ from .geometry import triad, vector
 
 WorldFrame = tuple[np.ndarray, np.ndarray]
 
-SAME = np.eye(3)
-Z_TO_X = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
+Z_TO_X = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0))
 """Turn of a frame whose x axis becomes the z axis of the frame it starts from."""
 
 

@@ -90,7 +90,7 @@ class Model:
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __getitem__(self, name: str) -> Element:
+    def __getitem__(self, name: str) -> Any:
         """The part with that name."""
         if name not in self._names:
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(name, self._names)}")
@@ -171,7 +171,7 @@ class Model:
             raise ModelError(f"{e.title}: {found.title} has no coordinate {coordinate!r}; it has {has}")
         return found
 
-    def coordinate(self, text: str, e: Element) -> tuple[Element | str, str]:
+    def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
         """(joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
         owner, _, what = text.partition(".")
         found = self._names.get(owner)
@@ -231,5 +231,3 @@ def listing(names: list[str]) -> str:
         return "there is none yet; add it first"
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     return f"known: {shown}"
-
-

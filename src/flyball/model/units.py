@@ -96,7 +96,7 @@ def is_unit(text: str) -> bool:
 def _registry() -> Any:
     import pint
 
-    registry = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
     registry.define("@alias turn = rev")
     registry.define("@alias ohm = Ohm")
     # pint reads Nm as "number of ... metre"; everyone who writes it means a torque.
@@ -109,7 +109,7 @@ def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tup
     """SI factor of a unit and the powers of its base units, sorted."""
     import pint
 
-    registry = _registry()
+    registry: Any = _registry()
     if not _UNIT.fullmatch(unit) or _TOWER.search(unit):
         raise UnitError(f"'{text}': '{unit}' is not a unit; write {_example(dimension)}")
     try:

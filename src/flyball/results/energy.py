@@ -87,5 +87,3 @@ class Energy:
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Named curves."""
         return {k: ("J", getattr(self, k)) for k in ("kinetic", "potential", "total", "balance")}
-
-

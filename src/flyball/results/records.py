@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -25,7 +26,9 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
-        self.W = SimpleNamespace(BK=np.zeros((nb, 24, self.n)), X=np.zeros((nv, 6, self.n)), O=np.zeros((nb, 3, self.n)))
+        self.W = SimpleNamespace(
+            BK=np.zeros((nb, 24, self.n)), X=np.zeros((nv, 6, self.n)), O=np.zeros((nb, 3, self.n))
+        )
         for b in range(nb):
             pose(S, self.W, b, q.T)
             motion(S, self.W, b, v.T)
@@ -69,7 +72,7 @@ class Records:
         return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
 
 
-def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, tuple], tuple[int, tuple], Coordinate]:
+def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
     """(frame, extra turn) twice: what a joint's coordinate is measured between, from its frames F and M."""
     c = joint.coordinates[what]
     ends = []
@@ -79,7 +82,7 @@ def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, tu
     return ends[0], ends[1], c
 
 
-def turned(record: Record, turn: np.ndarray) -> Record:
+def turned(record: Record, turn: Any) -> Record:
     """The record with its axes turned by a constant rotation."""
     from ..math.vec import mm
 

@@ -97,7 +97,7 @@ class Result:
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""
-        out = {}
+        out: dict[str, tuple[str, np.ndarray]] = {}
         for e in self.model.elements():
             if e.category != "initial":
                 out |= {f"{e.name}.{k}": c for k, c in self[e.name].channels().items()}

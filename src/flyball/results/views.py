@@ -15,6 +15,7 @@ from ..model.geometry import matrix_to_quaternion
 from ..model.joint import Joint
 from ..system.laws import evaluate
 from ..system.rows import parameters
+from ..system.tables import Q0
 from .records import coordinate_frames, turned
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ class PointView(View):
         local = np.arctan2(self._turn[1, 0], self._turn[0, 0])
         if self._body < 0:
             return np.full(len(self._result.t), local)
-        return self._result.q[:, 3 * self._body + 2] + local
+        return self._result.q[:, self._x.system.body_i[self._body, Q0] + 2] + local
 
     @property
     def angular_velocity(self) -> np.ndarray:
@@ -124,7 +125,7 @@ class JointView(View):
         r, x = self._result.records, self._x
         (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
         F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
-        value, f, tM, tF, second = self._formula(c.row.kind)(c.row.par[:6] + (0.0, 0.0), F, M)
+        value, f, tM, tF, second = self._formula(c.row.kind)((*c.row.par[:6], 0.0, 0.0), F, M)
         rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
         offset = self.element.offset(x.numbers[self.element.name], what)
         value = c.sign * value + offset
@@ -142,7 +143,9 @@ class JointView(View):
         for k in (i, j):
             b = int(self._x.system.frame_i[k])
             R = self._x.system.frame_x[k, 3:]
-            psi.append(np.arctan2(R[3], R[0]) + (self._result.q[:, 3 * b + 2] if b >= 0 else 0.0))
+            psi.append(
+                np.arctan2(R[3], R[0]) + (self._result.q[:, self._x.system.body_i[b, Q0] + 2] if b >= 0 else 0.0)
+            )
         return psi[1] - psi[0] + offset
 
     def __getattr__(self, name: str) -> np.ndarray:
@@ -214,7 +217,9 @@ class JointView(View):
             return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
         if axes not in names:
             raise ValueError(f"axes must be 'world', 'joint', {names[0]!r} or {names[1]!r}, not {axes!r}")
-        return PointView(self._result, x.structure.model[axes])._record[1] if axes != GROUND else tuple(np.eye(3).ravel())
+        return (
+            PointView(self._result, x.structure.model[axes])._record[1] if axes != GROUND else tuple(np.eye(3).ravel())
+        )
 
     @property
     def force(self) -> np.ndarray:

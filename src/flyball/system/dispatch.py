@@ -32,7 +32,7 @@ def row_values(S, W, t):
 
 @formula
 def row_biases(S, W):
-    """gamma of all constraint rows, from poses and velocities."""
+    """Gamma of all constraint rows, from poses and velocities."""
     for k in range(S.row_i.shape[0]):
         W.row[GAMMA, k] = W.row[NU_DOT, k]
     each_kind(S, W, each_bias)

@@ -45,7 +45,29 @@ ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(11, 16)
 NEGATE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN, CUBIC, QUINTIC, NOT = range(18)
 
 _UNARY = {
-    **dict(zip(["neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs", "sign"], range(15), strict=True)),
+    **dict(
+        zip(
+            [
+                "neg",
+                "sin",
+                "cos",
+                "tan",
+                "asin",
+                "acos",
+                "atan",
+                "sinh",
+                "cosh",
+                "tanh",
+                "exp",
+                "log",
+                "sqrt",
+                "abs",
+                "sign",
+            ],
+            range(15),
+            strict=True,
+        )
+    ),
     "cubic": CUBIC,
     "quintic": QUINTIC,
     "not": NOT,

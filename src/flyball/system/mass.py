@@ -82,4 +82,3 @@ def mass_entries(S, W):
                         W.M[e] = scratch[i]
                         e += 1
                 a = S.body_i[a, PARENT]
-

@@ -1,4 +1,4 @@
-"""The motion as an ordinary differential equation: y = (q, v, z) with z the work of accounted elements and turned angles.
+"""The motion as an ordinary differential equation: y = (q, v, z), z the work of accounted elements and turned angles.
 
 Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g = 0 and G v = nu are kept by one smooth
 projection P, along M^-1 G^T; the integrator sees f(P(y)), so its order is kept.
@@ -45,7 +45,7 @@ NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED = 2
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
-TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted and reported states that are left alone
+TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
@@ -104,7 +104,8 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
     lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
-    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W is good for a solve here).
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W
+    is good for a solve here).
     """
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
@@ -154,7 +155,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
 
 @formula
 def accelerate(S, W, t, p, dy, factored):
-    """dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
+    """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
     nq = S.kinds[-2]
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
@@ -170,7 +171,10 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
-    if not factored or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]:
+    if (
+        not factored
+        or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
+    ):
         status = factor(S, W)
         if status != 0:
             return status
@@ -212,7 +216,7 @@ def derivative(t, y, dy, S, W):
 
 @formula
 def arrive(t, y, dy, S, W):
-    """Project the state y in place, to rounding, and evaluate there. Returns (0 or a status, the relative violation)."""
+    """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
     nq = S.kinds[-2]
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class FrameSpec:
     """A frame that some element needs: on which body (-1 ground), whose, and which of its frames."""
 
     body: int
-    element: Element | None
+    element: Any
     role: str  # "F", "M"; "world" for ground itself
     coordinate: str = ""  # turned for that coordinate of a joint
 
@@ -81,7 +82,7 @@ class Structure:
     code: list[int] = field(default_factory=list)
     const: list[float] = field(default_factory=list)
     depth: int = 1
-    ldl: Pattern | None = None
+    ldl: Pattern = None  # type: ignore[assignment]
 
     @property
     def nq(self) -> int:
@@ -94,9 +95,7 @@ class Structure:
         return int(self.tables["body_i"][:, 5].sum())
 
 
-def structure(
-    model: Model, *, far: bool = False, holds: Sequence[Initial] = (), tree: Sequence[str] = ()
-) -> Structure:
+def structure(model: Model, *, far: bool = False, holds: Sequence[Initial] = (), tree: Sequence[str] = ()) -> Structure:
     """Decide the tables of a mechanism.
 
     Parameters
@@ -132,7 +131,7 @@ def _body_table(s: Structure) -> dict[int, Joint]:
     model = s.model
     hung = {}
     for name in s.tree:
-        joint = model[name]
+        joint: Any = model[name]
         hung[model.carrier(joint.body_j, joint)] = (joint, model.carrier(joint.body_i, joint))
     names = [b.name for b in model.bodies]
     done: dict[str, int] = {GROUND: -1}
@@ -189,9 +188,7 @@ def _unit(model: Model, e: Driver) -> str:
 def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, Coordinate]:
     """Frames that a joint's coordinate is measured between."""
     c = owner.coordinates[what]
-    first, second = (
-        frame(s, owner, role, what if len(getattr(c, f"turn_{role}")) else "") for role in c.frames
-    )
+    first, second = (frame(s, owner, role, what if len(getattr(c, f"turn_{role}")) else "") for role in c.frames)
     return first, second, c
 
 
@@ -212,7 +209,7 @@ def _coordinate_row(s: Structure, e: Element, text: str, law: int, work: bool = 
     s.slices[e.name] = slice(first, first + 1)
 
 
-def frame(s: Structure, e: Element, role: str, coordinate: str = "") -> int:
+def frame(s: Structure, e: Any, role: str, coordinate: str = "") -> int:
     """Index of a frame of an element, made when first asked for."""
     key = (e.name, role, coordinate)
     if key not in s.frame_at:
@@ -221,7 +218,7 @@ def frame(s: Structure, e: Element, role: str, coordinate: str = "") -> int:
     return s.frame_at[key]
 
 
-def _carrier(model: Model, e: Element, role: str) -> str:
+def _carrier(model: Model, e: Any, role: str) -> str:
     if isinstance(e, Frame):
         return e.body
     if hasattr(e, "body_i"):
@@ -255,7 +252,7 @@ def _forces(s: Structure) -> None:
             table[k, 6] = counted(joint, "angle")
         else:
             table[k, :2] = frame(s, e, "F") if hasattr(e, "body_i") else 0, frame(s, e, "M")
-        for name, of in fields_with(type(e), LawOf).items():
+        for name, of in fields_with(e.__class__, LawOf).items():
             for slot, law in enumerate(e.laws()):
                 if law is not None:
                     expression = law_expression(law, of.dimension, f"{name} of {e.title}")
@@ -309,18 +306,22 @@ def _patterns(s: Structure, tree_joint: dict[int, Joint]) -> None:
     for r, bodies in zip(s.rows, touched, strict=True):
         if not bodies:
             raise ModelError(f"{r.element.title} restrains nothing that can move")
-    block_i, row_p, col_i, at = [], [0], [], {}
+    block_i: list[tuple] = []
+    row_p, at = [0], {}
+    col_i: list[int] = []
     for k, bodies in enumerate(touched):
         for b in sorted(bodies):
             at[k, b] = len(col_i)
             block_i.append((b, len(col_i), k))
             col_i.extend(range(body_i[b, 3], body_i[b, 3] + body_i[b, 5]))
         row_p.append(len(col_i))
-    term_i, seg_i = [], []
+    term_i: list[tuple] = []
+    seg_i: list[tuple] = []
     for t in s.terms:
-        F, M = chains[s.frames[t.F].body], chains[s.frames[t.M].body]
+        on_F, on_M = chains[s.frames[t.F].body], chains[s.frames[t.M].body]
         first = len(seg_i)
-        seg_i += [(b, 1, at[t.row, b]) for b in sorted(M - F)] + [(b, -1, at[t.row, b]) for b in sorted(F - M)]
+        seg_i += [(b, 1, at[t.row, b]) for b in sorted(on_M - on_F)]
+        seg_i += [(b, -1, at[t.row, b]) for b in sorted(on_F - on_M)]
         term_i.append((t.row, t.F, t.M, first, len(seg_i)))
     s.tables |= {
         "term_i": _ints(term_i, 5),
@@ -337,7 +338,7 @@ def _patterns(s: Structure, tree_joint: dict[int, Joint]) -> None:
 
 def _chains(body_i: np.ndarray) -> dict[int, frozenset[int]]:
     """Each body and all it hangs on."""
-    chains = {-1: frozenset()}
+    chains: dict[int, frozenset[int]] = {-1: frozenset()}
     for b, parent in enumerate(body_i[:, 0].tolist()):
         chains[b] = chains[parent] | {b}
     return chains

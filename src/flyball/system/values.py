@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
@@ -54,7 +55,9 @@ class Values:
     poses: Poses  # where frames are when it is drawn
 
 
-def values(s: Structure, parameters: Mapping[str, float] | None = None, holds: Mapping[str, float] | None = None) -> Values:
+def values(
+    s: Structure, parameters: Mapping[str, float] | None = None, holds: Mapping[str, float] | None = None
+) -> Values:
     """Numbers of a mechanism.
 
     Parameters
@@ -150,7 +153,7 @@ class Poses:
         b = self.bodies[e.body]
         return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
 
-    def separation(self, e: object) -> float:
+    def separation(self, e: Any) -> float:
         """Drawn distance between the origins of an element's two frames."""
         a, b = (self.world(FrameSpec(0, e, role))[0] for role in "FM")
         return np.sqrt(((b - a) ** 2).sum())

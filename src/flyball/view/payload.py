@@ -93,8 +93,8 @@ def _body(body: RecordedBody, block: _Block) -> dict[str, object]:
         | {"quaternion": _numbers(shape.quaternion), "outline": [_numbers(point) for point in shape.outline]}
         for shape in body.shapes
     ]
-    poses = {"p": block.add(body.p), "q": block.add(_continuous(body.q))}
-    return {"name": body.name, "color": body.color, "shapes": shapes} | poses
+    poses: dict[str, object] = {"p": block.add(body.p), "q": block.add(_continuous(body.q))}
+    return {"name": body.name, "color": body.color, "shapes": shapes, **poses}
 
 
 def _continuous(q: np.ndarray) -> np.ndarray:

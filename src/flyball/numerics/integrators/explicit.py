@@ -1,8 +1,9 @@
 """One adaptive loop for every explicit Runge-Kutta pair, with dense output, projection and chunked output.
 
-Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``arrive(t, y, dy, S, W)``, which also projects y,
-and ``report(t, y, out, S, W)``. It returns when its output buffer is full, its share of steps is done, the end is
-reached, or it cannot go on; the caller calls again with the same ``Clock``. Progress, interrupt and restart are this.
+Knows nothing of mechanisms: it is given ``derivative(t, y, dy, S, W)``, ``arrive(t, y, dy, S, W)``, which also
+projects y, and ``report(t, y, out, S, W)``. It returns when its output buffer is full, its share of steps is done,
+the end is reached, or it cannot go on; the caller calls again with the same ``Clock``. Progress, interrupt and
+restart are this.
 
 Step control after Hairer, Norsett and Wanner, *Solving Ordinary Differential Equations I* (1993), section II.4.
 """
@@ -28,7 +29,7 @@ class Clock(NamedTuple):
     """Everything an interrupted integration needs to go on."""
 
     real: np.ndarray  # (9,)
-    count: np.ndarray  # (8,)
+    count: np.ndarray  # type: ignore[assignment]  # (8,)
     times: np.ndarray  # output times, ascending
     y: np.ndarray  # (3, ny): state, state in the making, interpolated state
     K: np.ndarray  # (stages, ny): derivatives of the stages
@@ -136,7 +137,7 @@ def interpolate(R, c, x, h, out):
 
 @formula
 def write(derivative, report, S, W, R, c, h, out, used):
-    """Report every output time within the step from T to T + h, as far as the buffer reaches. Returns (status, used)."""
+    """Report every output time within the step of width h, as far as the buffer reaches. Returns (status, used)."""
     t = c.real[T]
     end = t + h
     extra = R.order_i[1] + 1
