@@ -10,7 +10,6 @@ import dataclasses
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, TypeVar, dataclass_transform
 
@@ -166,16 +165,20 @@ class Element:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
 
-@cache
+_MARKED: dict[tuple[Any, Any], dict[str, Any]] = {}
+
+
 def fields_with(cls: Any, marker: Any) -> dict[str, Any]:
     """Fields whose type carries a marker (``Unit`` or ``LawOf``), with that marker."""
-    hints = typing.get_type_hints(cls, include_extras=True)
-    found = {}
-    for f in dataclasses.fields(cls):
-        for m in _markers(hints[f.name]):
-            if isinstance(m, marker):
-                found[f.name] = m
-    return found
+    if (cls, marker) not in _MARKED:
+        hints = typing.get_type_hints(cls, include_extras=True)
+        found = {}
+        for f in dataclasses.fields(cls):
+            for m in _markers(hints[f.name]):
+                if isinstance(m, marker):
+                    found[f.name] = m
+        _MARKED[cls, marker] = found
+    return _MARKED[cls, marker]
 
 
 def _markers(hint: Any) -> list[Any]:
