@@ -194,10 +194,6 @@ def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
             f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie {size:.3g} m "
             f"from its centre of mass; check the unit (kg m^2)"
         )
-    n = x.numbers[name]
-    if n.inertia is not None and n.com is None and max(abs(c) for c in b.com) > 1e-9 * max(size, radius):
-        where = ", ".join(f"{c:.4g}" for c in b.com)
-        yield f"body {name!r}: its inertia is given, its centre of mass ({where}) m is that of its shapes; give com="
     if len(b.moments) == 3:
         p, q, r = b.moments
         numbers = f"body {name!r}: its principal moments {p:g}, {q:g}, {r:g} kg m^2"
