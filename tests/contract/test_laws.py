@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 
 from flyball._jit import kernel
 from flyball.model.expressions import FUNCTIONS, Expression
-from flyball.system.laws import compile_law, evaluate, evaluate_jet
+from flyball.system.laws import evaluate, evaluate_jet
+from flyball.system.program import compile_law
 
 PARAMETERS = {"a": 0.7, "b": 1.3, "zero": 0.0, "n": 3.0}
 H = 1e-30

@@ -35,7 +35,25 @@ from flyball.math.scalar import (
     tanh,
 )
 
-ONE = ["sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log", "sinh", "cosh", "tanh", "absolute", "sign", "rounded", "cubic_rise", "quintic_rise"]
+ONE = [
+    "sqrt",
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "exp",
+    "log",
+    "sinh",
+    "cosh",
+    "tanh",
+    "absolute",
+    "sign",
+    "rounded",
+    "cubic_rise",
+    "quintic_rise",
+]
 TWO = ["atan2", "minimum", "maximum", "divide", "power"]
 SHARP = {"sign", "rounded"}
 INSIDE = [0.3, 0.71]

@@ -22,7 +22,7 @@ from ..model.force import Force, JointForce
 from ..model.joint import Coordinate, Joint
 from ..model.model import Model
 from ..numerics.ldl import Pattern, analyse
-from .laws import compile_law
+from .program import compile_law
 from .tables import TERM_KINDS
 from .tree import FREE, NQ, NV, PLANAR, REVOLUTE
 

@@ -1,0 +1,195 @@
+"""Two coordinate layers, one mechanism: absolute coordinates and joint coordinates give the same accelerations.
+
+That is the proof that the layer is data: rows, forces and reactions never ask what is below them.
+"""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.assemble import assemble
+from flyball.analysis.compiled import compiled
+from flyball.analysis.entry import MOTION
+from flyball.constraints import angle
+from flyball.results.records import Records
+from flyball.system.records import load
+from flyball.system.tables import F_APPLIED, GAMMA, LAM, REGULARISE
+from flyball.system.tree import REVOLUTE
+from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
+from tests.verification.test_reactions import actuated
+
+
+def planar_chain():
+    m = fb.Mechanism("chain", planar=True, gravity=(0, -9.81))
+    p = np.array([[0, 0], [0.5, -0.2], [0.9, 0.3], [1.6, 0.4]])
+    before = "ground"
+    for i in range(3):
+        m.add(planar_rod(f"rod {i}", p[i], p[i + 1], 1.0 + i, angular_velocity=(1, -2, 3)[i]))
+        m.add(fb.Revolute(f"J{i}", before, f"rod {i}", at=p[i]))
+        before = f"rod {i}"
+    m.add(fb.SpringDamper("s", "ground", "rod 2", at=((0, 1), p[3]), stiffness=40.0, damping=2.0, length=0.7))
+    m.add(fb.TorsionalSpringDamper("c", "J1", stiffness=7.0, damping=0.3, angle=0.2))
+    return m
+
+
+def spatial_chain():
+    m = fb.Mechanism("spatial chain", gravity=(1, -2, -9.81))
+    axes = [(0, 0, 1), (1, 2, 0), (0.3, -1, 0.5)]
+    p = np.array([[0, 0, 0], [0.5, 0.1, 0.2], [1, -0.3, 0.1], [1.2, 0.2, 0.7]])
+    before = "ground"
+    for i in range(3):
+        m.add(
+            fb.Body(
+                f"rod {i}",
+                mass=1.0 + i,
+                inertia=(0.1, 0.2, 0.25),
+                position=p[i],
+                com=(0.1, 0.02 * i, -0.05),
+                orientation=(0.1 * i, -0.3, 0.2),
+                angular_velocity=(0.5 * i, 1, -1),
+            )
+        )
+        m.add(fb.Revolute(f"J{i}", before, f"rod {i}", at=p[i], axis=axes[i]))
+        before = f"rod {i}"
+    m.add(fb.SpringDamper("s", "rod 0", "rod 2", at=(p[0], p[3]), stiffness=40.0, damping=2.0, length=0.7))
+    m.add(fb.PointTorque("twist", "rod 1", torque=(1, "t", 2), axes="body"))
+    return m
+
+
+def driven_four_bar():
+    m = four_bar()
+    m.add(fb.Driver("motor", "A.angle", "1 + 2*sin(3*t)"))
+    return m
+
+
+def moving_four_bar():
+    m = four_bar()
+    m.add(fb.Initial("A.angle", rate=5.0))
+    return m
+
+
+CASES = {
+    "planar chain": (planar_chain, ["J0", "J1", "J2"]),
+    "planar chain, one hinge": (planar_chain, ["J1"]),
+    "spatial chain": (spatial_chain, ["J0", "J1", "J2"]),
+    "spatial chain, two hinges": (spatial_chain, ["J0", "J2"]),
+    "four-bar, one side": (moving_four_bar, ["A", "B"]),
+    "four-bar, both sides": (moving_four_bar, ["A", "D"]),
+    "four-bar, all but one": (moving_four_bar, ["A", "B", "D"]),
+    "spatial four-bar": (spatial_four_bar, ["A", "D"]),
+    "spatial four-bar, driven": (lambda: spatial_four_bar(driven=True), ["A", "D"]),
+    "Bricard": (bricard, ["R1", "R2", "R3", "R4", "R5"]),
+    "governor": (lambda: example("governor.toml"), ["bearing", "left hinge", "right hinge"]),
+    "robot": (actuated, ["waist"]),
+}
+
+
+def joint_coordinates(absolute, q, v, tree):
+    """Coordinates and velocities in the other layer of the state (q, v) of the first, read from its kinematics."""
+    absolute.at(0.0, q, v)
+    old, new = absolute.structure, tree.structure
+    Q, V = np.zeros(new.nq), np.zeros(new.nv)
+    hinges = {new.model.carrier(new.model[j].body_j, new.model[j]): j for j in new.tree}
+    for name, b in new.place.items():
+        if b < 0:
+            continue
+        _, kind, q0, v0, nq, nv = new.tables["body_i"][b]
+        if kind == REVOLUTE:
+            F, M = (load(absolute.work.FK, old.frame_at[hinges[name], role, ""]) for role in "FM")
+            value, _, n, _, _ = angle.row((0.0,) * 8, F, M)
+            Q[q0], V[v0] = value, np.dot(n, np.subtract(M[2], F[2]))
+        else:
+            _, _, p0, u0, _, _ = old.tables["body_i"][old.place[name]]
+            Q[q0 : q0 + nq], V[v0 : v0 + nv] = q[p0 : p0 + nq], v[u0 : u0 + nv]
+    return Q, V
+
+
+def spun(model, a):
+    """A consistent state in motion: where nothing moves yet, the free motion of largest kinetic energy is added."""
+    q, v = a.q.copy(), a.v.copy()
+    a.compiled.at(0.0, q, v)
+    G = a.compiled.jacobian()
+    if len(G) and not model.drivers:
+        _, d, Vt = np.linalg.svd(G)
+        rank = int((d > 1e-9 * d[0]).sum())
+        free = Vt[rank:]
+        v = v + 3.0 * free.T @ np.cos(np.arange(len(free)))
+    return q, v
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_joint_coordinates_give_the_same_accelerations(case):
+    """Poses, velocities and accelerations of all bodies, and the multipliers that are unique, to 1e-9."""
+    make, hinges = CASES[case]
+    model = make()
+    a = assemble(model)
+    q, v = spun(model, a)
+    tree = compiled(model, tree=hinges)
+    tree.values.system.glob[REGULARISE] = 1e-6  # the layer is on trial here, not how closely the solve is regularised
+    Q, V = joint_coordinates(a.compiled, q, v, tree)
+    bodies = {}
+    for c, x, u in ((a.compiled, q, v), (tree, Q, V)):
+        status, dy = c.at(0.0, x, u, MOTION)
+        assert status == 0
+        s = c.structure
+        r = Records(c.values, x[None], u[None], dy[None, s.nq : s.nq + s.nv])
+        for name, b in s.place.items():
+            if b >= 0:
+                bodies.setdefault(name, []).append([np.ravel(part) for part in r.body(b)])
+    assert tree.structure.nv < a.compiled.structure.nv
+    assert len(tree.structure.rows) < len(a.compiled.structure.rows)
+    largest = max(np.abs(one[5]).max() for one, _ in bodies.values())
+    assert largest > 1.0, "something moves"
+    for name, (one, two) in bodies.items():
+        for part, (x, y) in enumerate(zip(one, two, strict=True)):
+            scale = largest if part >= 4 else 1.0
+            assert y == pytest.approx(x, abs=1e-9 * scale), f"{name}, part {part} of its record"
+    if case.startswith("four-bar"):
+        rows = tree.structure.slices["C"]
+        same = a.compiled.structure.slices["C"]
+        assert tree.work.row[LAM][rows] == pytest.approx(a.compiled.work.row[LAM][same], rel=1e-8)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_mass_matrix_is_symmetric_and_positive(case):
+    """The kinetic energy of random joint velocities, by the mass matrix of the tree, is that of the bodies."""
+    make, hinges = CASES[case]
+    c = compiled(make(), tree=hinges)
+    random = np.random.default_rng(1)
+    S, s = c.values.system, c.structure
+    V = random.normal(size=s.nv)
+    c.at(0.0, c.values.q, V, MOTION)
+    M = np.zeros((s.nv, s.nv))
+    M[S.mass_i[:, 0], S.mass_i[:, 1]] = c.work.M
+    M = M + np.tril(M, -1).T
+    assert np.linalg.eigvalsh(M).min() > 0
+    energy = 0.0
+    for b in range(len(S.body_i)):
+        _, R, w, u, _, _ = load(c.work.BK, b)
+        w = np.reshape(R, (3, 3)).T @ w
+        energy += 0.5 * S.body_x[b, 0] * np.dot(u, u) + 0.5 * w @ S.body_x[b, 1:10].reshape(3, 3) @ w
+    assert pytest.approx(energy, rel=1e-12) == 0.5 * V @ M @ V
+
+
+LOSES = "the factor of [M G^T; G -delta] may begin with a -delta, and only G x = gamma is refined: 1e-8 is lost"
+WEAK = ("planar chain, one hinge", "four-bar, one side", "four-bar, both sides", "Bricard", "robot")
+
+
+@pytest.mark.parametrize(
+    "case", [pytest.param(k, marks=pytest.mark.xfail(reason=LOSES, strict=True)) if k in WEAK else k for k in CASES]
+)
+def test_joint_layer_solves_the_equations_of_motion(case):
+    """M x - G^T lam = f and G x = gamma, by a dense solve of the same M, G, f and gamma."""
+    make, hinges = CASES[case]
+    model = make()
+    a = assemble(model)
+    c = compiled(model, tree=hinges)
+    Q, V = joint_coordinates(a.compiled, *spun(model, a), c)
+    S, s, W = c.values.system, c.structure, c.work
+    _, dy = c.at(0.0, Q, V, MOTION)
+    M = np.zeros((s.nv, s.nv))
+    M[S.mass_i[:, 0], S.mass_i[:, 1]] = W.M
+    M, G = M + np.tril(M, -1).T, c.jacobian()
+    K = np.block([[M, G.T], [G, np.zeros((len(G), len(G)))]])
+    exact = np.linalg.lstsq(K, np.r_[W.vel[F_APPLIED], W.row[GAMMA]], rcond=1e-12)[0][: s.nv]
+    assert dy[s.nq : s.nq + s.nv] == pytest.approx(exact, abs=2e-10 * np.abs(exact).max())
