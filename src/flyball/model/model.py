@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
-from .element import Element, Number, _plain, resolve
-from .expressions import number, resolve_parameters
+from .element import Element, LawOf, Number, _plain, fields_with, resolve
+from .expressions import Expression, law_expression, number, resolve_parameters
 from .force import BodyForce, Force, JointForce, TwoPointForce
 from .geometry import vector
 from .inertia import mass_properties
@@ -188,12 +188,38 @@ class Model:
         """Resolve the element's numbers and refuse those that make no sense."""
         n = resolve(e, env)
         e.check(n)
+        self._check_laws(e)
         if isinstance(e, Body):
             self._check_body(e, n, env)
         elif isinstance(e, Joint):
             self._check_joint(e, n)
         elif isinstance(e, TwoPointForce) and n.at is not None:
             e.world_points(n, self.planar)
+
+    def _check_laws(self, e: Element) -> None:
+        for name, of in fields_with(e.__class__, LawOf).items():
+            value = getattr(e, name)
+            for law in value if isinstance(value, tuple) else (value,):
+                self.law(law, of, f"{name} of {e.title}")
+        if isinstance(e, Driver):
+            self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}")
+
+    def unit(self, text: str, e: Element) -> str:
+        """Unit of a coordinate."""
+        owner, what = self.coordinate(text, e)
+        return owner.coordinates[what].unit if isinstance(owner, Joint) else "m"
+
+    def law(self, value: Any, of: LawOf, where: str) -> Expression | None:
+        """A law as an expression of t, its inputs and parameters; refused if it uses any other name."""
+        if value is None:
+            return None
+        try:
+            expression = law_expression(value, of.dimension, where)
+            expression.require(["t", *of.inputs, *self.parameters])
+        except ExpressionError as error:
+            text = str(error)
+            raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
+        return expression
 
     def _check_body(self, e: Body, n: Any, env: dict[str, float]) -> None:
         mass_properties(e, n, env, self.planar)

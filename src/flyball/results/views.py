@@ -350,8 +350,7 @@ class DriverView(View):
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Effort and work."""
-        owner, what = self._x.structure.model.coordinate(self.element.coordinate, self.element)
-        unit = owner.coordinates[what].unit if isinstance(owner, Joint) else "m"
+        unit = self._x.structure.model.unit(self.element.coordinate, self.element)
         return {"effort": ("N*m" if unit == "rad" else "N", self.effort), "work": ("J", self.work)}
 
 

@@ -15,9 +15,9 @@ from .. import forces
 from ..constraints import angle
 from ..constraints.blocks import Row, point_coordinate
 from ..errors import ModelError
-from ..model.body import GROUND, Driver, Frame, Initial
+from ..model.body import GROUND, Frame, Initial
 from ..model.element import Element, LawOf, fields_with
-from ..model.expressions import Expression, law_expression
+from ..model.expressions import Expression
 from ..model.force import Force, JointForce
 from ..model.joint import Coordinate, Joint
 from ..model.model import Model
@@ -173,16 +173,11 @@ def _frames_and_rows(s: Structure, holds: Sequence[Initial]) -> None:
                 s.rows.append(RowSpec(joint, label))
         s.slices[joint.name] = slice(first, len(s.rows))
     for driver in model.drivers:
-        law = law_expression(driver.law, _unit(model, driver), f"law of {driver.title}")
+        law = model.law(driver.law, LawOf(model.unit(driver.coordinate, driver)), f"law of {driver.title}")
         _coordinate_row(s, driver, driver.coordinate, _compile(s, law, (), driver), work=not s.far)
     for hold in holds:
         law = Expression.parse("0")
         _coordinate_row(s, hold, hold.name, _compile(s, law, (), hold))
-
-
-def _unit(model: Model, e: Driver) -> str:
-    owner, what = model.coordinate(e.coordinate, e)
-    return owner.coordinates[what].unit if isinstance(owner, Joint) else "m"
 
 
 def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, Coordinate]:
@@ -255,7 +250,7 @@ def _forces(s: Structure) -> None:
         for name, of in fields_with(e.__class__, LawOf).items():
             for slot, law in enumerate(e.laws()):
                 if law is not None:
-                    expression = law_expression(law, of.dimension, f"{name} of {e.title}")
+                    expression = s.model.law(law, of, f"{name} of {e.title}")
                     table[k, 2 + slot] = _compile(s, expression, of.inputs, e)
         if not e.conservative():
             table[k, 5] = len(s.states)
