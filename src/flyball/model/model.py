@@ -209,7 +209,7 @@ class Model:
         owner, what = self.coordinate(text, e)
         return owner.coordinates[what].unit if isinstance(owner, Joint) else "m"
 
-    def law(self, value: Any, of: LawOf, where: str) -> Expression | None:
+    def law(self, value: Any, of: LawOf, where: str) -> Any:
         """A law as an expression of t, its inputs and parameters; refused if it uses any other name."""
         if value is None:
             return None
