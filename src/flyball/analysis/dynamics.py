@@ -32,6 +32,7 @@ from ..system.tables import (
     WORST_V,
 )
 from .assemble import Assembly, assemble
+from .compiled import compiled
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
 
@@ -96,7 +97,7 @@ def simulate(
     parameters : mapping, optional
         Values of parameters in SI units, in place of the model's.
     start : Result, optional
-        Go on from the last state of this result (``t_start`` is then its last time).
+        Go on from where this result ended; its last time is then ``t_start``.
     progress : callable, optional
         Called with the fraction done about twenty times a second.
     **options
@@ -115,22 +116,29 @@ def simulate(
     """
     chosen = _options(options)
     begin = time.perf_counter()
-    t_start = t_start if start is None else float(start.t[-1])
+    t_start = t_start if start is None else start.final[0]
     times = output_times(t_start, t_end, outputs)
-    a = assemble(model, t=t_start, parameters=parameters)
-    y = a.y
-    if start is not None:
-        y = start.state_at_end(a.compiled)
-        a = Assembly(
-            a.compiled, t_start, y[: a.compiled.structure.nq], y[a.compiled.structure.nq :][: a.compiled.structure.nv]
-        )
-    else:
-        initial_turns(a.compiled.values, y)
+    a, y = _start(model, t_start, parameters, start)
     if a.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, a)  # refuses bodies that can move without inertia
     clock = _clock(a, t_start, float(t_end), times, y, chosen)
     rows, interrupted = _run(a, clock, tableau(chosen.method), progress)
     return _finish(model, a, clock, rows, interrupted, chosen, time.perf_counter() - begin)
+
+
+def _start(
+    model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None
+) -> tuple[Assembly, np.ndarray]:
+    """Compiled mechanism and state to start from: assembled as described, or where an earlier result ended."""
+    if before is None:
+        a = assemble(model, t=t, parameters=parameters)
+        y = a.y
+        initial_turns(a.compiled.values, y)
+        return a, y
+    c = compiled(model, parameters=parameters)
+    y = before.state_at_end(c)
+    nq, nv = c.structure.nq, c.structure.nv
+    return Assembly(c, t, y[:nq].copy(), y[nq : nq + nv].copy()), y
 
 
 def _options(options: Mapping[str, object]) -> Options:

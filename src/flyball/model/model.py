@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
-from .expressions import Expression, law_expression, number, resolve_parameters
+from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, Force, JointForce, TwoPointForce
 from .geometry import vector
 from .inertia import mass_properties

@@ -104,10 +104,16 @@ class Result:
         return out | {f"energy.{k}": c for k, c in self.energy.channels().items()}
 
     def state_at_end(self, compiled: Any) -> np.ndarray:
-        """State vector to go on from."""
-        if len(self.final[1]) == len(compiled.y):
-            return self.final[1].copy()
-        return np.r_[self.q[-1], self.v[-1], self.states[-1]]
+        """State vector to go on from.
+
+        Raises
+        ------
+        ModelError
+            If the mechanism it is wanted for has other coordinates.
+        """
+        if len(self.final[1]) != len(compiled.y):
+            raise ModelError(f"the result of {self.model.name!r} cannot be gone on with: the mechanism is another one")
+        return self.final[1].copy()
 
     def to_xarray(self) -> xarray.Dataset:
         """All curves as a labelled dataset with units."""

@@ -1,0 +1,158 @@
+"""Freedoms by Gruebler and by rank, redundant joints by name, and motions without inertia refused by name."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.assemble import assemble
+from flyball.analysis.mobility import mobility
+from tests.mechanisms import bricard, door, example, four_bar, free_body, planar_rod, spatial_four_bar
+
+
+def rssr():
+    """Revolute, spherical, spherical, revolute: the coupler may also spin about itself."""
+    m = fb.Mechanism("RSSR")
+    for e in spatial_four_bar().elements():
+        if e.name not in ("C", "A.angle"):
+            m.add(e)
+    m.add(fb.Spherical("C", "coupler", "rocker", at=(0.2, 0.5, 0.35)))
+    return m
+
+
+def parallelogram(bars=3):
+    """Equal cranks side by side: every crank beyond the second is redundant."""
+    m = fb.Mechanism("parallelogram", planar=True)
+    m.add(planar_rod("coupler", (0.3, 1), (0.3 + bars - 1, 1)))
+    for i in range(bars):
+        m.add(planar_rod(f"crank {i}", (i, 0), (i + 0.3, 1)))
+        m.add(fb.Revolute(f"A{i}", "ground", f"crank {i}", at=(i, 0)))
+        m.add(fb.Revolute(f"B{i}", f"crank {i}", "coupler", at=(i + 0.3, 1)))
+    return m
+
+
+def in_space(flat):
+    """A planar mechanism of revolutes, drawn in space."""
+    m = fb.Mechanism(flat.name)
+    for b in flat.bodies:
+        m.add(fb.Body(b.name, mass=b.mass, inertia=(1, 1, 1), position=(*b.position, 0), orientation=(0, 0, b.angle)))
+    for j in flat.joints:
+        m.add(fb.Revolute(j.name, j.body_i, j.body_j, at=(*j.at, 0), axis=(0, 0, 1)))
+    return m
+
+
+def linked(kind, **more):
+    m = fb.Mechanism(kind.__name__)
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1), position=(1, 0, 0)))
+    m.add(kind("J", "ground", "b", **more))
+    return m
+
+
+ALL = [f"R{i}" for i in range(1, 7)]
+TABLE = {  # mechanism, freedoms, Gruebler's count, redundant joints
+    "free body": (free_body, 6, 6, []),
+    "planar four-bar": (four_bar, 1, 1, []),
+    "planar four-bar in space": (lambda: in_space(four_bar()), 1, -2, ["A", "B", "C", "D"]),
+    "RSSR": (rssr, 2, 2, []),
+    "RSUR": (spatial_four_bar, 1, 1, []),
+    "parallelogram": (parallelogram, 1, 0, ["A0", "B0", "A1", "B1", "A2", "B2"]),
+    "two cranks": (lambda: parallelogram(2), 1, 1, []),
+    "door on two hinges": (door, 1, -4, ["upper", "lower"]),
+    "door on two balls": (lambda: door(fb.Spherical, fb.Spherical), 1, 0, ["upper", "lower"]),
+    "door on hinge and ball": (lambda: door(fb.Revolute, fb.Spherical), 1, -2, ["upper", "lower"]),
+    "Bricard": (bricard, 1, 0, ALL),
+    "governor": (lambda: example("governor.toml"), 4, 4, []),
+    "slider-crank, driven": (lambda: example("slider_crank.toml"), 0, 0, []),
+    "heavy top": (lambda: example("heavy_top.toml"), 3, 3, []),
+    "thin rod": (lambda: example("thin_rod.toml"), 2, 2, []),
+    "forty windows upright": (lambda: example("n_four_bar.py", windows=40), 1, 1, []),
+    "revolute": (lambda: linked(fb.Revolute, at=(0, 0, 0), axis=(1, 2, 3)), 1, 1, []),
+    "prismatic": (lambda: linked(fb.Prismatic, at=(0, 0, 0), axis=(1, 2, 3)), 1, 1, []),
+    "cylindrical": (lambda: linked(fb.Cylindrical, at=(0, 0, 0), axis=(1, 2, 3)), 2, 2, []),
+    "universal": (lambda: linked(fb.Universal, at=(0, 0, 0), axes=((1, 0, 0), (0, 0, 1))), 2, 2, []),
+    "spherical": (lambda: linked(fb.Spherical, at=(0, 0, 0)), 3, 3, []),
+    "distance": (lambda: linked(fb.Distance, at=((0, 0, 0), (1, 0, 0))), 5, 5, []),
+    "fixed": (lambda: linked(fb.Fixed, at=(0, 0, 0)), 0, 0, []),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_freedoms(name):
+    make, freedoms, gruebler, redundant = TABLE[name]
+    model = make()
+    found = mobility(model, assemble(model))
+    assert (found.freedoms, found.gruebler) == (freedoms, gruebler)
+    assert found.redundancy == freedoms - gruebler
+    assert sorted(found.redundant) == sorted(redundant)
+    report = model.check()
+    assert (report.freedoms, report.gruebler, sorted(report.redundant)) == (freedoms, gruebler, sorted(redundant))
+
+
+def test_flat_four_bar_counts_its_singular_position():
+    """At the flat position the window of A02 has a second, instantaneous freedom: mobility jumps from 1 to N + 1."""
+    m = fb.Mechanism("flat", planar=True)
+    m.add(planar_rod("left", (0, 0), (1, 0)), planar_rod("right", (1, 0), (2, 0)), planar_rod("bar", (1, 0), (2, 0)))
+    m.add(fb.Revolute("A", "ground", "left", at=(0, 0)), fb.Revolute("B", "left", "bar", at=(1, 0)))
+    m.add(fb.Revolute("C", "bar", "right", at=(2, 0)), fb.Revolute("D", "ground", "right", at=(1, 0)))
+    found = mobility(m, assemble(m))
+    assert (found.freedoms, found.gruebler) == (2, 1)
+    assert sorted(found.redundant) == ["A", "B", "C", "D"]
+
+
+def test_an_independent_constraint_is_not_called_redundant():
+    """Beside a redundant door, a pendulum of its own is not named."""
+    m = door()
+    m.add(fb.Body("bob", mass=1, inertia=(1, 1, 1), position=(3, 0, 0)))
+    m.add(fb.Spherical("pivot", "ground", "bob", at=(3, 0, 1)))
+    found = mobility(m, assemble(m))
+    assert set(found.redundant) == {"upper", "lower"}
+    assert "pivot" not in found.undetermined
+
+
+def test_size_and_units_do_not_change_the_count():
+    """The same mechanism a thousand times larger or smaller."""
+    for scale in (1e-3, 1.0, 1e3):
+        m = fb.Mechanism("scaled")
+        P = scale * np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)])
+        names = ["ground", *(f"rod {i}" for i in range(1, 6)), "ground"]
+        for i in range(5):
+            m.add(fb.Body(names[i + 1], mass=1, inertia=(scale**2,) * 3, position=(P[i] + P[i + 1]) / 2))
+        for j, at in zip(bricard().joints, P, strict=True):
+            m.add(fb.Revolute(j.name, j.body_i, j.body_j, at=at, axis=j.axis))
+        found = mobility(m, assemble(m))
+        assert (found.freedoms, found.rank) == (1, 29)
+
+
+def test_motion_without_inertia_is_refused_by_name():
+    """A thin rod on two balls may spin about itself, a point mass may turn: the message says which body, about what."""
+    m = fb.Mechanism("spins")
+    m.add(fb.Body("rod", mass=1, inertia=(1 / 12, 1 / 12, 0), position=(0, 0, 0.5)))
+    m.add(fb.Spherical("ball", "ground", "rod", at=(0, 0, 0)))
+    with pytest.raises(fb.ModelError, match=r"body 'rod' can turn about \(-?0, -?0, -?1\).* without any inertia"):
+        m.simulate(1.0)
+    m = fb.Mechanism("point", planar=True)
+    m.add(fb.Body("bob", mass=1, inertia=0, position=(1, 0)), fb.Distance("wire", "ground", "bob", at=((0, 0), (1, 0))))
+    with pytest.raises(fb.ModelError, match="body 'bob' can turn .* without any inertia"):
+        m.simulate(1.0)
+
+
+def test_missing_inertia_that_nothing_needs_is_fine():
+    """A point mass on a revolute: its rotation moves its mass."""
+    r = example("point_mass_pendulum.toml").simulate(0.5)
+    assert r.health.success
+    assert r.energy.drift < 1e-7
+
+
+def test_a_long_chain_is_counted_by_the_sparse_rank():
+    """Beyond 1500 velocities the rank comes from a sparse factorisation: the count is the same."""
+    links = 520
+    m = fb.Mechanism("long", planar=True)
+    before = "ground"
+    for i in range(links):
+        m.add(planar_rod(f"rod {i}", (i, 0), (i + 1, 0.1 * (i % 2))))
+        m.add(fb.Revolute(f"J{i}", before, f"rod {i}", at=(i, 0.0 if i == 0 else 0.1 * ((i - 1) % 2))))
+        before = f"rod {i}"
+    m.add(fb.Fixed("wall", "ground", "rod 0", at=(0, 0)))
+    found = mobility(m, assemble(m))
+    assert found.velocities == 1560
+    assert (found.freedoms, found.redundancy) == (links - 1, 2)
+    assert set(found.redundant) & {"J0", "wall"}
