@@ -19,7 +19,15 @@ from tests.verification.test_reactions import actuated
 
 @pytest.mark.parametrize(
     "make",
-    [four_bar, bricard, door, actuated, spatial_four_bar, lambda: example("governor.toml"), lambda: example("slider_crank.toml")],
+    [
+        four_bar,
+        bricard,
+        door,
+        actuated,
+        spatial_four_bar,
+        lambda: example("governor.toml"),
+        lambda: example("slider_crank.toml"),
+    ],
 )
 def test_drawn_joints_need_no_movement(make):
     """Joints given by points of the drawn configuration are closed by construction: the start is bit-equal."""
@@ -86,7 +94,9 @@ def rough_spatial_four_bar(seed=0, spread=0.3, angle=1.0):
     for name in ("crank", "coupler", "rocker"):
         axis = random.normal(size=3)
         turn = Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
-        m.add(fb.Body(name, mass=1, inertia=(0.01, 0.01, 0.01), position=spread * random.normal(size=3), orientation=turn))
+        m.add(
+            fb.Body(name, mass=1, inertia=(0.01, 0.01, 0.01), position=spread * random.normal(size=3), orientation=turn)
+        )
     length = np.sqrt(0.05**2 + 0.5**2 + 0.35**2)
     along_x, along_y = (0, "90 deg", 0), ("90 deg", 0, 0)
     framed(m, fb.Revolute, "A", "ground", (0, 0, 0), "crank", (0, 0, 0))
@@ -144,7 +154,7 @@ def test_an_antiparallel_start_comes_out_parallel(kind, turn):
     if kind in (fb.Prismatic, fb.Fixed):
         c = a.compiled
         F, M = (load(c.work.FK, c.structure.frame_at["J", role, ""])[1] for role in "FM")
-        assert M == pytest.approx(F, abs=1e-9)
+        assert pytest.approx(F, abs=1e-9) == M
 
 
 @settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.too_slow], derandomize=True)
@@ -192,7 +202,18 @@ def test_a_small_gap_is_closed_by_a_small_step():
 def test_fixed_bodies_stay_where_they_are():
     """Everything else comes to the body that is fixed, bit for bit unmoved, velocities included."""
     m = fb.Mechanism("fixed", planar=True)
-    m.add(fb.Body("held", mass=1, inertia=1, position=(1.0, 2.0), angle=0.3, velocity=(0.5, 0), angular_velocity=2.0, fixed=True))
+    m.add(
+        fb.Body(
+            "held",
+            mass=1,
+            inertia=1,
+            position=(1.0, 2.0),
+            angle=0.3,
+            velocity=(0.5, 0),
+            angular_velocity=2.0,
+            fixed=True,
+        )
+    )
     m.add(fb.Body("other", mass=1, inertia=1, position=(-1, 0)))
     framed(m, fb.Revolute, "J", "held", (0.5, 0), "other", (-0.5, 0))
     a = assemble(m)
@@ -245,7 +266,17 @@ def test_velocities_change_as_little_as_they_can():
     guess = fb.Mechanism("guess", planar=True)
     for b in m.bodies:
         v, w = random.normal(size=2), float(random.normal())
-        guess.add(fb.Body(b.name, mass=b.mass, inertia=b.inertia, position=b.position, angle=b.angle, velocity=v, angular_velocity=w))
+        guess.add(
+            fb.Body(
+                b.name,
+                mass=b.mass,
+                inertia=b.inertia,
+                position=b.position,
+                angle=b.angle,
+                velocity=v,
+                angular_velocity=w,
+            )
+        )
     for j in m.joints:
         guess.add(j)
     before = compiled(guess).values.v

@@ -131,7 +131,7 @@ def test_motion_without_inertia_is_refused_by_name():
         m.simulate(1.0)
     m = fb.Mechanism("point", planar=True)
     m.add(fb.Body("bob", mass=1, inertia=0, position=(1, 0)), fb.Distance("wire", "ground", "bob", at=((0, 0), (1, 0))))
-    with pytest.raises(fb.ModelError, match="body 'bob' can turn .* without any inertia"):
+    with pytest.raises(fb.ModelError, match=r"body 'bob' can turn .* without any inertia"):
         m.simulate(1.0)
 
 

@@ -185,7 +185,9 @@ def test_a_driver_follows_its_law_exactly():
     assert r["motor"].effort == pytest.approx(torque, abs=1e-9)
 
 
-@pytest.mark.parametrize("law", ["step(t, 0, 0, 1, 0.1)", "step5(t, -0.2, 0, 1, 0.1)", "0.05*(1 - cos(t))**2", "0.1*exp(-t)*sin(3*t)"])
+@pytest.mark.parametrize(
+    "law", ["step(t, 0, 0, 1, 0.1)", "step5(t, -0.2, 0, 1, 0.1)", "0.05*(1 - cos(t))**2", "0.1*exp(-t)*sin(3*t)"]
+)
 def test_driven_slides_follow_their_laws(law):
     """The displacement of a driven slide, against the law evaluated by NumPy and differences of it."""
     m = fb.Mechanism("slide")

@@ -42,7 +42,13 @@ def test_reactions_in_chosen_axes():
     m = fb.Mechanism("link", gravity=(0, 0, -G))
     a = np.radians(30)
     m.add(
-        fb.Body("link", mass=2, inertia=(0.1, 0.2, 0.2), position=(0.5 * np.cos(a), 0, -0.5 * np.sin(a)), orientation=(0, a, 0))
+        fb.Body(
+            "link",
+            mass=2,
+            inertia=(0.1, 0.2, 0.2),
+            position=(0.5 * np.cos(a), 0, -0.5 * np.sin(a)),
+            orientation=(0, a, 0),
+        )
     )
     m.add(fb.Revolute("pin", "ground", "link", at=(0, 0, 0), axis=(0, 1, 0)))
     r = m.simulate(0.7, outputs=21)
@@ -177,7 +183,10 @@ def test_accelerations_are_the_rates_of_velocities(name):
     curves |= {f"{b.name} turns": (r[b.name].angular_velocity, r[b.name].angular_acceleration) for b in m.bodies}
     for joint in m.joints:
         for c in joint.coordinates:
-            curves[f"{joint.name}.{c}"] = getattr(r[joint.name], f"{c}_rate"), getattr(r[joint.name], f"{c}_acceleration")
+            curves[f"{joint.name}.{c}"] = (
+                getattr(r[joint.name], f"{c}_rate"),
+                getattr(r[joint.name], f"{c}_acceleration"),
+            )
     for what, (v, a) in curves.items():
         size = 1.0 + np.abs(a).max()
         assert (v[2::3] - v[0::3]) / (2 * h) == pytest.approx(a[1::3], abs=1e-4 * size), what

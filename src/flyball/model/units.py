@@ -96,7 +96,7 @@ def is_unit(text: str) -> bool:
 def _registry() -> Any:
     import pint
 
-    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
+    registry: Any = pint.UnitRegistry(autoconvert_offset_to_baseunit=True, on_redefinition="ignore")
     registry.define("@alias turn = rev")
     registry.define("@alias ohm = Ohm")
     # pint reads Nm as "number of ... metre"; everyone who writes it means a torque.

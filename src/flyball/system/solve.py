@@ -164,12 +164,14 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     for _ in range(refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
-        if semidefinite:
+        if S.mass_i.shape[0] > 0:
+            worst = max(worst, remainder(S, W, f, x, lam, rhs, loaded))
+        elif semidefinite:
             worst = max(worst, excess(S, dx, rhs, x))
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
-        one_pass(S, W, rhs, dx, x, lam, semidefinite)
+        one_pass(S, W, rhs, dx, x, lam, semidefinite or S.mass_i.shape[0] > 0)
     return worst
 
 
@@ -229,6 +231,31 @@ def residual(S, W, gamma, x):
         W.row[R1, k] = s
         worst = max(worst, magnitude(s))
         size = max(size, a)
+    return worst / size
+
+
+@formula
+def remainder(S, W, f, x, lam, rhs, loaded):
+    """rhs = f - M x + G^T lam, for the coupled matrix; returns its largest entry relative to its terms."""
+    size = 1e-300
+    for d in range(x.shape[0]):
+        rhs[d] = f[d] if loaded else 0.0
+        size = max(size, magnitude(rhs[d]))
+    for e in range(S.mass_i.shape[0]):
+        i, j = S.mass_i[e, 0], S.mass_i[e, 1]
+        p = W.M[e] * x[j]
+        rhs[i] -= p
+        size = max(size, magnitude(p))
+        if i != j:
+            rhs[j] -= W.M[e] * x[i]
+    for k in range(lam.shape[0]):
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            p = W.G[e] * lam[k]
+            rhs[S.col_i[e]] += p
+            size = max(size, magnitude(p))
+    worst = 0.0
+    for d in range(x.shape[0]):
+        worst = max(worst, magnitude(rhs[d]))
     return worst / size
 
 

@@ -219,9 +219,11 @@ def advance(derivative, arrive, report, S, W, R, c, out):
             c.real[GROW] = 1.0
             continue
         status, used = write(derivative, report, S, W, R, c, h, out, used)
-        if status != 0:
-            c.count[STATUS] = status
-            return used
+        if status != 0:  # what lies inside the step cannot be reported: take a shorter one
+            c.count[REJECTED] += 1
+            c.real[H] = 0.25 * h
+            c.real[GROW] = 1.0
+            continue
         if c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= t + h:
             return used  # the buffer is full inside this step: it is taken again by the next call
         for i in range(c.y.shape[1]):

@@ -1,0 +1,221 @@
+"""The house keeps its plan (docs/architecture.md): imports point one way, files stay small, elements are one file."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import statistics
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.program.copied import PACKAGE
+
+FILES = sorted(PACKAGE.rglob("*.py"))
+TREES = {p: ast.parse(p.read_text(encoding="utf-8")) for p in FILES}
+LIBRARY = {"_jit", "math"}
+LEAF = {"errors", "__version__"}  # may be used anywhere
+ALLOWED = {  # room -> rooms that it may import when it is imported
+    "math": {"_jit"},
+    "numerics": {"_jit", "math"},
+    "constraints": LIBRARY,
+    "model": {"math", "constraints"},
+    "joints": {*LIBRARY, "constraints", "model"},
+    "forces": {*LIBRARY, "constraints", "model"},
+    "contact": {*LIBRARY, "constraints", "model"},
+    "system": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "contact"},
+    "results": {*LIBRARY, "constraints", "model", "joints", "forces", "system"},
+    "analysis": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "system", "results"},
+    "symbolic": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "system", "results"},
+    "view": {*LIBRARY, "constraints", "model", "joints", "forces", "system", "results"},
+    "errors": set(),
+    "_jit": set(),
+    "_link": set(),
+    "mechanism": {"model"},
+    "files": {"mechanism"},
+    "cli": set(),
+    "__init__": set(),
+    "__main__": {"cli"},
+}
+LATER = {  # imports inside functions, beyond those: the methods that lead from a thing to what is done with it
+    "_jit": {"_link"},
+    "mechanism": {"analysis"},
+    "files": {"model", "results"},
+    "results": {"view"},
+    "cli": {"analysis", "files", "mechanism", "model", "results", "view"},
+    "__init__": {"model"},
+}
+
+
+def imports(path: Path, tree: ast.Module):
+    """(room, line, whether inside a function) of every import of the house; those for type checkers are left out."""
+    package = path.relative_to(PACKAGE).parts[:-1]
+
+    def walk(node: ast.AST, later: bool):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+                continue
+            if isinstance(child, ast.ImportFrom) and child.level:
+                base = package[: len(package) - child.level + 1]
+                module = tuple(child.module.split(".")) if child.module else ()
+                for name in [module] if module else [(a.name,) for a in child.names]:
+                    yield (*base, *name)[0], child.lineno, later
+            elif isinstance(child, (ast.Import, ast.ImportFrom)):
+                names = [child.module] if isinstance(child, ast.ImportFrom) else [a.name for a in child.names]
+                assert not any((n or "").split(".")[0] == "flyball" for n in names), f"{path}: use relative imports"
+            yield from walk(child, later or isinstance(child, (ast.FunctionDef, ast.AsyncFunctionDef)))
+
+    return walk(tree, False)
+
+
+def room(path: Path) -> str:
+    first = path.relative_to(PACKAGE).parts[0]
+    return first.removesuffix(".py")
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_imports_point_one_way(path):
+    own = room(path)
+    assert own in ALLOWED, f"a new room {own!r}: say here what it may import"
+    for target, line, later in imports(path, TREES[path]):
+        allowed = ALLOWED[own] | LEAF | {own} | (LATER.get(own, set()) if later else set())
+        assert target in allowed, f"{path.name}, line {line}: {own} must not import {target}"
+
+
+@pytest.mark.parametrize("own", ["math", "numerics", "constraints"])
+def test_formulas_and_solvers_stand_on_numpy_alone(own):
+    """What they import at once is the standard library and NumPy; SciPy and Numba come when something asks for them."""
+    for path in FILES:
+        if room(path) == own:
+            for node in TREES[path].body:
+                if isinstance(node, (ast.Import, ast.ImportFrom)) and not getattr(node, "level", 0):
+                    names = [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names]
+                    for name in names:
+                        assert name.split(".")[0] in {*sys.stdlib_module_names, "numpy"}, f"{path.name} imports {name}"
+
+
+def test_only_dispatch_lists_kinds():
+    """Elements are found by registry: no other file of the system, analyses or numerics names one."""
+    names = {c.__name__ for c in fb.Body.registry.values() if c.category in ("joints", "forces")}
+    names -= {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
+    for path in FILES:
+        if room(path) in ("system", "analysis", "numerics", "results", "cli") and path.name != "dispatch.py":
+            used = {n.id for n in ast.walk(TREES[path]) if isinstance(n, ast.Name)}
+            assert not used & names, f"{path.name} names {used & names}"
+
+
+def test_files_stay_small():
+    lines = {p: len(p.read_text(encoding="utf-8").splitlines()) for p in FILES}
+    assert {str(p.relative_to(PACKAGE)): n for p, n in lines.items() if n > 400} == {}
+    assert statistics.median(lines.values()) < 150
+
+
+def own_lines(function: ast.FunctionDef) -> int:
+    """Lines of a function, those of functions inside it not counted."""
+    inner = [n for n in ast.walk(function) if isinstance(n, ast.FunctionDef) and n is not function]
+    taken = {line for n in inner for line in range(n.lineno, n.end_lineno + 1)}
+    return len(set(range(function.lineno, function.end_lineno + 1)) - taken)
+
+
+def test_functions_stay_small():
+    long = {
+        f"{p.name}: {n.name}": own_lines(n)
+        for p in FILES
+        for n in ast.walk(TREES[p])
+        if isinstance(n, ast.FunctionDef) and own_lines(n) > 60
+    }
+    assert {k: v for k, v in long.items() if not k.endswith("simulate")} == {}  # its docstring lists every option
+    assert all(v <= 70 for v in long.values())
+
+
+def test_public_names():
+    """Every public name is there, says what it is, and is found by completion; heavy imports come when needed."""
+    names = [n for n in dir(fb) if not n.startswith("_")]
+    assert {"Mechanism", "Body", "Revolute", "SpringDamper", "Driver", "load", "AssemblyError"} <= set(names)
+    for name in names:
+        doc = inspect.getdoc(getattr(fb, name))
+        assert doc, f"fb.{name} has no docstring"
+        assert doc[0].isupper() or doc.startswith("``"), f"fb.{name}: {doc!r}"
+    with pytest.raises(AttributeError, match="has no attribute 'Revolut'"):
+        fb.Revolut  # noqa: B018
+
+
+def test_everything_public_is_documented():
+    """Modules, and what they and their classes offer under a name without an underscore."""
+    missing = []
+    for path in FILES:
+        tree = TREES[path]
+        parts: list[ast.AST] = [tree]
+        for node in tree.body:
+            if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and not node.name.startswith("_"):
+                parts.append(node)
+                if isinstance(node, ast.ClassDef):
+                    parts += [n for n in node.body if isinstance(n, ast.FunctionDef) and not n.name.startswith("_")]
+        missing += [f"{path.name}: {getattr(n, 'name', 'the module')}" for n in parts if not ast.get_docstring(n)]
+    assert missing == []
+
+
+def test_parameters_of_elements_are_documented():
+    """Every field that a user may give stands in the docstring of its element, or of the one that it extends."""
+    missing = []
+    for name in dir(fb):
+        cls = getattr(fb, name)
+        if isinstance(cls, type) and dataclasses.is_dataclass(cls) and hasattr(cls, "category"):
+            text = " ".join(c.__doc__ or "" for c in cls.__mro__[:-1])
+            shared = {"at", "axis"} if cls.category == "joints" else {"name"}  # of all joints, needed by some
+            missing += [
+                f"{name}.{f.name}"
+                for f in dataclasses.fields(cls)
+                if not re.search(rf"\b{f.name}\b", text) and f.name not in shared
+            ]
+    assert missing == []
+
+
+def test_every_joint_is_one_file_and_one_export():
+    joints = importlib.import_module("flyball.joints")
+    lines = [
+        x for x in (PACKAGE / "joints" / "__init__.py").read_text(encoding="utf-8").splitlines() if x.startswith("from")
+    ]
+    files = {p.stem for p in (PACKAGE / "joints").glob("*.py")} - {"__init__"}
+    assert {x.split()[1].removeprefix(".") for x in lines} == files
+    assert all(hasattr(joints, x.split()[-1]) for x in lines)
+
+
+def test_adding_a_joint_and_a_force_touches_nothing_else(runs):
+    """One new file and one export; one new file and one line of dispatch (and the formula that the cache test edits)."""
+    copy, *_ = runs
+    assert copy.changed() == {
+        "joints/point_in_plane.py",
+        "joints/__init__.py",
+        "forces/drag.py",
+        "system/dispatch.py",
+        "system/loads.py",
+    }
+
+
+def test_the_added_joint_and_force_work(runs):
+    """A puck on a slope against the air: m dv/dt = m g - c v within the plane, the table carries the rest."""
+    *_, r = runs
+    assert r["names"] == [True, True]
+    assert r["same file"]
+    assert r["freedoms"] == 5
+    assert "Drag" not in r["kinds"]
+    assert r["kinds"] == ["air", "pull"]
+    assert r["drift"] < 1e-8
+    assert r["page"] > 10_000
+    t, m, c = np.array(r["t"]), 2.0, 0.8
+    n = np.array([0, 0.6, 0.8])
+    pull = np.array([0, 0, -20.0])
+    down = pull - n * (pull @ n)
+    decay = 1 - np.exp(-c / m * t)
+    steady = down / c
+    exact = [1, 0, 0] + np.outer(t, steady) + np.outer(decay * m / c, np.array([3, 0, 0]) - steady)
+    assert np.array(r["position"]) == pytest.approx(exact, abs=1e-8)
+    assert np.array(r["force"]) == pytest.approx(np.tile(-n * (pull @ n), (11, 1)), abs=1e-8)
+    assert np.all(np.diff(r["work"]) < 0)
