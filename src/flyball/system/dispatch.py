@@ -12,14 +12,12 @@ from .tables import GAMMA, NU_DOT
 
 @formula
 def each_kind(S, W, visit):
-    """Visit the terms of every kind with its formula."""
+    """Visit the terms of every kind that motions are made of, with its formula."""
     visit(S, W, coincident.KIND, coincident.row)
     visit(S, W, along.KIND, along.row)
     visit(S, W, perpendicular.KIND, perpendicular.row)
     visit(S, W, distance.KIND, distance.row)
     visit(S, W, angle.KIND, angle.row)
-    visit(S, W, alignment.KIND_AXIS, alignment.axis_row)
-    visit(S, W, alignment.KIND_FULL, alignment.full_row)
 
 
 @formula
@@ -27,6 +25,9 @@ def row_values(S, W, t):
     """Values, Jacobian and rates of all constraint rows, from the poses."""
     begin(S, W, t)
     each_kind(S, W, each_value)
+    # for assembly only: these have no acceleration term
+    each_value(S, W, alignment.KIND_AXIS, alignment.axis_row)
+    each_value(S, W, alignment.KIND_FULL, alignment.full_row)
     end(S, W)
 
 
