@@ -7,7 +7,7 @@ from scipy.integrate import solve_ivp
 import flyball as fb
 from tests.mechanisms import G, example
 
-# shared/reference/PROBLEMS.md, A02: exact digits; those for N = 40 agree with the library's file to 4e-6
+# the benchmark's published or closed-form values, A02: exact digits; those for N = 40 agree with the library's file to 4e-6
 A02 = {
     (1, 1): (-0.260712675184, -0.965416439159, -6.637809496122, 1.792553970389),
     (1, 4): (0.158955504257, 0.987285747728, 1.125395047766, -0.181191451125),

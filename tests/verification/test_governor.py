@@ -7,7 +7,7 @@ import pytest
 
 from tests.mechanisms import example
 
-# shared/reference/PROBLEMS.md: converged values of minimal coordinates; agree with the library's plot to its resolution
+# the benchmark's published or closed-form values: converged values of minimal coordinates; agree with the library's plot to its resolution
 S = {0.1: 0.5238364756, 0.5: 0.7432494248, 1.0: 0.5014209224, 2.0: 0.5059092943, 5.0: 0.5355631037, 10.0: 0.6196229171}
 ALPHA = {0.5: 0.2594913815, 10.0: 0.3900737018}
 

@@ -10,7 +10,7 @@ from scipy.special import ellipj, ellipk
 import flyball as fb
 from tests.mechanisms import G, example
 
-# shared/reference/PROBLEMS.md, A01: exact values (Jacobi); the last row of the IFToMM library's file agrees to 6 digits
+# the benchmark's published or closed-form values, A01: exact values (Jacobi); the last row of the IFToMM library's file agrees to 6 digits
 A01 = {
     0.5: (-0.391048791551, -0.920369948785),
     1.0: (0.986291751132, -0.165010853126),

@@ -7,7 +7,7 @@ from scipy.special import ellipj, ellipk
 import flyball as fb
 from tests.mechanisms import example, free_body
 
-# shared/reference/PROBLEMS.md, heavy top of Geradin and Cardona: converged values, MATLAB's published to 5 digits
+# the benchmark's published or closed-form values, heavy top of Geradin and Cardona: converged values, MATLAB's published to 5 digits
 TOP = {
     0.1: (0.42129666, 0.89457197, -0.14916470),
     0.2: (0.60555056, 0.59895768, -0.52398303),

@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import AssemblyError
+from ..model.body import Driver
+from ..model.element import LawOf
 from ..model.expressions import number
 from ..model.model import Model
 from ..system.tables import G_VALUE, NU
@@ -33,6 +35,7 @@ class Assembly:
     v: np.ndarray
     moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
     iterations: int = 0
+    known: dict[str, float] = field(default_factory=dict)  # coordinates that are told their value at the start
 
     @property
     def y(self) -> np.ndarray:
@@ -49,11 +52,20 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         If no closed position, or no consistent velocity, is found; the message names the joints that disagree and by
         how much.
     """
+    model = model.snapshot()
     plain = compiled(model, parameters=parameters)
     q, v = plain.values.q.copy(), plain.values.v.copy()
-    env = {**model.environment(), **(parameters or {})}
-    values = {i.name: number(i.value, env, None, i.title) for i in model.initial if i.value is not None}
-    rates = {i.name: number(i.rate, env, None, i.title) for i in model.initial if i.rate is not None}
+    env = model.environment(parameters)
+    values = {
+        i.name: number(i.value, env, model.unit(i.name, i), f"value of {i.title}")
+        for i in model.initial
+        if i.value is not None
+    }
+    rates = {
+        i.name: number(i.rate, env, model.unit(i.name, i) + "/s", f"rate of {i.title}")
+        for i in model.initial
+        if i.rate is not None
+    }
     holds = [i for i in model.initial if i.name in values]
     near = compiled(model, parameters=parameters, holds=holds, held=values) if holds else plain
     start = q.copy()
@@ -67,7 +79,25 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         if _misfit(near, t, q, v) > CLOSED or _misfit(far, t, q, v) > 1e-6:
             raise _disagreement(far, t, q, v)
     v = _velocities(model, plain, parameters, t, q, v, rates)
-    return Assembly(plain, t, q, v, _moved(plain, start, q), count)
+    known = values | {d.coordinate: _driven(model, d, t, env) for d in model.drivers}
+    return Assembly(plain, t, q, v, _moved(plain, start, q), count, known)
+
+
+def _told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
+    """Values and rates that initial conditions ask for."""
+    values, rates = {}, {}
+    for i in model.initial:
+        unit = model.unit(i.name, i)
+        if i.value is not None:
+            values[i.name] = number(i.value, env, unit, f"value of {i.title}")
+        if i.rate is not None:
+            rates[i.name] = number(i.rate, env, f"{unit}/s", f"rate of {i.title}")
+    return values, rates
+
+
+def _driven(model: Model, d: Driver, t: float, env: Mapping[str, float]) -> float:
+    """What a driver's law asks for at time t."""
+    return model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}").evaluate({**env, "t": t})
 
 
 def _by_frames(model: Model) -> bool:

@@ -10,6 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import ModelError, SimulationError
+from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
@@ -22,10 +23,12 @@ from ..system.tables import (
     BETA,
     EVALUATIONS,
     FACTORISATIONS,
+    G_VALUE,
     GUILTY,
     PASS,
     SEMIDEFINITE,
     STABILIZE,
+    STATUS,
     TOL_G,
     TOL_V,
     WORST_G,
@@ -63,9 +66,10 @@ class Options:
     max_steps: int = 10_000_000
 
     def __post_init__(self) -> None:
-        for name in ("rtol", "atol", "max_step"):
-            if not getattr(self, name) > 0.0:
-                raise ModelError(f"{name} must be greater than 0, got {getattr(self, name)}")
+        for name in ("rtol", "atol", "max_step", "max_steps", "alpha", "beta"):
+            value = getattr(self, name)
+            if not isinstance(value, (int, float, np.number)) or not value > 0:
+                raise ModelError(f"{name} must be greater than 0, got {value!r}")
         if self.stabilization not in STABILIZATION:
             known = ", ".join(STABILIZATION)
             raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
@@ -116,7 +120,9 @@ def simulate(
     """
     chosen = _options(options)
     begin = time.perf_counter()
-    t_start = t_start if start is None else start.final[0]
+    model = model.snapshot()
+    t_start = number(t_start, {}, "s", "t_start") if start is None else start.final[0]
+    t_end = number(t_end, {}, "s", "t_end")
     times = output_times(t_start, t_end, outputs)
     a, y = _start(model, t_start, parameters, start)
     if a.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
@@ -133,12 +139,20 @@ def _start(
     if before is None:
         a = assemble(model, t=t, parameters=parameters)
         y = a.y
-        initial_turns(a.compiled.values, y)
+        initial_turns(a.compiled.values, y, a.known)
         return a, y
     c = compiled(model, parameters=parameters)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
-    return Assembly(c, t, y[:nq].copy(), y[nq : nq + nv].copy()), y
+    a = Assembly(c, t, y[:nq].copy(), y[nq : nq + nv].copy())
+    c.at(t, a.q, a.v)
+    gap = np.abs(c.work.row[G_VALUE]).max(initial=0.0)
+    if not gap <= 1e-6 * c.values.length:
+        raise ModelError(
+            f"the result of {before.model.name!r} ends where the constraints of {model.name!r} are {gap:.3g} from "
+            f"fulfilled; it cannot be gone on with. Were parameters changed?"
+        )
+    return a, y
 
 
 def _options(options: Mapping[str, object]) -> Options:
@@ -167,7 +181,10 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
         if outputs < 2:
             raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
         return np.linspace(t_start, t_end, int(outputs))
-    times = np.asarray(outputs, float)
+    try:
+        times = np.asarray(outputs, float)
+    except (TypeError, ValueError):
+        raise ModelError(f"outputs must be a number of times, or the times [s] themselves, not {outputs!r}") from None
     if times.ndim != 1 or not len(times) or not (np.diff(times) > 0).all():
         raise ModelError("outputs must be a number of times, or times in ascending order")
     if times[0] < t_start or times[-1] > t_end:
@@ -264,11 +281,12 @@ def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
     name = a.compiled.structure.model.name
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
+    broken = a.compiled.work.info[STATUS] == motion.NOT_FINITE
     if status == ex.TOO_MANY:
         return f"{name!r}: max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {t:.6g} s. {kept}"
-    if status == ex.NOT_FINITE or wrong.any():
+    if status == ex.NOT_FINITE or broken:
         return (
-            f"{name!r}: the equations of motion are not finite at t = {t:.6g} s, first at "
+            f"{name!r}: the equations of motion are not finite just after t = {t:.6g} s, first at "
             f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
             f"points of a spring that coincide. {kept}"
         )

@@ -17,8 +17,9 @@ from .geometry import vector
 class Force(Element):
     """A force element between a frame F and a frame M.
 
-    The formulas ``inputs(par, F, M, turns)`` (what its laws may depend on besides time), ``wrench(par, F, M, laws)``
-    (force and torque on M at M's origin, world axes; the reverse acts on F's body) and ``energy(par, F, M, turns)``
+    The formulas ``inputs(par, F, M, turns)`` (what its laws may depend on besides time), ``wrench(par, F, M, laws,
+    values)`` with the values of the inputs (force and torque on M at M's origin, world axes; the reverse acts on F's
+    body) and ``energy(par, F, M, turns)``
     stand in the subclass's file, as plain functions of numbers.
     """
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import difflib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -66,13 +67,30 @@ class Model:
         self.initial: list[Initial] = []
         self._names: dict[str, Element] = {}
 
-    def environment(self) -> dict[str, float]:
-        """Values of the parameters in SI units."""
-        return resolve_parameters(self.parameters)
+    def environment(self, changed: Mapping[str, Number] | None = None) -> dict[str, float]:
+        """Values of the parameters in SI units, with some of them changed.
 
-    def gravity_vector(self) -> np.ndarray:
+        Raises
+        ------
+        ModelError
+            If a changed parameter does not exist.
+        """
+        for name in changed or {}:
+            if name not in self.parameters:
+                known = list(self.parameters)
+                raise ModelError(f"{self.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+        return resolve_parameters({**self.parameters, **(changed or {})})
+
+    def snapshot(self) -> Any:
+        """A copy that later additions to this one do not touch."""
+        out = copy.copy(self)
+        for name in (*CATEGORIES, "parameters", "_names"):
+            setattr(out, name, copy.copy(getattr(self, name)))
+        return out
+
+    def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:
         """Acceleration of gravity [m/s^2], three components."""
-        env = self.environment()
+        env = self.environment() if env is None else env
         what = f"gravity of {self.name!r}"
         return vector([number(x, env, "m/s^2", what) for x in self.gravity], self.planar, what)
 

@@ -111,7 +111,8 @@ class Result:
         ModelError
             If the mechanism it is wanted for has other coordinates.
         """
-        if len(self.final[1]) != len(compiled.y):
+        own, other = self.values.structure, compiled.structure
+        if list(own.place) != list(other.place) or own.states != other.states or list(own.slices) != list(other.slices):
             raise ModelError(f"the result of {self.model.name!r} cannot be gone on with: the mechanism is another one")
         return self.final[1].copy()
 

@@ -32,6 +32,7 @@ from .tables import (
     RESIDUAL,
     ROW_WORK,
     STABILIZE,
+    STATUS,
     TOL_G,
     TOL_V,
     V3,
@@ -42,7 +43,7 @@ from .tables import (
 from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
-NOT_CLOSED = 2
+NOT_CLOSED, NOT_FINITE = 2, 3
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
@@ -190,7 +191,17 @@ def accelerate(S, W, t, p, dy, factored):
         M = load(W.FK, S.angle_i[k, 1])
         n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M)[2]
         work[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
-    return 0
+    W.info[STATUS] = finite(dy)
+    return W.info[STATUS]
+
+
+@formula
+def finite(dy):
+    """0, or NOT_FINITE."""
+    s = 0.0
+    for i in range(dy.shape[0]):
+        s += (dy[i] - dy[i]).real
+    return 0 if s == 0.0 else NOT_FINITE
 
 
 @formula

@@ -13,7 +13,7 @@ import numpy as np
 
 from .. import forces
 from ..constraints import angle
-from ..constraints.blocks import Row, point_coordinate
+from ..constraints.blocks import FORMULAS, Row, point_coordinate
 from ..errors import ModelError
 from ..model.body import GROUND, Frame, Initial
 from ..model.element import Element, LawOf, fields_with
@@ -25,6 +25,9 @@ from ..numerics.ldl import Pattern, analyse
 from .program import compile_law
 from .tables import TERM_KINDS
 from .tree import FREE, NQ, NV, PLANAR, REVOLUTE
+
+if len(FORMULAS) != TERM_KINDS:
+    raise RuntimeError("TERM_KINDS in system/tables.py must count the formulas in constraints/blocks.py")
 
 FORCE_KINDS = 1 + max(f.kind for f in forces.ALL)
 
@@ -255,11 +258,12 @@ def _forces(s: Structure) -> None:
         if not e.conservative():
             table[k, 5] = len(s.states)
             s.states.append(f"{e.name}.work")
-    if not s.model.planar:
-        for joint in s.model.joints:
-            for what, c in joint.coordinates.items():
-                if c.row.kind == angle.KIND:
-                    counted(joint, what)
+    told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
+    for joint in s.model.joints:
+        for what, c in joint.coordinates.items():
+            # in the plane the bodies' own angles count turns, unless somebody says how many there are at the start
+            if c.row.kind == angle.KIND and (not s.model.planar or f"{joint.name}.{what}" in told):
+                counted(joint, what)
     angle_i = np.zeros((len(angles), 3), np.int64)
     for k, (joint, what) in enumerate(angles):
         angle_i[k] = *coordinate_frames(s, joint, what)[:2], len(s.states)

@@ -69,7 +69,7 @@ def values(
         Values of the coordinates that are held (see ``structure``).
     """
     model = s.model
-    env = {**model.environment(), **(parameters or {})}
+    env = model.environment(parameters)
     numbers = {e.name: resolve(e, env) for e in model.elements()}
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
@@ -82,7 +82,7 @@ def values(
         _tree_frames(s, pose, bodies, body_x)
     const = np.array(s.const or [0.0], float)
     const[: len(model.parameters)] = [env[k] for k in model.parameters]
-    glob = np.r_[model.gravity_vector(), REGULARISATION, semidefinite, length]
+    glob = np.r_[model.gravity_vector(env), REGULARISATION, semidefinite, length]
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], _term_x(s, pose, numbers, holds or {}), t["seg_i"],

@@ -114,7 +114,8 @@ def attempt(derivative, arrive, S, W, R, c, h):
         e3 += (b / s) ** 2
     if e5 == 0.0 and e3 == 0.0:
         return 0, moved
-    return 0, max(moved, h * e5 / sqrt((e5 + 0.01 * e3) * max(n, 1)))
+    error = h * e5 / sqrt((e5 + 0.01 * e3) * max(n, 1))
+    return 0, moved if error <= moved else error  # an error that is no number stays one, and is refused
 
 
 @formula

@@ -1,0 +1,84 @@
+"""What would otherwise go wrong without a word: each of these once gave a wrong answer that looked healthy."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+
+def block(**settings):
+    m = fb.Mechanism("block", planar=True, **settings)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    return m
+
+
+@pytest.mark.parametrize("law", ["sqrt(0.5 - t)", "log(0.5 - t)"])
+def test_a_law_that_leaves_its_range_stops_the_motion(law):
+    """Without constraints no residual grows: only the finite check can see it."""
+    m = block()
+    m.add(fb.PointForce("F", "b", force=(law, 0)))
+    with pytest.raises(fb.SimulationError, match=r"not finite just after t = 0.*'b'") as stopped:
+        m.simulate(1.0, outputs=11)
+    partial = stopped.value.result
+    assert np.isfinite(partial["b"].velocity).all()
+    assert 0.3 < partial.t[-1] <= 0.5
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_whole_turns_that_were_asked_for_count(planar):
+    """A spring wound up by a driver, or by the initial angle, pulls with all its turns."""
+    m = fb.Mechanism("spring", planar=planar)
+    m.add(fb.Body("b", mass=1, inertia=1 if planar else (1, 1, 1)))
+    m.add(fb.Revolute("J", "ground", "b", at=(0, 0) if planar else (0, 0, 0), axis=None if planar else (0, 0, 1)))
+    m.add(fb.TorsionalSpringDamper("T", "J", stiffness=2.0))
+    wound = m.snapshot()
+    m.add(fb.Driver("d", "J.angle", "10 + t"))
+    r = m.simulate(1.0)
+    assert r["J"].angle == pytest.approx(10 + r.t, abs=1e-9)
+    assert r["T"].torque == pytest.approx(-2 * (10 + r.t), abs=1e-8)
+    wound.add(fb.Initial("J.angle", value=12.0))
+    r = wound.simulate(1.0)
+    assert r["J"].angle == pytest.approx(12 * np.cos(np.sqrt(2) * r.t), abs=1e-6)
+    assert r.energy.total == pytest.approx(144.0, rel=1e-7)
+
+
+def test_changed_parameters_reach_everything_that_uses_them():
+    m = block(gravity=(0, "-g"), parameters={"g": 10.0, "r": 1.0, "d": "2*r"})
+    m.add(fb.PointForce("F", "b", force=("d", 0)))
+    assert m.simulate(1.0, parameters={"g": 0.0})["b"].position[-1] == pytest.approx([1.0, 0.0])
+    assert m.simulate(1.0, parameters={"r": "300 cm", "g": "2 m/s^2"})["b"].position[-1] == pytest.approx([3.0, -1.0])
+    with pytest.raises(fb.ModelError, match=r"no parameter 'dd'.*did you mean 'd'"):
+        m.simulate(1.0, parameters={"dd": 1.0})
+
+
+def test_a_result_keeps_the_mechanism_it_was_made_with():
+    m = block(gravity=(0, -10))
+    r = m.simulate(1.0)
+    m.add(fb.Body("c", mass=1, inertia=1))
+    m.add(fb.SpringDamper("k", "b", "c", at=((0, 0), (1, 1)), stiffness=1))
+    assert r.health.energy_drift < 1e-9
+    assert not any(name.startswith(("c.", "k.")) for name in r.channels())
+
+
+def test_going_on_with_another_mechanism_is_refused():
+    m = block(parameters={"x": 1.0})
+    m.add(fb.Distance("J", "ground", "b", at=((0, -1), (0, 0)), length="x"))
+    r = m.simulate(1.0)
+    with pytest.raises(fb.ModelError, match="another one"):
+        block().simulate(2.0, start=r)
+    with pytest.raises(fb.ModelError, match="cannot be gone on with"):
+        m.simulate(2.0, start=r, parameters={"x": 2.0})
+
+
+def test_units_of_initial_conditions_and_times():
+    m = block()
+    m.add(fb.Revolute("J", "ground", "b", at=(0, 0)), fb.Initial("J.angle", value="5 mm"))
+    with pytest.raises(fb.UnitError, match=r"value of Initial 'J.angle'"):
+        m.assemble()
+    with pytest.raises(fb.UnitError, match="t_end"):
+        block().simulate("1 kg")
+    assert block().simulate("10 ms").t[-1] == 0.01
+    with pytest.raises(fb.ModelError, match="rtol must be greater than 0, got 'x'"):
+        block().simulate(1.0, rtol="x")
+    with pytest.raises(fb.ModelError, match="outputs"):
+        block().simulate(1.0, outputs="abc")
