@@ -53,7 +53,8 @@ class Options:
     """Choices of a simulation, as kept in the result.
 
     ``method``: an explicit Runge-Kutta pair. ``stabilization``: ``projection`` (states and stages are kept on the
-    constraints), ``projection-steps`` (states only), ``baumgarte`` with its two rates [1/s], or ``none``.
+    constraints), ``projection-steps`` (states only), ``baumgarte`` with its two rates [1/s], or ``none``. ``max_step``
+    [s]: give it where a law acts for a short time only; what is shorter than a step can go unseen.
     """
 
     rtol: float = 1e-8
