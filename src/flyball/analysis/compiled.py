@@ -11,7 +11,7 @@ from ..model.body import Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, PASS, STABILIZE, Work
+from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -56,30 +56,26 @@ class Compiled:
 
     def mass(self):
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
-        import scipy.sparse as sp
-
-        S = self.values.system
-        blocks = []
-        for b in range(len(S.body_i)):
-            n = int(S.body_i[b, 5])
-            J = S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3)
-            k = 2 if n == 3 else 3
-            blocks.append(sp.block_diag([S.body_x[b, MASS] * np.eye(k), J[2:, 2:] if n == 3 else J]))
-        return sp.block_diag(blocks, format="csr")
+        return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
 
     def inverse_mass(self, movable: np.ndarray):
         """Sparse inverse mass matrix of absolute coordinates, with stand-ins for missing inertias; 0 for the fixed."""
         import scipy.sparse as sp
 
+        keep = sp.diags(movable)
+        return (keep @ self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS]) @ keep).tocsr()
+
+    def _blocks(self, column: int, translation: np.ndarray):
+        """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table."""
+        import scipy.sparse as sp
+
         S = self.values.system
         blocks = []
-        for b in range(len(S.body_i)):
-            n = int(S.body_i[b, 5])
-            J = S.body_x[b, INVERSE : INVERSE + 9].reshape(3, 3)
+        for b, n in enumerate(S.body_i[:, NV].tolist()):
+            J = S.body_x[b, column : column + 9].reshape(3, 3)
             k = 2 if n == 3 else 3
-            blocks.append(sp.block_diag([np.eye(k) / S.body_x[b, MASS], J[2:, 2:] if n == 3 else J]))
-        keep = sp.diags(movable)
-        return (keep @ sp.block_diag(blocks, format="csr") @ keep).tocsr()
+            blocks.append(sp.block_diag([translation[b] * np.eye(k), J[2:, 2:] if n == 3 else J]))
+        return sp.block_diag(blocks, format="csr")
 
 
 def compiled(

@@ -26,7 +26,7 @@ FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_TURNS = 0, 1, 2, 5, 6
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
-F_APPLIED, X_SOLVED, V1, V2, V3, V4 = range(6)
+F_APPLIED, X_SOLVED, V1, V2, V3 = range(5)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 # entries of Work.info
@@ -77,7 +77,7 @@ class Work(NamedTuple):
     G: np.ndarray  # (nG,): constraint Jacobian
     H: np.ndarray  # (nG,): M^-1 G^T
     row: np.ndarray  # (9, nr)
-    vel: np.ndarray  # (6, nv)
+    vel: np.ndarray  # (5, nv)
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
