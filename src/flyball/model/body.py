@@ -119,6 +119,10 @@ class Body(Element):
 
     category: ClassVar[str] = "bodies"
 
+    def ends(self) -> dict[str, str]:
+        """Its reference frame."""
+        return {"M": self.name}
+
     def solids(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
         if self.shape is None:
@@ -156,6 +160,7 @@ class Frame(Element):
 
     category: ClassVar[str] = "frames"
     rotation = Body.rotation
+    ends = Body.ends
 
 
 @element

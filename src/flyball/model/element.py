@@ -24,9 +24,9 @@ T = TypeVar("T", bound=type)
 
 @dataclass(frozen=True)
 class Unit:
-    """Dimension of a field, as an SI unit."""
+    """Dimension of a field, as an SI unit; any, if None."""
 
-    dimension: str
+    dimension: str | None
 
 
 @dataclass(frozen=True)
@@ -241,5 +241,5 @@ def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Calla
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):
-            unit = units[name].dimension
+            unit = units[name].dimension or ""
             raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")
