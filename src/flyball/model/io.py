@@ -16,13 +16,15 @@ from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
 from .element import Element, written
 from .force import Force
+from .function import function_name
 from .joint import Joint
 from .model import CATEGORIES, Model, suggest
+from .table import Table
 
 M = TypeVar("M", bound=Model)
 
 SETTINGS = ("name", "planar", "gravity", "parameters")
-ONE_KIND = {"bodies": Body, "frames": Frame, "drivers": Driver, "initial": Initial}
+ONE_KIND = {"bodies": Body, "tables": Table, "frames": Frame, "drivers": Driver, "initial": Initial}
 MANY_KINDS = {"joints": Joint, "forces": Force}
 WIDTH = 100  # a list of shapes longer than this is written one shape a line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
@@ -54,13 +56,25 @@ def dumps(model: Model) -> str:
         for e in getattr(model, category):
             lines += ["", f"[[{category}]]"]
             kind = {"type": type(e).__name__} if category in MANY_KINDS else {}
-            lines += [f"{k} = {_value(v)}" for k, v in (kind | written(e)).items()]
+            fields = kind | written(e)
+            _refuse_functions(e, fields)
+            lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
     text = "\n".join(lines) + "\n"
     try:
         text.encode()
     except UnicodeEncodeError as error:
         raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
     return text
+
+
+def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
+    for name, value in fields.items():
+        for law in value if isinstance(value, (list, tuple)) else (value,):
+            if callable(law):
+                raise ModelError(
+                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot hold a "
+                    f"Python function; use an expression or a Table"
+                )
 
 
 def _value(value: Any) -> str:

@@ -274,7 +274,8 @@ class ForceView(View):
         s, S = self._x.structure, self._x.system
         stack = np.zeros((s.depth + 1, 3))
         t = self._result.t
-        return np.array([evaluate(S.code, S.const, at, stack, (t[i], a[i], b[i])) for i in range(len(t))])
+        # chief: sensed
+        return np.array([evaluate(S.code, S.const, at, stack, (t[i], a[i], b[i]), stack) for i in range(len(t))])
 
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:

@@ -43,7 +43,7 @@ def law(S, W, k, slot, x):
     at = S.force_i[k, FORCE_LAW + slot]
     if at < 0:
         return 0.0 * x[0]
-    return evaluate(S.code, S.const, at, W.stack, x)
+    return evaluate(S.code, S.const, at, W.stack, x, W.stack)  # chief: sensed
 
 
 @formula

@@ -30,7 +30,7 @@ def begin(S, W, t):
     for k in range(S.row_i.shape[0]):
         law = S.row_i[k, ROW_LAW]
         if law >= 0:
-            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t)
+            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.stack, -1)  # chief: sensed
             W.row[G_VALUE, k] = -f
             W.row[NU, k] = f1
             W.row[NU_DOT, k] = f2
