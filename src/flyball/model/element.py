@@ -51,7 +51,10 @@ def _plain(value: Any) -> Any:
 Number = Annotated[float | str, BeforeValidator(_plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(_plain)]
-Law = Number
+Function = Callable[..., Any]
+Law = Annotated[float | str | Function, BeforeValidator(_plain)]
+"""A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
+Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(_plain)]
 
 Length = Annotated[Number, Unit("m")]
 Angle = Annotated[Number, Unit("rad")]
@@ -124,6 +127,7 @@ _TYPES = {
     "float_type": "a number",
     "float_parsing": "a number",
     "string_type": "a text",
+    "callable_type": "a function",
     "tuple_type": "a list",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
@@ -132,7 +136,7 @@ _TYPES = {
 
 def _is_branch(place: str) -> bool:
     """Names that pydantic gives to the members of a union."""
-    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none")
+    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none", "callable")
 
 
 def _did_you_mean(word: str, known: list[str]) -> str:

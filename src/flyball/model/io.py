@@ -18,6 +18,7 @@ from .body import Body, Driver, Frame, Initial
 from .coupling import Coupling
 from .element import Element, written
 from .force import Force
+from .function import function_name
 from .joint import Joint
 from .model import CATEGORIES, Model, suggest
 from .sensor import IMU, Sensor
@@ -59,13 +60,25 @@ def dumps(model: Model) -> str:
         for e in getattr(model, category):
             lines += ["", f"[[{category}]]"]
             kind = {"type": type(e).__name__} if category in MANY_KINDS or isinstance(e, IMU) else {}
-            lines += [f"{k} = {_value(v)}" for k, v in (kind | written(e)).items()]
+            fields = kind | written(e)
+            _refuse_functions(e, fields)
+            lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
     text = "\n".join(lines) + "\n"
     try:
         text.encode()
     except UnicodeEncodeError as error:
         raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
     return text
+
+
+def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
+    for name, value in fields.items():
+        for law in value if isinstance(value, (list, tuple)) else (value,):
+            if callable(law):
+                raise ModelError(
+                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot hold a "
+                    f"Python function; use an expression or a Table"
+                )
 
 
 def _value(value: Any) -> str:

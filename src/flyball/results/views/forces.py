@@ -6,9 +6,9 @@ import numpy as np
 
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, TwoPointForce
+from ...system.call import STACK_RESERVE
 from ...system.laws import evaluate
 from ...system.loads import power, wide
-from ...system.program import STACK_RESERVE
 from .base import View
 
 
@@ -47,7 +47,7 @@ class ForceView(View):
         if at < 0:
             return np.zeros(len(a))
         s, S, t = self._x.structure, self._x.system, self._result.t
-        stack = np.zeros((s.depth + STACK_RESERVE, 3))
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)
         return np.array(
