@@ -13,6 +13,9 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
+    "Sensor": "model.sensor",
+    "IMU": "model.sensor",
+    "Table": "model.table",
     "Box": "model.shapes",
     "Sphere": "model.shapes",
     "Cylinder": "model.shapes",
@@ -20,6 +23,7 @@ _HOME = {
     "Cone": "model.shapes",
     "Ellipsoid": "model.shapes",
     "load": "files",
+    "PerformanceNotice": "errors",
     "load_result": "files",
     "Result": "results.result",
     "FlyballError": "errors",
@@ -49,6 +53,6 @@ def __dir__() -> list[str]:
 
     for room in ("joints", "forces"):
         importlib.import_module(f".{room}", __name__)
-    elements = [k for k, c in Element.registry.items() if c.category in ("joints", "forces") and hasattr(c, "drawn")]
-    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
-    return sorted({*_HOME, *elements, "__version__"} - abstract)
+    rooms = tuple(f"{__name__}.{room}." for room in ("joints", "forces"))
+    elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
+    return sorted({*_HOME, *elements, "__version__"})

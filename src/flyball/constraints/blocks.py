@@ -81,8 +81,9 @@ def point_coordinate(axis: str) -> Row:
     return _row(coincident.KIND, axis, world=True)
 
 
-SKEW_LINES = (Row(perpendicular.KIND, (0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 1.0), "zz", measure="rad"),) + tuple(
-    Row(skew.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"
+SKEW_LINES = (
+    *CROSSED_AXES,
+    *(Row(skew.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"),
 )
 """The z axes of F and M keep their position to one another, each of them free to slide round a massless link."""
 

@@ -14,8 +14,8 @@ from .coordinate_spring import KIND, effort, energy
 class TorsionalSpringDamper(JointForce):
     """Spring and damper about the axis of a revolute or cylindrical joint.
 
-    The torque -k (angle - angle_0) - c rate + law acts on ``body_j`` of the joint, its reverse on ``body_i``; whole turns
-    count, so a spring may be wound up.
+    The torque -k (angle - angle_0) - c rate + law acts on ``body_j`` of the joint, its reverse on ``body_i``; whole
+    turns count, so a spring may be wound up.
 
     Parameters
     ----------

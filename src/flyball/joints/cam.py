@@ -94,7 +94,7 @@ class Cam(Joint):
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float, float]:
         """Parameter of the point of the profile nearest to M, the side that M is on (+1, -1), and its distance."""
-        data = np.array(sum(self.curves(n), []))
+        data = np.concatenate(self.curves(n))
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
         x, _, _, y, _, _ = curve.point(par, s, data)
@@ -108,7 +108,7 @@ class Cam(Joint):
 
     def sharpest(self, n: SimpleNamespace, side: float) -> float:
         """Least curvature [1/m] towards the given side: negative where the profile is hollow there."""
-        data = np.array(sum(self.curves(n), []))
+        data = np.concatenate(self.curves(n))
         par = (0.0, 0.0, float(len(self.curves(n)[0])))
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
         _, x1, x2, _, y1, y2 = curve.point(par, s, data)

@@ -85,10 +85,11 @@ def values(
     if s.tree:
         _tree_frames(s, pose, bodies, body_x)
     const, curve_at = _constants(s, numbers, env)
+    term_x = _term_x(s, pose, numbers, holds or {}, curve_at)
     glob = np.r_[model.gravity_vector(env), REGULARISATION, semidefinite, length]
     t = s.tables
     system = System(
-        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], _term_x(s, pose, numbers, holds or {}, curve_at), t["seg_i"],
+        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"],
         t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...math.vec import dot, sub
-from ...model.force import CoordinateForce, TwoPointForce
+from ...model.force import CoordinateForce, JointForce, TwoPointForce
 from ...system.call import STACK_RESERVE
 from ...system.laws import evaluate
 from ...system.loads import power, wide
@@ -56,17 +56,21 @@ class ForceView(View):
 
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:
-        """Force [N] and torque [N m] on the second body (for a two-point force: at the second point), world axes.
+        """Force [N] and torque [N m] on the second body, world axes; of a two-point force at the second point.
 
         Raises
         ------
         AttributeError
-            For forces along a coordinate, which act on several bodies.
+            For forces along coordinates in general, which may act on several bodies.
         """
+        n = len(self._result.t)
+        if isinstance(self.element, JointForce):
+            joint = self._x.structure.frame_at[self.element.joint, "F", ""]
+            axis = self._result.records.frame(joint)[1]
+            return np.zeros((n, 3)), np.stack([a * self._along()[2] for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
             raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self._names())}")
         _, force, torque = self._between()
-        n = len(self._result.t)
         return tuple(np.stack([np.broadcast_to(c, (n,)) for c in w], axis=1) for w in (force, torque))  # type: ignore[return-value]
 
     @property
