@@ -6,8 +6,19 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.constraints import alignment, along, angle, blade, coincident, curve, distance, perpendicular, rolling
-from flyball.constraints import skew, spin
+from flyball.constraints import (
+    alignment,
+    along,
+    angle,
+    blade,
+    coincident,
+    curve,
+    distance,
+    perpendicular,
+    rolling,
+    skew,
+    spin,
+)
 from flyball.constraints.registry import FORMULAS
 from flyball.model.element import resolve
 
