@@ -8,6 +8,7 @@ import numpy as np
 
 import flyball as fb
 from flyball import joints as room
+from flyball.model.geometry import triad
 from flyball.model.joint import Joint
 
 GRAVITY = (0.7, -1.5, -9.3)
@@ -16,12 +17,13 @@ Q = (0.7, -0.2, 0.3)
 AXIS = (1.0, 2.0, -2.0)
 ACROSS = (2.0, 1.0, 2.0)  # square to AXIS
 SKEW = (0.3, 1.0, 0.4)
+NORMAL = triad(np.array(AXIS) / 3.0)  # axes with AXIS as z
 ELLIPSE = [(0.3 * np.cos(u), 0.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)]
 
 JOINTS = [c for c in Joint.registry.values() if issubclass(c, Joint) and c.__module__.startswith(f"{room.__name__}.")]
 
 SPATIAL = {
-    "Cam": {"points": ELLIPSE, "centre": P, "axis": AXIS, "at": (0.8, 0.05, 0.62), "radius": 0.03},
+    "Cam": {"points": ELLIPSE, "centre": P, "axis": AXIS, "at": tuple(P + NORMAL @ (0.33, 0.0, 0.05)), "radius": 0.03},
     "Cylindrical": {"at": P, "axis": AXIS, "angle": 0.3, "displacement": -0.2},
     "Distance": {"at": (P, Q)},
     "Fixed": {"at": P},
@@ -41,7 +43,7 @@ SPATIAL = {
 }
 
 PLANAR = {
-    "Cam": {"points": ELLIPSE, "centre": P[:2], "at": (0.75, 0.25), "radius": 0.03},
+    "Cam": {"points": ELLIPSE, "centre": P[:2], "at": (P[0] + 0.33, P[1]), "radius": 0.03},
     "Distance": {"at": (P[:2], Q[:2])},
     "Fixed": {"at": P[:2]},
     "KnifeEdge": {"at": P[:2], "axis": (1.0, 2.0)},
@@ -55,6 +57,8 @@ PLANAR = {
 }
 
 CASES = [("space", name) for name in sorted(SPATIAL)] + [("plane", name) for name in sorted(PLANAR)]
+
+MASS = {"a": 1.7, "b": 1.1}
 
 REMOVED = {
     "space": {
@@ -108,7 +112,7 @@ def two_bodies(where: str, gravity=GRAVITY, names=("a", "b")) -> fb.Mechanism:
                 "a", mass=1.7, inertia=0.09, position=(0.1, -0.2), com=(0.03, -0.02), angle=0.4, angular_velocity=0.9
             ),
             "b": fb.Body(
-                "b", mass=1.1, inertia=0.05, position=(0.6, 0.3), com=(-0.04, 0.05), angle=-0.7, angular_velocity=-30.0
+                "b", mass=1.1, inertia=0.05, position=(0.6, 0.3), com=(-0.04, 0.05), angle=-0.7, angular_velocity=-50.0
             ),
         }
     else:
@@ -145,7 +149,7 @@ def joined(where: str, name: str, **more) -> fb.Mechanism:
     return m
 
 
-TIMES = np.linspace(0.0, 0.4, 161)
+TIMES = np.linspace(0.0, 0.4, 401)
 STEP = 5e-4
 MOMENTS = np.array([0.05, 0.21, 0.33])
 STENCIL = np.unique(np.r_[0.0, (MOMENTS[:, None] + STEP * np.arange(-3, 4)).ravel(), 0.4])
@@ -172,3 +176,17 @@ def difference(x: np.ndarray) -> np.ndarray:
 def at_moments(x: np.ndarray) -> np.ndarray:
     """X (over STENCIL) at the three moments."""
     return x[4::7][:3]
+
+
+def centre(result: fb.Result, body: str) -> tuple[np.ndarray, ...]:
+    """Position and velocity of a body's centre of mass, its angular velocity (three components) and rotation."""
+    p, R, w, v, _, _ = result.records.body(result.values.structure.place[body])
+    return *(np.stack(x, axis=1) for x in (p, v, w)), np.stack(R, axis=1).reshape(-1, 3, 3)
+
+
+def wrench(result: fb.Result, body: str) -> tuple[np.ndarray, np.ndarray]:
+    """Reaction of the joint on a body: force, and torque about the body's centre of mass."""
+    force, torque = result["J"].reaction(on=body)
+    s = result.values.structure
+    point = np.stack(result.records.frame(s.frame_at["J", "M", ""])[0], axis=1)
+    return force, torque + np.cross(point - centre(result, body)[0], force)
