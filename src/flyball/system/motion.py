@@ -175,7 +175,7 @@ def accelerate(S, W, t, p, dy, factored):
     if factored:
         factored = reuse(S, W)
     # joints with friction need the solution to know their loads: again until these return themselves
-    for attempt in range(SUBSTITUTIONS):
+    for attempt in range(SUBSTITUTIONS + 2 * W.load.shape[1]):
         inertial(S, W)
         forces(S, W, t, work)
         gather(S, W, W.vel[F_APPLIED])
@@ -191,10 +191,10 @@ def accelerate(S, W, t, p, dy, factored):
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
         if W.load.shape[1] == 0 or returned(S, W) <= CONVERGED:
             break
-        if attempt == SUBSTITUTIONS - 1:
+        if attempt == SUBSTITUTIONS + 2 * W.load.shape[1] - 1:
             W.info[STATUS] = JAMMED
             return JAMMED
-        improve(W, attempt == 0)
+        improve(W, attempt)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
