@@ -13,12 +13,6 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
-    "Box": "model.shapes",
-    "Sphere": "model.shapes",
-    "Cylinder": "model.shapes",
-    "Capsule": "model.shapes",
-    "Cone": "model.shapes",
-    "Ellipsoid": "model.shapes",
     "load": "files",
     "load_result": "files",
     "Result": "results.result",
@@ -30,14 +24,15 @@ _HOME = {
     "AssemblyError": "errors",
     "SimulationError": "errors",
 }
+_ROOMS = ("model.shapes", "joints", "forces")
 
 
 def __getattr__(name: str) -> Any:
-    """Public names are imported when first asked for: joints and forces from the folders that hold them."""
+    """Public names are imported when first asked for: shapes, joints and forces from the folders that hold them."""
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
     if not name.startswith("_"):
-        for room in ("joints", "forces"):
+        for room in _ROOMS:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
@@ -47,8 +42,9 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from .model.element import Element
 
-    for room in ("joints", "forces"):
+    for room in _ROOMS:
         importlib.import_module(f".{room}", __name__)
-    elements = [k for k, c in Element.registry.items() if c.category in ("joints", "forces") and hasattr(c, "drawn")]
-    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
+    ours = [c for c in Element.registry.values() if c.__module__.startswith(f"{__name__}.")]
+    elements = [c.__name__ for c in ours if c.category in ("joints", "forces", "shapes")]
+    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce", "Solid"}
     return sorted({*_HOME, *elements, "__version__"} - abstract)

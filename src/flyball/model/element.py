@@ -106,7 +106,8 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         where = place[0] if place else ""
         where = known[int(where)] if where.isdigit() and int(where) < len(known) else where
         if e["type"] == "unexpected_keyword_argument":
-            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
+            hint = getattr(cls, "hints", {}).get(where) or f"its fields are {', '.join(known)}"
+            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; {hint}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             lines.append(f"field {where!r} is missing")
         elif e["type"] in _TYPES:
