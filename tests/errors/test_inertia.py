@@ -321,3 +321,10 @@ def test_an_initial_condition_says_something() -> None:
     with pytest.raises(fb.ModelError, match=r"Initial 'b\.x': it says nothing; give value=\.\.\., rate=\.\.\. or both"):
         m.add(fb.Initial("b.x"))
     m.add(fb.Initial("b.x", rate=0.0))
+
+
+def test_a_long_value_is_cut_short_in_a_message() -> None:
+    many = {"type": "Mesh", "vertices": [(k, 0, 0) for k in range(10_000)], "facs": FACES}
+    text = said(density=1, shape=many)
+    assert "unknown field 'facs' (did you mean 'faces'?)" in text
+    assert len(text) < 800

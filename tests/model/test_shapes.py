@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import flyball as fb
 from flyball.model.element import Length, element, positive, resolve
+from flyball.model.inertia import mass_properties
 from flyball.model.io import dumps, loads
 from flyball.model.shapes import ALL
 from flyball.model.shapes.polyhedron import flaws, welded
@@ -163,6 +164,32 @@ def test_a_comb_can_be_cut_into_triangles() -> None:
     corners = len(s.outline)
     assert len(f) == 2 * (corners - 2) + 2 * corners
     assert trimesh.Trimesh(v, f, process=False).volume == pytest.approx(s.volume(n), rel=1e-12)
+
+
+def test_derivatives_by_complex_steps() -> None:
+    """All formulas of masses pass complex numbers through, so that derivatives by parameters are exact."""
+    sized = [
+        fb.Box(edges=("r", 2, 3), orientation=("r", 0, 0)),
+        fb.Capsule(radius="r", length=2, position=("r", 1, 1)),
+        fb.Cone(radius="r", height=2),
+        fb.Ellipsoid(semi_axes=("r", 2, 3)),
+        fb.Hemisphere(radius="r"),
+        fb.Tube(radius="2*r", inner_radius="r", length=1),
+        fb.Torus(radius=1, tube_radius="r"),
+        fb.Rod(start=("r", 0, 0), end=(1, 2, 3), radius=0.3),
+        fb.Link(start=(0, 0, 0), end=(1, "r", 0.2), width=0.4, thickness=0.1),
+        fb.Prism(outline=((0, 0), (2, 0), (2, 1), ("r", 1), (0, 2)), thickness="r"),
+        fb.Mesh(**TETRAHEDRON, scale="r"),
+    ]
+    for s in sized:
+        b = fb.Body("b", density=2, shape=[s, fb.Box(edges=(5, 5, 5), position=("r", 1, 1))])
+
+        def at(r: complex, b: fb.Body = b) -> np.ndarray:
+            m = mass_properties(b, resolve(b, {"r": r}), {"r": r}, False)
+            return np.r_[m.mass, m.com, m.inertia.ravel()]
+
+        step = at(0.3 + 1e-30j).imag / 1e-30
+        assert step == pytest.approx((at(0.3 + 1e-6) - at(0.3 - 1e-6)) / 2e-6, rel=1e-6, abs=1e-6)
 
 
 @element

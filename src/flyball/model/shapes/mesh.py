@@ -7,7 +7,7 @@ import os
 import reprlib
 from contextlib import contextmanager
 from contextvars import ContextVar
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
 from types import SimpleNamespace
@@ -99,8 +99,8 @@ class Mesh(Solid):
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
-    vertices: Annotated[Any, _rows(float)] = None
-    faces: Annotated[Any, _rows(int)] = None
+    vertices: Annotated[Any, _rows(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, _rows(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
