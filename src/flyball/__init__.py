@@ -13,7 +13,11 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
+    "Sensor": "model.sensor",
+    "IMU": "model.sensor",
+    "Table": "model.table",
     "load": "files",
+    "PerformanceNotice": "errors",
     "load_result": "files",
     "Result": "results.result",
     "FlyballError": "errors",
@@ -44,7 +48,6 @@ def __dir__() -> list[str]:
 
     for room in _ROOMS:
         importlib.import_module(f".{room}", __name__)
-    ours = [c for c in Element.registry.values() if c.__module__.startswith(f"{__name__}.")]
-    elements = [c.__name__ for c in ours if c.category in ("joints", "forces", "shapes")]
-    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce", "Solid"}
-    return sorted({*_HOME, *elements, "__version__"} - abstract)
+    rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
+    elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
+    return sorted({*_HOME, *elements, "__version__"} - {"Solid"})

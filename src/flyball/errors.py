@@ -19,6 +19,10 @@ class ExpressionError(ModelError):
     """An expression cannot be read, or uses a name that is not known."""
 
 
+class PerformanceNotice(UserWarning):
+    """Something works, but far slower than it could."""
+
+
 class AnalysisError(FlyballError):
     """An analysis cannot be done or cannot go on."""
 

@@ -69,7 +69,7 @@ from ..model.element import Damping, element
 from ..model.force import BodyForce
 from .point_force import inputs
 
-KIND = 5
+KIND = 7
 
 
 @formula

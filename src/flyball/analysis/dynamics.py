@@ -15,7 +15,6 @@ from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.health import Health
-from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
 from ..system.tables import (
@@ -139,13 +138,12 @@ def _start(
     """Compiled mechanism and state to start from: assembled as described, or where an earlier result ended."""
     if before is None:
         a = assemble(model, t=t, parameters=parameters)
-        y = a.y
-        initial_turns(a.compiled.values, y, a.known)
-        return a, y
+        return a, a.y
     c = compiled(model, parameters=parameters)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     a = Assembly(c, t, y[:nq].copy(), y[nq : nq + nv].copy())
+    c.z = y[nq + nv :].copy()
     c.at(t, a.q, a.v)
     gap = np.abs(c.work.row[G_VALUE]).max(initial=0.0)
     if not gap <= 1e-6 * c.values.length:

@@ -14,7 +14,7 @@ KIND = 3
 
 
 @formula
-def inputs(par, F, M, turns):
+def inputs(par, F, M):
     """Nothing is measured."""
     return 0.0 * M[0][0], 0.0 * M[0][0]
 

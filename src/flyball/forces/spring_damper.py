@@ -14,7 +14,7 @@ KIND = 0
 
 
 @formula
-def inputs(par, F, M, turns):
+def inputs(par, F, M):
     """Length and its rate."""
     d = sub(M[0], F[0])
     length = norm(d)
@@ -32,9 +32,9 @@ def wrench(par, F, M, laws, values):
 
 
 @formula
-def energy(par, F, M, turns):
+def energy(par, F, M):
     """Potential energy k (length - free length)^2 / 2 [J]."""
-    x = inputs(par, F, M, turns)[0] - par[2]
+    x = inputs(par, F, M)[0] - par[2]
     return 0.5 * par[0] * x * x
 
 

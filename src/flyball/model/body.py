@@ -143,6 +143,10 @@ class Body(Element):
         if self.color is not None:
             check_color(self.color, self.title)
 
+    def ends(self) -> dict[str, str]:
+        """Its reference frame."""
+        return {"M": self.name}
+
     def shapes(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
         if self.shape is None:
@@ -184,6 +188,7 @@ class Frame(Element):
 
     category: ClassVar[str] = "frames"
     rotation = Body.rotation
+    ends = Body.ends
 
 
 @element

@@ -25,9 +25,9 @@ LONG = 300  # letters of a value in a message
 
 @dataclass(frozen=True)
 class Unit:
-    """Dimension of a field, as an SI unit."""
+    """Dimension of a field, as an SI unit; any, if None."""
 
-    dimension: str
+    dimension: str | None
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,10 @@ def _plain(value: Any) -> Any:
 Number = Annotated[float | str, BeforeValidator(_plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(_plain)]
-Law = Number
+Function = Callable[..., Any]
+Law = Annotated[float | str | Function, BeforeValidator(_plain)]
+"""A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
+Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(_plain)]
 
 Length = Annotated[Number, Unit("m")]
 Angle = Annotated[Number, Unit("rad")]
@@ -126,6 +129,7 @@ _TYPES = {
     "float_type": "a number",
     "float_parsing": "a number",
     "string_type": "a text",
+    "callable_type": "a function",
     "tuple_type": "a list",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
@@ -134,7 +138,7 @@ _TYPES = {
 
 def _is_branch(place: str) -> bool:
     """Names that pydantic gives to the members of a union."""
-    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none")
+    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none", "callable")
 
 
 def _short(value: Any) -> str:
@@ -249,5 +253,5 @@ def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Calla
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):
-            unit = units[name].dimension
+            unit = units[name].dimension or ""
             raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")
