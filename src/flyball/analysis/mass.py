@@ -15,6 +15,7 @@ from ..system.tree import PLANAR
 from ..system.values import Values, values
 from .assemble import assemble
 
+ROUNDING = 1e-12
 ALIGNED = 1e-9  # a principal axis that differs by less from an axis of the body is that axis
 
 
@@ -194,7 +195,8 @@ def directions(axes: np.ndarray) -> str:
 
 
 def _tuple(p: np.ndarray) -> str:
-    return f"({_list(p)})"
+    """Components in brackets; what is only rounding beside the others is 0."""
+    return f"({_list(np.where(np.abs(p) < ROUNDING * np.abs(p).max(), 0.0, p))})"
 
 
 def _list(p: np.ndarray) -> str:
