@@ -27,7 +27,8 @@ PIECE = 4  # numbers a piece
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
-    ``data`` is an array of floats; ``x`` a float, a complex number (its real part chooses the piece), or an array.
+    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats (a
+    list will do for single numbers).
     """
     start, origin = piece(data, at, x)
     s = x - origin

@@ -2,7 +2,7 @@
 
 Such a code reads its arguments from the first column of the stack, one a row, and writes its value into the second
 column of the first of these rows, where nan stands before: whatever fails inside leaves nan. The addresses stand in
-the bytecode, so that a new function compiles nothing. `functions` makes the code.
+the bytecode, so that a new function compiles nothing. `native` makes the code.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ STACK_RESERVE = 3
 """Last rows of the stack, kept for a fault: (index + 1, arguments given, value), then up to six arguments."""
 
 NATIVE: WeakValueDictionary[int, Any] = WeakValueDictionary()
-"""What stands at an address, as long as it does: the `functions.Native`."""
+"""What stands at an address, as long as it does: the `native.Native`."""
 
 
 def call(address, stack, row):
