@@ -108,7 +108,8 @@ class Table(Element):
                     f"{self.title}: x[{k}] = {self.x[k]:g} comes after x[{k - 1}] = {self.x[k - 1]:g}; x must ascend: "
                     f"sort the points and leave out repeated ones"
                 )
-        slopes = np.abs(np.diff(y) / np.diff(x))
+        with np.errstate(all="ignore"):
+            slopes = np.abs(np.diff(y) / np.diff(x))
         if not np.isfinite(slopes).all():
             k = int(np.argmax(slopes))
             raise ModelError(f"{self.title}: x[{k}] and x[{k + 1}] are too close, the slope between them is no number")

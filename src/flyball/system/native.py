@@ -12,6 +12,7 @@ import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from inspect import CO_VARARGS
 from pathlib import Path
 from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
 from typing import Any
@@ -81,6 +82,7 @@ def _compiled(function: FunctionType, count: int) -> Any:
     """The function compiled by Numba, behind the calling convention of `call`; a failure leaves nan."""
     start_numba()
     from numba import carray, cfunc, config, types
+    from numba.core.errors import NumbaWarning
 
     if getattr(config, "DISABLE_JIT", False):
         return _callback(function, count)
@@ -97,7 +99,9 @@ def _compiled(function: FunctionType, count: int) -> Any:
         except Exception:  # `fault` runs the function again and finds it
             p[1] = np.nan
 
-    return cfunc(types.void(types.CPointer(types.float64)))(law)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # hints for those who write for Numba
+        return cfunc(types.void(types.CPointer(types.float64)))(law)
 
 
 def _callback(function: Callable[..., Any], count: int) -> Any:
@@ -121,17 +125,19 @@ def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
         return done[function]
     scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
     closure = tuple(CellType() for _ in function.__closure__ or ())
-    made = done[function] = njit(_twin(function, scope, closure))
+    made = done[function] = njit(_by_place(_twin(function, scope, closure)))
 
-    def known(value: Any) -> Any:
+    def known(name: str, value: Any) -> Any:
+        if isinstance(value, list | set | dict):  # Numba would take a copy, for good
+            raise TypeError(f"'{name}' is a {type(value).__name__}, which may change; an array or a tuple would do")
         if isinstance(value, FunctionType) and str(value.__module__).partition(".")[0] not in ("numpy", "flyball"):
             return _translatable(value, done)
         return value
 
     names = _names(function.__code__)
-    scope.update({k: known(v) for k, v in function.__globals__.items() if k in names})
-    for cell, original in zip(closure, function.__closure__ or (), strict=True):
-        cell.cell_contents = known(original.cell_contents)
+    scope.update({k: known(k, v) for k, v in function.__globals__.items() if k in names})
+    for name, cell, original in zip(function.__code__.co_freevars, closure, function.__closure__ or (), strict=True):
+        cell.cell_contents = known(name, original.cell_contents)
     return made
 
 
@@ -141,6 +147,18 @@ def _twin(function: FunctionType, scope: dict[str, Any], closure: tuple | None) 
     twin.__kwdefaults__ = function.__kwdefaults__
     twin.__module__, twin.__qualname__ = function.__module__, function.__qualname__
     return twin
+
+
+def _by_place(function: FunctionType) -> FunctionType:
+    """The function with arguments by keyword only made ordinary ones, as Numba wants them for a call by place."""
+    code, by_keyword = function.__code__, function.__kwdefaults__ or {}
+    count = code.co_kwonlyargcount
+    names = code.co_varnames[code.co_argcount : code.co_argcount + count]
+    if count and len(by_keyword) == count and not code.co_flags & CO_VARARGS:
+        function.__code__ = code.replace(co_argcount=code.co_argcount + count, co_kwonlyargcount=0)
+        function.__defaults__ = (*(function.__defaults__ or ()), *(by_keyword[name] for name in names))
+        function.__kwdefaults__ = None
+    return function
 
 
 def _names(code: CodeType) -> set[str]:
