@@ -57,12 +57,8 @@ class Law:
         self.code, self.const = np.array(code), np.array(const)
         self.stack = np.zeros((depth + STACK_RESERVE, 3))
 
-    def value(self, *x, how=compiled_value, dtype=float):
-        x = tuple(map(dtype, x or X))
-        stack, const = self.stack.astype(dtype), self.const.astype(dtype)
-        value = how(self.code, const, self.at, stack, x, np.full((3, 2), SPEED, dtype))
-        self.stack = stack
-        return value
+    def value(self, *x, how=compiled_value):
+        return how(self.code, self.const, self.at, self.stack, tuple(x or X), np.full((3, 2), SPEED))
 
     @property
     def native(self):
@@ -327,12 +323,6 @@ def test_expressions_of_functions_are_values():
     assert over[1, 0] == pytest.approx(pull(0.1, 2.0, 1.0))
     with pytest.raises(ExpressionError, match=r"(?s)unknown name 'k'.*<pull\(t, length, k\)>\n +\^\n"):
         a.evaluate({"t": 0, "length": 1})
-
-
-def test_complex_numbers_go_through_python_only():
-    law = Law(lambda t, length: t * length**2)
-    assert law.value(0.3, 0.5 + 1e-30j, 0, how=evaluate, dtype=complex) == pytest.approx(0.075 + 0.3e-30j)
-    assert np.isnan(law.value(0.3, 0.5 + 1e-30j, 0, dtype=complex))  # compiled code has no derivative to offer
 
 
 @pytest.mark.usefixtures("_quiet")

@@ -8,6 +8,7 @@ from flyball.errors import ExpressionError
 from flyball.math import scalar
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table
+from flyball.system.call import STACK_RESERVE
 from flyball.system.laws import evaluate, evaluate_jet
 from flyball.system.opcodes import BY_MOTION, BY_TIME, FREEZE
 from flyball.system.program import compile_law
@@ -188,3 +189,15 @@ def test_a_table_that_is_not_there():
     for use in (lambda: formula.evaluate({"t": 1.0}), lambda: compile_law(formula, ("t",), [], [], [])):
         with pytest.raises(ExpressionError, match="there is no table 'curve'; add the Table"):
             use()
+
+
+def test_functions_with_complex_numbers():
+    """Plain Python hands them to the function; compiled code for numbers has no derivative to offer and says nan."""
+    code, functions = [], []
+    law = law_expression(lambda t, speed: t * speed**2, "N", "x")
+    at, depth = compile_law(law, ("t",), [], code, [], sensors={"speed": 0}, functions=functions)
+    stack, sensed = np.zeros((depth + STACK_RESERVE, 3), complex), np.full((3, 1), 0.5 + 1j * H)
+    args = np.array(code), np.zeros(1, complex), at, stack, (0.3 + 0j,), sensed
+    assert evaluate(*args) == pytest.approx(0.075 + 0.3j * H)
+    assert np.isnan(compiled_value(*args))
+    assert np.isnan(evaluate_jet(*args[:4], 0.3, sensed, BY_MOTION)).all()  # derivatives must not be taken for known
