@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
@@ -187,10 +188,11 @@ class _Writer:
 
     def slot(self, literal: float) -> int:
         """Place of a literal in the table of constants."""
-        first = len(self.parameters)
-        if literal not in self.const[first:]:
-            self.const.append(literal)
-        return self.const.index(literal, first)
+        for k in range(len(self.parameters), len(self.const)):
+            if self.const[k] == literal and math.copysign(1.0, self.const[k]) == math.copysign(1.0, literal):
+                return k
+        self.const.append(literal)
+        return len(self.const) - 1
 
 
 _SHAPES = {"step": "cubic", "step5": "quintic"}
