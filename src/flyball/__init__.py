@@ -26,16 +26,21 @@ _HOME = {
     "ModelError": "errors",
     "UnitError": "errors",
     "ExpressionError": "errors",
+    "SingularOrientationError": "errors",
+    "SingularOrientationWarning": "errors",
     "AnalysisError": "errors",
     "AssemblyError": "errors",
     "SimulationError": "errors",
 }
+_MODULES = ("rotations",)
 
 
 def __getattr__(name: str) -> Any:
     """Public names are imported when first asked for: joints and forces from the folders that hold them."""
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     if not name.startswith("_"):
         for room in ("joints", "forces"):
             module = importlib.import_module(f".{room}", __name__)
@@ -51,4 +56,4 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     elements = [k for k, c in Element.registry.items() if c.category in ("joints", "forces") and hasattr(c, "drawn")]
     abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
-    return sorted({*_HOME, *elements, "__version__"} - abstract)
+    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - abstract)

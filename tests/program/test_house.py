@@ -24,8 +24,9 @@ LEAF = {"errors", "__version__"}  # may be used anywhere
 ALLOWED = {  # room -> rooms that it may import when it is imported
     "math": {"_jit"},
     "numerics": {"_jit", "math"},
+    "rotations": {"math"},
     "constraints": LIBRARY,
-    "model": {"math", "constraints"},
+    "model": {"math", "constraints", "rotations"},
     "joints": {*LIBRARY, "constraints", "model"},
     "forces": {*LIBRARY, "constraints", "model"},
     "contact": {*LIBRARY, "constraints", "model"},
