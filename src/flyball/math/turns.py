@@ -16,10 +16,10 @@ from .vec import add, cross, dot, mtv, mv, quaternion_product, scale
 def unit(axis, o):
     """Coordinate axis in numbers of the type of o, which is zero."""
     if axis == 0:
-        return (o + 1.0, o, o)
+        return (o + 1, o, o)
     if axis == 1:
-        return (o, o + 1.0, o)
-    return (o, o, o + 1.0)
+        return (o, o + 1, o)
+    return (o, o, o + 1)
 
 
 @formula
@@ -27,17 +27,18 @@ def turn(axis, angle):
     """Rotation matrix, row by row, of a turn about a coordinate axis by an angle [rad]."""
     c, s, o = cos(angle), sin(angle), 0.0 * angle
     if axis == 0:
-        return (o + 1.0, o, o, o, c, -s, o, s, c)
+        return (o + 1, o, o, o, c, -s, o, s, c)
     if axis == 1:
-        return (c, o, s, o, o + 1.0, o, -s, o, c)
-    return (c, -s, o, s, c, o, o, o, o + 1.0)
+        return (c, o, s, o, o + 1, o, -s, o, c)
+    return (c, -s, o, s, c, o, o, o, o + 1)
 
 
 @formula
 def turn_quaternion(axis, angle):
     """Unit quaternion of a turn about a coordinate axis by an angle [rad]."""
-    e = scale(sin(0.5 * angle), unit(axis, 0.0 * angle))
-    return (cos(0.5 * angle), e[0], e[1], e[2])
+    half = angle / 2
+    e = scale(sin(half), unit(axis, 0.0 * angle))
+    return (cos(half), e[0], e[1], e[2])
 
 
 @formula
@@ -80,5 +81,5 @@ def axes_in_body_rate(h, rates):
 def reciprocal(h):
     """Rows of the inverse of the matrix with the columns h; not finite where these lie in a plane."""
     n = cross(h[1], h[2])
-    f = divide(1.0, dot(h[0], n))
+    f = divide(1, dot(h[0], n))
     return scale(f, n), scale(f, cross(h[2], h[0])), scale(f, cross(h[0], h[1]))

@@ -9,14 +9,12 @@ take ``axes="body"`` for components along B, ``axes="base"`` for components alon
 
 from __future__ import annotations
 
+from .continuous import unwrap
 from .euler_angles import (
     bryant,
-    distance_to_singular,
     euler,
     from_bryant,
     from_euler,
-    is_singular,
-    unwrap,
 )
 from .euler_kinematics import (
     euler_accelerations,
@@ -49,6 +47,7 @@ from .quaternions import (
     slerp,
 )
 from .sequences import EXTRINSIC, INTRINSIC, singular_angles
+from .singular import distance_to_singular, is_singular
 from .vector_kinematics import (
     left_jacobian,
     left_jacobian_inverse,

@@ -8,12 +8,16 @@ import numpy as np
 
 
 def split(a: np.ndarray) -> tuple[Any, ...]:
-    """Components along the last axis."""
+    """Components along the last axis; of a single vector plain numbers, with which the formulas are much faster."""
+    if a.ndim == 1:
+        return tuple(a.tolist())
     return tuple(a[..., i] for i in range(a.shape[-1]))
 
 
 def joined(components: tuple[Any, ...]) -> np.ndarray:
     """Vectors (..., n) from their n components."""
+    if not any(isinstance(c, np.ndarray) for c in components):
+        return np.array(components)
     return np.stack(np.broadcast_arrays(*components), axis=-1)
 
 

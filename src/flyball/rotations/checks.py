@@ -35,7 +35,9 @@ def numbers(value: Any, shape: tuple[int, ...], what: str, rule: str = "") -> np
     if n < 0 or a.shape[n:] != shape:
         wanted = ", ".join(["...", *map(str, shape)])
         raise ModelError(f"{what}: the shape is {a.shape}, expected ({wanted})" + (f"; {rule}" if rule else ""))
-    refuse(~np.isfinite(a), a, what, "is not a finite number")
+    finite = np.isfinite(a)
+    if not finite.all():
+        refuse(~finite, a, what, "is not a finite number")
     return a
 
 

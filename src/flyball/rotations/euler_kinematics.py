@@ -14,9 +14,9 @@ from ..errors import ModelError, SingularOrientationError
 from ..math.turns import axes_in_base, axes_in_base_rate, axes_in_body, axes_in_body_rate, reciprocal
 from .arrays import columns, rows, split, times
 from .checks import numbers, place
-from .euler_angles import from_euler, remedy
+from .euler_angles import from_euler
 from .sequences import Sequence, find, singular_angles
-from .vectors import SINGULAR
+from .singular import SINGULAR, remedy
 
 
 def in_body(axes: str, what: str) -> bool:

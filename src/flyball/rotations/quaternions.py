@@ -162,7 +162,7 @@ def angular_distance(a: Any, b: Any) -> np.ndarray:
     e = relative(a, b)
     v = e[..., 1:]
     w = np.where(e[..., 0].real < 0, -e[..., 0], e[..., 0])
-    return 2 * atan2(np.sqrt((v * v).sum(axis=-1)), w)
+    return 2 * np.asarray(atan2(np.sqrt((v * v).sum(axis=-1)), w))
 
 
 def slerp(a: Any, b: Any, part: Any) -> np.ndarray:

@@ -19,8 +19,8 @@ from ..errors import SingularOrientationError
 from .arrays import skew, times
 from .checks import numbers, place
 from .euler_kinematics import in_body
+from .singular import SINGULAR
 from .stumpff import stumpff
-from .vectors import SINGULAR
 
 
 def _squared(phi: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -16,9 +16,8 @@ import numpy as np
 from ..errors import ModelError, SingularOrientationError
 from .arrays import skew
 from .checks import numbers, orientations, place, unit_vectors
+from .singular import SINGULAR
 from .stumpff import arc, stumpff
-
-SINGULAR = 1e-7  # distance [rad] from a singular orientation below which it counts as one
 
 
 def _short(orientation: Any, what: str) -> np.ndarray:
