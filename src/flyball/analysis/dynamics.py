@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -289,8 +290,16 @@ def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
             f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
             f"points of a spring that coincide. {kept}"
         )
+    guilty = int(a.compiled.work.info[GUILTY])
+    if a.compiled.work.info[STATUS] == motion.JAMMED:
+        e: Any = a.compiled.structure.forces[guilty]
+        return (
+            f"{name!r}: {e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
+            f"load that it comes from, so no finite force answers. Check its coefficients, and the lengths over which "
+            f"the joint carries moments (bending_length, twist_length). {kept}"
+        )
     rows = a.compiled.structure.rows
-    where = f" near {rows[int(a.compiled.work.info[GUILTY])].element.title}" if rows else ""
+    where = f" near {rows[guilty].element.title}" if rows else ""
     return (
         f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {clock.real[ex.H]:.3g} s"
         f"{where}. The mechanism may lock there (a driver asks for more than its links allow), pass a singular "

@@ -184,7 +184,9 @@ class Model:
     def _check_path(self, e: CoordinateForce) -> None:
         """What it acts along exists, and can move."""
         if e.coordinate_text():
-            self.coordinate(e.coordinate_text(), e)
+            owner, what = self.coordinate(e.coordinate_text(), e)
+            if hasattr(e, "joint") and not isinstance(owner, Joint):
+                self.joint(e.joint, e, what)  # a body's angle is no joint's
         carriers = [self.carrier(name, e) for name in e.ends().values()]
         for k, (a, b) in enumerate(itertools.pairwise(carriers)):
             if a == b:
