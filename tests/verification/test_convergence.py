@@ -40,10 +40,9 @@ def exact(t):
 
 def exact_reactions(t):
     """The forces on ``body_j`` of A, B, C and D, from Newton and Euler's laws of the three rods (nine equations)."""
-    phi, rate = exact(t)
-    c, s = np.cos(phi), np.sin(phi)
     out = []
-    for c, s, w, al in zip(c, s, rate, -W2 * s, strict=True):
+    for phi, w in zip(*exact(t), strict=True):
+        c, s, al = np.cos(phi), np.sin(phi), -W2 * np.sin(phi)
         tip = al * np.array([c, s]) + w * w * np.array([-s, c])  # acceleration of B and C
         e = np.array([s, -c])
         E, b = np.zeros((9, 8)), np.zeros(9)

@@ -141,8 +141,8 @@ def turned_round(m):
         elif isinstance(f, fb.TorsionalSpringDamper):
             f = dataclasses.replace(f, angle=-f.angle)
         out.add(f)
-    out.add(*(dataclasses.replace(d, law=f"-({d.law})") for d in m.drivers) or [])
-    out.add(*(dataclasses.replace(i, rate=-i.rate) for i in m.initial) or [])
+    out.add(*(dataclasses.replace(d, law=f"-({d.law})") for d in m.drivers))
+    out.add(*(dataclasses.replace(i, rate=-i.rate) for i in m.initial))
     return out
 
 

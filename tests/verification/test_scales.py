@@ -32,7 +32,7 @@ def scaled(base, length=1.0, mass=1.0, shift=None):
         )
     for j in base.joints:
         m.add(dataclasses.replace(j, at=point(n.numbers[j.name].at)))
-    m.add(*base.initial) if base.initial else None
+    m.add(*base.initial)
     return m
 
 
