@@ -13,6 +13,7 @@ import numpy as np
 import flyball as fb
 
 HEIGHT = 1.0
+UP = np.array([0, 0, HEIGHT])  # the platform as drawn
 #          x             y             z                 turn about z
 MOTION = ("0.15*sin(t)", "0.1*sin(2*t)", "0.12*(1 - cos(t))", "0.25*sin(t)")
 
@@ -32,7 +33,7 @@ def length_law(base: np.ndarray, plate: np.ndarray) -> str:
     x, y, z, turn = MOTION
     across = f"({x} + {plate[0]}*cos({turn}) - {plate[1]}*sin({turn}) - {base[0]})"
     along = f"({y} + {plate[0]}*sin({turn}) + {plate[1]}*cos({turn}) - {base[1]})"
-    drawn = math.dist(base, plate + (0, 0, HEIGHT))
+    drawn = math.dist(base, plate + UP)
     return f"sqrt({across}**2 + {along}**2 + ({HEIGHT} + {z})**2) - {drawn}"
 
 
@@ -58,7 +59,7 @@ def mechanism(laws: tuple[str, ...] | None = None) -> fb.Mechanism:
     m = fb.Mechanism("Stewart platform", gravity=(0, 0, -9.81))
     plate = fb.Cylinder(radius=0.55, length=0.05, position=(0, 0, 0.04))
     cabin = fb.Box(edges=(0.5, 0.36, 0.3), position=(0, 0, 0.2))
-    m.add(fb.Body("platform", mass=120, position=(0, 0, HEIGHT), shape=(plate, cabin), color="#3b6ea5"))
+    m.add(fb.Body("platform", mass=120, position=UP, shape=(plate, cabin), color="#3b6ea5"))
     for k, (base, top) in enumerate(zip(BASE, PLATE, strict=True)):
-        leg(m, k + 1, base, top + (0, 0, HEIGHT), laws[k] if laws else length_law(base, top))
+        leg(m, k + 1, base, top + UP, laws[k] if laws else length_law(base, top))
     return m
