@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone, Solid
+from ..model.shapes import Cone
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
