@@ -173,8 +173,9 @@ class Looks:
     def _cam(self, e: Any) -> list[Shape]:
         """The disc that a cam's outline bounds."""
         ends = self.places.ends(e)
-        outline = cam_outline(e, self.result.values.numbers[e.name])
-        if outline is None or ends is None:
+        n = self.result.values.numbers[e.name]
+        outline = cam_outline(n)
+        if outline is None or ends is None or not getattr(n, "closed", True):
             return []
         F = ends[0]
         turn = tuple(matrix_to_quaternion(F.R).tolist())

@@ -15,6 +15,7 @@ from .gears import gear_pair, rack
 from .places import End, Places, three
 from .recording import RecordedCurve, RecordedJoint, RecordedLine
 
+PER_POINT, LEAST, MOST = 8, 120, 600  # points of a drawn profile: for each that was given, and in all
 Drawn = RecordedJoint | RecordedCurve | RecordedLine
 
 BODILY = ("gear", "rack", "wheel", "ball")  # symbols that are the body itself, where it has no shape of its own
@@ -57,9 +58,10 @@ def symbols(e: Any, places: Places, every: np.ndarray) -> Iterator[Drawn]:
         ball = not places.result.planar and not hasattr(numbers, "tread")
         yield _at(e, "ball" if ball else "wheel", M, F, places, (wheel_radius(e, places),))
     elif kind == "cam":
-        outline = cam_outline(e, numbers)
+        outline = cam_outline(numbers)
         if outline is not None:
-            yield RecordedCurve(e.name, F.body, F.p + outline @ F.R.T, closed=True)
+            closed = bool(getattr(numbers, "closed", True))
+            yield RecordedCurve(e.name, F.body, F.p + outline @ F.R.T, closed)
         radius = float(getattr(numbers, "radius", None) or 0.0)
         yield _at(e, "roller" if radius else "point", M, F, places, (radius,))
     elif kind == "knife_edge":
@@ -85,13 +87,21 @@ def wheel_radius(e: Any, places: Places) -> float:
     return float(np.sqrt((places.seen(*ends)[:1, :2] ** 2).sum()))
 
 
-def cam_outline(e: Any, n: Any) -> np.ndarray | None:
-    """Points of a cam's outline in its frame, (k, 3): the element's own ``outline``, else the points it was given."""
-    points = e.outline(n) if hasattr(e, "outline") else getattr(n, "points", None)
-    if points is None:
+def cam_outline(n: Any) -> np.ndarray | None:
+    """Points of a cam's profile in its frame, (k, 3): along the C2 spline through the points given, by chord length."""
+    if getattr(n, "points", None) is None:
         return None
-    a = np.asarray(points, float)
-    return np.column_stack([a, np.zeros(len(a))]) if a.shape[1] == 2 else a
+    from scipy.interpolate import CubicSpline
+
+    p = np.asarray(n.points, float).real[:, :2]
+    closed = bool(getattr(n, "closed", True))
+    if closed:
+        p = np.vstack([p, p[:1]])
+    s = np.r_[0.0, np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))]
+    count = min(max(PER_POINT * (len(p) - 1), LEAST), MOST)
+    at = np.linspace(0.0, s[-1], count + 1)[: count if closed else None]
+    xy = CubicSpline(s, p, bc_type="periodic" if closed else "natural")(at)
+    return np.column_stack([xy, np.zeros(len(xy))])
 
 
 def _at(e: Any, kind: str, end: End, other: End, places: Places, size: tuple[float, ...] = ()) -> RecordedJoint:
