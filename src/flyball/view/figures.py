@@ -52,7 +52,9 @@ def energies(result: Result) -> Figure:
         curves.append(Channel("work put in", "J", work))
     note = f"largest deviation {e.drift:.2g} J"
     balance = Panel("balance", (Channel("balance", "J", np.asarray(e.balance)),), note)
-    return Figure("energy", "Energy", (*spread(Panel("energy", tuple(curves))), balance))
+    panel = Panel("energy", tuple(curves))
+    parts = [panel] if _comparable(curves[:2]) else spread(panel)
+    return Figure("energy", "Energy", (*parts, balance))
 
 
 def coordinates(result: Result) -> Figure | None:
@@ -90,8 +92,9 @@ def reactions(result: Result) -> Figure | None:
         for what, unit in (("force", "N"), ("torque", "N*m")):
             a = np.asarray(getattr(view, what))
             sizes[unit].append(Channel(name, unit, np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))))
-    largest = max((float(np.nanmax(c.values, initial=0.0)) for c in sizes["N*m"]), default=0.0)
-    sizes["N*m"] = [c for c in sizes["N*m"] if np.nanmax(c.values, initial=0.0) > max(1e-9, 1e-9 * largest)]
+    force, torque = (max((float(np.nanmax(c.values, initial=0.0)) for c in x), default=0.0) for x in sizes.values())
+    least = 1e-9 * max(torque, force * result.values.length)  # below, rounding errors
+    sizes["N*m"] = [c for c in sizes["N*m"] if np.nanmax(c.values, initial=0.0) > least]
     parts = [Panel(f"|{LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
     if not parts:
         return None

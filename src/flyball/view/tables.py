@@ -87,7 +87,8 @@ def joints(result: Result) -> Table:
     """Where joints are at the start, what they hold, and the largest reactions they carried."""
     p, s, rows = result.planar, result.values.structure, []
     sizes = {e.name: _largest(result[e.name]) for e in result.model.joints}
-    least = [1e-9 * max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1)]
+    force, torque = (max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1))
+    least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # below, rounding errors
     for e in (*result.model.joints, *getattr(result.model, "couplings", ())):
         k = s.frame_at.get((e.name, "M", ""))
         at = axis = ""
