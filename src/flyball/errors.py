@@ -21,6 +21,8 @@ class ExpressionError(ModelError):
 
 class PerformanceNotice(UserWarning):
     """Something works, but far slower than it could."""
+
+
 class SingularOrientationError(FlyballError, ValueError):
     """Coordinates of an orientation do not exist, or have no finite rates, where it was asked for them.
 
