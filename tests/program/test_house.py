@@ -193,7 +193,7 @@ def test_adding_a_joint_and_a_force_touches_nothing_else(runs):
     """One new file and one export; one new file and one line of dispatch (and the formula that the cache test edits)."""
     copy, *_ = runs
     assert copy.changed() == {
-        "joints/point_in_plane.py",
+        "joints/sheet.py",
         "joints/__init__.py",
         "forces/drag.py",
         "system/dispatch.py",
