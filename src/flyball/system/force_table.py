@@ -22,9 +22,9 @@ def measured_quantities(s: Structure) -> None:
         return
     named = _names(s)
     found = {}
-    for e in sensors:
-        if e.name in named and (what := s.model.measured(e)) is not None:
-            found[e.name] = _sensed(s, e, *what[:2]), what[2]
+    for sensor in sensors:
+        if sensor.name in named and (what := s.model.measured(sensor)) is not None:
+            found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
     values = len(s.measured)
     s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
 
