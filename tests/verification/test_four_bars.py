@@ -42,7 +42,7 @@ def one_freedom(windows, t):
 
 @pytest.mark.parametrize("windows", [1, 2])
 def test_a02_digits(windows):
-    """10 s to 1e-6 for N = 1 and 2, twenty singular positions passed."""
+    """10 s to 1e-6 for N = 1 and 2, ten singular positions passed."""
     r = example("n_four_bar.py", windows=windows).simulate(10.0, rtol=1e-9, atol=1e-11, outputs=101)
     b = corner(r)
     for (n, t), exact in A02.items():
@@ -62,7 +62,7 @@ def test_a02_forty_windows():
 
 
 def test_a02_forty_windows_for_twenty_seconds():
-    """N = 40 over the library's 20 s, forty singular positions passed: to 5e-6 of the exact motion and to 1e-5 of the
+    """N = 40 over the library's 20 s, twenty singular positions passed: to 5e-6 of the exact motion and to 1e-5 of the
     library's file, which is itself 4e-6 from exact.
 
     At a tolerance of 5e-10 steps are still long enough to pass over the singular positions: of tolerances from 2e-10

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from tests.mechanisms import example
+from tests.mechanisms import EXAMPLES, example
 
 # -------------------------------------------------------------------------------- Andrews' squeezing mechanism, II-13
 
@@ -178,3 +178,18 @@ def test_car_axis(make):
     assert np.abs(r["right"].angular_velocity).max() < 1e-14
     assert r.energy.drift < 1e-8
     assert np.ptp(r.energy.total) > 1.0  # what the road does
+
+
+def test_andrews_by_the_command(tmp_path):
+    """``flyball run`` on the example's file, at the default tolerances: the end state to 1e-7."""
+    from typer.testing import CliRunner
+
+    from flyball.cli import app
+
+    words = ["run", str(EXAMPLES / "andrews.toml"), "--t-end", "30 ms", "--out", str(tmp_path), "--no-animation"]
+    ended = CliRunner().invoke(app, words)
+    assert ended.exit_code == 0, ended.output
+    r = fb.load_result(tmp_path / "result.nc")
+    assert hinges(r, "angle", -1) == pytest.approx(ANGLES, abs=1e-7)
+    pictures = {"energy.png", "coordinates.png", "paths.png", "reactions.png", "actuation.png"}
+    assert pictures <= {p.name for p in tmp_path.iterdir()}
