@@ -202,7 +202,7 @@ def test_wheels_touch_the_plane_that_is_drawn(ball: bool) -> None:
 def test_a_wheel_on_a_line_in_the_plane() -> None:
     m = fb.Mechanism("wheel", planar=True)
     m.add(
-        body("wheel", (0, 0.2), velocity=(1, 0)),
+        body("wheel", (0, 0.2), velocity=(1, 0), angular_velocity=-5),
         fb.WheelOnLine("roll", "ground", "wheel", at=(0, 0), axis=(1, 0), centre=(0, 0.2)),
     )
     r = moved(m)
