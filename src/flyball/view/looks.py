@@ -139,7 +139,7 @@ class Looks:
         if self.given(name):
             return tuple(self._given(s) for s in self._solids[name])
         points = self.points[name]
-        out = [self._block(end) for end in self.blocks[name]]
+        out = [self._block(end) for end in self.blocks[name] if name not in self.worn]
         out += [shape for e in self.cams[name] for shape in self._cam(e)]
         bare = not out and name not in self.worn
         if len(points) >= 2:

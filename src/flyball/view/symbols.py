@@ -98,8 +98,8 @@ def cam_outline(n: Any) -> np.ndarray | None:
     if closed:
         p = np.vstack([p, p[:1]])
     s = np.r_[0.0, np.cumsum(np.sqrt((np.diff(p, axis=0) ** 2).sum(axis=1)))]
-    count = min(max(PER_POINT * (len(p) - 1), LEAST), MOST)
-    at = np.linspace(0.0, s[-1], count + 1)[: count if closed else None]
+    each = max(1, min(max(PER_POINT, LEAST // (len(p) - 1)), MOST // (len(p) - 1)))  # the points given are among them
+    at = np.interp(np.arange(each * (len(p) - 1) + (not closed)) / each, np.arange(len(p)), s)
     xy = CubicSpline(s, p, bc_type="periodic" if closed else "natural")(at)
     return np.column_stack([xy, np.zeros(len(xy))])
 
