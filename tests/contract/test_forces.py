@@ -202,7 +202,7 @@ def test_kind_stands_in_dispatch(kind):
 
     formula = kind.effort if kind in ALONG else kind.wrench
     module = formula.__module__.rsplit(".", 1)[1]
-    assert f"F.{module}.{formula.__name__}" in inspect.getsource(dispatch)
+    assert f"element.{module}.{formula.__name__}" in inspect.getsource(dispatch)
     assert kind.kind == inspect.getmodule(formula).KIND
 
 

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
-from .element import Element, Number, Point, PointPair
+from .element import Element, Law, Point, PointPair
 from .geometry import vector
 from .joint import WorldFrame
 
@@ -46,7 +46,7 @@ class Force(Element):
         """Up to sixteen numbers that the formulas see."""
         return ()
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Up to three expressions that the formulas see."""
         return ()
 

@@ -25,7 +25,8 @@ class JointView(View):
         r, x = self._result.records, self._x
         (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
         F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
-        par, hint = (*c.row.par[:6], 0.0, 0.0), 0.0
+        par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+        hint: Any = 0.0
         if c.row.kind == angle.KIND:
             par, hint = (1.0, *par[1:]), self._turns(what, i, j)
         value, f, tM, tF, second = FORMULAS[c.row.kind](par, F, M, hint, x.system.const)
