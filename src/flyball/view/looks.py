@@ -9,10 +9,11 @@ import numpy as np
 
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone
+from ..model.shapes import Cone, Solid
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
+from .recording_check import SIZES
 from .symbols import BODILY, cam_outline
 
 if TYPE_CHECKING:
@@ -127,8 +128,8 @@ class Looks:
         solids: tuple[Any, ...] = self._solids[name]
         for s in solids:
             n = self._numbers[id(s)]
-            if hasattr(s, "triangles"):
-                extents = np.ptp(s.vertices(n), axis=0).tolist()
+            if _meshed(s):
+                extents = np.ptp(s.mesh(n)[0], axis=0).tolist()
             else:
                 extents = _extents(type(s).__name__, s.size(n))
             out.append(float(np.median(extents)))
@@ -152,17 +153,16 @@ class Looks:
 
     def _mesh_share(self) -> float:
         """Part of their triangles that meshes may keep, so that the page stays small."""
-        meshes = [s for solids in self._solids.values() for s in solids if hasattr(s, "triangles")]
-        total = sum(len(s.triangles()) for s in meshes)
+        meshes = [s for solids in self._solids.values() for s in solids if _meshed(s)]
+        total = sum(len(s.mesh(self._numbers[id(s)])[1]) for s in meshes)
         return min(1.0, TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
         """A shape as the user gave it; a cone is counted from its middle in pictures."""
         n = self._numbers[id(s)]
-        if hasattr(s, "triangles"):
-            t = np.asarray(s.triangles())
-            most = max(int(self._share * len(t)), min(FEWEST, len(t)))
-            v, t = simplified(s.vertices(n), t, most)
+        if _meshed(s):
+            v, t = s.mesh(n)
+            v, t = simplified(v, t, max(int(self._share * len(t)), min(FEWEST, len(t))))
             return Shape("mesh", (), vertices=v, triangles=t)
         p, R = s.pose(n)
         if isinstance(s, Cone):
@@ -262,6 +262,11 @@ class Looks:
         return Shape(
             "box", tuple(max(x, 0.2 * least) for x in edges), three(com), tuple(matrix_to_quaternion(V).tolist())
         )
+
+
+def _meshed(s: Solid) -> bool:
+    """Whether the page has no solid of that kind, so that its triangles are drawn."""
+    return not SIZES.get(type(s).__name__.lower())
 
 
 def _extents(kind: str, size: tuple[float, ...]) -> list[float]:
