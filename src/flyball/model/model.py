@@ -177,7 +177,8 @@ class Model:
         elif isinstance(e, Sensor):
             self.measured(e)
         elif isinstance(e, IMU):
-            self.carrier(e.frame, e)
+            if self.carrier(e.frame, e) == GROUND:
+                raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
         elif isinstance(e, (Driver, Initial)):
             self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
 

@@ -194,7 +194,7 @@ def accelerate(S, W, t, p, dy, factored):
         if attempt == SUBSTITUTIONS - 1:
             W.info[STATUS] = JAMMED
             return JAMMED
-        improve(S, W, attempt == 0)
+        improve(S, W, attempt)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
