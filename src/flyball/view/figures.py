@@ -33,13 +33,14 @@ LABELS = {
 
 
 def figures(result: Result) -> list[Figure]:
-    """Energies with their balance, joint coordinates, positions, reactions, and what drivers and forces do.
+    """Energies with their balance, joint coordinates, positions, reactions, what drivers and forces do, sensors.
 
     Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
     """
     if not len(result.t):
         return []
-    makers: Sequence[Callable[[Result], Figure | None]] = (energies, coordinates, positions, reactions, actuation)
+    makers: Sequence[Callable[[Result], Figure | None]]
+    makers = (energies, coordinates, positions, reactions, actuation, sensors)
     return [figure for make in makers if (figure := make(result)) is not None]
 
 
@@ -112,6 +113,17 @@ def actuation(result: Result) -> Figure | None:
         curves += [Channel(f"{e.name}.{k}", u, np.asarray(v)) for k, (u, v) in channels.items() if u in ("N", "N*m")]
     parts = panels(curves)
     return Figure("actuation", "Drivers and forces", tuple(parts)) if parts else None
+
+
+def sensors(result: Result) -> Figure | None:
+    """What sensors measure."""
+    curves = []
+    for e in getattr(result.model, "sensors", ()):
+        channels = result[e.name].channels()
+        name = (lambda k, e=e: e.name) if len(channels) == 1 else (lambda k, e=e: f"{e.name}.{k}")
+        curves += [Channel(name(k), u, np.asarray(v)) for k, (u, v) in channels.items()]
+    parts = [p for panel in panels(curves) for p in spread(panel)]
+    return Figure("sensors", "Sensors", tuple(parts)) if parts else None
 
 
 def panels(curves: Sequence[Channel], most: int = MOST) -> list[Panel]:

@@ -147,13 +147,13 @@ def standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
     """Write the pictures that tell most of a motion, into a folder that is there; returns their paths.
 
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
-    in the plane or from three sides), ``reactions`` and ``actuation``: those that have something to show.
+    in the plane or from three sides), ``reactions``, ``actuation`` and ``sensors``: those that have something to show.
     """
     folder = Path(folder)
     makers: dict[str, Callable[[], Drawing]] = {f.name: partial(_drawn, result, f) for f in figures(result)}
     if len(result.t):
         makers["paths"] = partial(_paths, result)
-    order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation")
+    order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation", "sensors")
     written = []
     for name in (k for k in order if k in makers):
         with _drawing():
