@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.body import GROUND
-from .figures import _some, centre, few, figures, hidden, panels
+from .figures import centre, few, figures, hidden, panels, some
 from .recording import Channel, Figure, Panel
 from .writing import cannot
 
@@ -218,7 +218,7 @@ def _zoomed_out(ax: Axes, values: Iterable[np.ndarray]) -> None:
 
 def _paths(result: Result) -> Drawing:
     """Paths of centres of mass and named frames: in the plane, or from the front, the side and above."""
-    bodies = _some(result.model.bodies)
+    bodies = some(result.model.bodies)
     points = {b.name: centre(result, b.name) for b in bodies}
     for frame in result.model.frames if len(points) < 6 else ():
         if frame.body != GROUND:
