@@ -240,6 +240,18 @@ def test_meshes_are_drawn_on_their_body_and_kept_small() -> None:
     assert len(animation(still(m))) < 1_000_000
 
 
+def test_a_joint_that_nobody_can_draw_gets_a_mark() -> None:
+    class Odd(fb.Spherical):
+        drawn = "strange"
+
+    m = fb.Mechanism("m")
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), Odd("J", "ground", "b", at=(1, 2, 3)))
+    r = still(m)
+    (joint,) = record(r).joints
+    assert (joint.kind, joint.position) == ("strange", (1, 2, 3))
+    assert r.html()
+
+
 def test_symbols_are_smaller_on_slender_parts() -> None:
     m = fb.Mechanism("m")
     for name, width in (("slender", 0.01), ("stout", 0.3)):
