@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone
+from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
@@ -152,22 +152,23 @@ class Looks:
 
     def _mesh_share(self) -> float:
         """Part of their triangles that meshes may keep, so that the page stays small."""
-        meshes = [s for solids in self._solids.values() for s in solids if hasattr(s, "triangles")]
-        total = sum(len(s.triangles()) for s in meshes)
+        total = sum(
+            len(s.mesh(self._numbers[id(s)])[1]) for solids in self._solids.values() for s in solids if _meshed(s)
+        )
         return min(1.0, TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
         """A shape as the user gave it; a cone is counted from its middle in pictures."""
         n = self._numbers[id(s)]
-        if hasattr(s, "triangles"):
-            t = np.asarray(s.triangles())
+        if _meshed(s):
+            v, t = s.mesh(n)
             most = max(int(self._share * len(t)), min(FEWEST, len(t)))
-            v, t = simplified(s.vertices(n), t, most)
+            v, t = simplified(v, np.asarray(t), most)
             return Shape("mesh", (), vertices=v, triangles=t)
         p, R = s.pose(n)
         if isinstance(s, Cone):
             p = p + R[:, 2] * n.height / 2
-        kind = type(s).__name__.lower()
+        kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
         return Shape(kind, tuple(map(float, s.size(n))), three(p), tuple(matrix_to_quaternion(R).tolist()))
 
     def _cam(self, e: Any) -> list[Shape]:
@@ -283,3 +284,8 @@ def _unit(d: np.ndarray) -> np.ndarray:
 def _along(d: np.ndarray) -> tuple[float, float, float, float]:
     """Quaternion that turns z to the direction d."""
     return tuple(matrix_to_quaternion(triad(_unit(d))).tolist())  # type: ignore[return-value]
+
+
+def _meshed(s: Any) -> bool:
+    """Whether the player has no figure of its own for a shape."""
+    return type(s) not in (Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere)
