@@ -208,13 +208,8 @@ def test_a_result_without_times_cannot_be_drawn() -> None:
 class Blob(fb.Sphere):
     """Stands for a shape that is a mesh: a finely divided sphere of the given radius, off the body's origin."""
 
-    def vertices(self, n: object) -> np.ndarray:
-        return self._grid()[0]
-
-    def triangles(self) -> np.ndarray:
-        return self._grid()[1]
-
-    def _grid(self, rings: int = 150) -> tuple[np.ndarray, np.ndarray]:
+    def surface(self, n: object, fine: int = 150) -> tuple[np.ndarray, np.ndarray]:
+        rings = 150
         u, v = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False))
         p = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3)
         k = np.arange(len(p)).reshape(2 * rings, rings)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone, Solid
+from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
@@ -153,8 +153,9 @@ class Looks:
 
     def _mesh_share(self) -> float:
         """Part of their triangles that meshes may keep, so that the page stays small."""
-        meshes = [s for solids in self._solids.values() for s in solids if _meshed(s)]
-        total = sum(len(s.mesh(self._numbers[id(s)])[1]) for s in meshes)
+        total = sum(
+            len(s.mesh(self._numbers[id(s)])[1]) for solids in self._solids.values() for s in solids if _meshed(s)
+        )
         return min(1.0, TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
@@ -162,12 +163,13 @@ class Looks:
         n = self._numbers[id(s)]
         if _meshed(s):
             v, t = s.mesh(n)
-            v, t = simplified(v, t, max(int(self._share * len(t)), min(FEWEST, len(t))))
+            most = max(int(self._share * len(t)), min(FEWEST, len(t)))
+            v, t = simplified(v, np.asarray(t), most)
             return Shape("mesh", (), vertices=v, triangles=t)
         p, R = s.pose(n)
         if isinstance(s, Cone):
             p = p + R[:, 2] * n.height / 2
-        kind = type(s).__name__.lower()
+        kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
         return Shape(kind, tuple(map(float, s.size(n))), three(p), tuple(matrix_to_quaternion(R).tolist()))
 
     def _cam(self, e: Any) -> list[Shape]:
@@ -288,3 +290,8 @@ def _unit(d: np.ndarray) -> np.ndarray:
 def _along(d: np.ndarray) -> tuple[float, float, float, float]:
     """Quaternion that turns z to the direction d."""
     return tuple(matrix_to_quaternion(triad(_unit(d))).tolist())  # type: ignore[return-value]
+
+
+def _meshed(s: Any) -> bool:
+    """Whether the player has no figure of its own for a shape."""
+    return type(s) not in (Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere)
