@@ -13,7 +13,6 @@ from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
-from .recording_check import SIZES
 from .symbols import BODILY, cam_outline
 
 if TYPE_CHECKING:
@@ -131,7 +130,7 @@ class Looks:
             if _meshed(s):
                 extents = np.ptp(s.mesh(n)[0], axis=0).tolist()
             else:
-                extents = _extents(type(s).__name__, s.size(n))
+                extents = _extents("Cylinder" if isinstance(s, Rod) else type(s).__name__, s.size(n))
             out.append(float(np.median(extents)))
         return min(out)
 
@@ -264,11 +263,6 @@ class Looks:
         return Shape(
             "box", tuple(max(x, 0.2 * least) for x in edges), three(com), tuple(matrix_to_quaternion(V).tolist())
         )
-
-
-def _meshed(s: Solid) -> bool:
-    """Whether the page has no solid of that kind, so that its triangles are drawn."""
-    return not SIZES.get(type(s).__name__.lower())
 
 
 def _extents(kind: str, size: tuple[float, ...]) -> list[float]:
