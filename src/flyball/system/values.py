@@ -31,7 +31,6 @@ from .tables import (
     EXCESS,
     INERTIA,
     INVERSE,
-    INVERSE_JACOBIAN,
     MASS,
     PER_COMPACT,
     PER_MASS,
