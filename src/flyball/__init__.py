@@ -13,31 +13,35 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
-    "Box": "model.shapes",
-    "Sphere": "model.shapes",
-    "Cylinder": "model.shapes",
-    "Capsule": "model.shapes",
-    "Cone": "model.shapes",
-    "Ellipsoid": "model.shapes",
+    "Sensor": "model.sensor",
+    "IMU": "model.sensor",
+    "Table": "model.table",
     "load": "files",
+    "PerformanceNotice": "errors",
     "load_result": "files",
     "Result": "results.result",
     "FlyballError": "errors",
     "ModelError": "errors",
     "UnitError": "errors",
     "ExpressionError": "errors",
+    "SingularOrientationError": "errors",
+    "SingularOrientationWarning": "errors",
     "AnalysisError": "errors",
     "AssemblyError": "errors",
     "SimulationError": "errors",
 }
+_ROOMS = ("model.shapes", "joints", "forces")
+_MODULES = ("rotations",)
 
 
 def __getattr__(name: str) -> Any:
-    """Public names are imported when first asked for: joints and forces from the folders that hold them."""
+    """Public names are imported when first asked for: shapes, joints and forces from the folders that hold them."""
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     if not name.startswith("_"):
-        for room in ("joints", "forces"):
+        for room in _ROOMS:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
@@ -47,8 +51,8 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from .model.element import Element
 
-    for room in ("joints", "forces"):
+    for room in _ROOMS:
         importlib.import_module(f".{room}", __name__)
-    elements = [k for k, c in Element.registry.items() if c.category in ("joints", "forces") and hasattr(c, "drawn")]
-    abstract = {"Joint", "Force", "TwoPointForce", "JointForce", "BodyForce"}
-    return sorted({*_HOME, *elements, "__version__"} - abstract)
+    rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
+    elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
+    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid"})

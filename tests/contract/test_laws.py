@@ -11,20 +11,22 @@ from hypothesis import strategies as st
 from flyball._jit import kernel
 from flyball.model.expressions import FUNCTIONS, Expression
 from flyball.system.laws import evaluate, evaluate_jet
+from flyball.system.opcodes import BY_MOTION
 from flyball.system.program import compile_law
 
 PARAMETERS = {"a": 0.7, "b": 1.3, "zero": 0.0, "n": 3.0}
 H = 1e-30
+NOTHING = np.zeros((3, 0))  # no sensors
 
 
 @kernel
-def compiled_value(code, const, at, stack, x):
-    return evaluate(code, const, at, stack, x)
+def compiled_value(code, const, at, stack, x, sensed):
+    return evaluate(code, const, at, stack, x, sensed)
 
 
 @kernel
-def compiled_jet(code, const, at, stack, t):
-    return evaluate_jet(code, const, at, stack, t)
+def compiled_jet(code, const, at, stack, t, sensed, seed):
+    return evaluate_jet(code, const, at, stack, t, sensed, seed)
 
 
 class Law:
@@ -41,10 +43,10 @@ class Law:
         return self.code, self.const.astype(dtype), self.at, np.zeros((self.depth, 3), dtype)
 
     def value(self, *x, how=compiled_value):
-        return how(*self.tables(type(x[0])), x)
+        return how(*self.tables(type(x[0])), x, NOTHING.astype(type(x[0])))
 
     def jet(self, t, how=compiled_jet):
-        return np.array(how(*self.tables(type(t)), t))
+        return np.array(how(*self.tables(type(t)), t, NOTHING.astype(type(t)), BY_MOTION))
 
 
 SMOOTH = [
@@ -216,7 +218,17 @@ def test_many_laws_share_the_tables():
     stack = np.zeros((max(depth for _, depth in programs), 3))
     for text, (at, _) in zip(texts, programs, strict=True):
         expected = Expression.parse(text).evaluate({"k": 0.5, "t": 0.4})
-        assert compiled_value(np.array(code), np.array(const), at, stack, (0.4,)) == pytest.approx(expected, rel=1e-15)
+        assert compiled_value(np.array(code), np.array(const), at, stack, (0.4,), NOTHING) == pytest.approx(
+            expected, rel=1e-15
+        )
+
+
+def test_zeros_keep_their_sign():
+    """Numbers in the table are used again, but atan2(0, -1) and atan2(-0, -1) lie a whole turn apart."""
+    code, const = [], [-0.0, 1.0]  # no parameters: numbers of an earlier law
+    at, depth = compile_law(Expression.parse("atan2(0, -t)"), ("t",), [], code, const)
+    found = compiled_value(np.array(code), np.array(const), at, np.zeros((depth, 3)), (1.0,), NOTHING)
+    assert found == pytest.approx(math.pi)
 
 
 def test_constant_parts_are_computed_once():

@@ -115,8 +115,8 @@ PLANAR = [
         "stiffness is -1 N/m; it must be zero or greater",
     ),
     (fb.Driver, ("d", "A.angle", "t"), {}, "there is no joint named 'A'"),
-    (fb.Driver, ("d", "crank.z", "t"), {}, "'crank' has the coordinates x, y, not 'z'"),
-    (fb.Initial, ("crank",), {"value": 1}, "has the coordinates x, y, not ''"),
+    (fb.Driver, ("d", "crank.z", "t"), {}, "'crank' has the coordinates x, y, angle, not 'z'"),
+    (fb.Initial, ("crank",), {"value": 1}, "has the coordinates x, y, angle, not ''"),
 ]
 
 SPATIAL = [

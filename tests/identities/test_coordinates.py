@@ -96,7 +96,7 @@ def joint_coordinates(absolute, q, v, tree):
         _, kind, q0, v0, nq, nv = new.tables["body_i"][b]
         if kind == REVOLUTE:
             F, M = (load(absolute.work.FK, old.frame_at[hinges[name], role, ""]) for role in "FM")
-            value, _, n, _, _ = angle.row((0.0,) * 8, F, M)
+            value, _, n, _, _ = angle.row((0.0,) * 8, F, M, 0.0, None)
             Q[q0], V[v0] = value, np.dot(n, np.subtract(M[2], F[2]))
         else:
             _, _, p0, u0, _, _ = old.tables["body_i"][old.place[name]]

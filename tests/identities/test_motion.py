@@ -13,7 +13,6 @@ from flyball.analysis.compiled import compiled
 from flyball.analysis.entry import MOTION, motion_kernel
 from flyball.numerics.integrators import explicit
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.results.records import initial_turns
 from flyball.system import motion
 from flyball.system.tables import PASS, STABILIZE, TOL_G, TOL_V
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
@@ -43,8 +42,8 @@ def ready(name, stabilize):
     else:
         a = assemble(model)
         q, v = a.q, a.v
-    y = np.r_[q, v, np.zeros(len(c.structure.states))]
-    initial_turns(c.values, y)
+    c.at(0.0, q, v)
+    y = np.r_[q, v, c.z]
     y[: len(q) + len(v)] += 1e-5 * np.sin(np.arange(len(q) + len(v)))
     c.work.option[[STABILIZE, TOL_G, TOL_V, PASS]] = stabilize, 1e-12, 1e-11, 1e-13
     return c, y

@@ -214,12 +214,12 @@ def sphere(rings: int = 150) -> tuple[np.ndarray, np.ndarray]:
     return p, np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (c, b, d))])
 
 
-def test_meshes_are_drawn_on_their_body_and_kept_small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fb.Sphere, "vertices", lambda self, n: n.radius * sphere()[0], raising=False)
-    monkeypatch.setattr(fb.Sphere, "triangles", lambda self: sphere()[1], raising=False)  # what offers them is a mesh
+def test_meshes_are_drawn_on_their_body_and_kept_small() -> None:
     m = fb.Mechanism("m")
+    vertices, triangles = sphere()
     for name, radius in (("b", 0.5), ("c", 2.0)):
-        m.add(fb.Body(name, mass=1, inertia=(1, 1, 1), shape=fb.Sphere(radius=radius)))
+        mesh = fb.Mesh(vertices=radius * vertices, faces=triangles)
+        m.add(fb.Body(name, mass=1, inertia=(1, 1, 1), shape=mesh))
     recording = record(still(m))
     check(recording)
     (mesh,) = recording.bodies[0].shapes
@@ -228,6 +228,15 @@ def test_meshes_are_drawn_on_their_body_and_kept_small(monkeypatch: pytest.Monke
     total = sum(len(b.shapes[0].triangles) for b in recording.bodies)
     assert 10_000 < total <= 24_000  # of 178 800
     assert len(animation(still(m))) < 1_000_000
+
+
+def test_holes_are_drawn_as_holes() -> None:
+    m = fb.Mechanism("m")
+    plate = fb.Box(edges=(1, 1, 0.1))
+    bore = fb.Cylinder(radius=0.2, length=0.1, position=(0.2, 0, 0), hole=True)
+    m.add(fb.Body("b", density=1, shape=[plate, bore]))
+    shapes = record(still(m)).bodies[0].shapes
+    assert [(s.kind, s.hole) for s in shapes] == [("box", False), ("cylinder", True)]
 
 
 def test_a_joint_that_nobody_can_draw_gets_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import AssemblyError
-from ..model.body import Driver
+from ..model.body import Body, Driver, Frame
 from ..model.element import LawOf
 from ..model.expressions import number
 from ..model.model import Model
@@ -35,12 +35,11 @@ class Assembly:
     v: np.ndarray
     moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
     iterations: int = 0
-    known: dict[str, float] = field(default_factory=dict)  # coordinates that are told their value at the start
 
     @property
     def y(self) -> np.ndarray:
-        """State vector with work and turn states zero."""
-        return np.r_[self.q, self.v, np.zeros(len(self.compiled.structure.states))]
+        """State vector with work states zero."""
+        return np.r_[self.q, self.v, self.compiled.z]
 
 
 def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
@@ -56,31 +55,55 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
     plain = compiled(model, parameters=parameters)
     q, v = plain.values.q.copy(), plain.values.v.copy()
     env = model.environment(parameters)
-    values = {
-        i.name: number(i.value, env, model.unit(i.name, i), f"value of {i.title}")
-        for i in model.initial
-        if i.value is not None
-    }
-    rates = {
-        i.name: number(i.rate, env, model.unit(i.name, i) + "/s", f"rate of {i.title}")
-        for i in model.initial
-        if i.rate is not None
-    }
+    values, rates = _told(model, env)
+    known = values | _driven(model, model.drivers, t, env)
+    plain.follow(_turns(plain, known))
+    _wind(plain, known, q)
     holds = [i for i in model.initial if i.name in values]
-    near = compiled(model, parameters=parameters, holds=holds, held=values) if holds else plain
+    near = plain
+    if holds or not all(r.holonomic for r in plain.structure.rows):
+        near = compiled(model, parameters=parameters, positions=True, holds=holds, held=values)
+        near.follow(plain.hints)
     start = q.copy()
     count = 0
     if _misfit(near, t, q, v) > CLOSED or _by_frames(model):
         far = compiled(model, parameters=parameters, far=True, holds=holds, held=values)
+        far.follow(plain.hints)
         if _misfit(far, t, q, v) > 1e-6:
             q, count = _close(far, t, q, v)
+            near.follow(far.hints)
         q, more = _newton(near, t, q, v)
         count += more
         if _misfit(near, t, q, v) > CLOSED or _misfit(far, t, q, v) > 1e-6:
             raise _disagreement(far, t, q, v)
+    plain.follow(near.hints)
     v = _velocities(model, plain, parameters, t, q, v, rates)
-    known = values | {d.coordinate: _driven(model, d, t, env) for d in model.drivers}
-    return Assembly(plain, t, q, v, _moved(plain, start, q), count, known)
+    return Assembly(plain, t, q, v, _moved(plain, start, q), count)
+
+
+def _turns(c: Compiled, known: Mapping[str, float]) -> dict[str, float]:
+    """What the states that count turns begin near, where coordinates are told their value."""
+    out = {}
+    for name in set(known) & set(c.structure.state_at):
+        joint, what = c.structure.model.coordinate(name, c.structure.model.bodies[0])
+        coordinate = joint.coordinates[what] if hasattr(joint, "coordinates") else None
+        sign = coordinate.sign if coordinate else 1.0
+        offset = joint.offset(c.values.numbers[joint.name], what) if coordinate else 0.0
+        out[name] = sign * (known[name] - offset)
+    return out
+
+
+def _wind(c: Compiled, known: Mapping[str, float], q: np.ndarray) -> None:
+    """Bodies in the plane that are told their angle begin with its whole turns."""
+    s = c.structure
+    for name, value in known.items():
+        owner, what = s.model.coordinate(name, s.model.bodies[0])
+        if what != "angle" or not isinstance(owner, (Body, Frame)):
+            continue
+        b = s.place[s.model.carrier(owner.name, owner)]
+        if b >= 0:
+            turns = np.round((value - c.values.poses.turned(owner)) / (2.0 * np.pi))
+            q[s.tables["body_i"][b, 2] + 2] += 2.0 * np.pi * turns
 
 
 def _told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:
@@ -95,9 +118,15 @@ def _told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dic
     return values, rates
 
 
-def _driven(model: Model, d: Driver, t: float, env: Mapping[str, float]) -> float:
-    """What a driver's law asks for at time t."""
-    return model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}").evaluate({**env, "t": t})
+def _driven(model: Model, drivers: list[Driver], t: float, env: Mapping[str, float]) -> dict[str, float]:
+    """What drivers' laws ask for at time t, as far as they follow time alone."""
+    out = {}
+    tables = {x.name: x for x in model.tables}
+    for d in drivers:
+        law = model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}")
+        if law.names <= {"t", *env}:
+            out[d.coordinate] = law.evaluate({**env, "t": t}, tables=tables)
+    return out
 
 
 def _by_frames(model: Model) -> bool:
@@ -112,11 +141,11 @@ def _misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _movable(c: Compiled) -> np.ndarray:
-    """1 for velocities of bodies that may move, 0 for those of bodies described as fixed."""
+    """1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
     s = c.structure
     out = np.ones(s.nv)
     for name, b in s.place.items():
-        if b >= 0 and s.model[name].fixed:
+        if b >= 0 and s.model[name].as_drawn:
             v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
             out[v0 : v0 + n] = 0.0
     return out
@@ -252,6 +281,7 @@ def _velocities(
     """Velocities nearest to v (in kinetic energy) with G v = nu and the rates asked for."""
     holds = [i for i in model.initial if i.name in rates]
     c = compiled(model, parameters=parameters, holds=holds, held={}) if holds else plain
+    c.follow(plain.hints)
     if not len(c.values.system.row_i):
         return v
     c.at(t, q, v)
@@ -271,7 +301,7 @@ def _velocities(
         bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]
         raise AssemblyError(
             f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {', '.join(bad)} disagree. "
-            f"Check drivers, initial rates and bodies that are fixed",
+            f"Check drivers, initial rates and bodies with as_drawn=True",
             gaps={k: float(np.abs(r[c.structure.slices[k]]).max()) for k in bad},
         )
     return v

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.body import Initial
+from ..model.body import Body, Frame, Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
@@ -22,6 +22,7 @@ class Compiled:
 
     values: Values
     work: Work
+    z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
 
     @property
     def structure(self) -> Structure:
@@ -30,29 +31,44 @@ class Compiled:
 
     @property
     def y(self) -> np.ndarray:
-        """The drawn state, work and turn states zero."""
-        s = self.structure
-        return np.r_[self.values.q, self.values.v, np.zeros(len(s.states))]
+        """The drawn state."""
+        return np.r_[self.values.q, self.values.v, self.z]
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray, task: int = POSITION) -> tuple[int, np.ndarray]:
-        """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy)."""
-        y = np.r_[q, v, np.zeros(len(self.structure.states))]
-        return evaluate(self.values.system, self.work, float(t), y, task)
+        """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy).
+
+        Turns and places are those nearest to the last ones.
+        """
+        y = np.r_[q, v, self.z]
+        out = evaluate(self.values.system, self.work, float(t), y, task)
+        z = y[len(q) + len(v) :]
+        if np.isfinite(z).all():
+            self.z = z
+        return out
+
+    @property
+    def hints(self) -> dict[str, float]:
+        """Turns and places by name."""
+        return dict(zip(self.structure.states, self.z.tolist(), strict=True))
+
+    def follow(self, hints: Mapping[str, float]) -> None:
+        """Take turns and places from elsewhere."""
+        for name, k in self.structure.state_at.items():
+            if name in hints and not name.endswith(".work"):
+                self.z[k] = hints[name]
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
-        S = self.values.system
-        G = np.zeros((len(S.row_i), self.structure.nv))
-        rows = np.repeat(np.arange(len(S.row_i)), np.diff(S.row_p))
-        G[rows, S.col_i] = self.work.G
-        return G
+        return self.sparse_jacobian().toarray()
 
     def sparse_jacobian(self):
         """Sparse copy of the constraint Jacobian last evaluated."""
         import scipy.sparse as sp
 
         S = self.values.system
-        return sp.csr_matrix((self.work.G.copy(), S.col_i, S.row_p), shape=(len(S.row_i), self.structure.nv))
+        row_p = S.row_p[: len(S.row_i) + 1]
+        n = row_p[-1]
+        return sp.csr_matrix((self.work.G[:n].copy(), S.col_i[:n], row_p), shape=(len(S.row_i), self.structure.nv))
 
     def mass(self):
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
@@ -83,14 +99,30 @@ def compiled(
     *,
     parameters: Mapping[str, float] | None = None,
     far: bool = False,
+    positions: bool = False,
     holds: Sequence[Initial] = (),
     held: Mapping[str, float] | None = None,
     tree: Sequence[str] = (),
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, holds=holds, tree=tree)
+    s = structure(model, far=far, positions=positions, holds=holds, tree=tree)
     x = values(s, parameters, held)
     w = work(s, x.system)
     w.option[STABILIZE] = NONE
     w.option[PASS] = 1e-13
-    return Compiled(x, w)
+    return Compiled(x, w, _places(x))
+
+
+def _places(x: Values) -> np.ndarray:
+    """States as drawn: joints have no turns yet and works are none; bodies are turned as drawn, places on curves are
+    those nearest to the followers.
+    """
+    s = x.structure
+    z = np.zeros(len(s.states))
+    for t in s.terms:
+        if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
+            z[t.hint] = x.poses.turned(t.owner)
+    for joint in s.model.joints:
+        if (name := f"{joint.name}.place") in s.state_at:
+            z[s.state_at[name]] = joint.nearest(x.numbers[joint.name], *x.poses.ends(joint))[0]  # type: ignore[attr-defined]
+    return z

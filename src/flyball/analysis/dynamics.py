@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,6 @@ from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.health import Health
-from ..results.records import initial_turns
 from ..results.result import Result
 from ..system import motion
 from ..system.tables import (
@@ -139,13 +139,12 @@ def _start(
     """Compiled mechanism and state to start from: assembled as described, or where an earlier result ended."""
     if before is None:
         a = assemble(model, t=t, parameters=parameters)
-        y = a.y
-        initial_turns(a.compiled.values, y, a.known)
-        return a, y
+        return a, a.y
     c = compiled(model, parameters=parameters)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     a = Assembly(c, t, y[:nq].copy(), y[nq : nq + nv].copy())
+    c.z = y[nq + nv :].copy()
     c.at(t, a.q, a.v)
     gap = np.abs(c.work.row[G_VALUE]).max(initial=0.0)
     if not gap <= 1e-6 * c.values.length:
@@ -291,8 +290,16 @@ def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
             f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
             f"points of a spring that coincide. {kept}"
         )
+    guilty = int(a.compiled.work.info[GUILTY])
+    if a.compiled.work.info[STATUS] == motion.JAMMED:
+        e: Any = a.compiled.structure.forces[guilty]
+        return (
+            f"{name!r}: {e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
+            f"load that it comes from, so no finite force answers. Check its coefficients, and the lengths over which "
+            f"the joint carries moments (bending_length, twist_length). {kept}"
+        )
     rows = a.compiled.structure.rows
-    where = f" near {rows[int(a.compiled.work.info[GUILTY])].element.title}" if rows else ""
+    where = f" near {rows[guilty].element.title}" if rows else ""
     return (
         f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {clock.real[ex.H]:.3g} s"
         f"{where}. The mechanism may lock there (a driver asks for more than its links allow), pass a singular "

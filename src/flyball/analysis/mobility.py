@@ -133,7 +133,7 @@ def _check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
 
 def _undetermined(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, tuple[str, ...]]:
     """Reaction components (world axes, on body_j) that a self-stress can change."""
-    from ..constraints.blocks import FORMULAS
+    from ..constraints.registry import FORMULAS
     from ..system.records import load
     from ..system.rows import parameters
 
@@ -143,11 +143,12 @@ def _undetermined(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, t
     planar = s.model.planar
     labels = ["force x", "force y", "force z", "torque x", "torque y", "torque z"]
     wrenches: dict[str, np.ndarray] = {n: np.zeros((6, lam.shape[1])) for n in names}
-    for k, t in enumerate(s.terms):
-        name = s.rows[t.row].element.name
-        if name in wrenches:
+    for name in names:
+        for k in s.terms_of[name]:
+            t = s.terms[k]
             par = parameters(S.term_x, k)
-            _, f, tM, _, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M))
+            hint = c.z[t.hint] if t.hint >= 0 else 0.0
+            _, f, tM, _, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
             w = np.r_[f, np.array(tM) / c.values.length] * par[7]
             wrenches[name] += np.outer(w, lam[t.row])
     largest = max(np.abs(w).max() for w in wrenches.values())

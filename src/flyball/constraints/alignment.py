@@ -16,7 +16,7 @@ KIND_FULL = 6
 
 
 @formula
-def axis_row(par, F, M):
+def axis_row(par, F, M, hint, data):
     """Angle between the z axes of F and M, as a rotation vector, along the axis (par[0:3]) of F."""
     f = col(F[1], 2)
     m = col(M[1], 2)
@@ -34,7 +34,7 @@ def axis_row(par, F, M):
 
 
 @formula
-def full_row(par, F, M):
+def full_row(par, F, M, hint, data):
     """Rotation vector from F's axes to M's, along the axis (par[0:3]) of F, through the quaternion."""
     R = mm(transpose(F[1]), M[1])
     o = 0.0 * par[0]
@@ -67,3 +67,6 @@ def finish(value, n, F, o):
     """The row's record: a torque along F's axis n, no acceleration term."""
     t = mv(F[1], n)
     return value, (o, o, o), t, neg(t), o
+
+
+ROWS = {KIND_AXIS: axis_row, KIND_FULL: full_row}

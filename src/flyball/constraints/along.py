@@ -12,7 +12,7 @@ KIND = 1
 
 
 @formula
-def row(par, F, M):
+def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
 
     g = n.d - c, gdot = n.u + w_F.(n x d), with d = p_M - p_F, u = v_M - v_F and ndot = w_F x n.

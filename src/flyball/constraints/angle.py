@@ -1,6 +1,7 @@
 """The angle of M's x axis about F's z axis, counted from F's x axis: the coordinate of a revolute joint.
 
-Exact also off the constraint (M's x axis out of F's plane): theta = atan2(s, c), c = m.x, s = m.y.
+Exact also off the constraint (M's x axis out of F's plane): theta = atan2(s, c), c = m.x, s = m.y. Where par[0] is 1,
+the whole turns are those that bring it next to ``hint``.
 """
 
 from __future__ import annotations
@@ -13,7 +14,13 @@ KIND = 4
 
 
 @formula
-def row(par, F, M):
+def unwrapped(theta, hint):
+    """Theta plus the whole turns that bring it next to ``hint``."""
+    return theta + 6.283185307179586 * rounded((hint - theta) / 6.283185307179586)
+
+
+@formula
+def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
 
     thetadot = n.(w_M - w_F), n = m x u / (c^2 + s^2), u = c y - s x.
@@ -36,10 +43,7 @@ def row(par, F, M):
     n1 = scale(1.0 / r, sub(mu1, scale(r1, n)))
     o = 0.0 * par[0]
     bias = dot(n, sub(M[4], F[4])) + dot(n1, w)
-    return atan2(s, c) - par[6], (o, o, o), n, neg(n), bias
-
-
-@formula
-def unwrapped(theta, hint):
-    """Theta plus the whole turns that bring it next to ``hint``."""
-    return theta + 6.283185307179586 * rounded((hint - theta) / 6.283185307179586)
+    theta = atan2(s, c)
+    if par[0] > 0.5:
+        theta = unwrapped(theta, hint)
+    return theta - par[6], (o, o, o), n, neg(n), bias

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from . import alignment, along, angle, coincident, distance, perpendicular
+from . import alignment, along, angle, blade, coincident, curve, distance, perpendicular, rolling, skew, spin
 
 _UNIT = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 _ZERO = (0.0, 0.0, 0.0)
@@ -24,6 +24,8 @@ class Row:
     world: bool = False  # axes of the world, not of the joint
     far: Row | None = None
     measure: str = "m"  # unit of its value
+    holonomic: bool = True  # whether it has a value; else it restrains velocities only
+    plus: tuple[str, ...] = ()  # coordinates of the joint that are added to the row, with coefficients it gives
 
 
 def _row(kind: int, a: str, b: str = "", **more) -> Row:
@@ -79,13 +81,42 @@ def point_coordinate(axis: str) -> Row:
     return _row(coincident.KIND, axis, world=True)
 
 
-FORMULAS = {
-    coincident.KIND: coincident.row,
-    along.KIND: along.row,
-    perpendicular.KIND: perpendicular.row,
-    distance.KIND: distance.row,
-    angle.KIND: angle.row,
-    alignment.KIND_AXIS: alignment.axis_row,
-    alignment.KIND_FULL: alignment.full_row,
-}
-"""The formula of each kind of term, for use outside compiled loops."""
+SKEW_LINES = (
+    *CROSSED_AXES,
+    *(Row(skew.KIND, (*_UNIT[a], 0.0, 0.0, 0.0, 0.0, 1.0), a, world=True) for a in "xyz"),
+)
+"""The z axes of F and M keep their position to one another, each of them free to slide round a massless link."""
+
+IN_PLANE = _row(along.KIND, "z")
+"""The origin of M stays in F's x-y plane (or at a height above it)."""
+
+CURVE = Row(curve.KIND, (0.0,) * 7 + (1.0,), "xy")
+"""The origin of M stays at a constant distance from a curve in F's x-y plane."""
+
+
+def shift(axis: str) -> Row:
+    """Coordinate: displacement of M along an axis of F."""
+    return _row(along.KIND, axis)
+
+
+def no_slip(axis: str) -> Row:
+    """The wheel M does not slip on F's x-y plane along an axis of F (radii: parameters 3 and 4)."""
+    return Row(rolling.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, holonomic=False)
+
+
+ON_PLANE = Row(rolling.KIND, (*_UNIT["z"], 0.0, 0.0, 1.0, 0.0, 1.0), "z")
+"""The wheel M touches F's x-y plane."""
+
+
+def no_sideways(axis: str) -> Row:
+    """The origin of M has no velocity, seen from F, along an axis of M."""
+    return Row(blade.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, holonomic=False)
+
+
+def turning(axis: str) -> Row:
+    """Measured: angular velocity of M relative to F about an axis of M."""
+    return Row(spin.KIND, (*_UNIT[axis], 0.0, 0.0, 0.0, 0.0, 1.0), axis, measure="rad", holonomic=False)
+
+
+DISTANCE = Row(distance.KIND, (0.0,) * 7 + (1.0,))
+"""Measured: distance of the origins of F and M."""

@@ -12,7 +12,7 @@ KIND = 0
 
 
 @formula
-def row(par, F, M):
+def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias."""
     n = (par[0], par[1], par[2])
     o = 0.0 * par[0]

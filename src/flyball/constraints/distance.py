@@ -9,7 +9,7 @@ KIND = 3
 
 
 @formula
-def row(par, F, M):
+def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
 
     g = |d| - L, gdot = e.u, gddot = e.(a_M - a_F) + (u.u - (e.u)^2) / |d| with e = d / |d|.

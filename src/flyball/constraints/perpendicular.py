@@ -13,7 +13,7 @@ KIND = 2
 
 
 @formula
-def row(par, F, M):
+def row(par, F, M, hint, data):
     """Value, force on M at its origin (minus that on F), torques on M and F about their origins, acceleration bias.
 
     g = m.f, gdot = (w_M - w_F).(m x f).

@@ -7,14 +7,14 @@ from typing import Annotated, ClassVar, Literal
 
 from .._jit import formula
 from ..math.vec import mv
-from ..model.element import LawOf, Number, Numbers, Point, element
+from ..model.element import Law, LawOf, Numbers, Point, element
 from ..model.force import BodyForce
 
 KIND = 3
 
 
 @formula
-def inputs(par, F, M, turns):
+def inputs(par, F, M):
     """Nothing is measured."""
     return 0.0 * M[0][0], 0.0 * M[0][0]
 
@@ -64,6 +64,6 @@ class PointForce(BodyForce):
         """Numbers that the formulas see."""
         return (1.0 if self.axes == "body" else 0.0,)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The components."""
         return tuple(self.force)

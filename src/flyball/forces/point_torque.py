@@ -6,7 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 from .._jit import formula
-from ..model.element import LawOf, Number, Numbers, element
+from ..model.element import Law, LawOf, Number, Numbers, element
 from ..model.force import BodyForce
 from .point_force import in_world, inputs
 
@@ -46,6 +46,6 @@ class PointTorque(BodyForce):
         """Numbers that the formulas see."""
         return (1.0 if self.axes == "body" else 0.0,)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The components; a single one is about the normal."""
         return tuple(self.torque) if isinstance(self.torque, tuple) else (None, None, self.torque)

@@ -7,14 +7,14 @@ from typing import Annotated, ClassVar
 
 from .._jit import formula
 from ..math.vec import dot, neg, norm, scale, sub
-from ..model.element import Damping, Law, LawOf, Length, Number, Stiffness, element, nonnegative
+from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
 
 KIND = 0
 
 
 @formula
-def inputs(par, F, M, turns):
+def inputs(par, F, M):
     """Length and its rate."""
     d = sub(M[0], F[0])
     length = norm(d)
@@ -32,9 +32,9 @@ def wrench(par, F, M, laws, values):
 
 
 @formula
-def energy(par, F, M, turns):
+def energy(par, F, M):
     """Potential energy k (length - free length)^2 / 2 [J]."""
-    x = inputs(par, F, M, turns)[0] - par[2]
+    x = inputs(par, F, M)[0] - par[2]
     return 0.5 * par[0] * x * x
 
 
@@ -79,7 +79,7 @@ class SpringDamper(TwoPointForce):
         """Numbers that the formulas see."""
         return (n.stiffness, n.damping, separation if n.length is None else n.length)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Expressions that the formulas see."""
         return (self.force,)
 

@@ -1,10 +1,25 @@
-"""Joints: one file each. A new joint is a new file here and one line below."""
+"""Joints and couplings: one file each. A new one is a new file here and one line below."""
 
+from .cam import Cam as Cam
+from .coupler import Coupler as Coupler
 from .cylindrical import Cylindrical as Cylindrical
 from .distance import Distance as Distance
 from .fixed import Fixed as Fixed
+from .gear_pair import GearPair as GearPair
+from .general_universal import GeneralUniversal as GeneralUniversal
+from .knife_edge import KnifeEdge as KnifeEdge
+from .orientation import Orientation as Orientation
+from .planar import Planar as Planar
+from .point_in_plane import PointInPlane as PointInPlane
+from .point_on_line import PinInSlot as PinInSlot
+from .point_on_line import PointOnLine as PointOnLine
 from .prismatic import Prismatic as Prismatic
+from .rack_and_pinion import RackAndPinion as RackAndPinion
 from .revolute import Revolute as Revolute
+from .rolling import RollingBall as RollingBall
+from .rolling import RollingDisk as RollingDisk
+from .screw import Screw as Screw
 from .spherical import Spherical as Spherical
 from .translational import Translational as Translational
 from .universal import Universal as Universal
+from .wheel_on_line import WheelOnLine as WheelOnLine

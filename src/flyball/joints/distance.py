@@ -44,9 +44,10 @@ class Distance(Joint):
         a, b = (vector(p, planar, f"'at' of {self.title}") for p in n.at)
         return (a, np.eye(3)), (b, np.eye(3))
 
-    def parameter(self, n: SimpleNamespace, row: Row, separation: float) -> float:
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
         """The length: as given, or as drawn."""
-        length = separation if n.length is None else n.length
+        d = M[0] - F[0]
+        length = np.sqrt((d * d).sum()) if n.length is None else n.length
         if not length.real > 0.0:
             raise ModelError(f"{self.title}: its two points coincide; use Revolute or Spherical, or give a length")
-        return length
+        return (*row.par[:6], length)

@@ -158,6 +158,17 @@ def maximum(a, b):
     return sympy.Max(a, b)
 
 
+def choose(x, a, b):
+    """A where the real part of x is greater than zero, else b; both are computed."""
+    if isinstance(x, _NUMBERS):
+        return a if x.real > 0 else b
+    if _has_array(x):
+        return np.where(np.real(x) > 0, a, b)
+    import sympy
+
+    return sympy.Piecewise((a, x > 0), (b, True))
+
+
 def divide(a, b):
     """A / b; inf or nan where b is zero, as in C."""
     if isinstance(b, _NUMBERS):
@@ -271,6 +282,10 @@ def _register() -> None:
         if isinstance(x, types.Complex):
             return lambda x: complex(np.floor(x.real + 0.5), 0.0)
         return lambda x: np.floor(x + 0.5)
+
+    @overload(choose, jit_options=options)
+    def choose_choose(x, a, b):
+        return lambda x, a, b: a if x.real > 0 else b
 
     def smaller(a, b):
         return a if a.real <= b.real or a != a else b

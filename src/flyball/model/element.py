@@ -20,20 +20,21 @@ from ..errors import ModelError
 from .expressions import number
 
 T = TypeVar("T", bound=type)
+LONG = 300  # letters of a value in a message
 
 
 @dataclass(frozen=True)
 class Unit:
-    """Dimension of a field, as an SI unit."""
+    """Dimension of a field, as an SI unit; any, if None."""
 
-    dimension: str
+    dimension: str | None
 
 
 @dataclass(frozen=True)
 class LawOf:
-    """A field that is an expression of time and measured inputs; its value has this dimension."""
+    """A field that is an expression of time and measured inputs; its value has this dimension (any, if None)."""
 
-    dimension: str
+    dimension: str | None
     inputs: tuple[str, ...] = ()
 
 
@@ -51,7 +52,10 @@ def _plain(value: Any) -> Any:
 Number = Annotated[float | str, BeforeValidator(_plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(_plain)]
-Law = Number
+Function = Callable[..., Any]
+Law = Annotated[float | str | Function, BeforeValidator(_plain)]
+"""A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
+Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(_plain)]
 
 Length = Annotated[Number, Unit("m")]
 Angle = Annotated[Number, Unit("rad")]
@@ -106,14 +110,15 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         where = place[0] if place else ""
         where = known[int(where)] if where.isdigit() and int(where) < len(known) else where
         if e["type"] == "unexpected_keyword_argument":
-            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
+            hint = getattr(cls, "hints", {}).get(where) or f"its fields are {', '.join(known)}"
+            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; {hint}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             lines.append(f"field {where!r} is missing")
         elif e["type"] in _TYPES:
             wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:
             message = e["msg"].removeprefix("Value error, ")
-            lines.append(f"field {where!r}: {message} (got {e['input']!r})")
+            lines.append(f"field {where!r}: {message} (got {_short(e['input'])})")
     for where, wanted in wrong.items():
         value = kwargs.get(where, dict(zip(known, args, strict=False)).get(where))
         lines.append(f"field {where!r} must be {' or '.join(dict.fromkeys(wanted))}, got {value!r}")
@@ -124,6 +129,7 @@ _TYPES = {
     "float_type": "a number",
     "float_parsing": "a number",
     "string_type": "a text",
+    "callable_type": "a function",
     "tuple_type": "a list",
     "bool_type": "true or false",
     "bool_parsing": "true or false",
@@ -132,7 +138,13 @@ _TYPES = {
 
 def _is_branch(place: str) -> bool:
     """Names that pydantic gives to the members of a union."""
-    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none")
+    return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none", "callable")
+
+
+def _short(value: Any) -> str:
+    """A value as it is written, cut where it is long: the vertices of a mesh, for instance."""
+    text = repr(value)
+    return text if len(text) <= LONG else text[:LONG] + "..."
 
 
 def _did_you_mean(word: str, known: list[str]) -> str:
@@ -241,5 +253,5 @@ def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Calla
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):
-            unit = units[name].dimension
+            unit = units[name].dimension or ""
             raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")

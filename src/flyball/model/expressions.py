@@ -1,25 +1,30 @@
 """What a user may write where a number is wanted: a number, a quantity ("30 deg"), an expression ("2*k").
 
 Expressions are read with Python's own grammar into a small tree of known operations; nothing is ever executed.
-The same tree is evaluated here on numbers, arrays and symbols, and compiled for laws of time in `system.laws`.
+The same tree is evaluated here on numbers, arrays and symbols, and compiled for laws of time in `system.laws`. Laws may
+call tables by name, and a Python function may stand in place of a law (`model.function`).
 """
 
 from __future__ import annotations
 
 import keyword
 import operator
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from numbers import Complex, Integral, Real
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import ExpressionError, ModelError, UnitError
 from ..math import scalar
+from .function import apply, arguments, function_tree
 from .grammar import CONSTANTS, FUNCTIONS, Node, did_you_mean, read, refuse
 from .units import is_unit, split_quantity, to_si
+
+if TYPE_CHECKING:
+    from .table import Table
 
 
 @dataclass(frozen=True)
@@ -28,17 +33,30 @@ class Expression:
 
     text: str
     tree: Node = field(repr=False, compare=False)
+    function: Callable[..., Any] | None = field(default=None, repr=False, hash=False)
+    where: str = field(default="", repr=False, compare=False)  # what it is the law of, for messages
 
     @classmethod
-    def parse(cls, text: str) -> Expression:
-        """Read an expression.
+    def parse(cls, text: str, tables: Collection[str] = ()) -> Expression:
+        """Read an expression; ``tables`` are names that it may call like functions.
 
         Raises
         ------
         ExpressionError
-            If the text is not an expression of the known operators, functions and constants.
+            If the text is not an expression of the known operators, functions, tables and constants.
         """
-        return cls(*read(text))
+        return cls(*read(text, tables))
+
+    @classmethod
+    def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
+        """The law that a Python function is; its arguments' names say what it is given.
+
+        Raises
+        ------
+        ExpressionError
+            If its arguments have no fixed names, or are too many.
+        """
+        return cls(*function_tree(function), function, where)
 
     @classmethod
     def constant(cls, value: float) -> Expression:
@@ -47,20 +65,30 @@ class Expression:
 
     @cached_property
     def names(self) -> frozenset[str]:
-        """Names of parameters and inputs used."""
+        """Names of parameters, inputs and sensors used; of a function also those that it can do without."""
         return frozenset(node.value for node in self.tree.walk() if node.kind == "name")
+
+    @cached_property
+    def tables(self) -> frozenset[str]:
+        """Names of the tables called."""
+        return frozenset(node.value for node in self.tree.walk() if node.kind == "table")
 
     def require(self, known: Collection[str]) -> None:
         """Raise `ExpressionError`, with the place and the nearest known names, if a name used is not known."""
         if self.names <= set(known):
             return
-        node = next(n for n in self.tree.walk() if n.kind == "name" and n.value not in known)
+        nodes = self.tree.walk() if self.function is None else arguments(self.tree, known)
+        node = next((n for n in nodes if n.kind == "name" and n.value not in known), None)
+        if node is None:
+            return
         name = node.value
         guess = did_you_mean(name, [*known, *FUNCTIONS])
         if name == "t":
             remedy = "time t is known only in laws of drivers and forces"
         elif guess:
             remedy = guess.strip()
+        elif self.function is not None:
+            remedy = "the names of a function's arguments say what it is given: use known ones, or give a default"
         elif is_unit(name):
             remedy = f"a unit follows a single number, as in '2 {name}'; give the quantity a parameter's name"
         else:
@@ -68,13 +96,29 @@ class Expression:
         listed = f"known names: {', '.join(sorted(known)) or 'none'}; {remedy}"
         refuse(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
-    def evaluate(self, env: Mapping[str, Any]) -> Any:
-        """Value with the names in `env`: numbers (real or complex), arrays, or SymPy symbols.
+    def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:
+        """Value with the names in `env`: numbers (real or complex), arrays, or SymPy symbols; and the tables it calls.
 
         Out of a function's domain the value is nan or inf, not an error. Raises `ExpressionError` for unknown names.
+        What a Python function raises comes through.
         """
         self.require(env.keys())
-        return _evaluate(self.tree, env)
+        self.require_tables(tables or {})
+        return _evaluate(self.tree, env, tables or {})
+
+    def require_tables(self, known: Collection[str]) -> None:
+        """Raise `ExpressionError` if a table that it calls is not there."""
+        for name in sorted(self.tables - set(known)):
+            raise ExpressionError(f"'{self}': there is no table '{name}'; add the Table before the law that calls it")
+
+    def require_derivatives(self) -> None:
+        """Raise `ExpressionError` if the law has no exact derivatives."""
+        if self.function is not None:
+            who = f"{self.where}: " if self.where else ""
+            raise ExpressionError(
+                f"{who}'{self}' is a Python function, and a driver's law needs its derivatives: "
+                f"give an expression or a Table"
+            )
 
     def __str__(self) -> str:
         return self.text
@@ -110,13 +154,18 @@ def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str
     return result
 
 
-def law_expression(value: Any, dimension: str | None, where: str) -> Expression:
-    """Turn what a user wrote as a law into an expression: a number, a quantity ("120 rpm") or a formula of t."""
+def law_expression(value: Any, dimension: str | None, where: str, tables: Collection[str] = ()) -> Expression:
+    """Turn what a user wrote as a law into an expression.
+
+    It may be a number, a quantity ("120 rpm"), a formula of t that may call ``tables``, or a Python function.
+    """
     try:
         if isinstance(value, Expression):
             return value
         if isinstance(value, str) and split_quantity(value) is None:
-            return Expression.parse(value)
+            return Expression.parse(value, tables)
+        if callable(value):
+            return Expression.of_function(value, where)
     except ModelError as error:
         raise type(error)(f"{where}: {error}") from None
     return Expression.constant(number(value, {}, dimension, where))
@@ -222,12 +271,16 @@ def _check_parameter_name(name: Any) -> None:
         raise ExpressionError(f"parameter '{name}': the name is taken, it means {kind}; rename it, e.g. '{name}_0'")
 
 
-def _evaluate(node: Node, env: Mapping[str, Any]) -> Any:
+def _evaluate(node: Node, env: Mapping[str, Any], tables: Mapping[str, Table]) -> Any:
     if node.kind == "number":
         return node.value
     if node.kind == "name":
         return env[node.value]
-    args = [_evaluate(arg, env) for arg in node.args]
+    args = [_evaluate(arg, env, tables) for arg in (arguments(node, env) if node.kind == "function" else node.args)]
+    if node.kind == "table":
+        return tables[node.value].value(*args)
+    if node.kind == "function":
+        return apply(node.value, *args)
     return OPERATIONS[node.kind](*args)
 
 
@@ -285,4 +338,4 @@ OPERATIONS = {
     "or": _fold(operator.or_),
     "not": lambda a: not a if isinstance(a, bool) else ~a,
 }
-_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not"})
+_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function"})

@@ -1,4 +1,4 @@
-"""What every force declares: its formulas, its parameters and laws, and the frames it acts between."""
+"""What every force declares: its formulas, its parameters and laws, and what it acts on."""
 
 from __future__ import annotations
 
@@ -9,18 +9,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from .element import Element, Number, PointPair
+from ..constraints.blocks import Row
+from .element import Element, Law, Point, PointPair
 from .geometry import vector
+from .joint import WorldFrame
 
 
 @dataclass(frozen=True)
 class Force(Element):
-    """A force element between a frame F and a frame M.
+    """A force element.
 
-    The formulas ``inputs(par, F, M, turns)`` (what its laws may depend on besides time), ``wrench(par, F, M, laws,
-    values)`` with the values of the inputs (force and torque on M at M's origin, world axes; the reverse acts on F's
-    body) and ``energy(par, F, M, turns)``
-    stand in the subclass's file, as plain functions of numbers.
+    One family acts between a frame F and a frame M: ``inputs(par, F, M)`` (what its laws may depend on besides time)
+    and ``wrench(par, F, M, laws, values)`` with the values of the inputs: force and torque on M at M's origin, world
+    axes; the reverse acts on F's body at the same point. The other acts along a measured quantity x:
+    ``effort(par, x, rate, laws, load)``, positive where it pushes x up (`CoordinateForce`). Either may have an
+    ``energy``. They stand in the subclass's file, as plain functions of numbers; ``kind`` numbers them.
     """
 
     category: ClassVar[str] = "forces"
@@ -29,14 +32,21 @@ class Force(Element):
     wrench: ClassVar[Callable]
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
-    on_joint: ClassVar[bool] = False  # acts about a joint's axis and counts its turns
     drawn: ClassVar[str] = ""
 
+    def ends(self) -> dict[str, str]:
+        """Role of each of its frames -> body or frame that it is on."""
+        raise NotImplementedError
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Its frames in the world as drawn, if it says where they are; else they are those that it names."""
+        return None
+
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
-        """Up to eight numbers that the formulas see."""
+        """Up to sixteen numbers that the formulas see."""
         return ()
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Up to three expressions that the formulas see."""
         return ()
 
@@ -54,19 +64,30 @@ class TwoPointForce(Force):
     _: KW_ONLY
     at: PointPair | None = None
 
-    def world_points(self, n: SimpleNamespace, planar: bool) -> tuple[np.ndarray, np.ndarray]:
-        """The two points in world coordinates of the drawn configuration."""
+    def ends(self) -> dict[str, str]:
+        """F on ``body_i``, M on ``body_j``."""
+        return {"F": self.body_i, "M": self.body_j}
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """The two points."""
+        if n.at is None:
+            return None
         a, b = (vector(p, planar, f"'at' of {self.title}") for p in n.at)
-        return a, b
+        return {"F": (a, np.eye(3)), "M": (b, np.eye(3))}
 
 
 @dataclass(frozen=True)
-class JointForce(Force):
-    """A torque about the axis of a joint that has an angle, positive on ``body_j``."""
+class TwoFrameForce(Force):
+    """A force and a torque between two frames that lie on one another when they are drawn at a point."""
 
-    joint: str
+    body_i: str
+    body_j: str
+    _: KW_ONLY
+    at: Point | None = None
 
-    on_joint: ClassVar[bool] = True
+    def ends(self) -> dict[str, str]:
+        """F on ``body_i``, M on ``body_j``."""
+        return {"F": self.body_i, "M": self.body_j}
 
 
 @dataclass(frozen=True)
@@ -74,3 +95,38 @@ class BodyForce(Force):
     """A force or torque on one body, from outside."""
 
     body: str
+
+    def ends(self) -> dict[str, str]:
+        """M on the body."""
+        return {"M": self.body}
+
+
+@dataclass(frozen=True)
+class CoordinateForce(Force):
+    """A force along a measured quantity: a joint's coordinate, or a sum of distances."""
+
+    effort: ClassVar[Callable]
+    sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
+
+    def ends(self) -> dict[str, str]:
+        """No frames of its own."""
+        return {}
+
+    def coordinate_text(self) -> str:
+        """The coordinate that it acts along: ``"A.angle"``."""
+        return ""
+
+    def path(self) -> tuple[tuple[str, str, Row], ...]:
+        """Or the terms (role of F, role of M, formula) whose sum it acts along."""
+        return ()
+
+
+@dataclass(frozen=True)
+class JointForce(CoordinateForce):
+    """A torque about the axis of a joint that has an angle, positive on ``body_j``."""
+
+    joint: str
+
+    def coordinate_text(self) -> str:
+        """The joint's angle."""
+        return f"{self.joint}.angle"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import difflib
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NoReturn
@@ -66,13 +66,13 @@ class Node:
             yield from arg.walk()
 
 
-def read(text: str) -> tuple[str, Node]:
-    """The text on one line, and its tree; `ExpressionError` if it is not a formula."""
+def read(text: str, tables: Collection[str] = ()) -> tuple[str, Node]:
+    """The text on one line, and its tree; `ExpressionError` if it is not a formula. ``tables``: names of tables."""
     text = "".join(" " if c.isspace() else c for c in text).strip()
     if not text:
         raise ExpressionError("the expression is empty; write a number, a quantity such as '5 mm', or a formula")
     try:
-        return text, _Reader(text).read(ast.parse(text, mode="eval").body)
+        return text, _Reader(text, tables).read(ast.parse(text, mode="eval").body)
     except SyntaxError as error:
         start = (error.offset or 1) - 1
         refuse(text, start, start + 1, f"cannot read the expression ({error.msg})", _remedy(text))
@@ -85,8 +85,9 @@ def read(text: str) -> tuple[str, Node]:
 class _Reader:
     """Turns Python's syntax tree into nodes, refusing all that is no formula."""
 
-    def __init__(self, text: str) -> None:
+    def __init__(self, text: str, tables: Collection[str]) -> None:
         self.text = text
+        self.tables = tables
         self.depth = 0
 
     def read(self, node: ast.AST, *, condition: bool = False) -> Node:
@@ -129,6 +130,8 @@ class _Reader:
         if node.id in FUNCTIONS:
             example = f"{node.id}({', '.join(FUNCTIONS[node.id])})"
             self.refuse(node, f"'{node.id}' is a function", f"give its arguments: {example}")
+        if node.id in self.tables:
+            self.refuse(node, f"'{node.id}' is a table", f"give its argument: {node.id}(x)")
         if node.id in CONSTANTS:
             return self.made(node, "number", value=CONSTANTS[node.id])
         return self.made(node, "name", value=node.id)
@@ -167,15 +170,20 @@ class _Reader:
 
     def read_Call(self, node: ast.Call) -> Node:
         name = node.func.id if isinstance(node.func, ast.Name) else ast.unparse(node.func)
-        if name not in FUNCTIONS:
-            guess = did_you_mean(name, FUNCTIONS)
+        is_table = name in self.tables and name not in FUNCTIONS
+        if name not in FUNCTIONS and not is_table:
+            known = [*FUNCTIONS, *self.tables]
+            guess = did_you_mean(name, known)
             product = "" if guess else f"a product is written {name}*(...); "
-            known = f"{guess}{product}known functions: {', '.join(sorted(FUNCTIONS))}"
-            self.refuse(node.func, f"unknown function '{name}'", known)
-        wanted, given = FUNCTIONS[name], len(node.args)
+            listed = f"known functions: {', '.join(sorted(FUNCTIONS))}"
+            listed += f"; tables: {', '.join(sorted(self.tables))}" if self.tables else ""
+            self.refuse(node.func, f"unknown function '{name}'", f"{guess}{product}{listed}")
+        wanted, given = ("x",) if is_table else FUNCTIONS[name], len(node.args)
         if node.keywords or (given < 2 if wanted[-1] == "..." else given != len(wanted)):
             call = f"{name}({', '.join(wanted)})"
             self.refuse(node, f"wrong arguments: {given} given", f"write {call}, without names")
+        if is_table:
+            return self.made(node, "table", [self.read(node.args[0])], name)
         return self.made(
             node, name, [self.read(a, condition=name == "where" and i == 0) for i, a in enumerate(node.args)]
         )

@@ -5,6 +5,7 @@ Numbers are written so that they come back bit for bit, and strings ("60 rpm", "
 
 from __future__ import annotations
 
+import importlib
 import os
 import re
 import tomllib
@@ -14,16 +15,22 @@ from typing import Any, NoReturn, TypeVar
 
 from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
+from .coupling import Coupling
 from .element import Element, written
 from .force import Force
+from .function import function_name
 from .joint import Joint
 from .model import CATEGORIES, Model, suggest
+from .sensor import IMU, Sensor
+from .shapes.mesh import Mesh, paths_from
+from .table import Table
 
 M = TypeVar("M", bound=Model)
 
 SETTINGS = ("name", "planar", "gravity", "parameters")
-ONE_KIND = {"bodies": Body, "frames": Frame, "drivers": Driver, "initial": Initial}
-MANY_KINDS = {"joints": Joint, "forces": Force}
+ONE_KIND = {"bodies": Body, "frames": Frame, "tables": Table, "drivers": Driver, "initial": Initial}
+MANY_KINDS = {"joints": (Joint, "joints"), "couplings": (Coupling, "joints"), "forces": (Force, "forces")}
+SENSORS = {"Sensor": Sensor, "IMU": IMU}
 WIDTH = 100  # a list of shapes longer than this is written one shape a line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
 _PLACE = re.compile(r" \(at (?:line (\d+), column (\d+)|end of document)\)$")
@@ -37,15 +44,15 @@ def save(model: Model, path: str | os.PathLike) -> None:
     ModelError
         If the file cannot be written, or a value of the mechanism has no place in a file.
     """
-    data = dumps(model).encode()
+    data = dumps(model, Path(path).parent).encode()
     try:
         Path(path).write_bytes(data)
     except OSError as error:
         raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
 
 
-def dumps(model: Model) -> str:
-    """The text of the mechanism's TOML file."""
+def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
+    """The text of the mechanism's TOML file; relative paths in it as seen from ``folder``, else as they were given."""
     lines = [f"name = {_text(model.name)}", f"planar = {_value(model.planar)}", f"gravity = {_value(model.gravity)}"]
     if model.parameters:
         lines += ["", "[parameters]"]
@@ -53,14 +60,37 @@ def dumps(model: Model) -> str:
     for category in CATEGORIES:
         for e in getattr(model, category):
             lines += ["", f"[[{category}]]"]
-            kind = {"type": type(e).__name__} if category in MANY_KINDS else {}
-            lines += [f"{k} = {_value(v)}" for k, v in (kind | written(e)).items()]
+            kind = {"type": type(e).__name__} if category in MANY_KINDS or isinstance(e, IMU) else {}
+            fields = kind | _written(e, folder)
+            _refuse_functions(e, fields)
+            lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
     text = "\n".join(lines) + "\n"
     try:
         text.encode()
     except UnicodeEncodeError as error:
         raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
     return text
+
+
+def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
+    """The element's fields as plain data, paths of meshes as seen from the folder."""
+    data = written(e)
+    if folder is not None and isinstance(e, Body) and "shape" in data:
+        tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
+        for shape, table in zip(e.shapes(), tables, strict=True):
+            if isinstance(shape, Mesh) and shape.path is not None:
+                table["path"] = shape.path_from(folder)
+    return data
+
+
+def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
+    for name, value in fields.items():
+        for law in value if isinstance(value, (list, tuple)) else (value,):
+            if callable(law):
+                raise ModelError(
+                    f"{e.title}: {name} is the Python function '{function_name(law)}', and a model file cannot hold a "
+                    f"Python function; use an expression or a Table"
+                )
 
 
 def _value(value: Any) -> str:
@@ -112,7 +142,8 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
         raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
     except OSError as error:
         raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
-    return loads(text, cls, os.fspath(path))
+    with paths_from(path.parent):
+        return loads(text, cls, os.fspath(path))
 
 
 def loads(text: str, cls: type[M], source: str = "model") -> M:
@@ -124,7 +155,17 @@ def loads(text: str, cls: type[M], source: str = "model") -> M:
             what = "table" if isinstance(value, (Mapping, list)) else "key"
             raise ModelError(f"{source}: unknown {what} {key!r}{suggest(key, known)}; a model has {', '.join(known)}")
     model = _settings(data, cls, source)
+    _add_all(model, _entries(data, text, source))
+    return model
+
+
+Entry = tuple[str, Mapping[str, Any], str]
+
+
+def _entries(data: Mapping[str, Any], text: str, source: str) -> list[Entry]:
+    """(category, fields, place in the file) of every element."""
     lines = _header_lines(text)
+    out = []
     for category in CATEGORIES:
         tables = data.get(category, [])
         if not isinstance(tables, list) or not all(isinstance(t, Mapping) for t in tables):
@@ -133,8 +174,30 @@ def loads(text: str, cls: type[M], source: str = "model") -> M:
         for k, table in enumerate(tables):
             line = f" (line {places[k]})" if len(places) == len(tables) else ""
             name = f" {table['name']!r}" if isinstance(table.get("name"), str) else ""
-            _add(model, category, table, f"{source}: [[{category}]] {k + 1}{name}{line}")
-    return model
+            out.append((category, table, f"{source}: [[{category}]] {k + 1}{name}{line}"))
+    return out
+
+
+def _add_all(model: Model, entries: list[Entry]) -> None:
+    """Add every element; those that name others further down in the file come after them."""
+    waiting = entries
+    while waiting:
+        failed: list[Entry] = []
+        errors: list[ModelError] = []
+        for entry in waiting:
+            try:
+                _add(model, *entry)
+            except ModelError as error:
+                failed.append(entry)
+                errors.append(error)
+        if len(failed) == len(waiting):
+            raise errors[0]
+        if failed and all(category not in ("sensors", "forces", "drivers") for category, _, _ in failed):
+            raise errors[0]  # only these can name one another
+        waiting = failed
+    place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
+    for category in ("sensors", "forces", "drivers"):
+        getattr(model, category).sort(key=lambda e: place[e.name])
 
 
 def _parsed(text: str, source: str) -> dict[str, Any]:
@@ -185,7 +248,7 @@ def _header_lines(text: str) -> dict[str, list[int]]:
 
 def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
     fields = dict(table)
-    cls = _kind(category, fields, where) if category in MANY_KINDS else ONE_KIND[category]
+    cls = ONE_KIND[category] if category in ONE_KIND else _kind(category, fields, where)
     if "name" not in fields:
         raise ModelError(f'{where}: it has no name; add name = "..."')
     try:
@@ -196,14 +259,15 @@ def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> N
 
 def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
     """The class that the table's ``type`` names."""
-    import importlib
-
-    importlib.import_module(f"..{category}", __package__)
-    known = sorted(
-        k
-        for k, c in Element.registry.items()
-        if issubclass(c, MANY_KINDS[category]) and c.__module__.count(f".{category}.")
-    )
+    if category == "sensors":
+        known = sorted(SENSORS)
+        fields.setdefault("type", "Sensor")
+    else:
+        base, room = MANY_KINDS[category]
+        importlib.import_module(f"..{room}", __package__)
+        known = sorted(
+            k for k, c in Element.registry.items() if issubclass(c, base) and c.__module__.count(f".{room}.")
+        )
     name = fields.pop("type", None)
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"

@@ -57,6 +57,14 @@ class Joint(Element):
     needs_axis: ClassVar[bool] = False
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
 
+    def ends(self) -> dict[str, str]:
+        """Role of each of its frames -> body or frame that it is on."""
+        return {"F": self.body_i, "M": self.body_j}
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Its frames in the world as drawn, if it says where they are; else they are those that it names."""
+        return None if n.at is None else dict(zip("FM", self.world_frames(n, planar), strict=True))
+
     def rows(self, planar: bool) -> list[Row]:
         """The rows that count: in the plane, those that speak of the normal are fulfilled anyway."""
         if not planar:
@@ -86,11 +94,25 @@ class Joint(Element):
             return np.column_stack([np.cross(normal, a), normal, a])
         return triad(a)
 
+    def measured(self, planar: bool) -> dict[str, Coordinate]:
+        """Its relative coordinates: in the plane, those along the normal fall away."""
+        if not planar:
+            return self.coordinates
+        return {k: c for k, c in self.coordinates.items() if self.planar_normal not in c.row.axes or not c.row.axes}
+
     def offset(self, n: SimpleNamespace, coordinate: str) -> float:
         """Value of a coordinate in the drawn configuration."""
         name = self.coordinates[coordinate].offset
         return getattr(n, name) if name else 0.0
 
-    def parameter(self, n: SimpleNamespace, row: Row, separation: float) -> float:
-        """Constant that the row's value is compared with (a length, for instance)."""
-        return 0.0
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """Parameters 0 to 6 of a row, given the drawn frames; the last is what its value is compared with."""
+        return row.par[:7]
+
+    def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
+        """Coefficient of a coordinate that is added to a row (``Row.plus``)."""
+        raise NotImplementedError
+
+    def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
+        """Splines that its rows read, as flat lists of numbers (see ``math.spline``)."""
+        return ()

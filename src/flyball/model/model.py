@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import copy
 import difflib
+import itertools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -11,14 +12,17 @@ import numpy as np
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
+from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
 from .expressions import law_expression, number, resolve_parameters
-from .force import BodyForce, Force, JointForce, TwoPointForce
+from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
 from .geometry import vector
 from .inertia import mass_properties
 from .joint import Joint
+from .sensor import IMU, Sensor
+from .table import Table
 
-CATEGORIES = ("bodies", "frames", "joints", "forces", "drivers", "initial")
+CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
 RESERVED = (GROUND, "energy", "t", "time")
 
 
@@ -62,6 +66,9 @@ class Model:
         self.bodies: list[Body] = []
         self.frames: list[Frame] = []
         self.joints: list[Joint] = []
+        self.couplings: list[Coupling] = []
+        self.tables: list[Table] = []
+        self.sensors: list[Sensor | IMU] = []
         self.forces: list[Force] = []
         self.drivers: list[Driver] = []
         self.initial: list[Initial] = []
@@ -125,7 +132,10 @@ class Model:
         last = None
         for e in elements:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
-                raise ModelError(f"cannot add {e!r}: it is no body, frame, joint, force, driver or initial condition")
+                raise ModelError(
+                    f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table or initial "
+                    f"condition"
+                )
             self._check_name(e)
             self._check_references(e)
             self.validate(e, self.environment())
@@ -148,7 +158,7 @@ class Model:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
 
     def _check_references(self, e: Element) -> None:
-        if isinstance(e, (Joint, TwoPointForce)):
+        if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
             carriers = [self.carrier(name, e) for name in (e.body_i, e.body_j)]
             if carriers[0] == carriers[1]:
                 raise ModelError(f"{e.title}: both its ends are on {carriers[0]!r}; it must join two different bodies")
@@ -158,10 +168,33 @@ class Model:
         elif isinstance(e, BodyForce):
             if self.carrier(e.body, e) == GROUND:
                 raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
-        elif isinstance(e, JointForce):
-            self.joint(e.joint, e, "angle")
+        elif isinstance(e, CoordinateForce):
+            self._check_path(e)
+        elif isinstance(e, Coupling):
+            for text in e.coupled():
+                self.coordinate(text, e)
+            e.examine(self)
+        elif isinstance(e, Sensor):
+            self.measured(e)
+        elif isinstance(e, IMU):
+            if self.carrier(e.frame, e) == GROUND:
+                raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
         elif isinstance(e, (Driver, Initial)):
             self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
+
+    def _check_path(self, e: CoordinateForce) -> None:
+        """What it acts along exists, and can move."""
+        if e.coordinate_text():
+            owner, what = self.coordinate(e.coordinate_text(), e)
+            if hasattr(e, "joint") and not isinstance(owner, Joint):
+                self.joint(e.joint, e, what)  # a body's angle is no joint's
+        carriers = [self.carrier(name, e) for name in e.ends().values()]
+        for k, (a, b) in enumerate(itertools.pairwise(carriers)):
+            if a == b:
+                raise ModelError(
+                    f"{e.title}: points {k + 1} and {k + 2} are both on {a!r}, so the rope between them never changes "
+                    f"its length; leave one out"
+                )
 
     def body(self, name: str, e: Element) -> Body:
         """The body of that name, as asked for by e."""
@@ -184,9 +217,12 @@ class Model:
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
             raise ModelError(f"{e.title}: there is no joint named {name!r}{suggest(name, names)}; {listing(names)}")
-        if coordinate not in found.coordinates:
-            has = ", ".join(found.coordinates) or "none"
-            raise ModelError(f"{e.title}: {found.title} has no coordinate {coordinate!r}; it has {has}")
+        has = found.measured(self.planar)
+        if coordinate not in has:
+            raise ModelError(
+                f"{e.title}: {found.title} has no coordinate {coordinate!r}{suggest(coordinate, has)}; it has "
+                f"{', '.join(has) or 'none'}"
+            )
         return found
 
     def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
@@ -194,13 +230,55 @@ class Model:
         owner, _, what = text.partition(".")
         found = self._names.get(owner)
         if isinstance(found, (Body, Frame)):
-            axes = "xy" if self.planar else "xyz"
-            if what not in tuple(axes):
+            axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
+            if what not in axes:
                 raise ModelError(f"{e.title}: {owner!r} has the coordinates {', '.join(axes)}, not {what!r}")
             return found, what
         if not what:
             raise ModelError(f"{e.title}: {text!r} is no coordinate; write joint.coordinate, for instance 'A.angle'")
         return self.joint(owner, e, what), what
+
+    def measured(self, e: Sensor) -> tuple[str, str, int] | None:
+        """What a sensor measures, as (kind, coordinate or name, order): order 0 the value, 1 its rate.
+
+        The kind is ``"coordinate"``, ``"force"`` (the quantity that a force acts along), ``"spin"`` (angular velocity
+        in space), or None for an output that laws cannot use.
+
+        Raises
+        ------
+        ModelError
+            If there is no such part; its curves are known once there is a result.
+        """
+        owner, _, what = e.of.partition(".")
+        found = self._names.get(owner)
+        if owner == "energy" and what:
+            return None
+        if found is None or not what:
+            known = list(self._names)
+            raise ModelError(
+                f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
+                f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
+            )
+        if isinstance(found, (Body, Frame)):
+            return self._measured_point(owner, what)
+        if isinstance(found, Joint):
+            return _measured_joint(found, what, found.measured(self.planar))
+        if isinstance(found, (TwoPointForce, CoordinateForce)):
+            order = list(found.outputs).index(what) if what in found.outputs else 2
+            return ("force", owner, order) if order < 2 else None
+        return None
+
+    def _measured_point(self, owner: str, what: str) -> tuple[str, str, int] | None:
+        axes = "xy" if self.planar else "xyz"
+        if what in tuple(axes) or (self.planar and what == "angle"):
+            return "coordinate", f"{owner}.{what}", 0
+        if len(what) == 2 and what[0] == "v" and what[1] in axes:
+            return "coordinate", f"{owner}.{what[1]}", 1
+        if self.planar and what == "omega":
+            return "coordinate", f"{owner}.angle", 1
+        if not self.planar and what in ("omega_x", "omega_y", "omega_z"):
+            return "spin", f"{owner}.{what[-1]}", 1
+        return None
 
     def validate(self, e: Element, env: dict[str, float]) -> None:
         """Resolve the element's numbers and refuse those that make no sense."""
@@ -211,8 +289,12 @@ class Model:
             self._check_body(e, n, env)
         elif isinstance(e, Joint):
             self._check_joint(e, n)
-        elif isinstance(e, TwoPointForce) and n.at is not None:
-            e.world_points(n, self.planar)
+        elif isinstance(e, Force):
+            e.placed(n, self.planar)
+            if isinstance(e, TwoFrameForce) and n.at is None:
+                self._check_by_frames(e)
+        elif isinstance(e, (Driver, Initial)):
+            self._check_told(e, env)
 
     def _check_laws(self, e: Element) -> None:
         for name, of in fields_with(e.__class__, LawOf).items():
@@ -220,24 +302,49 @@ class Model:
             for law in value if isinstance(value, tuple) else (value,):
                 self.law(law, of, f"{name} of {e.title}")
         if isinstance(e, Driver):
-            self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}")
+            self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
     def unit(self, text: str, e: Element) -> str:
         """Unit of a coordinate."""
         owner, what = self.coordinate(text, e)
-        return owner.coordinates[what].unit if isinstance(owner, Joint) else "m"
+        if isinstance(owner, Joint):
+            return owner.coordinates[what].unit
+        return "rad" if what == "angle" else "m"
 
-    def law(self, value: Any, of: LawOf, where: str) -> Any:
-        """A law as an expression of t, its inputs and parameters; refused if it uses any other name."""
+    def law(self, value: Any, of: LawOf, where: str, driver: bool = False) -> Any:
+        """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
         if value is None:
             return None
+        tables = {x.name: x for x in self.tables}
+        sensors = {x.name: x for x in self.sensors if isinstance(x, Sensor)}
         try:
-            expression = law_expression(value, of.dimension, where)
-            expression.require(["t", *of.inputs, *self.parameters])
+            expression = law_expression(value, of.dimension, where, tables=tables)
+            expression.require(["t", *of.inputs, *sensors, *self.parameters])
         except ExpressionError as error:
             text = str(error)
             raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
+        for name in sorted(expression.names & set(sensors)):
+            self._check_sensed(sensors[name], where, driver)
         return expression
+
+    def _check_sensed(self, e: Sensor, where: str, driver: bool) -> None:
+        """Whether a law may use a sensor."""
+        found = self.measured(e)
+        if found is None:
+            raise ModelError(
+                f"{where}: sensor {e.name!r} measures {e.of!r}, which is known only after the accelerations are; laws "
+                f"can use positions, angles, lengths and their rates"
+            )
+        if driver and found[2] > 0:
+            raise ModelError(
+                f"{where}: sensor {e.name!r} measures {e.of!r}, a rate; a driver follows positions and angles only. "
+                f"For a controller use an Actuator or a Motor"
+            )
+
+    def _check_told(self, e: Driver | Initial, env: Mapping[str, float]) -> None:
+        """An initial condition says something."""
+        if isinstance(e, Initial) and e.value is None and e.rate is None:
+            raise ModelError(f"{e.title}: it gives neither value nor rate; give value=, rate=, or both")
 
     def _check_body(self, e: Body, n: Any, env: dict[str, float]) -> None:
         mass_properties(e, n, env, self.planar)
@@ -258,9 +365,23 @@ class Model:
         if not self.planar and not e.spatial:
             raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use Prismatic")
         if n.at is not None:
-            e.world_frames(n, self.planar)
-        elif all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
+            F, M = e.world_frames(n, self.planar)
+            for row in e.rows(self.planar):
+                e.constants(n, row, F, M)
+        else:
+            self._check_by_frames(e)
+
+    def _check_by_frames(self, e: Joint | TwoFrameForce) -> None:
+        """What is not placed by ``at`` names frames."""
+        if all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
             raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
+
+
+def _measured_joint(joint: Joint, what: str, own: Mapping) -> tuple[str, str, int] | None:
+    if what in own:
+        return "coordinate", f"{joint.name}.{what}", 0
+    name = next(iter(own)) if what == "rate" and len(own) == 1 else what.removesuffix("_rate")
+    return ("coordinate", f"{joint.name}.{name}", 1) if name in own else None
 
 
 def suggest(name: str, known: Any) -> str:

@@ -7,8 +7,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..model.force import BodyForce
-from .views import DriverView, ForceView, JointView, PointView, View
+from ..model.force import BodyForce, TwoFrameForce
+from .views import View
+from .views.forces import ForceView
+from .views.joints import JointView
+from .views.points import PointView
 
 if TYPE_CHECKING:
     from .result import Result
@@ -47,7 +50,7 @@ def labelled(result: Result, most: float = np.inf) -> Iterator[Labelled]:
 
     Energies only, where the mechanism has so many parts that there would be more than ``most`` quantities.
     """
-    parts = [e for e in result.model.elements() if e.category != "initial"]
+    parts = [e for e in result.model.elements() if e.category not in ("initial", "tables")]
     for e in parts if len(POINT) * len(parts) <= most else ():
         for what, unit, values, note in _of(result[e.name], result.planar):
             yield Labelled(f"{e.name}.{what}", _dims(what, values), unit, values, note)
@@ -69,16 +72,16 @@ def _of(view: View, planar: bool) -> Iterator[Quantity]:
         for what in (k for k in POINT if k != ("quaternion" if planar else "angle")):
             yield what, POINT[what], getattr(view, what), ""
     elif isinstance(view, JointView):
-        yield from _joint(view)
+        yield from _joint(view, planar)
     elif isinstance(view, ForceView):
         yield from _force(view, planar)
-    elif isinstance(view, DriverView):
+    else:
         for what, (unit, values) in view.channels().items():
             yield what, unit, values, ""
 
 
-def _joint(view: JointView) -> Iterator[Quantity]:
-    for what, c in view.element.coordinates.items():
+def _joint(view: JointView, planar: bool) -> Iterator[Quantity]:
+    for what, c in view.element.measured(planar).items():
         yield what, c.unit, getattr(view, what), ""
         yield f"{what}_rate", f"{c.unit}/s", getattr(view, f"{what}_rate"), ""
         yield f"{what}_acceleration", f"{c.unit}/s^2", getattr(view, f"{what}_acceleration"), ""
@@ -91,11 +94,12 @@ def _joint(view: JointView) -> Iterator[Quantity]:
 
 def _force(view: ForceView, planar: bool) -> Iterator[Quantity]:
     e = view.element
-    if isinstance(e, BodyForce):
+    if isinstance(e, (BodyForce, TwoFrameForce)):
         force, torque = view.wrench
-        yield "force", "N", force[:, :2] if planar else force, f"on {e.body}, world axes"
-        yield "torque", "N*m", torque[:, 2] if planar else torque, f"on {e.body}, world axes"
-    for what, unit in e.outputs.items():
-        yield what, unit, getattr(view, what), ""
+        on = f"on {e.ends()['M']}, world axes"
+        yield "force", "N", force[:, :2] if planar else force, on
+        yield "torque", "N*m", torque[:, 2] if planar else torque, on
+    for what in e.outputs:
+        yield what, view.unit(what), getattr(view, what), ""
     for what, unit in (("energy", "J"), ("power", "W"), ("work", "J")):
         yield what, unit, getattr(view, what), ""

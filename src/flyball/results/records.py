@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ..constraints.angle import row as angle_row
-from ..constraints.angle import unwrapped
 from ..math.vec import add, cross, load3, load9, scale, sub
 from ..model.joint import Coordinate, Joint
 from ..system.records import at_rest, carried, load
@@ -89,22 +86,3 @@ def turned(record: Record, turn: Any) -> Record:
     from ..math.vec import mm
 
     return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])
-
-
-def initial_turns(x: Values, y: np.ndarray, known: Mapping[str, float] | None = None) -> None:
-    """Start the states that count the turns of angles at the angles' first values.
-
-    ``known`` tells what some of them are meant to be (``"joint.coordinate"`` -> value), whole turns included.
-    """
-    s, S = x.structure, x.system
-    if not len(S.angle_i):
-        return
-    q, v = y[: s.nq], y[s.nq : s.nq + s.nv]
-    r = Records(x, q[None, :], v[None, :], 0 * v[None, :])
-    for F, M, state in S.angle_i:
-        name, what = s.states[state].split(".")
-        joint = s.model[name]
-        c = joint.coordinates[what]
-        raw = float(angle_row((0.0,) * 8, r.frame(F), r.frame(M))[0][0]) + c.sign * joint.offset(x.numbers[name], what)
-        meant = (known or {}).get(s.states[state])
-        y[s.nq + s.nv + state] = raw if meant is None else unwrapped(raw, c.sign * meant)

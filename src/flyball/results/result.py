@@ -13,6 +13,7 @@ from ..model.model import Model, suggest
 from ..system.values import Values
 from .energy import Energy
 from .health import Health
+from .measured import Measured
 from .records import Records
 from .views import View, view
 
@@ -67,6 +68,11 @@ class Result:
         """Kinematics of every body and frame at the output times."""
         return Records(self.values, self.q, self.v, self.vdot)
 
+    @cached_property
+    def measured(self) -> Measured:
+        """Quantities that forces act along and that laws name."""
+        return Measured(self)
+
     def __getitem__(self, name: str) -> Any:
         """A part by its name, or one of its curves by ``"part.curve"``."""
         if "." in name:
@@ -99,7 +105,7 @@ class Result:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""
         out: dict[str, tuple[str, np.ndarray]] = {}
         for e in self.model.elements():
-            if e.category != "initial":
+            if e.category not in ("initial", "tables"):
                 out |= {f"{e.name}.{k}": c for k, c in self[e.name].channels().items()}
         return out | {f"energy.{k}": c for k, c in self.energy.channels().items()}
 

@@ -1,49 +1,97 @@
-"""The only file that lists kinds: constraint terms and forces. Adding a force adds one line here."""
+"""The only file that lists kinds: constraint terms and forces. Adding one adds one case here."""
 
 from __future__ import annotations
 
-from .. import forces as F
+from .. import forces as element
 from .._jit import formula
-from ..constraints import alignment, along, angle, coincident, distance, perpendicular
-from .loads import each_force
-from .rows import begin, each_bias, each_value, end
-from .tables import GAMMA, NU_DOT
+from ..constraints import (
+    alignment,
+    along,
+    angle,
+    blade,
+    coincident,
+    curve,
+    distance,
+    perpendicular,
+    rolling,
+    skew,
+    spin,
+)
+from .rows import begin, begin_biases, each_bias, each_value, end, end_biases, rare_biases, rare_values
+from .tables import TERM_KINDS
+
+RARE = 5  # kinds below have loops of their own; from here on they share one: nearly as fast, much less to compile
 
 
 @formula
-def each_kind(S, W, visit):
-    """Visit the terms of every kind that motions are made of, with its formula."""
-    visit(S, W, coincident.KIND, coincident.row)
-    visit(S, W, along.KIND, along.row)
-    visit(S, W, perpendicular.KIND, perpendicular.row)
-    visit(S, W, distance.KIND, distance.row)
-    visit(S, W, angle.KIND, angle.row)
+def rare(kind, par, F, M, hint, data):
+    """The formula of one of the other kinds."""
+    if kind == alignment.KIND_AXIS:
+        return alignment.axis_row(par, F, M, hint, data)
+    if kind == alignment.KIND_FULL:
+        return alignment.full_row(par, F, M, hint, data)
+    if kind == skew.KIND:
+        return skew.row(par, F, M, hint, data)
+    if kind == curve.KIND:
+        return curve.row(par, F, M, hint, data)
+    if kind == rolling.KIND:
+        return rolling.row(par, F, M, hint, data)
+    if kind == blade.KIND:
+        return blade.row(par, F, M, hint, data)
+    return spin.row(par, F, M, hint, data)
 
 
 @formula
-def row_values(S, W, t):
-    """Values, Jacobian and rates of all constraint rows, from the poses."""
-    begin(S, W, t)
-    each_kind(S, W, each_value)
-    # for assembly only: these have no acceleration term
-    each_value(S, W, alignment.KIND_AXIS, alignment.axis_row)
-    each_value(S, W, alignment.KIND_FULL, alignment.full_row)
-    end(S, W)
+def row_values(S, W, t, z):
+    """Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
+    begin(S, W)
+    each_value(S, W, z, coincident.KIND, coincident.row)
+    each_value(S, W, z, along.KIND, along.row)
+    each_value(S, W, z, perpendicular.KIND, perpendicular.row)
+    each_value(S, W, z, distance.KIND, distance.row)
+    each_value(S, W, z, angle.KIND, angle.row)
+    rare_values(S, W, z, RARE, TERM_KINDS, rare)
+    end(S, W, t)
 
 
 @formula
-def row_biases(S, W):
-    """Gamma of all constraint rows, from poses and velocities."""
-    for k in range(S.row_i.shape[0]):
-        W.row[GAMMA, k] = W.row[NU_DOT, k]
-    each_kind(S, W, each_bias)
+def row_biases(S, W, t, v, z):
+    """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
+    begin_biases(S, W, v)
+    each_bias(S, W, z, coincident.KIND, coincident.row)
+    each_bias(S, W, z, along.KIND, along.row)
+    each_bias(S, W, z, perpendicular.KIND, perpendicular.row)
+    each_bias(S, W, z, distance.KIND, distance.row)
+    each_bias(S, W, z, angle.KIND, angle.row)
+    rare_biases(S, W, z, RARE, TERM_KINDS, rare)
+    end_biases(S, W, t)
 
 
 @formula
-def forces(S, W, t, z, work):
-    """Wrenches of all force elements on their bodies; the power of accounted elements in ``work``."""
-    each_force(S, W, t, z, work, F.spring_damper.KIND, F.spring_damper.inputs, F.spring_damper.wrench)
-    each_force(S, W, t, z, work, F.torsional_spring.KIND, F.torsional_spring.inputs, F.torsional_spring.wrench)
-    each_force(S, W, t, z, work, F.point_force.KIND, F.point_force.inputs, F.point_force.wrench)
-    each_force(S, W, t, z, work, F.point_torque.KIND, F.point_torque.inputs, F.point_torque.wrench)
-    each_force(S, W, t, z, work, F.motor.KIND, F.motor.inputs, F.motor.wrench)
+def inputs(kind, par, F, M):
+    """What the laws of a force between frames may depend on."""
+    if kind == element.spring_damper.KIND:
+        return element.spring_damper.inputs(par, F, M)
+    return element.point_force.inputs(par, F, M)
+
+
+@formula
+def wrench(kind, par, F, M, laws, values):
+    """Wrench of a force between frames on M."""
+    if kind == element.spring_damper.KIND:
+        return element.spring_damper.wrench(par, F, M, laws, values)
+    if kind == element.point_force.KIND:
+        return element.point_force.wrench(par, F, M, laws, values)
+    if kind == element.point_torque.KIND:
+        return element.point_torque.wrench(par, F, M, laws, values)
+    return element.bushing.wrench(par, F, M, laws, values)
+
+
+@formula
+def effort(kind, par, x, rate, laws, load):
+    """Force along a measured quantity."""
+    if kind == element.coordinate_spring.KIND:
+        return element.coordinate_spring.effort(par, x, rate, laws, load)
+    if kind == element.rope.KIND:
+        return element.rope.effort(par, x, rate, laws, load)
+    return element.joint_friction.effort(par, x, rate, laws, load)

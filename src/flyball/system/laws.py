@@ -3,11 +3,13 @@
 A program is ``[count, depth, operation, operand, operation, operand, ...]`` in a shared list of integers, run on a
 stack of numbers. Its constants are slots of one table, parameters first, so that a new value of a parameter is a new
 number in the table and nothing is compiled again. There are two readers of the same program: `evaluate` gives the
-value, `evaluate_jet` the value and its first two derivatives by time. Each carries the row of one derivative order
+value, `evaluate_jet` the value and its first two derivatives. Each carries the row of one derivative order
 through the operations by the chain rule; what a function's value and slopes are is said once, in `value` and `slopes`.
 """
 
 from __future__ import annotations
+
+import math
 
 from .._jit import formula
 from ..math.scalar import (
@@ -34,6 +36,8 @@ from ..math.scalar import (
     tan,
     tanh,
 )
+from ..math.spline import spline
+from .call import called
 from .opcodes import (
     ABS,
     ACOS,
@@ -41,14 +45,17 @@ from .opcodes import (
     ASIN,
     ATAN,
     ATAN2,
+    BY_MOTION,
     CALL,
     CONSTANT,
     COS,
     COSH,
+    COUNT,
     CUBIC,
     DIVIDE,
     EXP,
     FREEZE,
+    FUNCTION,
     INPUT,
     LESS,
     LOG,
@@ -59,11 +66,13 @@ from .opcodes import (
     NOT,
     POWER,
     QUINTIC,
+    SENSOR,
     SIGN,
     SIN,
     SINH,
     SQRT,
     SUBTRACT,
+    TABLE,
     TAN,
     TANH,
     WHERE,
@@ -72,8 +81,11 @@ from .opcodes import (
 
 
 @formula
-def evaluate(code, const, at, stack, x):
-    """Value of the law that starts at `at`, for the inputs x = (t, ...), all of one type; `stack` is scratch."""
+def evaluate(code, const, at, stack, x, sensed):
+    """Value of the law that starts at `at`; `stack` is scratch.
+
+    The inputs x = (t, ...) are all of one type, and `sensed` holds the values of the sensors in its first row.
+    """
     top = -1
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
@@ -84,10 +96,18 @@ def evaluate(code, const, at, stack, x):
         elif operation == INPUT:
             top += 1
             stack[top, 0] = x[operand]
+        elif operation == SENSOR:
+            top += 1
+            stack[top, 0] = sensed[0, operand]
         elif operation == CALL:
             stack[top, 0] = value(operand, stack[top, 0])
         elif operation == WHOLE_POWER:
             stack[top, 0] = integer_power(stack[top, 0], operand)
+        elif operation == TABLE:
+            stack[top, 0] = spline(const, operand, stack[top, 0])[0]
+        elif operation == FUNCTION:
+            top += 1 - code[operand + COUNT]
+            stack[top, 0] = called(code, operand, stack, top)
         elif operation == WHERE:
             top -= 2
             stack[top, 0] = stack[top + 1, 0] if stack[top, 0].real > 0.5 else stack[top + 2, 0]
@@ -98,8 +118,13 @@ def evaluate(code, const, at, stack, x):
 
 
 @formula
-def evaluate_jet(code, const, at, stack, t):
-    """Value, first and second time derivative of a law of time alone; `stack` is scratch of 3 columns."""
+def evaluate_jet(code, const, at, stack, t, sensed, seed):
+    """Value, first and second derivative of a law of time and sensors; `stack` is scratch of 3 columns.
+
+    The rows of `sensed` are the sensors' values and their first two time derivatives. `seed` says by what to derive:
+    BY_MOTION, time with the sensors moving along; BY_TIME, time with the sensors held; k >= 0, the value of sensor k
+    alone.
+    """
     top = -1
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
@@ -109,10 +134,18 @@ def evaluate_jet(code, const, at, stack, t):
             put(stack, top, const[operand], 0.0, 0.0)
         elif operation == INPUT:
             top += 1
-            put(stack, top, t, 1.0, 0.0)
-        elif operation == CALL or operation == WHOLE_POWER:
+            put(stack, top, t, 1.0 if seed < 0 else 0.0, 0.0)
+        elif operation == SENSOR:
+            top += 1
+            if seed == BY_MOTION:
+                put(stack, top, sensed[0, operand], sensed[1, operand], sensed[2, operand])
+            else:
+                put(stack, top, sensed[0, operand], 1.0 if seed == operand else 0.0, 0.0)
+        elif operation == CALL or operation == WHOLE_POWER or operation == TABLE:
             v = stack[top, 0]
-            if operation == CALL:
+            if operation == TABLE:
+                f, f1, f2 = spline(const, operand, v)
+            elif operation == CALL:
                 f = value(operand, v)
                 f1, f2 = slopes(operand, v, f)
             else:
@@ -125,6 +158,9 @@ def evaluate_jet(code, const, at, stack, t):
             put(stack, top, stack[k, 0], stack[k, 1], stack[k, 2])
         elif operation == FREEZE:
             put(stack, top, stack[top, 0], 0.0, 0.0)
+        elif operation == FUNCTION:  # its derivatives are not known
+            top += 1 - code[operand + COUNT]
+            put(stack, top, math.nan, math.nan, math.nan)
         else:
             top -= 1
             combine_jets(operation, stack, top)

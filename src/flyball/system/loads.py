@@ -8,10 +8,26 @@ from __future__ import annotations
 
 from .._jit import formula
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
+from .dispatch import effort, inputs, wrench
 from .laws import evaluate
 from .records import load
-from .rows import parameters
-from .tables import FORCE_F, FORCE_LAW, FORCE_M, FORCE_TURNS, FORCE_WORK, INERTIA, MASS, NV, PARENT, TERM_KINDS, V0
+from .tables import (
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_KIND,
+    FORCE_LAW,
+    FORCE_LOAD,
+    FORCE_M,
+    FORCE_WORK,
+    INERTIA,
+    LOAD,
+    MASS,
+    NV,
+    PARENT,
+    RATE,
+    V0,
+    VALUE,
+)
 from .tree import project
 
 
@@ -43,30 +59,80 @@ def law(S, W, k, slot, x):
     at = S.force_i[k, FORCE_LAW + slot]
     if at < 0:
         return 0.0 * x[0]
-    return evaluate(S.code, S.const, at, W.stack, x)
+    return evaluate(S.code, S.const, at, W.stack, x, W.sensed)
 
 
 @formula
-def each_force(S, W, t, z, work, kind, inputs, wrench):
-    """Apply every force of one kind; the power of accounted ones goes to their work state."""
-    base = TERM_KINDS + 1 + kind
-    for k in range(S.kinds[base], S.kinds[base + 1]):
+def wide(T, k):
+    """The sixteen parameters of row k of the force table."""
+    return (
+        T[k, 0],
+        T[k, 1],
+        T[k, 2],
+        T[k, 3],
+        T[k, 4],
+        T[k, 5],
+        T[k, 6],
+        T[k, 7],
+        T[k, 8],
+        T[k, 9],
+        T[k, 10],
+        T[k, 11],
+        T[k, 12],
+        T[k, 13],
+        T[k, 14],
+        T[k, 15],
+    )
+
+
+@formula
+def forces(S, W, t, work):
+    """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 1:
+            continue
+        kind = S.force_i[k, FORCE_KIND]
         i = S.force_i[k, FORCE_F]
         j = S.force_i[k, FORCE_M]
         F = load(W.FK, i)
         M = load(W.FK, j)
-        par = parameters(S.force_x, k)
-        turns = S.force_i[k, FORCE_TURNS]
-        a, b = inputs(par, F, M, z[turns] if turns >= 0 else 0.0 * par[0])
+        par = wide(S.force_x, k)
+        a, b = inputs(kind, par, F, M)
         x = (t + 0.0 * a, a, b)
-        force, torque = wrench(par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
+        force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
         if S.frame_i[j] >= 0:
             act(W, S.frame_i[j], 1.0, force, torque, M[0])
         if S.frame_i[i] >= 0:
             act(W, S.frame_i[i], -1.0, force, torque, M[0])
         if S.force_i[k, FORCE_WORK] >= 0:
-            u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
-            work[S.force_i[k, FORCE_WORK]] = dot(force, u) + dot(torque, sub(M[2], F[2]))
+            work[S.force_i[k, FORCE_WORK]] = power(F, M, force, torque)
+
+
+@formula
+def power(F, M, force, torque):
+    """Power [W] of a wrench on M at M's origin, and of its reverse on F's body at the same point."""
+    u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
+    return dot(force, u) + dot(torque, sub(M[2], F[2]))
+
+
+@formula
+def efforts(S, W, t, work, f):
+    """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 0:
+            continue
+        m = S.force_i[k, FORCE_F]
+        x = W.sensed[VALUE, m]
+        rate = W.sensed[RATE, m]
+        o = 0.0 * x
+        pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
+        laws = (law(S, W, k, 0, (t + o, x, rate)), o, o)
+        s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed)
+        r = S.row_i.shape[0] + m
+        for e in range(S.row_p[r], S.row_p[r + 1]):
+            f[S.col_i[e]] += s * W.G[e]
+        if S.force_i[k, FORCE_WORK] >= 0:
+            work[S.force_i[k, FORCE_WORK]] = s * rate
 
 
 @formula

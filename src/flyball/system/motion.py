@@ -1,4 +1,4 @@
-"""The motion as an ordinary differential equation: y = (q, v, z), z the work of accounted elements and turned angles.
+"""The motion as an ordinary differential equation: y = (q, v, z), z being works, turned angles, places on curves.
 
 Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g = 0 and G v = nu are kept by one smooth
 projection P, along M^-1 G^T; the integrator sees f(P(y)), so its order is kept.
@@ -7,13 +7,15 @@ projection P, along M^-1 G^T; the integrator sees f(P(y)), so its order is kept.
 from __future__ import annotations
 
 from .._jit import formula
+from ..constraints import curve
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
-from .dispatch import forces, row_biases, row_values
+from .dispatch import row_biases, row_values
+from .friction import CONVERGED, SUBSTITUTIONS, improve, returned
 from .kinematics import motions, poses
-from .loads import gather, inertial
+from .loads import efforts, forces, gather, inertial
 from .records import load
-from .rows import row_times
+from .rows import parameters, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
@@ -33,6 +35,9 @@ from .tables import (
     ROW_WORK,
     STABILIZE,
     STATUS,
+    TERM_F,
+    TERM_HINT,
+    TERM_M,
     TOL_G,
     TOL_V,
     V3,
@@ -43,7 +48,7 @@ from .tables import (
 from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
-NOT_CLOSED, NOT_FINITE = 2, 3
+NOT_CLOSED, NOT_FINITE, JAMMED = 2, 3, 4
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
@@ -53,18 +58,18 @@ FAR = 1e3  # a state this far off is given up at once
 
 
 @formula
-def place(S, W, t, q):
-    """Poses, and the constraint rows as far as they follow from them: g, G, nu."""
+def place(S, W, t, q, z):
+    """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
     W.info[EVALUATIONS] += 1
     poses(S, W, q)
-    row_values(S, W, t)
+    row_values(S, W, t, z)
 
 
 @formula
-def move(S, W, v):
-    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma."""
+def move(S, W, t, v, z):
+    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
     motions(S, W, v)
-    row_biases(S, W)
+    row_biases(S, W, t, v, z)
 
 
 @formula
@@ -98,7 +103,7 @@ def drift(S, W, v, out):
 
 
 @formula
-def settle(S, W, t, q, v, tol_g, tol_v):
+def settle(S, W, t, q, v, z, tol_g, tol_v):
     """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
     Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. Accepted states are taken
@@ -112,9 +117,9 @@ def settle(S, W, t, q, v, tol_g, tol_v):
     step = W.vel[V3]
     r = W.row[R2]
     normalise(S, q)
-    place(S, W, t, q)
+    place(S, W, t, q, z)
     if r.shape[0] == 0:
-        move(S, W, v)
+        move(S, W, t, v, z)
         return 0, 0.0, False
     worst = violation(W, r)
     found = worst
@@ -134,7 +139,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
         last = worst
         solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         retract(S, q, step)
-        place(S, W, t, q)
+        place(S, W, t, q, z)
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
@@ -150,7 +155,7 @@ def settle(S, W, t, q, v, tol_g, tol_v):
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    move(S, W, v)
+    move(S, W, t, v, z)
     return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
 
 
@@ -161,9 +166,6 @@ def accelerate(S, W, t, p, dy, factored):
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
-    inertial(S, W)
-    forces(S, W, t, p[nq + nv :], work)
-    gather(S, W, W.vel[F_APPLIED])
     if W.option[STABILIZE] == BAUMGARTE:
         a = 2.0 * W.option[ALPHA]
         b = W.option[BETA] * W.option[BETA]
@@ -172,27 +174,67 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
-    if (
-        not factored
-        or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
-    ):
-        status = factor(S, W)
-        if status != 0:
-            return status
-        solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
+    # joints with friction need the solution to know their loads: again until these return themselves
+    for attempt in range(SUBSTITUTIONS):
+        inertial(S, W)
+        forces(S, W, t, work)
+        gather(S, W, W.vel[F_APPLIED])
+        efforts(S, W, t, work, W.vel[F_APPLIED])
+        if (
+            not factored
+            or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
+        ):
+            status = factor(S, W)
+            if status != 0:
+                return status
+            factored = True
+            solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
+        if S.load_i.shape[0] == 0 or returned(S, W) <= CONVERGED:
+            break
+        if attempt == SUBSTITUTIONS - 1:
+            W.info[STATUS] = JAMMED
+            return JAMMED
+        improve(S, W, attempt)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]
     for k in range(S.row_i.shape[0]):
         if S.row_i[k, ROW_WORK] >= 0:
             work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
+    progress(S, W, p[nq + nv :], work)
+    W.info[STATUS] = finite(dy)
+    return W.info[STATUS]
+
+
+@formula
+def progress(S, W, z, dz):
+    """Rates of the states that count turns of angles and places on curves."""
     for k in range(S.angle_i.shape[0]):
         F = load(W.FK, S.angle_i[k, 0])
         M = load(W.FK, S.angle_i[k, 1])
-        n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M)[2]
-        work[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
-    W.info[STATUS] = finite(dy)
-    return W.info[STATUS]
+        n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
+        dz[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
+    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        par = parameters(S.term_x, k)
+        s = curve.foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
+        dz[S.term_i[k, TERM_HINT]] = curve.progress(par, F, M, s, S.const)[0]
+
+
+@formula
+def remember(S, W, z):
+    """Put the states that count turns and places where the poses in W say they are: no drift over long motions."""
+    for k in range(S.angle_i.shape[0]):
+        F = load(W.FK, S.angle_i[k, 0])
+        M = load(W.FK, S.angle_i[k, 1])
+        h = S.angle_i[k, 2]
+        z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
+    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        h = S.term_i[k, TERM_HINT]
+        z[h] = curve.foot(parameters(S.term_x, k), F, M, z[h], S.const)
 
 
 @formula
@@ -213,15 +255,16 @@ def derivative(t, y, dy, S, W):
         p[i] = y[i]
     q = p[:nq]
     v = p[nq : nq + W.vel.shape[1]]
+    z = p[nq + W.vel.shape[1] :]
     factored = False
     if W.option[STABILIZE] == STAGES:
-        status, _, factored = settle(S, W, t, q, v, W.option[TOL_G], W.option[TOL_V])
+        status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
             return status
     else:
         normalise(S, q)
-        place(S, W, t, q)
-        move(S, W, v)
+        place(S, W, t, q, z)
+        move(S, W, t, v, z)
     return accelerate(S, W, t, p, dy, factored)
 
 
@@ -231,16 +274,18 @@ def arrive(t, y, dy, S, W):
     nq = S.kinds[-2]
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]
+    z = y[nq + W.vel.shape[1] :]
     found = 0.0
     factored = False
     if W.option[STABILIZE] >= STEPS:
-        status, found, factored = settle(S, W, t, q, v, TIGHT_G * S.glob[LENGTH], TIGHT_V)
+        status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
             return status, found
     else:
         normalise(S, q)
-        place(S, W, t, q)
-        move(S, W, v)
+        place(S, W, t, q, z)
+        move(S, W, t, v, z)
+    remember(S, W, z)
     return accelerate(S, W, t, y, dy, factored), found
 
 

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
-CONSTANT, INPUT, CALL, WHOLE_POWER, WHERE, FREEZE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER = range(11)
-ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(11, 16)
+CONSTANT, INPUT, SENSOR, CALL, WHOLE_POWER, TABLE, FUNCTION, WHERE, FREEZE = range(9)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, ATAN2, MINIMUM, MAXIMUM, LESS, LESS_EQUAL = range(9, 19)
 NEGATE, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT, ABS, SIGN, CUBIC, QUINTIC, NOT = range(18)
+
+# what the operand of FUNCTION points to, in the code too
+ADDRESS, INDEX, COUNT = range(3)
+# values of ``seed`` of `evaluate_jet` besides the number of a sensor
+BY_MOTION, BY_TIME = -1, -2

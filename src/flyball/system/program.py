@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
+from types import MappingProxyType
 
 from ..errors import ExpressionError
 from ..model.expressions import Expression, folded
+from ..model.function import arguments
 from ..model.grammar import Node
+from .functions import Called
+from .native import native
 from .opcodes import (
     ADD,
     ATAN2,
@@ -14,6 +19,7 @@ from .opcodes import (
     CONSTANT,
     DIVIDE,
     FREEZE,
+    FUNCTION,
     INPUT,
     LESS,
     LESS_EQUAL,
@@ -22,7 +28,9 @@ from .opcodes import (
     MULTIPLY,
     NEGATE,
     POWER,
+    SENSOR,
     SUBTRACT,
+    TABLE,
     WHERE,
     WHOLE_POWER,
 )
@@ -34,23 +42,41 @@ _BINARY = {
     **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
 }
 _LARGEST_WHOLE_POWER = 64
+_NONE: Mapping[str, int] = MappingProxyType({})
 
 
 def compile_law(
-    expression: Expression, inputs: Sequence[str], parameters: Sequence[str], code: list[int], const: list[float]
+    expression: Expression,
+    inputs: Sequence[str],
+    parameters: Sequence[str],
+    code: list[int],
+    const: list[float],
+    *,
+    sensors: Mapping[str, int] = _NONE,
+    tables: Mapping[str, int] = _NONE,
+    functions: list[Called] | None = None,
+    derivatives: bool = False,
 ) -> tuple[int, int]:
     """Append the program of a law to the shared tables.
 
     Parameters
     ----------
     expression
-        The law, of the names in `inputs` and `parameters`.
+        The law, of the names in `inputs`, `parameters` and `sensors`.
     inputs
         Names of the measured quantities; the first is always "t", time [s].
     parameters
         Names of the parameters; their values are the first entries of `const`, in this order.
     code, const
         Tables that are appended to. A literal that is in `const` already is used again.
+    sensors
+        Names of sensors, and the columns of `sensed` that hold them.
+    tables
+        Names of the tables that laws may call, and where the `data()` of each begins in `const`.
+    functions
+        List that a law which is a Python function is appended to. Keep it as long as the code: addresses stand there.
+    derivatives
+        Whether the law is read by `evaluate_jet`.
 
     Returns
     -------
@@ -60,33 +86,66 @@ def compile_law(
     Raises
     ------
     ExpressionError
-        If a name is not known or means both an input and a parameter, or a constant part has no finite value.
+        If a name is not known or means two things, a constant part is not finite, or a function has no derivatives.
     """
     if not inputs or inputs[0] != "t" or len(const) < len(parameters):
         raise ValueError("the first input is 't', and const begins with one value for each parameter")
-    twice = sorted(expression.names & set(inputs) & set(parameters))
-    if twice:
-        raise ExpressionError(
-            f"'{expression}': '{twice[0]}' is an input of this law and also a parameter; rename the parameter"
-        )
-    expression.require([*inputs, *parameters])
-    writer = _Writer(expression, inputs, parameters, const)
-    writer.write(folded(_expand(expression.tree, inputs), expression.text))
+    _refuse_twins(expression, inputs, parameters, sensors)
+    known = [*inputs, *sensors, *parameters]
+    expression.require(known)
+    expression.require_tables(tables)
+    if derivatives:
+        expression.require_derivatives()
+    tree = expression.tree
+    if expression.function is not None:
+        args = tuple(arguments(tree, known))
+        tree = Node("function", args, _function(expression, args, code, functions))
+    writer = _Writer(expression, inputs, parameters, const, sensors, tables)
+    writer.write(folded(_expand(tree, writer.varying), expression.text))
     at = len(code)
     code += [len(writer.program) // 2, writer.deepest, *writer.program]
     return at, writer.deepest
+
+
+def _refuse_twins(
+    expression: Expression, inputs: Collection[str], parameters: Collection[str], sensors: Collection[str]
+) -> None:
+    """Refuse names that mean two things."""
+    input_, parameter, sensor = (inputs, "an input of this law"), (parameters, "a parameter"), (sensors, "a sensor")
+    for (names, what), (others, also) in ((input_, parameter), (input_, sensor), (parameter, sensor)):
+        for name in sorted(expression.names & set(names) & set(others)):
+            raise ExpressionError(f"'{expression}': '{name}' is {what} and also {also}; rename the {also[2:]}")
+
+
+def _function(expression: Expression, args: Sequence[Node], code: list[int], functions: list[Called] | None) -> int:
+    """Append what a call of the law's function needs to the code; where it stands there."""
+    if functions is None:
+        raise ValueError("a law that is a Python function needs a list to be kept in")
+    names = tuple("" if node.kind == "number" else node.value for node in args)
+    made = native(expression, len(names))
+    code += [made.address, len(functions), len(names)]
+    functions.append(Called(made, names, expression.text, expression.where))
+    return len(code) - 3
 
 
 class _Writer:
     """Writes the program of one law."""
 
     def __init__(
-        self, expression: Expression, inputs: Sequence[str], parameters: Sequence[str], const: list[float]
+        self,
+        expression: Expression,
+        inputs: Sequence[str],
+        parameters: Sequence[str],
+        const: list[float],
+        sensors: Mapping[str, int],
+        tables: Mapping[str, int],
     ) -> None:
         self.expression = expression
-        self.inputs = {name: k for k, name in enumerate(inputs)}
+        self.varying = {name: (INPUT, k) for k, name in enumerate(inputs)}
+        self.varying |= {name: (SENSOR, k) for name, k in sensors.items()}
         self.parameters = {name: k for k, name in enumerate(parameters)}
         self.const = const
+        self.tables = tables
         self.program: list[int] = []
         self.depth = self.deepest = 0
 
@@ -97,16 +156,16 @@ class _Writer:
 
     def write(self, node: Node, frozen: bool = False) -> None:
         """Write a node after its arguments; `frozen` means that a constant part around it is already marked."""
-        constant = frozen or not any(n.kind == "name" and n.value in self.inputs for n in node.walk())
+        constant = frozen or not any(n.kind == "name" and n.value in self.varying for n in node.walk())
         if node.kind == "number":
             return self.emit(CONSTANT, self.slot(float(node.value)), 1)
-        if node.kind == "name" and node.value in self.inputs:
-            return self.emit(INPUT, self.inputs[node.value], 1)
+        if node.kind == "name" and node.value in self.varying:
+            return self.emit(*self.varying[node.value], 1)
         if node.kind == "name":
             return self.emit(CONSTANT, self.parameters[node.value], 1)
         self.write_operation(node, constant)
         if constant and not frozen:
-            # Parts without an input have no derivatives, not even where a function's own slope is infinite.
+            # Parts without an input or a sensor have no derivatives, not even where a function's own slope is infinite.
             self.emit(FREEZE, 0, 0)
 
     def write_operation(self, node: Node, constant: bool) -> None:
@@ -117,6 +176,10 @@ class _Writer:
             self.emit(WHOLE_POWER, int(node.args[1].value), 0)
         elif node.kind in _UNARY:
             self.emit(CALL, _UNARY[node.kind], 0)
+        elif node.kind == "table":
+            self.emit(TABLE, self.tables[node.value], 0)
+        elif node.kind == "function":
+            self.emit(FUNCTION, node.value, 1 - len(node.args))
         elif node.kind == "where":
             self.emit(WHERE, 0, -2)
         else:
@@ -125,10 +188,11 @@ class _Writer:
 
     def slot(self, literal: float) -> int:
         """Place of a literal in the table of constants."""
-        first = len(self.parameters)
-        if literal not in self.const[first:]:
-            self.const.append(literal)
-        return self.const.index(literal, first)
+        for k in range(len(self.parameters), len(self.const)):
+            if self.const[k] == literal and math.copysign(1.0, self.const[k]) == math.copysign(1.0, literal):
+                return k
+        self.const.append(literal)
+        return len(self.const) - 1
 
 
 _SHAPES = {"step": "cubic", "step5": "quintic"}
@@ -139,19 +203,19 @@ def _is_whole(node: Node) -> bool:
     return node.kind == "number" and node.value == int(node.value) and abs(node.value) <= _LARGEST_WHOLE_POWER
 
 
-def _expand(node: Node, inputs: Collection[str]) -> Node:
+def _expand(node: Node, varying: Collection[str]) -> Node:
     """Write steps and powers with a varying exponent in terms of simpler operations."""
 
     def made(kind: str, *args: Node) -> Node:
         return Node(kind, args, None, node.start, node.stop)
 
-    args = tuple(_expand(arg, inputs) for arg in node.args)
+    args = tuple(_expand(arg, varying) for arg in node.args)
     if node.kind in _SHAPES:
         x, x0, y0, x1, y1 = args
         s = made("/", made("-", x, x0), made("-", x1, x0))
         s = made("min", made("max", s, Node("number", value=0.0)), Node("number", value=1.0))
         shape = made(_SHAPES[node.kind], s)
         return made("+", y0, made("*", made("-", y1, y0), shape))
-    if node.kind == "**" and any(n.kind == "name" and n.value in inputs for n in args[1].walk()):
+    if node.kind == "**" and any(n.kind == "name" and n.value in varying for n in args[1].walk()):
         return made("exp", made("*", made("log", args[0]), args[1]))
     return Node(node.kind, args, node.value, node.start, node.stop)

@@ -5,6 +5,7 @@ Runs again for every change of a parameter; nothing is compiled and no descripti
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from types import SimpleNamespace
@@ -12,13 +13,17 @@ from typing import Any
 
 import numpy as np
 
-from ..model.body import GROUND, Body, Frame
+from ..constraints import angle, curve
+from ..constraints.registry import FORMULAS
+from ..model.body import GROUND, Body
+from ..model.coupling import Coupling
 from ..model.element import resolve
-from ..model.force import BodyForce, JointForce, TwoPointForce
+from ..model.force import BodyForce, TwoPointForce
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
-from .structure import FrameSpec, Structure
+from .call import STACK_RESERVE
+from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
     BODY_R,
@@ -26,6 +31,7 @@ from .tables import (
     EXCESS,
     INERTIA,
     INVERSE,
+    INVERSE_JACOBIAN,
     MASS,
     PER_COMPACT,
     PER_MASS,
@@ -80,14 +86,14 @@ def values(
     body_x, semidefinite = _body_x(s, bodies, frame_x, length)
     if s.tree:
         _tree_frames(s, pose, bodies, body_x)
-    const = np.array(s.const or [0.0], float)
-    const[: len(model.parameters)] = [env[k] for k in model.parameters]
+    const, curve_at = _constants(s, numbers, env)
+    term_x = _term_x(s, pose, numbers, holds or {}, curve_at)
     glob = np.r_[model.gravity_vector(env), REGULARISATION, semidefinite, length]
     t = s.tables
     system = System(
-        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], _term_x(s, pose, numbers, holds or {}), t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"], t["kinds"],
-        t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
+        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"],
+        t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip
     q, v = _drawn_state(s, bodies, pose)
     return Values(s, system, q, v, numbers, bodies, length, pose)
@@ -102,7 +108,9 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
     arm = R @ m.com
     v = vector(n.velocity, planar, b.name) + np.cross(w, arm)
-    return SimpleNamespace(p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, c=p + arm, v=v, w=w, angle=n.angle)
+    return SimpleNamespace(
+        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
+    )
 
 
 class Poses:
@@ -111,6 +119,7 @@ class Poses:
     def __init__(self, s: Structure, numbers: dict[str, SimpleNamespace], bodies: dict[str, SimpleNamespace]) -> None:
         self.s, self.numbers, self.bodies = s, numbers, bodies
         self.model = s.model
+        self._found: dict[str, dict] = {}
 
     def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
         """Position from the body's centre of mass and rotation, in body axes."""
@@ -122,27 +131,27 @@ class Poses:
 
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         """Position, rotation and carrier of a frame in the drawn configuration."""
+        if f.element is None:
+            return np.zeros(3), np.eye(3), GROUND
         e = f.element
         n = self.numbers[e.name]
-        if isinstance(e, (Body, Frame)):
-            return *self.named(e.name), e.body if isinstance(e, Frame) else e.name
+        end = e.ends()[f.role]
+        name = self.model.carrier(end, e)
         if isinstance(e, BodyForce):
-            name = self.model.carrier(e.body, e)
-            p, R = self.named(e.body)
-            if isinstance(self.model[e.body], Body):
+            p, R = self.named(end)
+            if isinstance(self.model[end], Body):
                 at = getattr(n, "at", None)
                 p = self.bodies[name].c if at is None else vector(at, self.model.planar, e.title)
             return p, R, name
-        name = self.model.carrier(e.body_i if f.role == "F" else e.body_j, e)
-        if n.at is None:
-            p, R = self.named(e.body_i if f.role == "F" else e.body_j)
-        elif isinstance(e, TwoPointForce):
-            p, R = e.world_points(n, self.model.planar)[f.role == "M"], np.eye(3)
-        else:
-            p, R = e.world_frames(n, self.model.planar)[f.role == "M"]
+        p, R = self._placed(e, n)[f.role] if hasattr(e, "placed") and n.at is not None else self.named(end)
         if f.coordinate:
             R = R @ np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}"))
         return p, R, name
+
+    def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        if e.name not in self._found:
+            self._found[e.name] = e.placed(n, self.model.planar)
+        return self._found[e.name]
 
     def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Drawn pose of a body's reference frame or of a named frame."""
@@ -154,9 +163,35 @@ class Poses:
         return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
 
     def separation(self, e: Any) -> float:
-        """Drawn distance between the origins of an element's two frames."""
-        a, b = (self.world(FrameSpec(0, e, role))[0] for role in "FM")
-        return np.sqrt(((b - a) ** 2).sum())
+        """Drawn distance from the first of an element's frames to the last, by way of all between."""
+        points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
+        return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
+
+    def ends(self, e: Any) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Drawn frames F and M of a joint."""
+        F, M = (self.world(FrameSpec(0, e, role))[:2] for role in "FM")
+        return F, M
+
+    def axis(self, joint: str) -> np.ndarray:
+        """Axis of a joint's angle in the world as drawn."""
+        e = self.model[joint]
+        R = self.ends(e)[0][1]
+        turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
+        return (R @ np.array(turn) if len(turn) else R)[:, 2]
+
+    def drawn(self, t: TermSpec) -> float:
+        """What a term's formula gives in the drawn configuration."""
+        poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
+        F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
+        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.kind == angle.KIND else (*t.formula.par[:6], 0.0, 0.0)
+        return FORMULAS[t.formula.kind](par, F, M, self.turned(t.owner), None)[0]
+
+    def turned(self, owner: Any) -> float:
+        """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
+        if isinstance(owner, Joint) or not self.model.planar:
+            return 0.0
+        own = self.numbers[owner.name].angle
+        return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
 
 
 def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> float:
@@ -209,32 +244,68 @@ def _tree_frames(s: Structure, pose: Poses, bodies: dict, body_x: np.ndarray) ->
         body_x[child, BODY_P : BODY_P + 3], body_x[child, BODY_R : BODY_R + 9] = -R.T @ p, R.T.ravel()
 
 
-def _term_x(s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, float]) -> np.ndarray:
+def _constants(s: Structure, numbers: dict, env: Mapping[str, float]) -> tuple[np.ndarray, dict[str, int]]:
+    """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
+    const = list(s.const or [0.0])
+    const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
+    curve_at = {}
+    for e in s.model.joints:
+        if curves := e.curves(numbers[e.name]):
+            curve_at[e.name] = len(const)
+            for data in curves:
+                const += data
+    return np.array(const, float), curve_at
+
+
+def _term_x(
+    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, float], curve_at: Mapping[str, int]
+) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
     x = np.zeros((len(s.terms), 8))
+    factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
+    factors = {name: f / f[0] for name, f in factors.items()}
     for k, t in enumerate(s.terms):
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
-        if isinstance(e, Joint):
-            separation = pose.separation(e) if hasattr(e, "length") else 0.0
-            x[k, 6] = e.parameter(numbers[e.name], t.formula, separation)
-        else:
-            owner, what = s.model.coordinate(getattr(e, "coordinate", e.name), e)
-            offset = owner.offset(numbers[owner.name], what) if isinstance(owner, Joint) else 0.0
-            x[k, 6] = t.sign * (holds.get(e.name, 0.0) - offset)
+        n = numbers[e.name]
+        if t.hint >= 0 and t.formula.kind == angle.KIND:
+            x[k, 0] = 1.0
+        if isinstance(e, Joint) and t.owner is None:
+            x[k, :7] = e.constants(n, t.formula, *pose.ends(e))
+            if t.formula.kind == curve.KIND:
+                at = curve_at[e.name]
+                x[k, 1:3] = at, at + len(e.curves(n)[0])
+        elif isinstance(e, Joint):
+            x[k, 7] *= e.weight(n, t.what, *pose.ends(e))
+        elif isinstance(e, Coupling):
+            x[k, 7] *= factors[e.name][t.index]
+            x[k, 6] = _coupled(e, n, t, pose)
+        elif t.owner is not None:
+            x[k, 6] = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
     return x
 
 
+def _offset(t: TermSpec, numbers: dict) -> float:
+    """Value of a term's coordinate as drawn."""
+    return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
+
+
+def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
+    """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
+    total = e.total(n)
+    if total is None:
+        return pose.drawn(t)
+    share = total / e.first_weight(n) if t.index == 0 else 0.0
+    return t.sign * (share - _offset(t, pose.numbers))
+
+
 def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:
-    x = np.zeros((len(s.forces), 8))
+    x = np.zeros((len(s.forces), 16))
     for k, e in enumerate(s.forces):
-        separation = pose.separation(e) if isinstance(e, TwoPointForce) else 0.0
+        separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
         par = e.parameters(numbers[e.name], separation)
         x[k, : len(par)] = par
-        if isinstance(e, JointForce):
-            joint = s.model[e.joint]
-            x[k, 7] = joint.offset(numbers[joint.name], "angle")
     return x
 
 
@@ -272,8 +343,9 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
 
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
-        z(len(system.col_i)), z(9, nr), z(5, nv), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
-        z(s.depth + 1, 3), z(3, ny), np.zeros(8), np.zeros(6, np.int64),
+        z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
+        z(4, 2 * len(s.measured) + len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
+        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(6, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames
 

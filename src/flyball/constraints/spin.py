@@ -1,0 +1,20 @@
+"""m . (w_M - w_F) with m fixed in M: the angular velocity about an axis of M, as a gyroscope on it feels it.
+
+The row has no value: angular velocities about axes in space are no derivatives of angles.
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from ..math.vec import cross, dot, mv, neg, sub
+
+KIND = 11
+
+
+@formula
+def row(par, F, M, hint, data):
+    """No value, no force, torques on M and F, acceleration bias m.(alpha_M - alpha_F) + (w_M x m).(w_M - w_F)."""
+    m = mv(M[1], (par[0], par[1], par[2]))
+    o = 0.0 * par[0]
+    bias = dot(m, sub(M[4], F[4])) + dot(cross(M[2], m), sub(M[2], F[2]))
+    return o * m[0], (o, o, o), m, neg(m), bias

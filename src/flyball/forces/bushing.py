@@ -1,0 +1,140 @@
+"""Bushing: springs and dampers against all six relative motions of two frames."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+
+from .._jit import formula
+from ..errors import ModelError
+from ..math.rotation import log_gradient, rotation_vector
+from ..math.vec import add, cross, mm, mtv, mv, neg, sub, transpose
+from ..model.body import Orientation
+from ..model.element import Number, Numbers, Unit, element
+from ..model.force import TwoFrameForce
+from ..model.geometry import orientation_matrix, rotation_about, vector
+from ..model.joint import WorldFrame
+
+KIND = 5
+
+
+@formula
+def times(par, k, a):
+    """Three neighbouring parameters, each times its component of a."""
+    return (par[k] * a[0], par[k + 1] * a[1], par[k + 2] * a[2])
+
+
+@formula
+def deflection(par, F, M):
+    """Displacement and rotation vector of M seen from F, along F's axes."""
+    return mtv(F[1], sub(M[0], F[0])), rotation_vector(mm(transpose(F[1]), M[1]))
+
+
+@formula
+def inputs(par, F, M):
+    """It has no laws."""
+    return 0.0 * M[0][0], 0.0 * M[0][0]
+
+
+@formula
+def wrench(par, F, M, laws, values):
+    """On M, along F's axes: force -K d - C ddot, torque -J^T K_r theta - C_r omega.
+
+    With theta the rotation vector, thetadot = J omega: the torque is the exact gradient of theta . K_r theta / 2, so
+    a bushing without damping keeps energy also where it turns far and its stiffnesses differ.
+    """
+    d, theta = deflection(par, F, M)
+    u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
+    force = add(times(par, 0, d), times(par, 3, mtv(F[1], u)))
+    torque = add(log_gradient(theta, times(par, 6, theta)), times(par, 9, mtv(F[1], sub(M[2], F[2]))))
+    return neg(mv(F[1], force)), neg(mv(F[1], torque))
+
+
+@formula
+def energy(par, F, M):
+    """Potential energy d . K d / 2 + theta . K_r theta / 2 [J]."""
+    d, theta = deflection(par, F, M)
+    a = times(par, 0, d)
+    b = times(par, 6, theta)
+    s = 0.5 * (d[0] * a[0] + d[1] * a[1] + d[2] * a[2])
+    return s + 0.5 * (theta[0] * b[0] + theta[1] * b[1] + theta[2] * b[2])
+
+
+Triple = Number | Numbers
+
+
+@element
+class Bushing(TwoFrameForce):
+    """A rubber mount: ``body_j`` is held to ``body_i`` at a point by springs and dampers, in six components.
+
+    It carries nothing as drawn. Components are along axes fixed in ``body_i``. Rotations are measured by the rotation
+    vector, so they have no singular position short of half a turn; there the run stops.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Bodies, or frames fixed on bodies; ``"ground"`` is the world.
+    at : point [m]
+        The point, in world coordinates of the drawn configuration.
+    orientation : quaternion, Bryant angles [rad] or matrix; in the plane one angle
+        Axes of the components, in the world as drawn.
+    stiffness : number, or one for each axis [N/m]
+    damping : number, or one for each axis [N s/m]
+    torsional_stiffness : number, or one for each axis [N m/rad]
+    torsional_damping : number, or one for each axis [N m s/rad]
+    """
+
+    orientation: Orientation | None = None
+    angle: Annotated[Number, Unit("rad")] = 0.0
+    stiffness: Annotated[Triple, Unit("N/m")] = 0.0
+    damping: Annotated[Triple, Unit("N*s/m")] = 0.0
+    torsional_stiffness: Annotated[Triple, Unit("N*m/rad")] = 0.0
+    torsional_damping: Annotated[Triple, Unit("N*m*s/rad")] = 0.0
+
+    kind: ClassVar[int] = KIND
+    inputs: ClassVar = staticmethod(inputs)
+    wrench: ClassVar = staticmethod(wrench)
+    energy: ClassVar = staticmethod(energy)
+    drawn: ClassVar[str] = "bushing"
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Both frames at the point."""
+        if n.at is None:
+            return None
+        p = vector(n.at, planar, f"'at' of {self.title}")
+        R = rotation_about(2, n.angle)
+        if n.orientation is not None:
+            R = orientation_matrix(n.orientation, f"orientation of {self.title}")
+        return {"F": (p, R), "M": (p, R)}
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Constants are one number, or one for each axis, and not negative."""
+        for name in ("stiffness", "damping", "torsional_stiffness", "torsional_damping"):
+            value = np.atleast_1d(getattr(n, name))
+            if len(value) not in (1, 2, 3) or not all(x.real >= 0.0 for x in value):
+                raise ModelError(f"{self.title}: {name} is one number or one for each axis, none negative; got {value}")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return (
+            *_three(n.stiffness),
+            *_three(n.damping),
+            *_three(n.torsional_stiffness, turning=True),
+            *_three(n.torsional_damping, turning=True),
+        )
+
+    def conservative(self) -> bool:
+        """Whether its energy is all that it ever takes or gives."""
+        return not np.any(np.array(self.damping) != 0.0) and not np.any(np.array(self.torsional_damping) != 0.0)
+
+
+def _three(value: Any, turning: bool = False) -> tuple[float, ...]:
+    """One for each axis; in the plane two along it, or the one about the normal."""
+    if not isinstance(value, tuple):
+        return (value, value, value)
+    if len(value) == 1 and turning:
+        return (0.0, 0.0, value[0])
+    return (*value, *(0.0,) * (3 - len(value)))

@@ -1,0 +1,105 @@
+"""Spring, damper and actuator along any coordinate."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, ClassVar
+
+from .._jit import formula
+from ..model.element import Law, LawOf, Number, Unit, element, nonnegative
+from ..model.force import CoordinateForce
+
+KIND = 1
+
+
+@formula
+def effort(par, x, rate, laws, load):
+    """Along x: -k (x - x_0) - c rate + law."""
+    return laws[0] - par[0] * (x - par[2]) - par[1] * rate
+
+
+@formula
+def energy(par, x):
+    """Potential energy k (x - x_0)^2 / 2 [J]."""
+    return 0.5 * par[0] * (x - par[2]) * (x - par[2])
+
+
+@element
+class CoordinateSpring(CoordinateForce):
+    """Spring and damper along a coordinate: of a prismatic joint, say, or a point's height.
+
+    The force (or torque) -k (x - rest) - c rate acts along the coordinate, whole turns of angles counted.
+
+    Parameters
+    ----------
+    name : str
+    coordinate : str
+        ``"joint.coordinate"`` such as ``"slide.displacement"``, or a world coordinate of a body's or frame's origin
+        such as ``"block.y"``.
+    stiffness : number [N/m] or [N m/rad]
+    damping : number [N s/m] or [N m s/rad]
+    rest : number [m] or [rad]
+        Value of the coordinate at which the spring carries nothing.
+    force : law [N] or [N m]
+        Added, an expression of ``t``, ``value``, ``rate``, sensors and parameters.
+    """
+
+    coordinate: str
+    stiffness: Annotated[Number, Unit(None)] = 0.0
+    damping: Annotated[Number, Unit(None)] = 0.0
+    rest: Annotated[Number, Unit(None)] = 0.0
+    force: Annotated[Law | None, LawOf(None, ("value", "rate"))] = None
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    energy: ClassVar = staticmethod(energy)
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
+
+    def coordinate_text(self) -> str:
+        """As given."""
+        return self.coordinate
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Stiffness and damping must not be negative."""
+        nonnegative(self, n, "stiffness", "damping")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return (n.stiffness, n.damping, n.rest)
+
+    def laws(self) -> tuple[Law | None, ...]:
+        """Expressions that the formulas see."""
+        return (self.force,)
+
+    def conservative(self) -> bool:
+        """Whether its energy is all that it ever takes or gives."""
+        return self.force is None and self.damping == 0.0
+
+
+@element
+class Actuator(CoordinateForce):
+    """A force or torque along a coordinate by a law: a hydraulic cylinder in a prismatic joint, a controller.
+
+    Parameters
+    ----------
+    name : str
+    coordinate : str
+        ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
+    force : law [N] or [N m]
+        An expression of ``t``, ``value``, ``rate``, sensors and parameters: ``"kp*(0.2 - value) - kd*rate"``.
+    """
+
+    coordinate: str
+    force: Annotated[Law, LawOf(None, ("value", "rate"))]
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
+
+    def coordinate_text(self) -> str:
+        """As given."""
+        return self.coordinate
+
+    def laws(self) -> tuple[Law | None, ...]:
+        """The force."""
+        return (self.force,)

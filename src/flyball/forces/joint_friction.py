@@ -1,0 +1,123 @@
+"""Friction in a joint, driven by what the joint actually carries."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, ClassVar
+
+from .._jit import formula
+from ..errors import ModelError
+from ..math.scalar import absolute, exp, sqrt, tanh
+from ..math.vec import col, dot, scale, sub
+from ..model.element import Length, Number, Unit, element, nonnegative, positive
+from ..model.force import CoordinateForce
+
+KIND = 6
+STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
+
+
+@formula
+def load(par, axes, force, torque):
+    """What presses the surfaces together [N], from the joint's reaction on body j; the axis is that frame's z."""
+    a = col(axes[1], 2)
+    thrust = dot(a, force)
+    twist = dot(a, torque)
+    radial = sub(force, scale(thrust, a))
+    bending = sub(torque, scale(twist, a))
+    pressed = sqrt(dot(radial, radial)) + par[7] * absolute(thrust)
+    return pressed + par[8] * sqrt(dot(bending, bending)) + par[9] * absolute(twist)
+
+
+@formula
+def coefficient(par, v):
+    """Stribeck law: mu_k + (mu_s - mu_k) exp(-(v / v_s)^2)."""
+    s = v / par[3]
+    return par[2] + (par[1] - par[2]) * exp(-s * s)
+
+
+@formula
+def effort(par, x, rate, laws, load):
+    """Along the coordinate: -r mu(v) (N + preload) tanh(v / v_0) - c rate, with the sliding speed v = r rate."""
+    v = par[0] * rate
+    return -par[0] * coefficient(par, v) * (load + par[6]) * tanh(v / par[4]) - par[5] * rate
+
+
+@element
+class JointFriction(CoordinateForce):
+    """Coulomb friction with Stribeck effect in a joint, proportional to the load that the joint carries.
+
+    The load is N = |radial force| + thrust_factor |thrust| + |bending moment| / bending_length + |twist| /
+    twist_length, from the joint's actual reaction at every instant. The law is regularised: what would stick creeps
+    at ``stick_speed`` times artanh(part of the full friction that holds it). (Armstrong-Helouvry, Dupont and Canudas
+    de Wit, *A survey of models for the control of machines with friction*, 1994.)
+
+    Parameters
+    ----------
+    name : str
+    joint : str
+        Joint with a coordinate ``angle`` or ``displacement``.
+    coordinate : str
+        Which one, if it has both.
+    static, kinetic : number
+        Coefficients of friction at rest and in motion; the kinetic one equals the static one if not given.
+    radius : number [m]
+        Radius of the bearing, where the friction acts; needed for an angle.
+    stribeck_speed : number [m/s]
+        Sliding speed over which the coefficient falls from static to kinetic.
+    stick_speed : number [m/s]
+        Sliding speed that counts as rest: smaller is nearer to true sticking, and stiffer.
+    viscous : number [N s/m] or [N m s/rad]
+        Viscous friction along the coordinate.
+    preload : number [N]
+        Load that is there besides the reaction (seals, clamping).
+    thrust_factor : number
+        Weight of the force along the axis, for collars.
+    bending_length, twist_length : number [m]
+        Lengths over which bending moment and twist are carried as pairs of forces; moments count nothing if not given.
+    """
+
+    joint: str
+    coordinate: str | None = None
+    static: Annotated[Number, Unit("1")]
+    kinetic: Annotated[Number | None, Unit("1")] = None
+    radius: Length | None = None
+    stribeck_speed: Annotated[Number, Unit("m/s")] = 0.01
+    stick_speed: Annotated[Number, Unit("m/s")] = 0.001
+    viscous: Annotated[Number, Unit(None)] = 0.0
+    preload: Annotated[Number, Unit("N")] = 0.0
+    thrust_factor: Annotated[Number, Unit("1")] = 1.0
+    bending_length: Length | None = None
+    twist_length: Length | None = None
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    load: ClassVar = staticmethod(load)
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
+
+    def coordinate_text(self) -> str:
+        """The joint's coordinate."""
+        return f"{self.joint}.{self._coordinate()}"
+
+    def _coordinate(self) -> str:
+        return self.coordinate or ("displacement" if self.radius is None else "angle")
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Coefficients and lengths make sense."""
+        nonnegative(self, n, "static", "kinetic", "viscous", "preload", "thrust_factor")
+        positive(self, n, "radius", "stribeck_speed", "stick_speed", "bending_length", "twist_length")
+        if n.kinetic is not None and n.kinetic.real > n.static.real:
+            raise ModelError(
+                f"{self.title}: kinetic friction {n.kinetic:g} is greater than static friction {n.static:g}; it must "
+                f"not be. Are they swapped?"
+            )
+        if self._coordinate().startswith("angle") and n.radius is None:
+            raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        turning = self._coordinate().startswith("angle")
+        kinetic = n.static if n.kinetic is None else n.kinetic
+        bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
+        arm = n.radius if turning else 1.0
+        speeds = n.stribeck_speed, n.stick_speed
+        return (arm, n.static, kinetic, *speeds, n.viscous, n.preload, n.thrust_factor, bending, twist)

@@ -1,0 +1,138 @@
+"""Cam: a point, or a roller, that follows a smooth curve."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from ..constraints import curve
+from ..constraints.blocks import CURVE, Row
+from ..errors import ModelError
+from ..model.element import Length, Numbers, Point, Unit, element, nonnegative
+from ..model.geometry import vector
+from ..model.joint import Joint, WorldFrame
+from ..model.table import Table
+
+
+def _list(value: Any) -> Any:
+    return tuple(map(tuple, value.tolist() if hasattr(value, "tolist") else value))
+
+
+Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
+
+
+@element
+class Cam(Joint):
+    """A point of ``body_j``, or the centre of a roller on it, follows a smooth curve fixed in ``body_i``.
+
+    The curve is the C2 spline through ``points``, run through by their chord length. In space it is the profile of a
+    cylinder along ``axis``: one row, which holds the distance from the profile and nothing along the axis. It pulls
+    as well as pushes; see that the reaction keeps pushing.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        The cam and the follower; bodies, or frames fixed on bodies (the curve then lies in the x-y plane of the first).
+    points : list of points [m]
+        Points of the profile in the drawn configuration, two components each: in the plane world coordinates from
+        ``centre``, in space along the axes of a frame there whose z is ``axis``. At least four; the first is not
+        repeated at the end of a closed curve.
+    at : point [m]
+        The follower's point, or its roller's centre, in world coordinates of the drawn configuration.
+    centre : point [m]
+        Where the profile's coordinates are counted from, in world coordinates; the world's origin if not given.
+    axis : direction
+        In space: normal of the profile's plane, in world coordinates.
+    closed : bool
+        Whether the profile closes on itself.
+    radius : number [m]
+        Radius of the follower's roller.
+    """
+
+    points: Points
+    centre: Point = (0.0, 0.0, 0.0)
+    closed: bool = True
+    radius: Length = 0.0
+
+    blocks: ClassVar = (CURVE,)
+    needs_axis: ClassVar[bool] = True
+    drawn: ClassVar[str] = "cam"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Enough points, each with two coordinates, none twice running."""
+        nonnegative(self, n, "radius")
+        if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
+            raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
+        for k, d in enumerate(np.sqrt((np.diff(_closing(n.points, self.closed), axis=0) ** 2).sum(axis=1))):
+            if not d > 0.0:
+                raise ModelError(
+                    f"{self.title}: points {k} and {(k + 1) % len(n.points)} of its profile coincide at "
+                    f"{tuple(n.points[k])}; leave one out"
+                )
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """F in the profile's origin, M in the follower's point."""
+        R = self.orientation(n.axis, planar)
+        centre = vector(n.centre[: 2 if planar and not n.centre[2:] else 3], planar, f"centre of {self.title}")
+        return (centre, R), (vector(n.at, planar, f"'at' of {self.title}"), R)
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The side of the curve that the roller is on, and its radius; where the splines stand is told later."""
+        _, side, gap = self.nearest(n, F, M)
+        bend = max(0.0, -self.sharpest(n, side)) * n.radius
+        if bend >= 1.0:
+            raise ModelError(
+                f"{self.title}: its roller of {n.radius:g} m does not fit into the profile, which bends with a radius "
+                f"of {n.radius / bend:.4g} m; take a smaller roller or a smoother profile"
+            )
+        return (0.0, 0.0, 0.0, side, 0.0, 0.0, n.radius)
+
+    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float, float]:
+        """Parameter of the point of the profile nearest to M, the side that M is on (+1, -1), and its distance."""
+        data = np.concatenate(self.curves(n))
+        par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
+        s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
+        x, _, _, y, _, _ = curve.point(par, s, data)
+        p = F[1].T @ (M[0] - F[0])
+        guess = float(s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)])
+        zero = np.zeros(3)
+        i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))
+        at = curve.foot(par, i, j, guess, data)
+        delta = curve.local(par, i, j, at, data)[2]
+        return at, -1.0 if delta < 0.0 else 1.0, abs(delta)
+
+    def sharpest(self, n: SimpleNamespace, side: float) -> float:
+        """Least curvature [1/m] towards the given side: negative where the profile is hollow there."""
+        data = np.concatenate(self.curves(n))
+        par = (0.0, 0.0, float(len(self.curves(n)[0])))
+        s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
+        _, x1, x2, _, y1, y2 = curve.point(par, s, data)
+        return float((side * (x1 * y2 - y1 * x2) / (x1 * x1 + y1 * y1) ** 1.5).min())
+
+    def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
+        """The splines x(s) and y(s)."""
+        return _splines(n.points, self.closed)
+
+
+def _closing(points: tuple, closed: bool) -> np.ndarray:
+    p = np.array(points, float)
+    return np.vstack([p, p[:1]]) if closed else p
+
+
+def _chords(points: tuple, closed: bool) -> np.ndarray:
+    """Length along the polygon up to each point."""
+    steps = np.sqrt((np.diff(_closing(points, closed), axis=0) ** 2).sum(axis=1))
+    return np.r_[0.0, np.cumsum(steps)]
+
+
+@lru_cache(maxsize=64)
+def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
+    s = tuple(_chords(points, closed).tolist())
+    outside: Any = "periodic" if closed else "linear"
+    x, y = (tuple(c) for c in _closing(points, closed).T.tolist())
+    return tuple(Table(k, x=s, y=c, outside=outside).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]

@@ -1,0 +1,66 @@
+"""Coupler: any linear relation between coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any
+
+from ..errors import ModelError
+from ..model.coupling import Coupling
+from ..model.element import Number, Numbers, Unit, element
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+
+@element
+class Coupler(Coupling):
+    """Coordinates of joints or points held in a linear relation: weight_1 q_1 + weight_2 q_2 + ... = constant.
+
+    For a relation that is not linear use a `Driver` whose law names sensors.
+
+    Parameters
+    ----------
+    name : str
+    coordinates : list of str
+        Two or more: ``"A.angle"``, ``"slide.displacement"``, ``"block.x"``.
+    weights : list of numbers
+        One for each coordinate; metres for radians where both kinds are coupled.
+    value : number
+        What the sum has to be; what it is in the drawn configuration if not given.
+    """
+
+    coordinates: tuple[str, ...]
+    weights: Annotated[Numbers, Unit(None)]
+    value: Annotated[Number | None, Unit(None)] = None
+
+    def coupled(self) -> tuple[str, ...]:
+        """The coordinates."""
+        return self.coordinates
+
+    def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
+        """The weights as given."""
+        return n.weights
+
+    def first_weight(self, n: SimpleNamespace) -> float:
+        """As given."""
+        return n.weights[0]
+
+    def total(self, n: SimpleNamespace) -> Any:
+        """As given."""
+        return n.value
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A weight for each of at least two coordinates, none of them zero."""
+        if len(self.coordinates) < 2:
+            raise ModelError(f"{self.title}: it couples {len(self.coordinates)} coordinate; give two or more")
+        if len(n.weights) != len(self.coordinates):
+            raise ModelError(
+                f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"
+            )
+        for text in self.coordinates:
+            if self.coordinates.count(text) > 1:
+                raise ModelError(f"{self.title}: {text!r} is coupled twice; name it once, with the sum of its weights")
+        if not all(w != 0.0 for w in n.weights):
+            raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")

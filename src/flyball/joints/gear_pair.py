@@ -1,0 +1,67 @@
+"""Gear pair: two wheels that mesh on a common carrier."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.coupling import Coupling, sense, shared_body
+from ..model.element import Numbers, Unit, element
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+
+@element
+class GearPair(Coupling):
+    """Two gears that mesh; each turns in a joint on the same carrier, which may itself move (planetary trains).
+
+    With numbers of teeth z and angles seen from the carrier about axes that point the same way:
+    z_1 angle_1 + z_2 angle_2 = constant for external gears, z_1 angle_1 - z_2 angle_2 = constant where the second is
+    a ring with its teeth inside. Whole turns count.
+
+    Parameters
+    ----------
+    name : str
+    joint_1, joint_2 : str
+        The joints (with a coordinate ``angle``) in which the two gears turn on their carrier.
+    teeth : two numbers
+        Numbers of teeth, or radii: only their ratio counts.
+    internal : bool
+        Whether the second gear is a ring with its teeth inside.
+    """
+
+    joint_1: str
+    joint_2: str
+    teeth: Annotated[Numbers, Unit(None)]
+    internal: bool = False
+
+    drawn: ClassVar[str] = "gear"
+
+    def coupled(self) -> tuple[str, ...]:
+        """The two angles."""
+        return f"{self.joint_1}.angle", f"{self.joint_2}.angle"
+
+    def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
+        """1 and the ratio, signed for external or internal, for the axes' senses and for what turns on what."""
+        carrier = self._carrier(model)
+        s1, s2 = (sense(model, self, j, carrier) for j in (self.joint_1, self.joint_2))
+        same = -1.0 if np.dot(axes(self.joint_1), axes(self.joint_2)).real < -1e-9 else 1.0
+        return 1.0, (-1.0 if self.internal else 1.0) * same * s1 * s2 * n.teeth[1] / n.teeth[0]
+
+    def _carrier(self, model: Model) -> str:
+        remedy = "both gears must turn on one carrier: put a Revolute between each gear and the arm that holds them"
+        return shared_body(self, model, self.joint_1, self.joint_2, remedy)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Two positive numbers of teeth."""
+        if len(n.teeth) != 2 or not all(z.real > 0.0 for z in n.teeth):
+            raise ModelError(f"{self.title}: teeth are two numbers greater than 0, got {n.teeth}")
+
+    def examine(self, model: Model) -> None:
+        """The joints share a carrier."""
+        self._carrier(model)

@@ -1,0 +1,56 @@
+"""Knife edge: a skate, which glides along its edge and never sideways. Non-holonomic."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+
+from ..constraints.blocks import no_sideways
+from ..errors import ModelError
+from ..model.element import Direction, element
+from ..model.geometry import vector
+from ..model.joint import Joint, WorldFrame
+
+
+@element
+class KnifeEdge(Joint):
+    """A point of ``body_j`` has no velocity across an edge fixed in ``body_j``, as seen from ``body_i``.
+
+    It restrains velocities only. In space it does not hold the point in a plane: add `PointInPlane` or `Planar`.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Body that carries the ice (``"ground"`` is the world), and the skate.
+    at : point [m]
+        The point, in world coordinates of the drawn configuration.
+    axis : direction
+        Along the edge, in world coordinates.
+    normal : direction
+        In space: the direction in which the skate stands; what is barred is square to both.
+    """
+
+    normal: Direction = (0.0, 0.0, 1.0)
+
+    blocks: ClassVar = (no_sideways("x"),)
+    needs_axis: ClassVar[bool] = True
+    planar_normal: ClassVar[str] = "y"
+    drawn: ClassVar[str] = "knife_edge"
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """Both at the point; z along the edge, y up, x across."""
+        p = vector(n.at, planar, f"'at' of {self.title}")
+        if planar:
+            R = self.orientation(n.axis, planar)
+            return (p, R), (p, R)
+        a = vector(n.axis if n.axis is not None else (0, 0, 0), False, f"axis of {self.title}", direction=True)
+        up = vector(n.normal, False, f"normal of {self.title}", direction=True)
+        x = np.cross(up, a)
+        size = np.sqrt((x * x).sum())
+        if not size.real > 1e-6:
+            raise ModelError(f"{self.title}: its normal is along its edge; give the direction in which it stands")
+        R = np.column_stack([x / size, np.cross(a, x / size), a])
+        return (p, R), (p, R)

@@ -1,0 +1,50 @@
+"""Rack and pinion: a toothed bar that a gear drives, or that drives a gear."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from ..errors import ModelError
+from ..model.coupling import Coupling
+from ..model.element import Length, element
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+
+@element
+class RackAndPinion(Coupling):
+    """A rack that moves by radius times angle of the pinion; whole turns count.
+
+    Parameters
+    ----------
+    name : str
+    rack : str
+        Joint with a coordinate ``displacement`` in which the rack slides.
+    pinion : str
+        Joint with a coordinate ``angle`` in which the pinion turns.
+    radius : number [m]
+        Rolling radius: displacement of the rack per radian of the pinion's coordinate; negative where a positive
+        angle moves the rack backwards.
+    """
+
+    rack: str
+    pinion: str
+    radius: Length
+
+    drawn: ClassVar[str] = "rack"
+
+    def coupled(self) -> tuple[str, ...]:
+        """The displacement and the angle."""
+        return f"{self.rack}.displacement", f"{self.pinion}.angle"
+
+    def factors(self, n: SimpleNamespace, model: Model, axes: Callable[[str], Any]) -> tuple[float, ...]:
+        """Displacement - radius * angle = constant."""
+        return 1.0, -n.radius
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A pinion has a radius."""
+        if n.radius == 0.0:
+            raise ModelError(f"{self.title}: its radius is 0 m; give the rolling radius of the pinion")

@@ -1,0 +1,109 @@
+"""Wheels and balls that roll on a plane without slip: non-holonomic."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+
+from ..constraints.blocks import ON_PLANE, Row, no_slip
+from ..errors import ModelError
+from ..model.element import Direction, Length, element, nonnegative, positive
+from ..model.geometry import triad, vector
+from ..model.joint import Joint, WorldFrame
+
+FLAT = 1e-6  # a disk whose axle is this close to the plane's normal lies flat
+
+
+@element
+class RollingDisk(Joint):
+    """``body_j`` is a wheel that touches a plane fixed in ``body_i`` and rolls on it without slip.
+
+    Two of its three rows restrain velocities only (non-holonomic). It carries pull as well as push: see that
+    the reaction along the normal keeps pushing.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Body that carries the plane (``"ground"`` is the world), and the wheel.
+    at : point [m]
+        Centre of the wheel, in world coordinates of the drawn configuration.
+    axis : direction
+        The wheel's axle, in world coordinates.
+    radius : number [m]
+        From the centre to the middle of the tread.
+    tread : number [m]
+        Radius of the tread's cross-section: 0 for a sharp disk. The wheel touches at ``radius + tread`` when upright.
+    normal : direction
+        Normal of the plane, on the side of the wheel, in world coordinates.
+    """
+
+    radius: Length
+    tread: Length = 0.0
+    normal: Direction = (0.0, 0.0, 1.0)
+
+    blocks: ClassVar = (ON_PLANE, no_slip("x"), no_slip("y"))
+    planar_normal: ClassVar[str] = ""
+    needs_axis: ClassVar[bool] = True
+    drawn: ClassVar[str] = "rolling"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Radii must make a wheel."""
+        positive(self, n, "radius", why="For a ball use RollingBall")
+        nonnegative(self, n, "tread")
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """F where the wheel touches the plane, z along its normal; M in the wheel's centre, z along its axle."""
+        centre = vector(n.at, planar, f"'at' of {self.title}")
+        up = vector(n.normal, planar, f"normal of {self.title}", direction=True)
+        M = self.orientation(n.axis, planar)
+        c = up @ M[:, 2]
+        s = np.sqrt((1.0 - c) * (1.0 + c))
+        if not s.real > FLAT:
+            raise ModelError(f"{self.title}: its axle is square to the plane: the wheel lies flat and cannot roll")
+        contact = centre - n.radius / s * (up - c * M[:, 2]) - n.tread * up
+        return (contact, triad(up)), (centre, M)
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The radii."""
+        return (*row.par[:3], n.radius, n.tread, row.par[5], 0.0)
+
+
+@element
+class RollingBall(Joint):
+    """``body_j`` is a ball that touches a plane fixed in ``body_i`` and rolls on it without slip; it may spin.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Body that carries the plane (``"ground"`` is the world), and the ball.
+    at : point [m]
+        Centre of the ball, in world coordinates of the drawn configuration.
+    radius : number [m]
+    normal : direction
+        Normal of the plane, on the side of the ball, in world coordinates.
+    """
+
+    radius: Length
+    normal: Direction = (0.0, 0.0, 1.0)
+
+    blocks: ClassVar = (ON_PLANE, no_slip("x"), no_slip("y"))
+    planar_normal: ClassVar[str] = ""
+    drawn: ClassVar[str] = "rolling"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A ball has a radius."""
+        positive(self, n, "radius")
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """F where the ball touches the plane, z along its normal; M in the ball's centre."""
+        centre = vector(n.at, planar, f"'at' of {self.title}")
+        up = vector(n.normal, planar, f"normal of {self.title}", direction=True)
+        return (centre - n.radius * up, triad(up)), (centre, np.eye(3))
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """A ball is the tread of a wheel of no radius."""
+        return (*row.par[:3], 0.0, n.radius, row.par[5], 0.0)

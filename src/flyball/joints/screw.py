@@ -1,0 +1,56 @@
+"""Screw joint: turning and sliding along an axis go together."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import ClassVar
+
+from ..constraints.blocks import ANGLE, PARALLEL_AXES, SLIDE, STRAIGHT_LINE
+from ..errors import ModelError
+from ..model.element import Angle, Length, element
+from ..model.joint import Coordinate, Joint, WorldFrame
+
+TURN = 6.283185307179586
+
+
+@element
+class Screw(Joint):
+    """A thread: ``body_j`` moves along the axis by the lead for each turn about it, counted over any number of turns.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Bodies, or frames fixed on bodies (z is then the axis); ``"ground"`` is the world.
+    at : point [m]
+        A point of the axis, in world coordinates of the drawn configuration.
+    axis : direction
+        Axis in world coordinates.
+    lead : number [m]
+        Way along the axis for one turn; negative for a left-handed thread.
+    angle, displacement : number [rad], [m]
+        Values of the coordinates in the drawn configuration.
+    """
+
+    lead: Length
+    angle: Angle = 0.0
+    displacement: Length = 0.0
+
+    blocks: ClassVar = (*STRAIGHT_LINE, *PARALLEL_AXES, replace(SLIDE, plus=("angle",)))
+    coordinates: ClassVar = {
+        "angle": Coordinate(ANGLE, offset="angle"),
+        "displacement": Coordinate(SLIDE, offset="displacement"),
+    }
+    needs_axis: ClassVar[bool] = True
+    planar_normal: ClassVar[str] = ""
+    drawn: ClassVar[str] = "screw"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A thread has a lead."""
+        if n.lead == 0.0:
+            raise ModelError(f"{self.title}: its lead is 0 m; without one it is a Revolute joint")
+
+    def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
+        """Displacement - lead / (2 pi) angle = 0."""
+        return -n.lead / TURN

@@ -1,0 +1,77 @@
+"""A wheel that rolls along a straight line, in the plane."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import ClassVar
+
+import numpy as np
+
+from ..constraints.blocks import ANGLE, SLIDE, STRAIGHT_LINE, Row
+from ..errors import ModelError
+from ..model.element import Angle, Length, Point, element
+from ..model.geometry import vector
+from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
+
+
+@element
+class WheelOnLine(Joint):
+    """``body_j`` is a wheel that rolls, without slip, along a straight line fixed in ``body_i``: a pinion on a rack.
+
+    Parameters
+    ----------
+    name : str
+    body_i, body_j : str
+        Body that carries the line (``"ground"`` is the world), and the wheel.
+    at : point [m]
+        Where the wheel touches the line, in world coordinates of the drawn configuration.
+    axis : direction
+        The line, in world coordinates.
+    centre : point [m]
+        Centre of the wheel, square to the line from ``at``; its distance is the rolling radius.
+    angle, displacement : number [rad], [m]
+        Values of the coordinates in the drawn configuration: how far the wheel has turned relative to ``body_i``,
+        and how far its centre has come along the line.
+    """
+
+    centre: Point
+    angle: Angle = 0.0
+    displacement: Length = 0.0
+
+    blocks: ClassVar = (STRAIGHT_LINE[0], replace(SLIDE, plus=("angle",)))
+    coordinates: ClassVar = {
+        "angle": Coordinate(ANGLE, turn_F=Z_TO_X, turn_M=Z_TO_X, offset="angle"),
+        "displacement": Coordinate(SLIDE, offset="displacement"),
+    }
+    needs_axis: ClassVar[bool] = True
+    planar_normal: ClassVar[str] = "y"
+    spatial: ClassVar[bool] = False
+    drawn: ClassVar[str] = "rolling"
+
+    def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
+        """F on the line where the wheel touches it, M in the wheel's centre."""
+        R = self.orientation(n.axis, planar)
+        at = vector(n.at, planar, f"'at' of {self.title}")
+        centre = vector(n.centre, planar, f"centre of {self.title}")
+        d = R.T @ (centre - at)
+        if not abs(d[0].real) > 0.0:
+            raise ModelError(f"{self.title}: its centre lies on the line; the wheel has no radius")
+        if abs(d[2].real) > 1e-9 * abs(d[0].real):
+            raise ModelError(
+                f"{self.title}: the way from 'at' to the centre must be square to the line; the centre is "
+                f"{d[2].real:g} m further along it"
+            )
+        return (at, R), (centre, R)
+
+    def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
+        """The centre keeps its height over the line."""
+        return (*row.par[:6], 0.0 if row.plus else _height(F, M))
+
+    def weight(self, n: SimpleNamespace, coordinate: str, F: WorldFrame, M: WorldFrame) -> float:
+        """Displacement + height * angle = 0, the height counted to the left of the line."""
+        return _height(F, M)
+
+
+def _height(F: WorldFrame, M: WorldFrame) -> float:
+    return np.dot(F[1][:, 0], M[0] - F[0])

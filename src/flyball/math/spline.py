@@ -1,0 +1,99 @@
+"""Piecewise cubics in a flat list of numbers: what tables of points become, for formulas, arrays and compiled code.
+
+A spline of m breaks stands in an array from place ``at`` on as::
+
+    period, m, break[0] ... break[m-1], piece 0, piece 1, ..., piece m
+
+with four coefficients c0 c1 c2 c3 a piece, f = c0 + c1 s + c2 s^2 + c3 s^3. Piece k holds between break[k-1] and
+break[k], and s = x - break[k-1]; piece 0 extends the spline before the first break (there s = x - break[0]), piece m
+behind the last one. A break belongs to the piece behind it, the last one to the piece before it, so that the ends of a
+table count as inside. A period greater than zero says that x is first brought into [break[0], break[0] + period).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from .._jit import formula, on_numba
+
+BREAKS = 2  # place of the first break
+PIECE = 4  # numbers a piece
+
+
+@formula
+def spline(data, at, x):
+    """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
+
+    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats (a
+    list will do for single numbers).
+    """
+    start, origin = piece(data, at, x)
+    s = x - origin
+    c0, c1, c2, c3 = data[start], data[start + 1], data[start + 2], data[start + 3]
+    return c0 + s * (c1 + s * (c2 + s * c3)), c1 + s * (2.0 * c2 + 3.0 * c3 * s), 2.0 * c2 + 6.0 * c3 * s
+
+
+def piece(data, at, x):
+    """Place of the coefficients that hold at x, and the x that they count from."""
+    if isinstance(x, float | int | complex):
+        return found(data, at, x)
+    count = int(data[at + 1].real)
+    breaks = data[at + BREAKS : at + BREAKS + count].real
+    period, x = data[at].real, np.real(x)
+    shift = period * np.floor((x - breaks[0]) / period) if period > 0.0 else 0.0 * x
+    k = np.searchsorted(breaks, x - shift, side="right")
+    k = np.where(x - shift == breaks[-1], count - 1, k)
+    return at + BREAKS + count + PIECE * k, breaks[np.maximum(k - 1, 0)] + shift
+
+
+def found(data, at, x):
+    """The same for one number, by bisection; this is what compiled code does."""
+    x = x.real
+    count = int(data[at + 1].real)
+    first = at + BREAKS
+    period = data[at].real
+    shift = 0.0
+    if period > 0.0:
+        turns = (x - data[first].real) / period
+        shift = period * math.floor(turns) if turns - turns == 0.0 else turns
+    low, high = 0, count
+    while low < high:
+        middle = (low + high) // 2
+        if data[first + middle].real <= x - shift:
+            low = middle + 1
+        else:
+            high = middle
+    if low == count and x - shift == data[first + count - 1].real:
+        low = count - 1
+    return first + count + PIECE * low, data[first + max(low - 1, 0)].real + shift
+
+
+def symbolic(data: Any, at: int, x: Any) -> Any:
+    """The spline's value as a SymPy expression of the symbol (or expression) ``x``."""
+    import sympy
+
+    count = int(data[at + 1])
+    breaks = [float(b) for b in data[at + BREAKS : at + BREAKS + count]]
+    if data[at] > 0.0:
+        x = x - float(data[at]) * sympy.floor((x - breaks[0]) / float(data[at]))
+    pieces = []
+    for k in range(count + 1):
+        start = at + BREAKS + count + PIECE * k
+        c0, c1, c2, c3 = (float(c) for c in data[start : start + PIECE])
+        s = x - breaks[max(k - 1, 0)]
+        inside = sympy.true if k == count else x <= breaks[k] if k == count - 1 else x < breaks[k]
+        pieces.append((c0 + s * (c1 + s * (c2 + s * c3)), inside))
+    return sympy.Piecewise(*pieces)
+
+
+@on_numba
+def _register() -> None:
+    """In compiled code x is one number."""
+    from numba.extending import overload
+
+    @overload(piece, jit_options={"error_model": "numpy"})
+    def choose(data, at, x):
+        return found

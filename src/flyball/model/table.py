@@ -1,0 +1,157 @@
+"""Tables: a curve through measured points, called by name in laws."""
+
+from __future__ import annotations
+
+import keyword
+from functools import cached_property
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from ..errors import ModelError, UnitError
+from ..math.spline import spline, symbolic
+from .element import Element, _plain, element
+from .grammar import CONSTANTS, FUNCTIONS
+from .units import to_si
+
+Column = Annotated[tuple[float, ...], BeforeValidator(_plain)]
+
+
+@element
+class Table(Element):
+    """A function of one number, given by points; laws call it by its name: ``"spring_curve(length - 0.3)"``.
+
+    Parameters
+    ----------
+    name : str
+        A plain name, since expressions use it.
+    x, y : numbers
+        The points; x ascends.
+    interpolation : ``"cubic"``, ``"monotone"`` or ``"linear"``
+        Cubic: the smoothest, with two continuous derivatives (not-a-knot at the ends), good for laws of motion; it may
+        swing beyond the points. Monotone: one continuous derivative and never beyond the points (Fritsch and Butland,
+        A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984).
+        Linear: straight between the points, with kinks.
+    outside : ``"linear"``, ``"hold"`` or ``"periodic"``
+        Beyond the points: straight on with the slope of the end, the value of the end, or again and again from the
+        start (the last y must then be the first; cubic is smooth across the seam too).
+    x_unit, y_unit : str
+        Units that x and y are written in, such as ``"mm"`` and ``"kN"``; SI if not given.
+    """
+
+    x: Column
+    y: Column
+    interpolation: Literal["cubic", "monotone", "linear"] = "cubic"
+    outside: Literal["linear", "hold", "periodic"] = "linear"
+    x_unit: str = ""
+    y_unit: str = ""
+
+    category: ClassVar[str] = "tables"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Refuse points that make no curve, and a name that no expression could use."""
+        if not self.name.isidentifier() or keyword.iskeyword(self.name):
+            raise ModelError(f"{self.title}: expressions call a table by its name; use letters, digits and _ only")
+        if self.name in FUNCTIONS or self.name in CONSTANTS or self.name == "t":
+            raise ModelError(f"{self.title}: the name has a meaning in expressions; call it '{self.name}_curve'")
+        self.data()
+
+    def data(self) -> list[float]:
+        """The curve in SI units as the flat list that `flyball.math.spline` reads.
+
+        Raises
+        ------
+        ModelError
+            If there are fewer than two points, x does not ascend, or a number is not finite.
+        """
+        return list(self._list)
+
+    def values(self, x: Any) -> tuple[Any, Any, Any]:
+        """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array."""
+        return spline(self._array if isinstance(x, np.ndarray | np.generic) else self._list, 0, x)
+
+    def value(self, x: Any) -> Any:
+        """Value at ``x`` [SI]: a number (real or complex), an array, or a SymPy expression."""
+        if isinstance(x, float | int | complex | np.ndarray | np.generic):
+            return self.values(x)[0]
+        return symbolic(self._array, 0, x)
+
+    @cached_property
+    def _list(self) -> list[float]:
+        return self._array.tolist()
+
+    @cached_property
+    def _array(self) -> np.ndarray:
+        x, y = self._points()
+        periodic = self.outside == "periodic"
+        with np.errstate(all="ignore"):
+            pieces = _MAKERS[self.interpolation](x, y, periodic)
+            slopes = 0.0, 0.0
+            if self.outside != "hold":
+                width = x[-1] - x[-2]
+                slopes = pieces[0, 1], pieces[-1, 1] + width * (2.0 * pieces[-1, 2] + 3.0 * width * pieces[-1, 3])
+        ends = [(y[0], slopes[0], 0.0, 0.0), (y[-1], slopes[1], 0.0, 0.0)]
+        return np.r_[x[-1] - x[0] if periodic else 0.0, len(x), x, np.vstack([ends[:1], pieces, ends[1:]]).ravel()]
+
+    def _points(self) -> tuple[np.ndarray, np.ndarray]:
+        """The points in SI units, checked."""
+        if len(self.x) != len(self.y):
+            raise ModelError(f"{self.title}: x has {len(self.x)} numbers and y has {len(self.y)}; give pairs")
+        if len(self.x) < 2:
+            raise ModelError(f"{self.title}: {len(self.x)} point makes no curve; give two points or more")
+        x, y = (self._column(name) for name in "xy")
+        for k in range(1, len(x)):
+            if not x[k] > x[k - 1]:
+                raise ModelError(
+                    f"{self.title}: x[{k}] = {self.x[k]:g} comes after x[{k - 1}] = {self.x[k - 1]:g}; x must ascend: "
+                    f"sort the points and leave out repeated ones"
+                )
+        with np.errstate(all="ignore"):
+            slopes = np.abs(np.diff(y) / np.diff(x))
+        if not np.isfinite(slopes).all():
+            k = int(np.argmax(slopes))
+            raise ModelError(f"{self.title}: x[{k}] and x[{k + 1}] are too close, the slope between them is no number")
+        if self.outside == "periodic":
+            if abs(y[-1] - y[0]) > 1e-9 * np.ptp(y):
+                raise ModelError(
+                    f"{self.title}: a periodic table ends where it starts, but y[0] = {self.y[0]:g} and "
+                    f"y[{len(y) - 1}] = {self.y[-1]:g}; add the point that closes the period, or choose another outside"
+                )
+            y[-1] = y[0]
+        return x, y
+
+    def _column(self, name: str) -> np.ndarray:
+        values, unit = getattr(self, name), getattr(self, f"{name}_unit")
+        for k, value in enumerate(values):
+            if value - value != 0.0:
+                raise ModelError(f"{self.title}: {name}[{k}] is {value}; give a finite number, or leave the point out")
+        try:
+            return np.array(values) * (to_si(f"1 {unit}", None) if unit else 1.0)
+        except UnitError as error:
+            raise UnitError(f"{self.title}: {name}_unit: {error}") from None
+
+
+def _cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
+    from scipy.interpolate import CubicSpline
+
+    return CubicSpline(x, y, bc_type="periodic" if periodic else "not-a-knot").c[::-1].T
+
+
+def _monotone(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
+    from scipy.interpolate import PchipInterpolator
+
+    if not periodic:
+        return PchipInterpolator(x, y).c[::-1].T
+    n, period = len(x) - 1, x[-1] - x[0]  # with a period before and behind, the seam is a point like the others
+    x, y = np.r_[x[:-1] - period, x, x[1:] + period], np.r_[y[:-1], y, y[1:]]
+    return PchipInterpolator(x, y).c[::-1].T[n : 2 * n]
+
+
+def _linear(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
+    zero = np.zeros(len(x) - 1)
+    return np.column_stack([y[:-1], np.diff(y) / np.diff(x), zero, zero])
+
+
+_MAKERS = {"cubic": _cubic, "monotone": _monotone, "linear": _linear}

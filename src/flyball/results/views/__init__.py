@@ -1,0 +1,36 @@
+"""What a result says of one part: arrays over time, named, in SI units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ...model.body import Body, Driver, Frame
+from ...model.coupling import Coupling
+from ...model.force import Force
+from ...model.joint import Joint
+from ...model.sensor import IMU, Sensor
+from .base import View as View
+from .drivers import CouplingView, DriverView
+from .forces import ForceView
+from .joints import JointView
+from .points import PointView
+from .sensors import IMUView, SensorView
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+VIEWS = (
+    (Body, PointView),
+    (Frame, PointView),
+    (Joint, JointView),
+    (Coupling, CouplingView),
+    (Force, ForceView),
+    (Driver, DriverView),
+    (Sensor, SensorView),
+    (IMU, IMUView),
+)
+
+
+def view(result: Result, element: Any) -> View:
+    """The view of a part."""
+    return next(cls for kind, cls in VIEWS if isinstance(element, kind))(result, element)

@@ -1,0 +1,156 @@
+"""What force elements measure and do."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...math.vec import dot, sub
+from ...model.force import CoordinateForce, JointForce, TwoPointForce
+from ...system.call import STACK_RESERVE
+from ...system.laws import evaluate
+from ...system.loads import power, wide
+from ..records import coordinate_frames, turned
+from .base import View
+
+
+class ForceView(View):
+    """What a force element measures and does."""
+
+    def _index(self) -> int:
+        return next(i for i, f in enumerate(self._x.structure.forces) if f is self.element)
+
+    def _between(self) -> tuple[tuple, tuple, tuple]:
+        """(inputs, force on M, torque on M) over time, of a force between frames."""
+        e, r, S = self.element, self._result.records, self._x.system
+        k = self._index()
+        F, M = r.frame(int(S.force_i[k, 0])), r.frame(int(S.force_i[k, 1]))
+        par = wide(S.force_x, k)
+        a, b = (np.broadcast_to(i, (r.n,)) for i in e.inputs(par, F, M))
+        laws = tuple(self._law(int(S.force_i[k, 2 + i]), a, b) for i in range(3))
+        force, torque = e.wrench(par, F, M, laws, (a, b))
+        self._frames = F, M, par
+        return (a, b), force, torque
+
+    def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(value, rate, effort) over time, of a force along a measured quantity."""
+        e, S = self.element, self._x.system
+        k = self._index()
+        x, rate = self._result.measured.quantity(int(S.force_i[k, 0]))
+        laws = (self._law(int(S.force_i[k, 2]), x, rate), 0.0 * x, 0.0 * x)
+        load = 0.0 * x
+        if hasattr(e, "load"):
+            force, torque = self._result[e.joint]._wrench()
+            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, 1])), force, torque)
+        return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
+
+    def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        """Values of a law over time."""
+        if at < 0:
+            return np.zeros(len(a))
+        s, S, t = self._x.structure, self._x.system, self._result.t
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
+        sensed = self._result.measured.slots
+        x = np.stack([t, a, b], axis=1)
+        return np.array(
+            [evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i]) for i in range(len(t))], float
+        )
+
+    @property
+    def wrench(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force [N] and torque [N m] on the second body, world axes; of a two-point force at the second point.
+
+        Raises
+        ------
+        AttributeError
+            For forces along coordinates in general, which may act on several bodies.
+        """
+        n = len(self._result.t)
+        if isinstance(self.element, JointForce):
+            (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
+            axis = turned(self._result.records.frame(k), turn)[1]
+            return np.zeros((n, 3)), np.stack([a * self._along()[2] for a in (axis[2], axis[5], axis[8])], axis=1)
+        if isinstance(self.element, CoordinateForce):
+            raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self._names())}")
+        _, force, torque = self._between()
+        return tuple(np.stack([np.broadcast_to(c, (n,)) for c in w], axis=1) for w in (force, torque))  # type: ignore[return-value]
+
+    @property
+    def pulls(self) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
+        r, s = self._result.records, self._x.structure
+        points = [np.stack(r.frame(s.frame_at[self.element.name, role, ""])[0], axis=1) for role in self.element.ends()]
+        tension = -self._along()[2]
+        forces = [np.zeros_like(p) for p in points]
+        for k in range(len(points) - 1):
+            d = points[k + 1] - points[k]
+            pull = d * (tension / np.sqrt((d * d).sum(axis=1)))[:, None]
+            forces[k] += pull
+            forces[k + 1] -= pull
+        return list(zip(points, forces, strict=True))
+
+    @property
+    def energy(self) -> np.ndarray:
+        """Potential energy stored in it [J]."""
+        e = self.element
+        if e.energy is None:
+            return np.zeros(len(self._result.t))
+        if isinstance(e, CoordinateForce):
+            return e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
+        self._between()
+        F, M, par = self._frames
+        return e.energy(par, F, M)
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power that it gives to the bodies [W]."""
+        if isinstance(self.element, CoordinateForce):
+            _, rate, effort = self._along()
+            return rate * effort
+        _, force, torque = self._between()
+        return power(self._frames[0], self._frames[1], force, torque)
+
+    @property
+    def work(self) -> np.ndarray:
+        """Work given to the bodies since the start [J], integrated with the motion."""
+        name = f"{self.element.name}.work"
+        states = self._x.structure.state_at
+        if name in states:
+            return self._result.states[:, states[name]]
+        return self.energy[0] - self.energy
+
+    def _names(self) -> list[str]:
+        return [*self.element.outputs, "energy", "power", "work"]
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint."""
+        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
+            raise AttributeError(name)
+        if name not in self.element.outputs:
+            has = ", ".join([*self._names(), *(() if isinstance(self.element, CoordinateForce) else ("wrench",))])
+            raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
+        k = list(self.element.outputs).index(name)
+        if isinstance(self.element, CoordinateForce):
+            value = self._along()[k]
+            return self.element.sign * value if k == 2 else value
+        inputs, force, _ = self._between()
+        if k < 2:
+            return inputs[k]
+        F, M, _ = self._frames
+        return -dot(force, sub(M[0], F[0])) / inputs[0]
+
+    def unit(self, name: str) -> str:
+        """Unit of one of its outputs."""
+        unit = self.element.outputs[name]
+        if unit not in ("", "/s", "effort"):
+            return unit
+        base = self._x.structure.model.unit(self.element.coordinate_text(), self.element)
+        return {"": base, "/s": f"{base}/s", "effort": "N*m" if base == "rad" else "N"}[unit]
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Its outputs; for others, the components of force and torque."""
+        if not isinstance(self.element, (TwoPointForce, CoordinateForce)):
+            force, torque = self.wrench
+            out = {f"f{a}": ("N", force[:, i]) for i, a in enumerate("xyz")}
+            out |= {f"t{a}": ("N*m", torque[:, i]) for i, a in enumerate("xyz")}
+            return {k: v for k, v in out.items() if v[1].any()}
+        return {k: (self.unit(k), getattr(self, k)) for k in self.element.outputs}

@@ -1,0 +1,151 @@
+"""Coordinates and reactions of joints."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...constraints import angle
+from ...constraints.registry import FORMULAS
+from ...math.vec import add, dot, mtv, scale, sub
+from ...model.body import GROUND
+from ...system.rows import parameters
+from ...system.tables import Q0
+from ..records import coordinate_frames, turned
+from .base import View, stacked
+from .points import PointView
+
+
+class JointView(View):
+    """Coordinates and reaction of a joint."""
+
+    def _measure(self, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A coordinate, its rate and its acceleration, through the row that measures it."""
+        r, x = self._result.records, self._x
+        (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
+        F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
+        par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+        hint: Any = 0.0
+        if c.row.kind == angle.KIND:
+            par, hint = (1.0, *par[1:]), self._turns(what, i, j)
+        value, f, tM, tF, second = FORMULAS[c.row.kind](par, F, M, hint, x.system.const)
+        rate = dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2])
+        offset = self.element.offset(x.numbers[self.element.name], what)
+        return c.sign * value + offset, c.sign * rate, c.sign * second
+
+    def _turns(self, what: str, i: int, j: int) -> np.ndarray:
+        """Something close to the measured angle that knows its whole turns."""
+        name = f"{self.element.name}.{what}"
+        s = self._x.structure
+        if name in s.state_at:
+            return self._result.states[:, s.state_at[name]]
+        x = self._x
+        now = self._heading(j, self._result.q) - self._heading(i, self._result.q)
+        drawn = self._heading(j, x.q[None]) - self._heading(i, x.q[None])
+        return now - 2.0 * np.pi * np.round(drawn / (2.0 * np.pi))
+
+    def _heading(self, frame: int, q: np.ndarray) -> Any:
+        """In the plane: the way that a frame's x axis points, by the turned angle of its body."""
+        S = self._x.system
+        b, R = int(S.frame_i[frame]), S.frame_x[frame, 3:]
+        return np.arctan2(R[3], R[0]) + (q[:, S.body_i[b, Q0] + 2] if b >= 0 else 0.0)
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
+        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
+            raise AttributeError(name)
+        own = self.element.measured(self._result.planar)
+        for ending, k in (("_rate", 1), ("_acceleration", 2)):
+            if name.endswith(ending) and name.removesuffix(ending) in own:
+                return self._measure(name.removesuffix(ending))[k]
+            if name == ending[1:] and len(own) == 1:
+                return self._measure(next(iter(own)))[k]
+        if name in own:
+            return self._measure(name)[0]
+        has = ", ".join([*own, "force", "torque"])
+        raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
+
+    def _wrench(self) -> tuple[tuple, tuple]:
+        """Force on body_j at M's origin and torque about it, world components."""
+        s, r, S = self._x.structure, self._result.records, self._x.system
+        zero = np.zeros(r.n)
+        force, torque = (zero,) * 3, (zero,) * 3
+        for k in s.terms_of.get(self.element.name, ()):
+            t = s.terms[k]
+            lam = self._result.multipliers[:, t.row]
+            par = parameters(S.term_x, k)
+            hint = self._result.states[:, t.hint] if t.hint >= 0 else 0.0
+            _, f, tM, _, _ = FORMULAS[t.formula.kind](par, r.frame(t.F), r.frame(t.M), hint, S.const)
+            force = add(force, scale(lam * par[7], f))
+            torque = add(torque, scale(lam * par[7], tM))
+        return force, torque
+
+    def reaction(self, *, axes: str = "world", on: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Reaction force and torque of the joint.
+
+        Parameters
+        ----------
+        axes : ``"world"``, ``"joint"`` or the name of one of the two bodies
+            Axes of the components; ``"joint"`` are those of the joint's frame on ``body_i``.
+        on : str
+            Name of the body it acts on; ``body_j`` if not given.
+
+        Returns
+        -------
+        force [N], torque [N m] : ndarray (n, 3)
+            The torque is about the joint's point on ``body_j`` (for a two-point link: its second end).
+        """
+        e, s = self.element, self._x.structure
+        force, torque = self._wrench()
+        names = [s.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        on = names[1] if on is None else on
+        if on not in names:
+            raise ValueError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}")
+        if axes != "world":
+            R = self._axes(axes, names)
+            force, torque = mtv(R, force), mtv(R, torque)
+        sign = 1.0 if on == names[1] else -1.0
+        return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
+
+    def _axes(self, axes: str, names: list[str]) -> tuple:
+        records, x = self._result.records, self._x
+        if axes == "joint":
+            return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
+        if axes not in names:
+            raise ValueError(f"axes must be 'world', 'joint', {names[0]!r} or {names[1]!r}, not {axes!r}")
+        return (
+            PointView(self._result, x.structure.model[axes])._record[1] if axes != GROUND else tuple(np.eye(3).ravel())
+        )
+
+    @property
+    def force(self) -> np.ndarray:
+        """Reaction force on ``body_j``, world axes [N], (n, 2) or (n, 3)."""
+        return stacked(self._wrench()[0], self._result.planar)
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Reaction torque on ``body_j`` about the joint's point, world axes [N m]; planar: one number a time."""
+        t = self._wrench()[1]
+        return t[2] if self._result.planar else np.stack(t, axis=1)
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Reaction components that redundancy leaves undetermined; of those one choice is given."""
+        return self._result.health.undetermined.get(self.element.name, ())
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Coordinates, their rates, reaction force and torque."""
+        out: dict[str, tuple[str, np.ndarray]] = {}
+        own = self.element.measured(self._result.planar)
+        for what, c in own.items():
+            value, rate, _ = self._measure(what)
+            out[what] = (c.unit, value)
+            out["rate" if len(own) == 1 else f"{what}_rate"] = (f"{c.unit}/s", rate)
+        if (place := f"{self.element.name}.place") in self._x.structure.state_at:
+            out["place"] = ("m", self._result.states[:, self._x.structure.state_at[place]])
+        axes = "xy" if self._result.planar else "xyz"
+        out |= {f"f{a}": ("N", self.force[:, i]) for i, a in enumerate(axes)}
+        torque = np.atleast_2d(self.torque.T)
+        names = ["torque"] if self._result.planar else [f"t{a}" for a in axes]
+        return out | {k: ("N*m", torque[i]) for i, k in enumerate(names)}

@@ -1,0 +1,89 @@
+"""Motion of bodies and frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...model.body import GROUND, Body, Frame
+from ...model.geometry import matrix_to_quaternion
+from ...system.tables import Q0
+from .base import View, stacked
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+
+class PointView(View):
+    """Motion of a frame: a body's reference frame or a named one."""
+
+    def __init__(self, result: Result, element: Body | Frame) -> None:
+        super().__init__(result, element)
+        body = element.name if isinstance(element, Body) else element.body
+        pose = self._x.poses
+        p, R = pose.named(element.name)
+        b = self._x.bodies[body]
+        local, turn = b.R.T @ (p - b.c), b.R.T @ R
+        self._body = -1 if body == GROUND else self._x.structure.place[body]
+        self._record = result.records.carried(self._body, tuple(local), tuple(turn.ravel()))
+        self._turn = turn
+
+    @property
+    def position(self) -> np.ndarray:
+        """Position of its origin in the world [m], (n, 2) or (n, 3)."""
+        return stacked(self._record[0], self._result.planar)
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """Velocity of its origin, world axes [m/s]."""
+        return stacked(self._record[3], self._result.planar)
+
+    @property
+    def acceleration(self) -> np.ndarray:
+        """Acceleration of its origin, world axes [m/s^2]."""
+        return stacked(self._record[5], self._result.planar)
+
+    @property
+    def rotation(self) -> np.ndarray:
+        """Rotation matrices, world from frame, (n, 3, 3)."""
+        return np.stack(self._record[1], axis=1).reshape(-1, 3, 3)
+
+    @property
+    def quaternion(self) -> np.ndarray:
+        """Unit quaternions, scalar first, (n, 4); neighbours have the same sign."""
+        e = np.array([matrix_to_quaternion(R) for R in self.rotation])
+        flips = np.cumprod(np.r_[1.0, np.where((e[1:] * e[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
+        return e * flips[:, None]
+
+    @property
+    def angle(self) -> np.ndarray:
+        """Planar: orientation [rad], whole turns counted."""
+        if not self._result.planar:
+            raise AttributeError(f"{self.element.title} moves in space and has no single angle; use rotation")
+        local = np.arctan2(self._turn[1, 0], self._turn[0, 0])
+        if self._body < 0:
+            return np.full(len(self._result.t), local)
+        return self._result.q[:, self._x.system.body_i[self._body, Q0] + 2] + local
+
+    @property
+    def angular_velocity(self) -> np.ndarray:
+        """Angular velocity, world axes [rad/s]; planar: one number a time."""
+        return self._record[2][2] if self._result.planar else np.stack(self._record[2], axis=1)
+
+    @property
+    def angular_acceleration(self) -> np.ndarray:
+        """Angular acceleration, world axes [rad/s^2]; planar: one number a time."""
+        return self._record[4][2] if self._result.planar else np.stack(self._record[4], axis=1)
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """x, y, z, their derivatives, and the orientation."""
+        axes = "xy" if self._result.planar else "xyz"
+        out = {a: ("m", self.position[:, i]) for i, a in enumerate(axes)}
+        if self._result.planar:
+            out["angle"] = ("rad", self.angle)
+        out |= {f"v{a}": ("m/s", self.velocity[:, i]) for i, a in enumerate(axes)}
+        out |= {f"a{a}": ("m/s^2", self.acceleration[:, i]) for i, a in enumerate(axes)}
+        if self._result.planar:
+            return out | {"omega": ("rad/s", self.angular_velocity)}
+        return out | {f"omega_{a}": ("rad/s", self.angular_velocity[:, i]) for i, a in enumerate(axes)}

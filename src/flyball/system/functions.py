@@ -1,0 +1,103 @@
+"""Python functions as laws call them, and what is left of a call that failed."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+
+from ..errors import ExpressionError
+from .call import STACK_RESERVE
+from .native import Native
+
+
+class Called(NamedTuple):
+    """A Python function as some law calls it."""
+
+    native: Native
+    names: tuple[str, ...]  # its arguments; "" where a default is given
+    text: str
+    where: str  # what it is the law of
+
+    @property
+    def title(self) -> str:
+        """What it is, for messages."""
+        return f"{self.where + ': ' if self.where else ''}the Python function {self.text}"
+
+
+class Fault(NamedTuple):
+    """A call of a Python function that gave no finite number: with which arguments, and what it raised, if it did."""
+
+    function: Called
+    arguments: tuple[float, ...]
+    exception: Exception | None
+    value: float
+
+    @property
+    def message(self) -> str:
+        """What happened, in words."""
+        given = zip(self.function.names, self.arguments, strict=True)
+        listed = ", ".join(f"{name} = {x:.6g}" for name, x in given if name)
+        at = f" for {listed}" if listed else ""
+        if self.exception is None:
+            return f"{self.function.title} gives {self.value}{at}; it must give a finite number"
+        return f"{self.function.title} raises {type(self.exception).__name__}{at}: {self.exception}"
+
+
+def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
+    """The last call that gave no finite number, or None.
+
+    The Python function is run again with the same arguments, for the exception that compiled code does not tell.
+
+    Parameters
+    ----------
+    stack : array
+        Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
+    functions : sequence of Called
+        What `compile_law` appended to its list.
+    """
+    record = np.real(stack[-STACK_RESERVE:])
+    if not record[0, 0] > 0.0:
+        return None
+    function = functions[int(record[0, 0]) - 1]
+    arguments = tuple(record[1:].ravel()[: int(record[0, 1])].tolist())
+    value, error = float(record[0, 2]), None
+    try:
+        given = function.native.python(*arguments)
+    except Exception as raised:
+        error = raised
+    else:
+        try:
+            value = float(given)
+        except (TypeError, ValueError):
+            error = ExpressionError(f"it returned {given!r} ({type(given).__name__}); a law returns a number")
+    return Fault(function, arguments, error, value)
+
+
+def forget(stack: np.ndarray) -> None:
+    """Wipe the record of a fault, as before a run: an analysis may try positions that a law is not made for."""
+    stack[-STACK_RESERVE:] = 0.0
+
+
+@contextmanager
+def interrupts_kept(functions: Sequence[Called]) -> Iterator[None]:
+    """Keep the user's interrupt until compiled code has returned, where that calls back into Python.
+
+    Python would raise KeyboardInterrupt on entering the callback, and ctypes would swallow it.
+    """
+    in_main = threading.current_thread() is threading.main_thread()
+    if not in_main or not any(f.native.reason for f in functions) or signal.getsignal(signal.SIGINT) is None:
+        yield
+        return
+    asked: list[int] = []
+    before = signal.signal(signal.SIGINT, lambda number, frame: asked.append(number))
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+    if asked:
+        signal.raise_signal(signal.SIGINT)
