@@ -23,7 +23,9 @@ class Shape:
     ``kind`` and ``size`` [m]: ``box`` (x, y, z edges), ``sphere`` (radius,), ``cylinder`` (radius, length; along z),
     ``capsule`` (radius, length between the cap centres; along z), ``cone`` (radius, height; tip at +z),
     ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness), ``mesh`` (no size;
-    ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside). A ``hole`` is drawn as a dark opening in the others.
+    ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside).
+
+    A ``hole`` is drawn as a dark opening in the body's other shapes.
     """
 
     kind: str
