@@ -37,7 +37,7 @@ class Looks:
         self.result, self.places = result, places
         self.planar = result.planar
         self._env = dict(zip(result.model.parameters, result.values.system.const.tolist(), strict=False))
-        self._solids = {b.name: b.solids() for b in result.model.bodies}
+        self._solids = {b.name: b.shapes() for b in result.model.bodies}
         self._numbers = {id(s): resolve(s, self._env) for solids in self._solids.values() for s in solids}
         self._share = self._mesh_share()
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
@@ -126,13 +126,15 @@ class Looks:
         out = []
         solids: tuple[Any, ...] = self._solids[name]
         for s in solids:
+            if s.hole:
+                continue
             n = self._numbers[id(s)]
             if _meshed(s):
                 extents = np.ptp(s.mesh(n)[0], axis=0).tolist()
             else:
                 extents = _extents("Cylinder" if isinstance(s, Rod) else type(s).__name__, s.size(n))
             out.append(float(np.median(extents)))
-        return min(out)
+        return min(out, default=np.inf)
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """The body's shapes."""
@@ -164,12 +166,13 @@ class Looks:
             v, t = s.mesh(n)
             most = max(int(self._share * len(t)), min(FEWEST, len(t)))
             v, t = simplified(v, np.asarray(t), most)
-            return Shape("mesh", (), vertices=v, triangles=t)
+            return Shape("mesh", (), vertices=v, triangles=t, hole=s.hole)
         p, R = s.pose(n)
         if isinstance(s, Cone):
             p = p + R[:, 2] * n.height / 2
         kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
-        return Shape(kind, tuple(map(float, s.size(n))), three(p), tuple(matrix_to_quaternion(R).tolist()))
+        turn = tuple(matrix_to_quaternion(R).tolist())
+        return Shape(kind, tuple(map(float, s.size(n))), three(p), turn, hole=s.hole)
 
     def _cam(self, e: Any) -> list[Shape]:
         """The disc that a cam's outline bounds."""
