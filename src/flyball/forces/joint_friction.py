@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
@@ -76,7 +77,7 @@ class JointFriction(CoordinateForce):
         Lengths over which bending moment and twist are carried as pairs of forces; moments count nothing if not given.
     """
 
-    joint: str
+    joint: str = field(kw_only=False)
     coordinate: str | None = None
     static: Annotated[Number, Unit("1")]
     kinetic: Annotated[Number | None, Unit("1")] = None

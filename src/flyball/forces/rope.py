@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -63,7 +64,7 @@ class Rope(CoordinateForce):
         Free length; the drawn length if not given.
     """
 
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...] = field(kw_only=False)
     at: Points | None = None
     stiffness: Stiffness
     damping: Damping = 0.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,7 +32,7 @@ class Coupler(Coupling):
         What the sum has to be; what it is in the drawn configuration if not given.
     """
 
-    coordinates: tuple[str, ...]
+    coordinates: tuple[str, ...] = field(kw_only=False)
     weights: Annotated[Numbers, Unit(None)]
     value: Annotated[Number | None, Unit(None)] = None
 

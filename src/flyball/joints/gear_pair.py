@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -35,8 +36,8 @@ class GearPair(Coupling):
         Whether the second gear is a ring with its teeth inside.
     """
 
-    joint_1: str
-    joint_2: str
+    joint_1: str = field(kw_only=False)
+    joint_2: str = field(kw_only=False)
     teeth: Annotated[Numbers, Unit(None)]
     internal: bool = False
 

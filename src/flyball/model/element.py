@@ -103,6 +103,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     name = kwargs.get("name", args[0] if args else None)
     who = f"{kind} {name!r}" if isinstance(name, str) else kind
     lines = []
+    by_place = {known[int(e["loc"][0])] for e in error.errors() if e["type"] == "unexpected_positional_argument"}
     wrong: dict[str, list[str]] = {}  # field -> what it may be: a union complains once for each of its members
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
@@ -111,7 +112,10 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         if e["type"] == "unexpected_keyword_argument":
             lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
-            lines.append(f"field {where!r} is missing")
+            if where not in by_place:
+                lines.append(f"field {where!r} is missing")
+        elif e["type"] == "unexpected_positional_argument":
+            lines.append(f"give field {where!r} by its name: {where}=...")
         elif e["type"] in _TYPES:
             wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:

@@ -16,6 +16,7 @@ from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
 from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .function import function_name
 from .geometry import vector
 from .inertia import mass_properties
 from .joint import Joint
@@ -312,6 +313,11 @@ class Model:
         """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
         if value is None:
             return None
+        if driver and callable(value):
+            raise ExpressionError(
+                f"{where} is the Python function '{function_name(value)}', whose derivatives a driver cannot know; "
+                f"give an expression, or a Table that is called in one"
+            )
         tables = {x.name: x for x in self.tables}
         sensors = {x.name: x for x in self.sensors if isinstance(x, Sensor)}
         try:

@@ -55,6 +55,14 @@ def note(code, at, stack, row, value):
         stack[last + 1 + k // 3, k % 3] = stack[row + k, 0]
 
 
+@formula
+def forget(stack):
+    """Mark a recorded fault as overcome: the step that met it was taken again, shorter, and got by."""
+    last = stack.shape[0] - STACK_RESERVE
+    if stack[last, 0].real > 0.0:
+        stack[last, 0] = -stack[last, 0]
+
+
 @on_numba
 def _register() -> None:
     """In compiled code: a jump to the address; complex numbers are not for such code, their value stays nan."""

@@ -36,6 +36,7 @@ class Native:
 
     def __init__(self, python: Callable[..., Any], count: int) -> None:
         self.python, self.count = python, count
+        self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
         self.seen: Any = None
         self.reason = ""
         if isinstance(python, FunctionType):
@@ -47,7 +48,7 @@ class Native:
         else:
             self.reason = f"it is no plain function but a {type(python).__name__}"
         if self.reason:
-            self.code = _callback(python, count)
+            self.code = _callback(python, count, self.raised)
         self.address = _address(self.code)
         NATIVE[self.address] = self
 
@@ -86,6 +87,8 @@ class Fault(NamedTuple):
         at = f" for {given}" if given else ""
         if self.exception is None:
             return f"{self.function.title} gives {self.value}{at}; make it give a finite number there"
+        if isinstance(self.exception, ExpressionError):
+            return f"{self.function.title}{at}: {self.exception}"
         return f"{self.function.title} raises {type(self.exception).__name__}{at}: {self.exception}"
 
 
@@ -106,10 +109,11 @@ def native(expression: Expression, count: int) -> Native:
     return made
 
 
-def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
+def fault(stack: np.ndarray, functions: Sequence[Called], overcome: bool = False) -> Fault | None:
     """The last call that gave no finite number, or None.
 
-    The Python function is run again with the same arguments, for the exception that compiled code has swallowed.
+    The Python function is run again with the same arguments, for the exception that compiled code has swallowed. A
+    function with a memory may not raise it again; then it is the one that it raised last, if that is known.
 
     Parameters
     ----------
@@ -117,11 +121,14 @@ def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
         Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
     functions : sequence of Called
         What `compile_law` appended to its list.
+    overcome : bool
+        Ask for a call in a step that was taken again, shorter, and then did without such a call.
     """
     record = np.real(stack[-STACK_RESERVE:])
-    if not record[0, 0] > 0.0:
+    at = -record[0, 0] if overcome else record[0, 0]
+    if not at > 0.0:
         return None
-    function = functions[int(record[0, 0]) - 1]
+    function = functions[int(at) - 1]
     arguments = tuple(record[1:].ravel()[: int(record[0, 1])].tolist())
     value, error = float(record[0, 2]), None
     try:
@@ -133,6 +140,8 @@ def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
             value = float(given)
         except (TypeError, ValueError):
             error = ExpressionError(f"it returned {given!r} ({type(given).__name__}); a law returns a number")
+    if error is None and np.isfinite(value) and function.native.raised:
+        error = function.native.raised[0]
     return Fault(function, arguments, error, value)
 
 
@@ -162,7 +171,7 @@ def _compiled(function: FunctionType, count: int) -> Any:
     from numba import carray, cfunc, config, types
 
     if getattr(config, "DISABLE_JIT", False):
-        return _callback(function, count)
+        return _callback(function, count, [])
     f = _translatable(function, {})
     rows, last = max(count, 1), max(count - 1, 0)
 
@@ -179,14 +188,17 @@ def _compiled(function: FunctionType, count: int) -> Any:
     return cfunc(types.void(types.CPointer(types.float64)))(law)
 
 
-def _callback(function: Callable[..., Any], count: int) -> Any:
-    """A way from compiled code back into Python."""
+def _callback(function: Callable[..., Any], count: int, raised: list[Exception]) -> Any:
+    """A way from compiled code back into Python; what the function raises last is kept in a list."""
     places = [3 * k for k in range(count)]
 
     def law(p: Any) -> None:
         try:
             p[1] = function(*[p[k] for k in places])
-        except BaseException:  # nan stays; `fault` runs the function again for the exception
+        except Exception as error:  # nan stays; `fault` runs the function again for the exception
+            raised[:] = [error]
+            p[1] = np.nan
+        except BaseException:
             p[1] = np.nan
 
     return ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double))(law)

@@ -10,6 +10,7 @@ from .._jit import formula
 from ..constraints import curve
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
+from .call import forget
 from .dispatch import efforts, forces, row_biases, row_values
 from .friction import CONVERGED, SUBSTITUTIONS, improve, returned
 from .kinematics import motions, poses
@@ -48,7 +49,7 @@ from .tables import (
 from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
-NOT_CLOSED, NOT_FINITE, JAMMED = 2, 3, 4
+NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
@@ -184,9 +185,9 @@ def accelerate(S, W, t, p, dy, factored):
             not factored
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
         ):
-            status = factor(S, W)
-            if status != 0:
-                return status
+            if factor(S, W) != 0:
+                W.info[STATUS] = SINGULAR
+                return SINGULAR
             factored = True
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
         if W.load.shape[1] == 0 or returned(S, W) <= CONVERGED:
@@ -260,6 +261,7 @@ def derivative(t, y, dy, S, W):
     if W.option[STABILIZE] == STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
+            W.info[STATUS] = status
             return status
     else:
         normalise(S, q)
@@ -277,9 +279,11 @@ def arrive(t, y, dy, S, W):
     z = y[nq + W.vel.shape[1] :]
     found = 0.0
     factored = False
+    forget(W.stack)
     if W.option[STABILIZE] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
+            W.info[STATUS] = status
             return status, found
     else:
         normalise(S, q)
