@@ -16,12 +16,6 @@ _HOME = {
     "Sensor": "model.sensor",
     "IMU": "model.sensor",
     "Table": "model.table",
-    "Box": "model.shapes",
-    "Sphere": "model.shapes",
-    "Cylinder": "model.shapes",
-    "Capsule": "model.shapes",
-    "Cone": "model.shapes",
-    "Ellipsoid": "model.shapes",
     "load": "files",
     "PerformanceNotice": "errors",
     "load_result": "files",
@@ -34,14 +28,15 @@ _HOME = {
     "AssemblyError": "errors",
     "SimulationError": "errors",
 }
+_ROOMS = ("model.shapes", "joints", "forces")
 
 
 def __getattr__(name: str) -> Any:
-    """Public names are imported when first asked for: joints and forces from the folders that hold them."""
+    """Public names are imported when first asked for: shapes, joints and forces from the folders that hold them."""
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
     if not name.startswith("_"):
-        for room in ("joints", "forces"):
+        for room in _ROOMS:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
@@ -51,8 +46,8 @@ def __getattr__(name: str) -> Any:
 def __dir__() -> list[str]:
     from .model.element import Element
 
-    for room in ("joints", "forces"):
+    for room in _ROOMS:
         importlib.import_module(f".{room}", __name__)
-    rooms = tuple(f"{__name__}.{room}." for room in ("joints", "forces"))
+    rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *elements, "__version__"})
+    return sorted({*_HOME, *elements, "__version__"} - {"Solid"})

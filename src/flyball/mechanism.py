@@ -10,6 +10,7 @@ from .model.model import Model
 if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
+    from .analysis.mass import MassReport
     from .results.result import Result
 
 
@@ -36,6 +37,12 @@ class Mechanism(Model):
         from .analysis.check import check
 
         return check(self)
+
+    def mass_properties(self, **options: Any) -> MassReport:
+        """Masses, inertias and principal axes; see `flyball.analysis.mass.mass_properties` for the options."""
+        from .analysis.mass import mass_properties
+
+        return mass_properties(self, **options)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the description to a TOML file; `flyball.load` reads it back exactly."""

@@ -211,7 +211,7 @@ def test_fixed_bodies_stay_where_they_are():
             angle=0.3,
             velocity=(0.5, 0),
             angular_velocity=2.0,
-            fixed=True,
+            as_drawn=True,
         )
     )
     m.add(fb.Body("other", mass=1, inertia=1, position=(-1, 0)))
@@ -338,7 +338,9 @@ def test_contradictory_drivers():
 
 def test_fixed_bodies_that_cannot_meet():
     m = fb.Mechanism("apart", planar=True)
-    m.add(fb.Body("a", mass=1, inertia=1, fixed=True), fb.Body("b", mass=1, inertia=1, position=(1, 0), fixed=True))
+    m.add(
+        fb.Body("a", mass=1, inertia=1, as_drawn=True), fb.Body("b", mass=1, inertia=1, position=(1, 0), as_drawn=True)
+    )
     framed(m, fb.Revolute, "J", "a", (0, 0), "b", (0, 0))
     with pytest.raises(fb.AssemblyError, match="J is 1 m from closed"):
         assemble(m)

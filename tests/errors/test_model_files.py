@@ -68,7 +68,9 @@ def test_malformed_toml_is_shown_with_its_line() -> None:
         ("[[bodies]]\nname = 'b'\ndensity = 1\nshape = { type = 'Box', edges = [1, 0, 1] }", ["Box: edges must be"]),
         (
             BODY + "[[joints]]\nname = 'A'\ntype = 'Revolut'",
-            ["m.toml: [[joints]] 1 'A' (line 5): unknown type 'Revolut' (did you mean 'Revolute'?); joints are Cam, Cyl"],
+            [
+                "m.toml: [[joints]] 1 'A' (line 5): unknown type 'Revolut' (did you mean 'Revolute'?); joints are Cam, Cyl"
+            ],
         ),
         (BODY + "[[forces]]\nname = 'f'", ["[[forces]] 1 'f' (line 5): it has no type; forces are Actuator, Bushing"]),
         (

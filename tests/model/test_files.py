@@ -25,7 +25,7 @@ def planar() -> fb.Mechanism:
     m = fb.Mechanism(
         "slider crank", planar=True, gravity=(0, "-9.81 m/s^2"), parameters={"k": "2 kN/m", "r": 0.1 + 0.2}
     )
-    m.add(fb.Body("crank", mass=1, inertia="10 g*m^2", com=(0.1, 0), angle="30 deg", color="#ff8800", fixed=True))
+    m.add(fb.Body("crank", mass=1, inertia="10 g*m^2", com=(0.1, 0), angle="30 deg", color="#ff8800", as_drawn=True))
     m.add(fb.Body("slider", mass=1 / 3, inertia=0, position=(1, -0.0)))
     m.add(fb.Body("tip", shape=[fb.Box(edges=(1, 2, 3)), fb.Sphere(radius="5 mm")], density=7.85e3))
     m.add(fb.Frame("eye", "crank", position=("r", "2*r"), angle=math.pi))
@@ -79,10 +79,10 @@ def bits(x: float) -> bytes:
     return struct.pack("<d", x)
 
 
-@given(x=numbers, y=numbers, mass=positive, name=texts)
-def test_numbers_and_names_survive_bit_for_bit(x: float, y: float, mass: float, name: str) -> None:
+@given(x=numbers, y=numbers, mass=positive, name=texts, color=st.from_regex(r"\A#[0-9a-fA-F]{6}\Z"))
+def test_numbers_and_names_survive_bit_for_bit(x: float, y: float, mass: float, name: str, color: str) -> None:
     m = fb.Mechanism(name, planar=True, gravity=(x, y), parameters={"p": y})
-    m.add(fb.Body(name, mass=mass, inertia=mass, position=(x, y), angle=x, color=name))
+    m.add(fb.Body(name, mass=mass, inertia=mass, position=(x, y), angle=x, color=color))
     back = loads(dumps(m), fb.Mechanism)
     assert back == m
     for a, b in ((back.bodies[0], m.bodies[0]),):

@@ -23,7 +23,7 @@ found = {"y": float(r["stone.y"][-1]), "where": fb.__file__}
 SLIDE = """
 m = fb.Mechanism("slope")
 m.add(fb.Body("puck", mass=2, inertia=(1, 1, 1), position=(1, 0, 0), velocity=(3, 0, 0)))
-m.add(fb.PointInPlane("table", "ground", "puck", at=(1, 0, 0), axis=(0, 3, 4)))
+m.add(fb.Sheet("table", "ground", "puck", at=(1, 0, 0), axis=(0, 3, 4)))
 m.add(fb.Drag("air", "puck", coefficient="0.8 N*s/m"), fb.PointForce("pull", "puck", force=(0, 0, -20)))
 found |= {"freedoms": m.check().freedoms}
 m.save("slope.toml")
@@ -31,7 +31,7 @@ found |= {"same file": fb.load("slope.toml") == m}
 r = m.simulate(1.0, rtol=1e-11, atol=1e-12, outputs=11)
 found |= {"t": r.t.tolist(), "position": r["puck"].position.tolist(), "force": r["table"].force.tolist()}
 found |= {"drift": r.energy.drift, "work": r.energy.work["air"].tolist(), "kinds": sorted(set(r.energy.work))}
-found |= {"page": len(r.html()), "names": [n in dir(fb) for n in ("PointInPlane", "Drag")]}
+found |= {"page": len(r.html()), "names": [n in dir(fb) for n in ("Sheet", "Drag")]}
 """
 
 PRINT = "print(json.dumps(cache_counts() | found))\n"
@@ -48,7 +48,7 @@ from ..model.joint import Joint
 
 
 @element
-class PointInPlane(Joint):
+class Sheet(Joint):
     """A point of ``body_j`` stays in the plane of ``body_i`` through ``at`` whose normal is ``axis``."""
 
     blocks: ClassVar = (SLIDE,)
@@ -94,7 +94,8 @@ class Drag(BodyForce):
         return (n.coefficient,)
 '''
 
-LAST_FORCE = "    each_force(S, W, t, z, work, F.motor.KIND, F.motor.inputs, F.motor.wrench)\n"
+LAST_FORCE = "    return element.bushing.wrench(par, F, M, laws, values)\n"
+DRAG = "    if kind == element.drag.KIND:\n        return element.drag.wrench(par, F, M, laws, values)\n"
 
 
 @pytest.fixture(scope="session")
@@ -105,8 +106,8 @@ def runs(tmp_path_factory):
     second = copy.run(FALL + PRINT)
     # a callee in another file than the kernel's: gravity pulls the other way
     copy.edit("system/loads.py", "sub(gravity, a)", "sub(neg(gravity), a)")
-    copy.add("joints/point_in_plane.py", JOINT)
-    copy.append("joints/__init__.py", "from .point_in_plane import PointInPlane as PointInPlane\n")
+    copy.add("joints/sheet.py", JOINT)
+    copy.append("joints/__init__.py", "from .sheet import Sheet as Sheet\n")
     copy.add("forces/drag.py", FORCE)
-    copy.edit("system/dispatch.py", LAST_FORCE, LAST_FORCE + LAST_FORCE.replace("F.motor", "F.drag"))
+    copy.edit("system/dispatch.py", LAST_FORCE, DRAG + LAST_FORCE)
     return copy, first, second, copy.run(FALL + SLIDE + PRINT)

@@ -127,11 +127,11 @@ def _misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
 
 
 def _movable(c: Compiled) -> np.ndarray:
-    """1 for velocities of bodies that may move, 0 for those of bodies described as fixed."""
+    """1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
     s = c.structure
     out = np.ones(s.nv)
     for name, b in s.place.items():
-        if b >= 0 and s.model[name].fixed:
+        if b >= 0 and s.model[name].as_drawn:
             v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
             out[v0 : v0 + n] = 0.0
     return out
@@ -287,7 +287,7 @@ def _velocities(
         bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]
         raise AssemblyError(
             f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {', '.join(bad)} disagree. "
-            f"Check drivers, initial rates and bodies that are fixed",
+            f"Check drivers, initial rates and bodies with as_drawn=True",
             gaps={k: float(np.abs(r[c.structure.slices[k]]).max()) for k in bad},
         )
     return v

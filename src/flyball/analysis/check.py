@@ -15,9 +15,11 @@ from ..model.force import BodyForce, TwoPointForce
 from ..model.model import Model
 from ..system.values import Values
 from .assemble import Assembly, assemble
+from .mass import MassProperties, directions, letters, report
 from .mobility import mobility
 
 FAR = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
+EQUAL = 1e-9  # moments that differ by less than this part are the same
 BARELY = 1e-3  # slack of the triangle inequality, as part of the largest moment, below which a body is all but flat
 
 
@@ -27,7 +29,22 @@ class BodyReport:
 
     mass: float  # [kg]
     com: tuple[float, ...]  # centre of mass in the reference frame [m]
-    moments: tuple[float, ...]  # principal moments about the centre of mass [kg m^2]; planar: one
+    moments: tuple[float, ...]  # principal moments about the centre of mass [kg m^2], ascending; planar: one
+    axes: tuple[tuple[float, ...], ...]  # their axes: three vectors in body axes; planar: none
+
+    def line(self) -> str:
+        """What a reader wants to see."""
+        com = ", ".join(f"{x:.4g}" for x in self.com)
+        moments = ", ".join(f"{x:.4g}" for x in self.moments)
+        text = f"{self.mass:.4g} kg, centre of mass ({com}) m, "
+        if not self.axes:
+            return text + f"inertia {moments} kg m^2"
+        if self.moments[-1] - self.moments[0] <= EQUAL * self.moments[-1]:
+            return text + f"inertia {self.moments[0]:.4g} kg m^2 about every axis"
+        axes = np.array(self.axes).T
+        if names := letters(axes):
+            return text + f"inertia {moments} kg m^2 about {names}"
+        return text + f"principal moments {moments} kg m^2 about {directions(axes)}"
 
 
 @dataclass(frozen=True)
@@ -46,6 +63,8 @@ class Report:
     redundancy: int  # how many rows say nothing new
     undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
     moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
+    mass: float  # of all bodies together [kg]
+    com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
 
     def as_dict(self) -> dict[str, Any]:
@@ -69,11 +88,12 @@ class Report:
             out.append(("reactions not determined", text))
         out.append(("assembly", self._assembly()))
         for name, b in list(self.bodies.items())[:30]:
-            moments = ", ".join(f"{x:.4g}" for x in b.moments)
-            com = ", ".join(f"{x:.4g}" for x in b.com)
-            out.append((f"body {name}", f"{b.mass:.4g} kg, centre of mass ({com}) m, inertia {moments} kg m^2"))
+            out.append((f"body {name}", b.line()))
         if len(self.bodies) > 30:
             out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
+        if len(self.bodies) > 1:
+            com = ", ".join(f"{x:.4g}" for x in self.com)
+            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at ({com}) m"))
         return out + [("warning", w) for w in self.warnings]
 
     def _freedoms(self) -> str:
@@ -119,7 +139,8 @@ def check(model: Model) -> Report:
     a = assemble(model)
     m = mobility(model, a)
     x = a.compiled.values
-    bodies = {b.name: _body(x, b.name, model.planar) for b in model.bodies}
+    weights = report(model, x, a.q)
+    bodies = {name: _body(b, model.planar) for name, b in weights.bodies.items()}
     return Report(
         name=model.name,
         planar=model.planar,
@@ -133,15 +154,15 @@ def check(model: Model) -> Report:
         redundancy=m.redundancy,
         undetermined=m.undetermined,
         moved=a.moved,
+        mass=weights.total.mass,
+        com=tuple(weights.total.com.tolist()),
         warnings=tuple(_warnings(model, a, bodies, m.freedoms)),
     )
 
 
-def _body(x: Values, name: str, planar: bool) -> BodyReport:
-    b = x.bodies[name]
-    moments = [b.inertia[2, 2]] if planar else np.linalg.eigvalsh(b.inertia)
-    com = tuple(float(c) for c in (b.com[:2] if planar else b.com))
-    return BodyReport(float(b.mass), com, tuple(float(j) for j in moments))
+def _body(b: MassProperties, planar: bool) -> BodyReport:
+    axes = () if planar else tuple(map(tuple, b.axes.T.tolist()))
+    return BodyReport(b.mass, tuple(b.com.tolist()), tuple(b.moments.tolist()), axes)
 
 
 def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms: int) -> Iterator[str]:
@@ -150,7 +171,8 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
     held, pushed = _touched(model)
     for b in model.bodies:
         if b.name not in held | pushed:
-            yield f"body {b.name!r} has neither a joint nor a force: it moves on its own"
+            kept = "; as_drawn keeps assembly from moving it, it does not weld it to ground" if b.as_drawn else ""
+            yield f"body {b.name!r} has neither a joint nor a force: it moves on its own{kept}"
     if not model.gravity_vector().any():
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         yield f"no gravity; if that is not meant, give gravity={example}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._jit import kernel
+from .._jit import formula, kernel
 from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
@@ -12,6 +12,23 @@ from ..system.motion import arrive, derivative, move, place, remember, report
 from ..system.tables import System, Work
 
 POSITION, MOTION, INTEGRATE = 0, 1, 2
+
+
+@formula
+def perform(S, W, R, clock, out, task):
+    """What the kernel does. A formula, so that callees have one caller's flags and are compiled once."""
+    y = clock.y[0]
+    if task == POSITION:
+        t = clock.real[0]
+        nq = S.kinds[-2]
+        z = y[nq + W.vel.shape[1] :]
+        place(S, W, t, y[:nq], z)
+        move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
+        remember(S, W, z)
+        return 0
+    if task == MOTION:
+        return derivative(clock.real[0], y, clock.K[0], S, W)
+    return advance(derivative, arrive, report, S, W, R, clock, out)
 
 
 @kernel
@@ -22,18 +39,7 @@ def motion_kernel(S, W, R, clock, out, task):
     brought up to it. MOTION: also its derivative, in clock.K[0].
     INTEGRATE: go on with the integration; returns the number of output rows written. The others return a status.
     """
-    y = clock.y[0]
-    if task == 0:
-        t = clock.real[0]
-        nq = S.kinds[-2]
-        z = y[nq + W.vel.shape[1] :]
-        place(S, W, t, y[:nq], z)
-        move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
-        remember(S, W, z)
-        return 0
-    if task == 1:
-        return derivative(clock.real[0], y, clock.K[0], S, W)
-    return advance(derivative, arrive, report, S, W, R, clock, out)
+    return perform(S, W, R, clock, out, task)
 
 
 def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import field
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator
 
+from ..errors import ModelError
+from .color import check_color
 from .element import (
     Angle,
     AngularVelocity,
@@ -43,16 +46,16 @@ def _orientation(value: Any) -> Any:
 def _solids(value: Any) -> Any:
     """Shapes, or plain data of a model file that says their type."""
     if isinstance(value, dict):
-        from ..errors import ModelError
-
         kind = value.get("type")
-        cls = Element.registry.get(str(kind))
-        if cls is None or not issubclass(cls, Solid):
-            known = sorted(k for k, v in Element.registry.items() if issubclass(v, Solid) and v is not Solid)
-            raise ModelError(f"unknown shape type {kind!r}; there are {', '.join(known)}")
-        return cls(**{k: v for k, v in value.items() if k != "type"})
+        known = {c.__name__: c for c in Element.registry.values() if issubclass(c, Solid) and c is not Solid}
+        if kind not in known:
+            problem = "a shape has no type" if kind is None else f"unknown shape type {kind!r}"
+            raise ModelError(f"{problem}; there are {', '.join(sorted(known))}")
+        return known[kind](**{k: v for k, v in value.items() if k != "type"})
     if isinstance(value, (list, tuple)):
         return tuple(_solids(v) for v in value)
+    if value is not None and not isinstance(value, Solid):
+        raise ValueError("give a shape such as Sphere(radius=0.1), or a list of shapes")
     return value
 
 
@@ -72,16 +75,26 @@ class Body(Element):
     Its reference frame is where the user puts it: ``position`` and ``angle`` (planar) or ``orientation`` (spatial)
     in the drawn configuration. Mass properties and everything attached are counted from that frame.
 
+    Give ``mass`` and ``inertia``; then shapes are for looks only. Or give shapes with a ``density`` or a ``mass``, or
+    with densities or masses of their own: these say what it weighs, where its centre of mass is, and its inertia. In a
+    planar mechanism shapes are solids as in space, and their inertia about z counts. What would have no effect is
+    refused.
+
     Parameters
     ----------
     name : str
     mass : number [kg]
+        With shapes and no ``inertia``: shared out among the shapes by volume, or, where all have a density of their
+        own, by volume times density.
     inertia : number [kg m^2]
-        Planar: one number. Spatial: three principal moments or a 3x3 matrix. 0 for a point mass.
+        Planar: one number. Spatial: three principal moments (Ixx, Iyy, Izz) or the inertia tensor as a symmetric 3x3
+        matrix, whose diagonal holds the moments, Ixx = sum of m (y^2 + z^2), and which off the diagonal holds *minus*
+        the products of inertia, Ixy = -sum of m x y. A program that lists products with the plus sign needs its signs
+        turned. 0 for a point mass; 0 for one moment, and the others equal, for an ideal thin rod.
     inertia_about : point [m]
         Point of the reference frame that ``inertia`` is about; the centre of mass if not given.
     inertia_axes : orientation
-        Axes that a spatial ``inertia`` is given in, relative to the reference frame.
+        Axes that a spatial ``inertia`` is given in, relative to the reference frame; its axes if not given.
     com : point [m]
         Centre of mass in the reference frame. If not given: the shapes' where they give the inertia, else its origin.
     position : point [m]
@@ -95,18 +108,20 @@ class Body(Element):
     angular_velocity : number or vector [rad/s]
         At the start, world axes.
     shape : shape or list of shapes
-        What the body looks like; with ``density`` or ``mass`` also what it weighs.
+        What the body looks like and, unless ``inertia`` is given, what it weighs (see `Solid`).
     density : number [kg/m^3]
-    fixed : bool
-        Assembly must not change the pose and velocities given here.
+        Of the shapes that have no mass or density of their own.
+    as_drawn : bool
+        Assembly must not change the pose and velocities given here. It holds nothing during the motion: to weld a body
+        to ground add a `Fixed` joint.
     color : str
-        Colour in pictures, as in CSS.
+        Colour in pictures: a name of CSS such as ``"steelblue"``, or ``"#rgb"`` or ``"#rrggbb"``.
     """
 
     mass: Mass | None = None
     inertia: Inertia | None = None
     inertia_about: Point | None = None
-    inertia_axes: Orientation = (1.0, 0.0, 0.0, 0.0)
+    inertia_axes: Orientation | None = None
     com: Point | None = None
     position: Point = (0.0, 0.0, 0.0)
     angle: Angle = 0.0
@@ -115,20 +130,33 @@ class Body(Element):
     angular_velocity: AngularVelocity | None = None
     shape: Shapes = field(default=None)
     density: Density | None = None
-    fixed: bool = False
+    as_drawn: bool = False
     color: str | None = None
 
     category: ClassVar[str] = "bodies"
+
+    hints: ClassVar[dict[str, str]] = {
+        "fixed": "to weld it to ground add a Fixed joint; to keep assembly from moving it, as_drawn=True"
+    }
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A colour that there is; masses and shapes are looked at by `mass_properties`."""
+        if self.color is not None:
+            check_color(self.color, self.title)
 
     def ends(self) -> dict[str, str]:
         """Its reference frame."""
         return {"M": self.name}
 
-    def solids(self) -> tuple[Solid, ...]:
+    def shapes(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
         if self.shape is None:
             return ()
         return self.shape if isinstance(self.shape, tuple) else (self.shape,)
+
+    def solids(self) -> tuple[Solid, ...]:
+        """Its shapes that are seen: all but holes."""
+        return tuple(s for s in self.shapes() if not s.hole)
 
     def rotation(self, n: Any) -> np.ndarray:
         """Rotation matrix of the reference frame in the drawn configuration."""
@@ -187,7 +215,7 @@ class Driver(Element):
 
 @element
 class Initial(Element):
-    """A coordinate, its rate, or both, that assembly has to meet at the start.
+    """A coordinate, its rate, or both, that assembly has to meet at the start. One of them must be given.
 
     Parameters
     ----------
@@ -201,3 +229,8 @@ class Initial(Element):
     rate: Number | None = None
 
     category: ClassVar[str] = "initial"
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Something to meet."""
+        if self.value is None and self.rate is None:
+            raise ModelError(f"{self.title}: it says nothing; give value=..., rate=... or both")

@@ -20,6 +20,7 @@ from ..errors import ModelError
 from .expressions import number
 
 T = TypeVar("T", bound=type)
+LONG = 300  # letters of a value in a message
 
 
 @dataclass(frozen=True)
@@ -110,7 +111,8 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
         where = place[0] if place else ""
         where = known[int(where)] if where.isdigit() and int(where) < len(known) else where
         if e["type"] == "unexpected_keyword_argument":
-            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; its fields are {', '.join(known)}")
+            hint = getattr(cls, "hints", {}).get(where) or f"its fields are {', '.join(known)}"
+            lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; {hint}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
             if where not in by_place:
                 lines.append(f"field {where!r} is missing")
@@ -120,7 +122,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
             wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:
             message = e["msg"].removeprefix("Value error, ")
-            lines.append(f"field {where!r}: {message} (got {e['input']!r})")
+            lines.append(f"field {where!r}: {message} (got {_short(e['input'])})")
     for where, wanted in wrong.items():
         value = kwargs.get(where, dict(zip(known, args, strict=False)).get(where))
         lines.append(f"field {where!r} must be {' or '.join(dict.fromkeys(wanted))}, got {value!r}")
@@ -141,6 +143,12 @@ _TYPES = {
 def _is_branch(place: str) -> bool:
     """Names that pydantic gives to the members of a union."""
     return "[" in place or place in ("float", "str", "tuple", "constrained-str", "none", "callable")
+
+
+def _short(value: Any) -> str:
+    """A value as it is written, cut where it is long: the vertices of a mesh, for instance."""
+    text = repr(value)
+    return text if len(text) <= LONG else text[:LONG] + "..."
 
 
 def _did_you_mean(word: str, known: list[str]) -> str:

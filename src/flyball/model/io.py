@@ -22,6 +22,7 @@ from .function import function_name
 from .joint import Joint
 from .model import CATEGORIES, Model, suggest
 from .sensor import IMU, Sensor
+from .shapes.mesh import Mesh, paths_from
 from .table import Table
 
 M = TypeVar("M", bound=Model)
@@ -43,15 +44,15 @@ def save(model: Model, path: str | os.PathLike) -> None:
     ModelError
         If the file cannot be written, or a value of the mechanism has no place in a file.
     """
-    data = dumps(model).encode()
+    data = dumps(model, Path(path).parent).encode()
     try:
         Path(path).write_bytes(data)
     except OSError as error:
         raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
 
 
-def dumps(model: Model) -> str:
-    """The text of the mechanism's TOML file."""
+def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
+    """The text of the mechanism's TOML file; relative paths in it as seen from ``folder``, else as they were given."""
     lines = [f"name = {_text(model.name)}", f"planar = {_value(model.planar)}", f"gravity = {_value(model.gravity)}"]
     if model.parameters:
         lines += ["", "[parameters]"]
@@ -60,7 +61,7 @@ def dumps(model: Model) -> str:
         for e in getattr(model, category):
             lines += ["", f"[[{category}]]"]
             kind = {"type": type(e).__name__} if category in MANY_KINDS or isinstance(e, IMU) else {}
-            fields = kind | written(e)
+            fields = kind | _written(e, folder)
             _refuse_functions(e, fields)
             lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
     text = "\n".join(lines) + "\n"
@@ -69,6 +70,17 @@ def dumps(model: Model) -> str:
     except UnicodeEncodeError as error:
         raise ModelError(f"{model.name!r} cannot be written: a text holds {error.object[error.start]!r}") from None
     return text
+
+
+def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
+    """The element's fields as plain data, paths of meshes as seen from the folder."""
+    data = written(e)
+    if folder is not None and isinstance(e, Body) and "shape" in data:
+        tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
+        for shape, table in zip(e.shapes(), tables, strict=True):
+            if isinstance(shape, Mesh) and shape.path is not None:
+                table["path"] = shape.path_from(folder)
+    return data
 
 
 def _refuse_functions(e: Element, fields: Mapping[str, Any]) -> None:
@@ -130,7 +142,8 @@ def load(path: str | os.PathLike, cls: type[M]) -> M:
         raise ModelError(f"{path}: not a text in UTF-8 (byte {error.start}), so no model file") from None
     except OSError as error:
         raise ModelError(f"cannot read {os.fspath(path)!r}: {error.strerror}") from None
-    return loads(text, cls, os.fspath(path))
+    with paths_from(path.parent):
+        return loads(text, cls, os.fspath(path))
 
 
 def loads(text: str, cls: type[M], source: str = "model") -> M:

@@ -122,7 +122,7 @@ def _write(result: Result, path: Path) -> None:
         for x in shown:
             made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
             made.attrs.update(_attributes(x.unit, x.note))
-        _write_solution(result, file.create_group(GROUP))
+        _write_solution(result, file.create_group(GROUP), path.parent)
 
 
 def _text_type() -> Any:
@@ -135,7 +135,7 @@ def _safe(name: str) -> str:
     return name.replace("/", SLASH).strip() or "_"
 
 
-def _write_solution(result: Result, group: Any) -> None:
+def _write_solution(result: Result, group: Any, folder: Path) -> None:
     """The arrays as they are, the model as its file's text, parameters as used, health as JSON."""
     from .. import __version__
     from ..model.io import dumps
@@ -144,7 +144,7 @@ def _write_solution(result: Result, group: Any) -> None:
     group.attrs["format"] = FORMAT
     group.attrs["version"] = __version__
     texts = {
-        "model": dumps(result.model),
+        "model": dumps(result.model, folder),
         "health": json.dumps(result.health.as_dict()),
         "tree": json.dumps(list(s.tree)),
         "parameters": json.dumps(list(result.model.parameters)),
@@ -211,11 +211,13 @@ def _read(variable: Any) -> Any:
 
 def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     from ..model.io import loads
+    from ..model.shapes.mesh import paths_from
     from ..system.structure import structure
     from ..system.values import values
 
     try:
-        model = loads(stored["model"], cls, where)
+        with paths_from(Path(where).parent):
+            model = loads(stored["model"], cls, where)
         x = values(
             structure(model, tree=json.loads(stored["tree"])),
             dict(zip(json.loads(stored["parameters"]), stored["parameter_values"].tolist(), strict=True)),

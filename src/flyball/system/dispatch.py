@@ -1,8 +1,8 @@
-"""The only file that lists kinds: constraint terms and forces. Adding one adds one line here."""
+"""The only file that lists kinds: constraint terms and forces. Adding one adds one case here."""
 
 from __future__ import annotations
 
-from .. import forces as F
+from .. import forces as element
 from .._jit import formula
 from ..constraints import (
     alignment,
@@ -17,33 +17,46 @@ from ..constraints import (
     skew,
     spin,
 )
-from .loads import each_effort, each_force
-from .rows import begin, begin_biases, each_bias, each_value, end, end_biases
+from .rows import begin, begin_biases, each_bias, each_value, end, end_biases, rare_biases, rare_values
+from .tables import TERM_KINDS
+
+RARE = 5  # kinds from here on share one loop: nearly as fast, and much less to compile
 
 
 @formula
 def each_kind(S, W, z, visit):
-    """Visit the terms of every kind that motions are made of, with its formula."""
+    """Visit the terms of the kinds that most joints are made of, each with a loop of its own."""
     visit(S, W, z, coincident.KIND, coincident.row)
     visit(S, W, z, along.KIND, along.row)
     visit(S, W, z, perpendicular.KIND, perpendicular.row)
     visit(S, W, z, distance.KIND, distance.row)
     visit(S, W, z, angle.KIND, angle.row)
-    visit(S, W, z, skew.KIND, skew.row)
-    visit(S, W, z, curve.KIND, curve.row)
-    visit(S, W, z, rolling.KIND, rolling.row)
-    visit(S, W, z, blade.KIND, blade.row)
-    visit(S, W, z, spin.KIND, spin.row)
+
+
+@formula
+def rare(kind, par, F, M, hint, data):
+    """The formula of one of the other kinds."""
+    if kind == alignment.KIND_AXIS:
+        return alignment.axis_row(par, F, M, hint, data)
+    if kind == alignment.KIND_FULL:
+        return alignment.full_row(par, F, M, hint, data)
+    if kind == skew.KIND:
+        return skew.row(par, F, M, hint, data)
+    if kind == curve.KIND:
+        return curve.row(par, F, M, hint, data)
+    if kind == rolling.KIND:
+        return rolling.row(par, F, M, hint, data)
+    if kind == blade.KIND:
+        return blade.row(par, F, M, hint, data)
+    return spin.row(par, F, M, hint, data)
 
 
 @formula
 def row_values(S, W, t, z):
     """Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
-    begin(W)
+    begin(S, W)
     each_kind(S, W, z, each_value)
-    # for assembly only: these have no acceleration term
-    each_value(S, W, z, alignment.KIND_AXIS, alignment.axis_row)
-    each_value(S, W, z, alignment.KIND_FULL, alignment.full_row)
+    rare_values(S, W, z, RARE, TERM_KINDS, rare)
     end(S, W, t)
 
 
@@ -52,21 +65,35 @@ def row_biases(S, W, t, v, z):
     """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
     begin_biases(S, W, v)
     each_kind(S, W, z, each_bias)
+    rare_biases(S, W, z, RARE, TERM_KINDS, rare)
     end_biases(S, W, t)
 
 
 @formula
-def forces(S, W, t, work):
-    """Wrenches of all force elements on their bodies; the power of accounted elements in ``work``."""
-    each_force(S, W, t, work, F.spring_damper.KIND, F.spring_damper.inputs, F.spring_damper.wrench)
-    each_force(S, W, t, work, F.point_force.KIND, F.point_force.inputs, F.point_force.wrench)
-    each_force(S, W, t, work, F.point_torque.KIND, F.point_torque.inputs, F.point_torque.wrench)
-    each_force(S, W, t, work, F.bushing.KIND, F.bushing.inputs, F.bushing.wrench)
+def inputs(kind, par, F, M):
+    """What the laws of a force between frames may depend on."""
+    if kind == element.spring_damper.KIND:
+        return element.spring_damper.inputs(par, F, M)
+    return element.point_force.inputs(par, F, M)
 
 
 @formula
-def efforts(S, W, t, work, f):
-    """Forces along measured quantities, added to the generalised forces ``f``."""
-    each_effort(S, W, t, work, f, F.coordinate_spring.KIND, F.coordinate_spring.effort)
-    each_effort(S, W, t, work, f, F.rope.KIND, F.rope.effort)
-    each_effort(S, W, t, work, f, F.joint_friction.KIND, F.joint_friction.effort)
+def wrench(kind, par, F, M, laws, values):
+    """Wrench of a force between frames on M."""
+    if kind == element.spring_damper.KIND:
+        return element.spring_damper.wrench(par, F, M, laws, values)
+    if kind == element.point_force.KIND:
+        return element.point_force.wrench(par, F, M, laws, values)
+    if kind == element.point_torque.KIND:
+        return element.point_torque.wrench(par, F, M, laws, values)
+    return element.bushing.wrench(par, F, M, laws, values)
+
+
+@formula
+def effort(kind, par, x, rate, laws, load):
+    """Force along a measured quantity."""
+    if kind == element.coordinate_spring.KIND:
+        return element.coordinate_spring.effort(par, x, rate, laws, load)
+    if kind == element.rope.KIND:
+        return element.rope.effort(par, x, rate, laws, load)
+    return element.joint_friction.effort(par, x, rate, laws, load)

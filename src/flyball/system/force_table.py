@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from .. import forces as room
 from ..constraints.blocks import DISTANCE, turning
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from .structure import Structure, frame
 from .term_table import coordinate_term, measured_term
-
-FORCE_KINDS = 1 + max(f.kind for f in room.ALL)
 
 
 def measured_quantities(s: Structure) -> None:
@@ -84,13 +81,14 @@ def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
     s.forces = sorted(s.model.forces, key=lambda f: f.kind)
-    table = np.full((len(s.forces), 7), -1, np.int64)
+    table = np.full((len(s.forces), 9), -1, np.int64)
     for k, e in enumerate(s.forces):
+        table[k, 7:] = e.kind, isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
             table[k, 0] = _along(s, e)
             if hasattr(e, "load"):
                 table[k, 1] = frame(s, s.model[e.joint], "M")  # type: ignore[attr-defined]
-                table[k, 6] = len(s.loads)
+                table[k, 6] = 2 * len(s.measured) + len(s.loads)
                 s.loads.append(e)
         else:
             table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
@@ -98,7 +96,6 @@ def forces(s: Structure) -> None:
         if not e.conservative():
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
-    s.tables["force_kinds"] = np.searchsorted([f.kind for f in s.forces], np.arange(FORCE_KINDS + 1))
 
 
 def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:

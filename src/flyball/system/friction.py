@@ -8,12 +8,11 @@ friction does not outweigh what causes it. Where it does, the joint jams and the
 from __future__ import annotations
 
 from .._jit import formula
-from ..forces.joint_friction import KIND
 from ..forces.joint_friction import load as pressed
-from ..math.vec import load3
+from ..math.vec import add, load3, scale
 from .loads import wide
 from .records import load
-from .rows import COEFFICIENT
+from .rows import COEFFICIENT, measured
 from .tables import (
     FORCE_LOAD,
     FORCE_M,
@@ -23,7 +22,6 @@ from .tables import (
     LOAD_BEFORE,
     RETURNED,
     RETURNED_BEFORE,
-    TERM_KINDS,
     TERM_ROW,
 )
 
@@ -34,27 +32,22 @@ CONVERGED = 1e-12  # relative
 @formula
 def returned(S, W):
     """Loads that follow from the reactions now in W, into row RETURNED; the largest relative change."""
-    base = TERM_KINDS + 1 + KIND
     worst = 0.0
-    for k in range(S.kinds[base], S.kinds[base + 1]):
+    for k in range(S.force_i.shape[0]):
         n = S.force_i[k, FORCE_LOAD]
-        fx = fy = fz = tx = ty = tz = 0.0
+        if n < 0:
+            continue
+        force = (0.0, 0.0, 0.0)
+        torque = (0.0, 0.0, 0.0)
         for x in range(S.load_i.shape[0]):
             if S.load_i[x, 0] == n:
                 term = S.load_i[x, 1]
                 c = W.row[LAM, S.term_i[term, TERM_ROW]] * S.term_x[term, COEFFICIENT]
-                f = load3(W.T, term, 0)
-                m = load3(W.T, term, 3)
-                fx += c * f[0]
-                fy += c * f[1]
-                fz += c * f[2]
-                tx += c * m[0]
-                ty += c * m[1]
-                tz += c * m[2]
-        M = load(W.FK, S.force_i[k, FORCE_M])
-        new = pressed(wide(S.force_x, k), M, (fx, fy, fz), (tx, ty, tz))
-        W.load[RETURNED, n] = new
-        change = abs(new - W.load[LOAD, n]) / (1e-300 + abs(new) + abs(W.load[LOAD, n]))
+                force = add(force, scale(c, load3(W.T, term, 0)))
+                torque = add(torque, scale(c, load3(W.T, term, 3)))
+        new = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
+        W.sensed[RETURNED, n] = new
+        change = abs(new - W.sensed[LOAD, n]) / (1e-300 + abs(new) + abs(W.sensed[LOAD, n]))
         if not change <= worst:
             worst = change
             W.info[GUILTY] = k
@@ -62,18 +55,17 @@ def returned(S, W):
 
 
 @formula
-def improve(W, first):
+def improve(S, W, first):
     """Next loads: each by its own secant of (load, returned load), or by substitution the first time."""
-    for n in range(W.load.shape[1]):
-        x = W.load[LOAD, n]
-        y = W.load[RETURNED, n]
+    for n in range(2 * measured(S), W.sensed.shape[1]):
+        x = W.sensed[LOAD, n]
+        y = W.sensed[RETURNED, n]
         new = y
-        if not first:
-            slope = W.load[RETURNED_BEFORE, n] - y
-            step = W.load[LOAD_BEFORE, n] - x
-            if step != 0.0 and abs(slope) < 0.9 * abs(step):
-                s = slope / step
-                new = (y - s * x) / (1.0 - s)
-        W.load[LOAD_BEFORE, n] = x
-        W.load[RETURNED_BEFORE, n] = y
-        W.load[LOAD, n] = new if new > 0.0 else 0.0
+        slope = W.sensed[RETURNED_BEFORE, n] - y
+        step = W.sensed[LOAD_BEFORE, n] - x
+        if not first and step != 0.0 and abs(slope) < 0.9 * abs(step):
+            s = slope / step
+            new = (y - s * x) / (1.0 - s)
+        W.sensed[LOAD_BEFORE, n] = x
+        W.sensed[RETURNED_BEFORE, n] = y
+        W.sensed[LOAD, n] = new if new > 0.0 else 0.0

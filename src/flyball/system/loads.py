@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from .._jit import formula
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
+from .dispatch import effort, inputs, wrench
 from .laws import evaluate
 from .records import load
 from .tables import (
+    FORCE_ALONG,
     FORCE_F,
+    FORCE_KIND,
     FORCE_LAW,
     FORCE_LOAD,
     FORCE_M,
@@ -22,7 +25,6 @@ from .tables import (
     NV,
     PARENT,
     RATE,
-    TERM_KINDS,
     V0,
     VALUE,
 )
@@ -84,18 +86,20 @@ def wide(T, k):
 
 
 @formula
-def each_force(S, W, t, work, kind, inputs, wrench):
-    """Apply every force of one kind between frames; the power of accounted ones goes to their work state."""
-    base = TERM_KINDS + 1 + kind
-    for k in range(S.kinds[base], S.kinds[base + 1]):
+def forces(S, W, t, work):
+    """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 1:
+            continue
+        kind = S.force_i[k, FORCE_KIND]
         i = S.force_i[k, FORCE_F]
         j = S.force_i[k, FORCE_M]
         F = load(W.FK, i)
         M = load(W.FK, j)
         par = wide(S.force_x, k)
-        a, b = inputs(par, F, M)
+        a, b = inputs(kind, par, F, M)
         x = (t + 0.0 * a, a, b)
-        force, torque = wrench(par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
+        force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
         if S.frame_i[j] >= 0:
             act(W, S.frame_i[j], 1.0, force, torque, M[0])
         if S.frame_i[i] >= 0:
@@ -112,17 +116,18 @@ def power(F, M, force, torque):
 
 
 @formula
-def each_effort(S, W, t, work, f, kind, effort):
-    """Apply every force of one kind along its measured quantity; accounted ones as in ``each_force``."""
-    base = TERM_KINDS + 1 + kind
-    for k in range(S.kinds[base], S.kinds[base + 1]):
+def efforts(S, W, t, work, f):
+    """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 0:
+            continue
         m = S.force_i[k, FORCE_F]
         x = W.sensed[VALUE, m]
         rate = W.sensed[RATE, m]
-        inputs = (t + 0.0 * x, x, rate)
-        pressed = W.load[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0 * x
-        laws = (law(S, W, k, 0, inputs), 0.0 * x, 0.0 * x)
-        s = effort(wide(S.force_x, k), x, rate, laws, pressed)
+        o = 0.0 * x
+        pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
+        laws = (law(S, W, k, 0, (t + o, x, rate)), o, o)
+        s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed)
         r = S.row_i.shape[0] + m
         for e in range(S.row_p[r], S.row_p[r + 1]):
             f[S.col_i[e]] += s * W.G[e]

@@ -11,10 +11,10 @@ from ..constraints import curve
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
 from .call import forget
-from .dispatch import efforts, forces, row_biases, row_values
+from .dispatch import row_biases, row_values
 from .friction import CONVERGED, SUBSTITUTIONS, improve, returned
 from .kinematics import motions, poses
-from .loads import gather, inertial
+from .loads import efforts, forces, gather, inertial
 from .records import load
 from .rows import parameters, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
@@ -190,12 +190,12 @@ def accelerate(S, W, t, p, dy, factored):
                 return SINGULAR
             factored = True
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
-        if W.load.shape[1] == 0 or returned(S, W) <= CONVERGED:
+        if S.load_i.shape[0] == 0 or returned(S, W) <= CONVERGED:
             break
         if attempt == SUBSTITUTIONS - 1:
             W.info[STATUS] = JAMMED
             return JAMMED
-        improve(W, attempt == 0)
+        improve(S, W, attempt == 0)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]

@@ -30,7 +30,7 @@ def patterns(s: Structure, tree_joint: dict[int, Joint]) -> None:
         for m in r.sensors
         for b in sorted(touched[len(s.rows) + m])
     ]
-    load_i = [(k, n) for k, e in enumerate(s.loads) for n in s.terms_of.get(e.joint, ())]  # type: ignore[attr-defined]
+    load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in s.terms_of.get(e.joint, ())]  # type: ignore[attr-defined]
     s.tables |= {
         "term_i": ints(term_i, 6),
         "seg_i": ints(seg_i, 3),

@@ -49,11 +49,17 @@ def parameters(T, k):
 
 
 @formula
-def begin(W):
+def measured(S):
+    """Number of measured quantities."""
+    return S.row_p.shape[0] - 1 - S.row_i.shape[0]
+
+
+@formula
+def begin(S, W):
     """Start every row and measured quantity from nothing."""
     for k in range(W.row.shape[1]):
         W.row[G_VALUE, k] = 0.0
-    for m in range(W.sensed.shape[1]):
+    for m in range(measured(S)):
         W.sensed[VALUE, m] = 0.0
     for e in range(W.G.shape[0]):
         W.G[e] = 0.0
@@ -67,44 +73,80 @@ def hint_of(S, z, k, o):
 
 
 @formula
+def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
+    """Add term k, of which F and M are at the given points, to its row or measured quantity."""
+    c = S.term_x[k, COEFFICIENT]
+    r = S.term_i[k, TERM_ROW]
+    nr = S.row_i.shape[0]
+    if r < nr:
+        W.row[G_VALUE, r] += c * g
+    else:
+        W.sensed[VALUE, r - nr] += c * g
+    if W.T.shape[0] > 0:
+        put3(W.T, k, 0, force)
+        put3(W.T, k, 3, torque_M)
+    for s in range(S.term_i[k, TERM_SEG], S.term_i[k, TERM_SEG_END]):
+        if S.seg_i[s, 1] > 0:
+            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, force, torque_M, from_M)
+        else:
+            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, neg(force), torque_F, from_F)
+
+
+@formula
+def add_bias(S, W, k, bias):
+    """Take term k's acceleration bias from its row's gamma, or add it to its measured quantity."""
+    r = S.term_i[k, TERM_ROW]
+    nr = S.row_i.shape[0]
+    if r < nr:
+        W.row[GAMMA, r] -= S.term_x[k, COEFFICIENT] * bias
+    else:
+        W.sensed[BIAS, r - nr] += S.term_x[k, COEFFICIENT] * bias
+
+
+@formula
 def each_value(S, W, z, kind, row):
     """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
-    nr = S.row_i.shape[0]
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
         F = load(W.FK, S.term_i[k, TERM_F])
         M = load(W.FK, S.term_i[k, TERM_M])
         hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
         g, force, torque_M, torque_F, _ = row(parameters(S.term_x, k), F, M, hint, S.const)
-        c = S.term_x[k, COEFFICIENT]
-        r = S.term_i[k, TERM_ROW]
-        if r < nr:
-            W.row[G_VALUE, r] += c * g
-        else:
-            W.sensed[VALUE, r - nr] += c * g
-        if W.T.shape[0] > 0:
-            put3(W.T, k, 0, force)
-            put3(W.T, k, 3, torque_M)
-        for s in range(S.term_i[k, TERM_SEG], S.term_i[k, TERM_SEG_END]):
-            if S.seg_i[s, 1] > 0:
-                project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, force, torque_M, M[0])
-            else:
-                project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, neg(force), torque_F, F[0])
+        add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
 
 
 @formula
 def each_bias(S, W, z, kind, row):
     """Take every term's acceleration bias of one kind from its row's gamma; add it to its measured quantity."""
-    nr = S.row_i.shape[0]
     for k in range(S.kinds[kind], S.kinds[kind + 1]):
         F = load(W.FK, S.term_i[k, TERM_F])
         M = load(W.FK, S.term_i[k, TERM_M])
         hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
         _, _, _, _, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
-        r = S.term_i[k, TERM_ROW]
-        if r < nr:
-            W.row[GAMMA, r] -= S.term_x[k, COEFFICIENT] * bias
-        else:
-            W.sensed[BIAS, r - nr] += S.term_x[k, COEFFICIENT] * bias
+        add_bias(S, W, k, bias)
+
+
+@formula
+def rare_values(S, W, z, first, last, row):
+    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
+    for kind in range(first, last):
+        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+            F = load(W.FK, S.term_i[k, TERM_F])
+            M = load(W.FK, S.term_i[k, TERM_M])
+            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+            g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
+
+
+@formula
+def rare_biases(S, W, z, first, last, row):
+    """``each_bias`` for kinds that share one loop."""
+    for kind in range(first, last):
+        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+            F = load(W.FK, S.term_i[k, TERM_F])
+            M = load(W.FK, S.term_i[k, TERM_M])
+            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+            _, _, _, _, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            add_bias(S, W, k, bias)
 
 
 @formula
@@ -132,7 +174,7 @@ def end(S, W, t):
 def begin_biases(S, W, v):
     """Rates of the measured quantities; gamma of the laws as far as they follow time."""
     nr = S.row_i.shape[0]
-    nm = W.sensed.shape[1] // 2
+    nm = measured(S)
     for m in range(nm):
         s = 0.0 * W.sensed[VALUE, m]
         for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):

@@ -25,14 +25,14 @@ ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
 # columns of System.mix_i
 MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
 # columns of System.force_i; forces along a measured quantity have its slot in place of frame F
-FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD = 0, 1, 2, 5, 6
+FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG = 0, 1, 2, 5, 6, 7, 8
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
 F_APPLIED, X_SOLVED, V1, V2, V3 = range(5)
-# rows of Work.sensed, each (2 nm,): the second half holds rates as values of their own
+# rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
-# rows of Work.load, each (nl,): the load now, the one that a solve returned, and both of the pass before
+# in the columns after those, of each load of a joint: the load now, the one returned, and both of the pass before
 LOAD, RETURNED, LOAD_BEFORE, RETURNED_BEFORE = range(4)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
@@ -59,11 +59,11 @@ class System(NamedTuple):
     row_p: np.ndarray  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
     col_i: np.ndarray  # (nG,): velocity of each entry of Work.G
     mix_i: np.ndarray  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
-    force_i: np.ndarray  # (nk, 7): frame F, frame M, three laws or -1, state of its work or -1, its load or -1
+    force_i: np.ndarray  # (nk, 9): F, M, three laws or -1, state of its work or -1, its load or -1, kind, family
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
     load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
-    kinds: np.ndarray  # first row of each kind: terms, then forces; number of q; frames on ground
+    kinds: np.ndarray  # first row of each kind of term; number of q; frames on ground
     code: np.ndarray  # bytecode of the laws
     const: np.ndarray  # parameters, literals of the laws, splines
     glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism
@@ -88,8 +88,7 @@ class Work(NamedTuple):
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (5, nv)
-    sensed: np.ndarray  # (3, 2 nm): measured quantities: value, rate, second derivative less that from vdot
-    load: np.ndarray  # (4, nl): loads of joints with friction
+    sensed: np.ndarray  # (4, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side

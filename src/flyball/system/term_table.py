@@ -143,7 +143,7 @@ def sort(s: Structure) -> None:
     s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
-    s.tables["kinds"] = np.r_[terms, s.tables["force_kinds"], s.nq, ground].astype(np.int64)
+    s.tables["kinds"] = np.r_[terms, s.nq, ground].astype(np.int64)
     _force_frames(s, new)
 
 
@@ -151,6 +151,6 @@ def _force_frames(s: Structure, new: np.ndarray) -> None:
     """New numbers of frames in the force table."""
     table = s.tables["force_i"]
     for k, e in enumerate(s.forces):
-        columns = slice(0, 2) if e.ends() and not hasattr(e, "effort") else slice(1, 2)
-        if (table[k, columns] >= 0).all():
-            table[k, columns] = new[table[k, columns]]
+        for column in (1,) if hasattr(e, "effort") else (0, 1):
+            if table[k, column] >= 0:
+                table[k, column] = new[table[k, column]]

@@ -106,7 +106,9 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
     arm = R @ m.com
     v = vector(n.velocity, planar, b.name) + np.cross(w, arm)
-    return SimpleNamespace(p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, c=p + arm, v=v, w=w, angle=n.angle)
+    return SimpleNamespace(
+        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
+    )
 
 
 class Poses:
@@ -320,8 +322,8 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
 
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
-        z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv), z(3, 2 * len(s.measured)),
-        z(4, len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3),
+        z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
+        z(4, 2 * len(s.measured) + len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3),
         z(3, ny), np.zeros(8), np.zeros(6, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames

@@ -1,0 +1,44 @@
+"""A box."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..element import Point, element
+from .rules import three_lengths
+from .solid import FINE, Solid
+from .surface import extrude
+
+
+@element
+class Box(Solid):
+    """A box about its origin with ``edges`` = (x, y, z) [m]."""
+
+    edges: Point
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Three edges greater than zero."""
+        three_lengths(self, "edges", n.edges)
+        super().check(n)
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """V = x y z."""
+        x, y, z = n.edges
+        return x * y * z
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """(y^2 + z^2) / 12 and so on."""
+        x, y, z = n.edges
+        return (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12
+
+    def size(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """The edges."""
+        return tuple(n.edges)
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Twelve triangles."""
+        x, y, z = n.edges
+        return extrude(np.array([(-x, -y), (x, -y), (x, y), (-x, y)]) / 2, z)

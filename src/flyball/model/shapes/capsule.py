@@ -1,0 +1,36 @@
+"""A cylinder with round ends."""
+
+from __future__ import annotations
+
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..element import element
+from .cylinder import Cylinder
+from .solid import FINE
+from .surface import arc, lathe, on_axis
+
+
+@element
+class Capsule(Cylinder):
+    """A cylinder of ``radius`` and ``length`` [m] along its z axis with a half ball on either end."""
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """V = pi r^2 l + 4/3 pi r^3."""
+        return pi * n.radius**2 * (n.length + 4 / 3 * n.radius)
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """Cylinder and two half balls, each moved by the parallel axis theorem."""
+        r, length = n.radius, n.length
+        rod, balls = length / (length + 4 / 3 * r), 4 / 3 * r / (length + 4 / 3 * r)
+        across = rod * (3 * r**2 + length**2) / 12 + balls * (0.4 * r**2 + length**2 / 4 + 3 / 8 * length * r)
+        return across, across, rod * r**2 / 2 + balls * 0.4 * r**2
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Two domes and the side between them."""
+        r, h, quarter = n.radius, n.length / 2, max(fine // 4, 1)
+        domes = arc((0, -h), r, -pi / 2, 0.0, quarter), arc((0, h), r, 0.0, pi / 2, quarter)
+        return lathe(on_axis(np.vstack(domes)), fine)

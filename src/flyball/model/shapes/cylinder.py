@@ -1,0 +1,44 @@
+"""A cylinder."""
+
+from __future__ import annotations
+
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..element import Length, element, positive
+from .solid import FINE, Solid
+from .surface import lathe
+
+
+@element
+class Cylinder(Solid):
+    """A cylinder of ``radius`` and ``length`` [m] along its z axis, its middle at its origin."""
+
+    radius: Length
+    length: Length
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Radius and length greater than zero."""
+        positive(self, n, "radius", "length")
+        super().check(n)
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """V = pi r^2 l."""
+        return pi * n.radius**2 * n.length
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """(3 r^2 + l^2) / 12 across, r^2 / 2 along."""
+        k = (3 * n.radius**2 + n.length**2) / 12
+        return k, k, n.radius**2 / 2
+
+    def size(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """Radius and length."""
+        return n.radius, n.length
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Two discs and the side."""
+        r, h = n.radius, n.length / 2
+        return lathe(np.array([(0, -h), (r, -h), (r, h), (0, h)]), fine)

@@ -1,0 +1,45 @@
+"""An ellipsoid."""
+
+from __future__ import annotations
+
+from math import pi
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..element import Point, element
+from .rules import three_lengths
+from .solid import FINE, Solid
+from .surface import arc, lathe, on_axis
+
+
+@element
+class Ellipsoid(Solid):
+    """An ellipsoid about its origin with ``semi_axes`` = (a, b, c) [m] along x, y, z."""
+
+    semi_axes: Point
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Three semi-axes greater than zero."""
+        three_lengths(self, "semi_axes", n.semi_axes)
+        super().check(n)
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """V = 4/3 pi a b c."""
+        a, b, c = n.semi_axes
+        return 4 / 3 * pi * a * b * c
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """(b^2 + c^2) / 5 and so on."""
+        a, b, c = n.semi_axes
+        return (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5
+
+    def size(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """The semi-axes."""
+        return tuple(n.semi_axes)
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """A ball, stretched."""
+        v, f = lathe(on_axis(arc((0, 0), 1.0, -pi / 2, pi / 2, fine // 2)), fine)
+        return v * np.array(n.semi_axes), f

@@ -1,0 +1,253 @@
+"""A solid given by the triangles of its surface: from a file, or as arrays."""
+
+from __future__ import annotations
+
+import difflib
+import os
+import reprlib
+from contextlib import contextmanager
+from contextvars import ContextVar
+from dataclasses import dataclass, field, fields
+from functools import cached_property, lru_cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from ...errors import ModelError
+from ..element import Length, element, positive
+from .polyhedron import Integrals, flaws, integrals, welded
+from .solid import FINE, Solid
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+KINDS = (".stl", ".obj", ".ply", ".off")
+_FOLDER: ContextVar[Path | None] = ContextVar("folder", default=None)
+
+
+@contextmanager
+def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
+    """Relative paths of meshes made in here are counted from this folder, not from the current one."""
+    token = _FOLDER.set(None if folder is None else Path(folder).absolute())
+    try:
+        yield
+    finally:
+        _FOLDER.reset(token)
+
+
+@dataclass(frozen=True, eq=False)
+class Triangulation:
+    """Vertices (k, 3) and triangles (m, 3) with what follows from them, in units of their own."""
+
+    v: np.ndarray
+    f: np.ndarray
+
+    @cached_property
+    def flaws(self) -> str:
+        """Why it has no inside, or nothing."""
+        return flaws(self.v, self.f)
+
+    @cached_property
+    def integrals(self) -> Integrals:
+        """Volume, centre, inertia."""
+        return integrals(self.v, self.f)
+
+
+def _rows(kind: type) -> Any:
+    """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
+
+    def convert(value: Any) -> Any:
+        try:
+            a = np.asarray(value)
+        except ValueError:  # ragged
+            return value
+        if a.ndim != 2 or a.dtype.kind not in ("iuf" if kind is float else "iu"):
+            return value
+        return tuple(map(tuple, a.astype(kind).tolist()))
+
+    return BeforeValidator(convert)
+
+
+def _text(value: Any) -> Any:
+    return Path(value).as_posix() if isinstance(value, os.PathLike) else value
+
+
+@element
+class Mesh(Solid):
+    """A solid given by its surface: triangles from a file, or vertices and faces.
+
+    The surface must be closed and its triangles counter-clockwise seen from outside; then its volume, centre of mass
+    and inertia are exact for the polyhedron. It may have several parts and, with triangles that face into them,
+    cavities; parts that overlap count twice. Where it is for looks only (``looks=True``, or the body's mass and
+    inertia are given) any surface will do.
+
+    Parameters
+    ----------
+    path : str
+        An STL, OBJ, PLY or OFF file. A relative path is counted from the folder of the model file; of a mechanism
+        described in Python, from the current folder. Reading it takes the package trimesh.
+    vertices : (k, 3) numbers
+        In place of a path; in units of ``scale``.
+    faces : (m, 3) whole numbers
+        With ``vertices``: three indices of vertices, from 0, for each triangle.
+    scale : number [m]
+        Length of one unit of the file or of the vertices: ``"1 mm"`` for a drawing in millimetres. A file does not
+        say it; 1 m if not given.
+    """
+
+    path: Annotated[str | None, BeforeValidator(_text)] = None
+    vertices: Annotated[Any, _rows(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, _rows(int)] = field(default=None, repr=False)
+    scale: Length = 1.0
+
+    def __post_init__(self) -> None:
+        """Remember the folder that a relative path is counted from."""
+        object.__setattr__(self, "_folder", _FOLDER.get() or Path.cwd())
+
+    def _key(self) -> tuple:
+        return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
+
+    def __eq__(self, other: object) -> bool:
+        """Equal if everything is; of paths, the files that they lead to."""
+        return self._key() == other._key() if isinstance(other, Mesh) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._key())
+
+    @property
+    def title(self) -> str:
+        """Kind, and name or path if it has one, for messages."""
+        name = self.name or self.path
+        return f"Mesh {name!r}" if name else "Mesh"
+
+    @property
+    def file(self) -> str | None:
+        """Where the file is."""
+        return self.path and os.path.normpath(os.path.join(self._folder, self.path))  # type: ignore[attr-defined]
+
+    def path_from(self, folder: str | os.PathLike) -> str | None:
+        """The path as a model file in that folder has to say it."""
+        if self.path is None or os.path.isabs(self.path) or os.path.normpath(Path(folder, self.path)) == self.file:
+            return self.path
+        try:
+            return Path(os.path.relpath(str(self.file), folder)).as_posix()
+        except ValueError:  # on another drive
+            return self.file
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A surface that can be had, and a scale greater than zero."""
+        positive(self, n, "scale")
+        if (self.path is None) == (self.vertices is None):
+            both = "both a path and vertices" if self.path is not None else "neither a path nor vertices"
+            raise ModelError(f"{self.title}: it has {both}; give path='part.stl', or vertices=... and faces=...")
+        if (self.vertices is None) != (self.faces is None):
+            raise ModelError(f"{self.title}: vertices and faces belong together; a path has its own")
+        if self.vertices is not None:
+            self._check_rows()
+        if not len(self.triangulation.f):
+            raise ModelError(f"{self.title}: it has no triangles")
+        super().check(n)
+
+    def _check_rows(self) -> None:
+        v, f = self.vertices, self.faces
+        if not isinstance(v, tuple) or len(v) < 3 or len(v[0]) != 3 or not np.isfinite(v).all():
+            raise ModelError(
+                f"{self.title}: vertices must be three or more points of three finite numbers, got {reprlib.repr(v)}"
+            )
+        if not isinstance(f, tuple) or not f or len(f[0]) != 3:
+            raise ModelError(
+                f"{self.title}: faces must be triangles, each given by three indices of vertices, got {reprlib.repr(f)}"
+            )
+        low, high = int(np.min(f)), int(np.max(f))
+        if low < 0 or high >= len(v):
+            hint = ". They count from 0 here: subtract 1" if low == 1 and high == len(v) else ""
+            raise ModelError(
+                f"{self.title}: faces name the vertices {low} to {high}; there are those from 0 to {len(v) - 1}{hint}"
+            )
+
+    @cached_property
+    def _given(self) -> Triangulation:
+        return Triangulation(*welded(np.array(self.vertices, float), np.array(self.faces, int)))
+
+    @property
+    def triangulation(self) -> Triangulation:
+        """Its triangles, in its own units; a file is read again if it has changed.
+
+        Raises
+        ------
+        ModelError
+            If there is no such file, it cannot be read, or trimesh is not installed.
+        """
+        if self.file is None:
+            return self._given
+        try:
+            stat = os.stat(self.file)
+            return read(self.file, stat.st_mtime_ns, stat.st_size)
+        except FileNotFoundError:
+            folder = Path(self.file).parent
+            there = [p.name for p in folder.iterdir()] if folder.is_dir() else []
+            close = difflib.get_close_matches(Path(self.file).name, there, 1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise ModelError(f"{self.title}: there is no file {self.file!r}{hint}") from None
+        except OSError as error:
+            raise ModelError(f"{self.title}: cannot read {self.file!r}: {error.strerror}") from None
+        except ModelError as error:
+            raise ModelError(f"{self.title}: {error}") from None
+
+    def _integrals(self) -> Integrals:
+        t = self.triangulation
+        if t.flaws:
+            raise ModelError(
+                f"{self.title}: it gives no mass and inertia, since {t.flaws}. Or give mass and inertia of the body, "
+                f"or looks=True here: then it is for looks only"
+            )
+        return t.integrals
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """By Gauss's theorem."""
+        return self._integrals().volume * n.scale**3
+
+    def centre(self, n: SimpleNamespace) -> Any:
+        """By Gauss's theorem."""
+        return self._integrals().centre * n.scale
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """By Gauss's theorem; its axes need not be principal ones."""
+        return self._integrals().gyration * n.scale**2
+
+    def size(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """Edges of the box around it."""
+        return tuple((np.ptp(self.triangulation.v, axis=0) * n.scale).tolist())
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Its triangles."""
+        return self.triangulation.v * n.scale, self.triangulation.f
+
+
+@lru_cache(maxsize=256)
+def read(file: str, *stamp: int) -> Triangulation:
+    """The triangles of a file; ``stamp`` says which state of it, so that one that has changed is read again.
+
+    Raises
+    ------
+    ModelError
+        If trimesh is not installed, or cannot read it.
+    """
+    kind = Path(file).suffix.lower()
+    if kind not in KINDS:
+        raise ModelError(f"{kind or 'a file without a suffix'} is no kind of mesh; export it as {', '.join(KINDS)}")
+    try:
+        import trimesh
+    except ImportError:
+        raise ModelError("reading mesh files takes the package trimesh: pip install trimesh") from None
+    try:
+        loaded: Any = trimesh.load(file, force="mesh", process=False)
+        v, f = np.array(loaded.vertices, float), np.array(loaded.faces, int)
+    except Exception as error:  # trimesh fails with many kinds of error on files that are none
+        raise ModelError(f"{file!r} cannot be read as {kind[1:].upper()}: {error}") from None
+    if v.ndim != 2 or not np.isfinite(v).all():
+        raise ModelError(f"{file!r} has vertices that are no points")
+    return Triangulation(*welded(v, f))

@@ -1,0 +1,139 @@
+"""What every shape is: placed on a body, with a volume, a centre of mass, an inertia and a surface to draw."""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from types import SimpleNamespace
+from typing import Annotated, Any, ClassVar
+
+import numpy as np
+from pydantic import BeforeValidator
+
+from ...errors import ModelError
+from ..element import Density, Element, Mass, Point, Unit, positive
+from ..geometry import orientation_matrix, vector
+
+
+def _oriented(value: Any) -> Any:
+    """As for bodies, whose file imports this one."""
+    from ..body import _orientation
+
+    return _orientation(value)
+
+
+Orientation = Annotated[tuple[float | str, ...], BeforeValidator(_oriented), Unit("rad")]
+FINE = 32  # corners of a circle in a picture
+
+
+@dataclass(frozen=True)
+class Solid(Element):
+    """A homogeneous solid on a body: its own frame lies at ``position``, turned by ``orientation``.
+
+    What it adds to the body's mass is its own ``mass``, or its volume times its own ``density``, or its volume times
+    the body's density. A body whose ``mass`` is given shares it out among its shapes by volume or, where all of them
+    have a density of their own, by volume times density.
+
+    Parameters
+    ----------
+    name : str
+        Optional.
+    position : point [m]
+        Origin of its own frame, in the body's reference frame. In a planar mechanism two components will do.
+    orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
+        Of its own frame, relative to the body's reference frame.
+    density : number [kg/m^3]
+    mass : number [kg]
+    looks : bool
+        It is only seen: it has no mass.
+    hole : bool
+        It is missing from the others: its mass is taken away, and it is not drawn. It must lie inside them, which is
+        not checked beyond what comes out: a positive mass and a possible inertia.
+    """
+
+    name: str = ""
+    _: KW_ONLY
+    position: Point = (0.0, 0.0, 0.0)
+    orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
+    density: Density | None = None
+    mass: Mass | None = None
+    looks: bool = False
+    hole: bool = False
+
+    category: ClassVar[str] = "shapes"
+    points: ClassVar[tuple[str, ...]] = ("position",)  # fields that are points of the body
+
+    @property
+    def title(self) -> str:
+        """Kind, and name if it has one, for messages."""
+        return f"{type(self).__name__} {self.name!r}" if self.name else type(self).__name__
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Refuse numbers that make no sense.
+
+        Raises
+        ------
+        ModelError
+            If a mass or density is not greater than zero, both are given, or it is said to be massless as well.
+        """
+        if n.density == 0.0 or n.mass == 0.0:
+            zero = "density" if n.density == 0.0 else "mass"
+            raise ModelError(f"{self.title}: its {zero} is 0; a shape that is only seen is given by looks=True")
+        positive(self, n, "density", "mass")
+        if n.density is not None and n.mass is not None:
+            raise ModelError(
+                f"{self.title}: mass {n.mass:g} kg and density {n.density:g} kg/m^3 are both given; leave one out"
+            )
+        if self.looks:
+            for field in ("density", "mass", "hole"):
+                if getattr(n, field):
+                    raise ModelError(f"{self.title}: it is for looks only, so leave out looks or {field}")
+        self.pose(n)
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """Volume [m^3]."""
+        raise NotImplementedError
+
+    def centre(self, n: SimpleNamespace) -> Any:
+        """Centre of mass [m] in its own frame."""
+        return 0.0, 0.0, 0.0
+
+    def gyration(self, n: SimpleNamespace) -> Any:
+        """Inertia per unit mass [m^2] about the centre of mass, in its own axes.
+
+        Three moments, or a 3x3 matrix where its own axes are not principal.
+        """
+        raise NotImplementedError
+
+    def size(self, n: SimpleNamespace) -> tuple[float, ...]:
+        """Numbers for drawing it [m]."""
+        raise NotImplementedError
+
+    def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (k, 3) [m] in its own frame and triangles (m, 3), counter-clockwise seen from outside.
+
+        ``fine`` is the number of corners of a circle; the surface is closed whatever it is.
+        """
+        raise NotImplementedError
+
+    def pose(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+        """Origin and axes of its own frame in the body's reference frame."""
+        return point(n.position, f"position of {self.title}"), orientation_matrix(
+            n.orientation, f"orientation of {self.title}"
+        )
+
+    def placed(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+        """Centre of mass [m] and inertia per unit mass [m^2] about it, in the body's reference frame."""
+        p, R = self.pose(n)
+        k = np.asarray(self.gyration(n))
+        return p + R @ np.asarray(self.centre(n)), R @ (np.diag(k) if k.ndim == 1 else k) @ R.T
+
+    def mesh(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
+        """Its surface for drawing: vertices (k, 3) [m] in the body's reference frame and triangles (m, 3)."""
+        p, R = self.pose(n)
+        v, f = self.surface(n)
+        return p + v @ R.T, f
+
+
+def point(values: Any, what: str) -> np.ndarray:
+    """Three components of a point that is given by three, or by two in the plane z = 0."""
+    return vector((*values, 0.0) if len(values) == 2 else values, False, what)
