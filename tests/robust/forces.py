@@ -89,7 +89,9 @@ def _along(kind: str, ending: str, coordinate: bool):
 def _coordinate_spring(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
     force = d.pick([None, law(d, m, 3.0, ("value", "rate"))])
     damping = d.pick([0, d.size(0.01, 10)])
-    return fb.CoordinateSpring(name, along, stiffness=stiffness(d, stiff), damping=damping, rest=d.number(-1, 1), force=force)
+    return fb.CoordinateSpring(
+        name, along, stiffness=stiffness(d, stiff), damping=damping, rest=d.number(-1, 1), force=force
+    )
 
 
 def _friction(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):

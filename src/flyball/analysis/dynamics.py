@@ -38,6 +38,7 @@ from .compiled import compiled
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
 from .reasons import reason, remarks
+from .residual import acceleration_violation
 
 STABILIZATION = {
     "projection": motion.STAGES,
@@ -271,6 +272,7 @@ def _finish(
     health.late = {
         "mobility": partial(mobility, model, a),
         "energy_drift": partial(_energy_drift, result),
+        "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
     }

@@ -7,16 +7,36 @@ import math
 import numpy as np
 
 from ..model.body import Driver
+from ..model.force import CoordinateForce
 from ..numerics.integrators import explicit as ex
 from ..system import motion
 from ..system.functions import fault
-from ..system.laws import evaluate_jet
+from ..system.laws import evaluate, evaluate_jet
+from ..system.loads import wide
 from ..system.opcodes import BY_TIME
-from ..system.tables import GUILTY, NU, NU_DOT, ROW_LAW, ROW_WRAP, STATUS
+from ..system.records import load
+from ..system.tables import (
+    FORCE_F,
+    FORCE_LAW,
+    FORCE_LOAD,
+    FORCE_M,
+    GAMMA,
+    GUILTY,
+    LOAD,
+    NU,
+    NU_DOT,
+    RATE,
+    ROW_LAW,
+    ROW_WRAP,
+    STATUS,
+    VALUE,
+)
 from .assemble import Assembly
+from .entry import MOTION
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
+LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTS = ("value", "rate", "second derivative")
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
@@ -35,11 +55,11 @@ def reason(a: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
     t = float(clock.real[ex.T])
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
     if clock.count[ex.STATUS] == ex.TOO_MANY:
-        return f"{name!r}: max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {t:.6g} s. {kept}", None
+        return f"{name!r}: {_too_many(a, clock)}. {kept}", None
     found = fault(a.compiled.work.stack, a.compiled.structure.functions)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a) or _stuck(a, clock)
+    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a) or _locked(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}. {kept}", None
 
 
@@ -101,11 +121,69 @@ def _jump(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
 def _not_finite(a: Assembly, clock: ex.Clock) -> str:
     if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
         return ""
+    t = float(clock.real[ex.T])
+    force = _broken_force(a, t)
+    if force:
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
     return (
-        f"the equations of motion are not finite just after t = {clock.real[ex.T]:.6g} s, first at "
-        f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
-        f"points of a spring that coincide"
+        f"the equations of motion are not finite just after t = {t:.6g} s, first at "
+        f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range"
+    )
+
+
+def _broken_force(a: Assembly, t: float) -> str:
+    """The force that is no number at the kinematics that the compiled loop has left, and why."""
+    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+    stack = np.zeros_like(W.stack)
+    with np.errstate(all="ignore"):
+        for k, e in enumerate(s.forces):
+            F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
+            along = isinstance(e, CoordinateForce)
+            m = S.force_i[k, FORCE_F]
+            x, y = W.sensed[VALUE : RATE + 1, m] if along else e.inputs(par, F, M)
+            if not math.isfinite(x) or not math.isfinite(y):
+                return f"what {e.title} measures is no number. {e.fails}"
+            laws = [
+                evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed) if at >= 0 else 0.0
+                for at in S.force_i[k, FORCE_LAW : FORCE_LAW + 3].tolist()
+            ]
+            if not np.isfinite(laws).all():
+                given = (
+                    "".join(f", {n} = {v:.6g}" for n, v in zip(e.outputs, (x, y), strict=False)) if e.outputs else ""
+                )
+                return (
+                    f"the law of {e.title} gives {laws} for t = {t:.6g}{given}. Look for a division by zero or a range "
+                    f"that it leaves"
+                )
+            pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+            out = e.effort(par, x, y, laws, pressed) if along else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            if not np.isfinite(out).all():
+                return f"the force of {e.title} is no number. {e.fails}"
+    return ""
+
+
+def _locked(a: Assembly, clock: ex.Clock) -> str:
+    """The elements for whose rows there are no accelerations where the motion stopped, if so."""
+    c = a.compiled
+    nq, nv = c.structure.nq, c.structure.nv
+    y = clock.y[0]
+    if not len(c.structure.rows) or not np.isfinite(y).all():
+        return ""
+    c.z = y[nq + nv :].copy()
+    _, dy = c.at(clock.real[ex.T], y[:nq].copy(), y[nq : nq + nv].copy(), MOTION)
+    x = dy[nq : nq + nv]
+    if not np.isfinite(x).all():
+        return ""
+    G, gamma = c.sparse_jacobian(), c.work.row[GAMMA]
+    gap = np.abs(G @ x - gamma)
+    if not gap.max() > LOCKED * (np.abs(gamma).max() + 1e-9):
+        return ""
+    names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 0.1 * gap.max()))
+    return (
+        f"at t = {clock.real[ex.T]:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: "
+        f"in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
+        f"than its links allow), or it is drawn in a singular position with velocities that it cannot have"
     )
 
 
@@ -135,6 +213,23 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
         f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
         f"a force that changes abruptly"
     )
+
+
+def _too_many(a: Assembly, clock: ex.Clock) -> str:
+    slowest = _component(a, _pacemaker(clock))
+    return (
+        f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "
+        f"{clock.real[ex.H]:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
+        f"rtol, or less stiffness (friction too is stiff) there"
+    )
+
+
+def _pacemaker(clock: ex.Clock) -> int:
+    """The component of the state whose derivative changed most within the last step, by its tolerance."""
+    n = clock.count[ex.CONTROLLED]
+    with np.errstate(all="ignore"):
+        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real[ex.ATOL] + clock.real[ex.RTOL] * np.abs(clock.y[0, :n]))
+    return int(np.argmax(np.nan_to_num(change)))
 
 
 def _component(a: Assembly, i: int) -> str:

@@ -99,6 +99,9 @@ class Bushing(TwoFrameForce):
     wrench: ClassVar = staticmethod(wrench)
     energy: ClassVar = staticmethod(energy)
     drawn: ClassVar[str] = "bushing"
+    fails: ClassVar[str] = (
+        "It has been turned by half a turn, where it no longer knows its axis; stop before, or use a joint with springs"
+    )
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
         """Both frames at the point."""

@@ -33,6 +33,7 @@ class Force(Element):
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
     drawn: ClassVar[str] = ""
+    fails: ClassVar[str] = "Its numbers are too large"  # where its formulas give no number, and what to do
 
     def ends(self) -> dict[str, str]:
         """Role of each of its frames -> body or frame that it is on."""

@@ -84,6 +84,8 @@ class Joint(Element):
                 example = "(1, 0)" if planar else "(0, 0, 1)"
                 raise ModelError(f"{self.title}: give its axis in world coordinates, for instance axis={example}")
             return np.eye(3)
+        if planar and self.planar_normal == "z" and len(axis) != 3:
+            raise ModelError(f"{self.title}: in a planar mechanism its axis is the normal; leave axis out")
         a = vector(axis, planar and self.planar_normal != "z", f"axis of {self.title}", direction=True)
         if planar and self.planar_normal == "z":
             if abs(a[0]) + abs(a[1]) > 1e-12:

@@ -364,7 +364,10 @@ class Model:
 
     def _check_joint(self, e: Joint, n: Any) -> None:
         if self.planar and not e.planar_normal:
-            raise ModelError(f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism")
+            raise ModelError(
+                f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, "
+                f"such as Revolute, Translational, PinInSlot or Distance"
+            )
         if not self.planar and not e.spatial:
             raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use Prismatic")
         if n.at is not None:

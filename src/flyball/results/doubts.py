@@ -8,18 +8,28 @@ import numpy as np
 
 from ..forces.joint_friction import STICKING, JointFriction
 from ..system.loads import wide
+from ..system.tables import MASS
 
 if TYPE_CHECKING:
     from .result import Result
 
 UNBALANCED = 1e-4  # part of the energy moved above which the balance is worth a word
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
+UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
+AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
 CREPT = 1e-3  # part of the mechanism's length above which creep is
 
 
 def warnings(result: Result) -> tuple[str, ...]:
     """Reasons to look at a result twice, each with what can be done; none for a sound one."""
-    texts = [*result.health.remarks, _balance(result), _violation(result), *_open_loads(result), *_creep(result)]
+    texts = [
+        *result.health.remarks,
+        _balance(result),
+        _violation(result),
+        _accelerations(result),
+        *_open_loads(result),
+        *_creep(result),
+    ]
     return tuple(text for text in texts if text)
 
 
@@ -36,8 +46,7 @@ def energy_moved(result: Result) -> float:
 
 def _balance(result: Result) -> str:
     moved, drift = energy_moved(result), result.health.energy_drift
-    rounding = 1e-12 * float(np.abs(result.energy.potential).max(initial=0.0))
-    if drift <= UNBALANCED * moved + rounding:
+    if drift <= UNBALANCED * moved + _rest(result):
         return ""
     return (
         f"the energy balance is off by {drift:.3g} J where {moved:.3g} J were moved; a smaller rtol may tell whether "
@@ -45,11 +54,27 @@ def _balance(result: Result) -> str:
     )
 
 
+def _rest(result: Result) -> float:
+    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies."""
+    rounding = 1e-12 * float(np.abs(result.energy.potential).max(initial=0.0))
+    return rounding + float(result.values.system.body_x[:, MASS].sum()) * (AT_REST * result.values.length) ** 2
+
+
 def _violation(result: Result) -> str:
     worst, length = result.health.violation, result.values.length
     if not worst > OPEN * length:
         return ""
     return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' keeps them"
+
+
+def _accelerations(result: Result) -> str:
+    worst = result.health.acceleration_violation
+    if not worst > UNSOLVED:
+        return ""
+    return (
+        f"accelerations miss the constraints by a part of {worst:.1e}: a position is all but singular, or masses "
+        f"differ too much. Reactions are as uncertain there"
+    )
 
 
 def _open_loads(result: Result) -> list[str]:

@@ -247,6 +247,7 @@ def _health(data: dict[str, Any]) -> Health:
         undetermined={k: tuple(v) for k, v in data["undetermined"].items()},
     )
     late: dict[str, Any] = {"mobility": found, "energy_drift": data["energy_drift"]}
+    late["acceleration_violation"] = data.get("acceleration_violation", 0.0)
     late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
     late["warnings"] = tuple(data.get("warnings", ()))
     data["remarks"] = tuple(data.get("remarks", ()))

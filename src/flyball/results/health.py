@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "creep", "warnings")
+LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
 """Figures that are found when first asked for."""
 
 
@@ -56,6 +56,11 @@ class Health:
     def energy_drift(self) -> float:
         """Largest deviation from the energy balance [J]."""
         return self._found("energy_drift")
+
+    @property
+    def acceleration_violation(self) -> float:
+        """Largest |G vdot - gamma| at output times, relative to the terms that make it up."""
+        return self._found("acceleration_violation") if "acceleration_violation" in self.late else 0.0
 
     @property
     def creep(self) -> dict[str, tuple[float, float]]:
