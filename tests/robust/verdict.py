@@ -16,7 +16,7 @@ from flyball.results.result import Result
 from .families import Case
 
 STEPS = 3000
-VIOLATION, UNBALANCED, RESIDUAL = 1e-9, 1e-4, 1e-6
+VIOLATION, UNBALANCED, RESIDUAL = 1e-7, 1e-4, 1e-6
 
 
 @dataclass

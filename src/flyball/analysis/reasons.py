@@ -179,7 +179,7 @@ def _locked(a: Assembly, clock: ex.Clock) -> str:
     gap = np.abs(G @ x - gamma)
     if not gap.max() > LOCKED * (np.abs(gamma).max() + 1e-9):
         return ""
-    names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 0.1 * gap.max()))
+    names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
     return (
         f"at t = {clock.real[ex.T]:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: "
         f"in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "

@@ -27,6 +27,9 @@ from .tables import (
 
 SUBSTITUTIONS = 60
 CONVERGED = 1e-12  # relative
+BLURRED = (
+    1e-6  # where redundancy leaves a reaction open, rounding over the regularisation blurs it: good enough at rest
+)
 
 
 @formula

@@ -12,7 +12,7 @@ from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
 from .call import forget
 from .dispatch import row_biases, row_values
-from .friction import CONVERGED, SUBSTITUTIONS, improve, returned
+from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, returned
 from .kinematics import motions, poses
 from .loads import efforts, forces, gather, inertial
 from .records import load
@@ -175,6 +175,7 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
+    change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
         inertial(S, W)
@@ -190,11 +191,15 @@ def accelerate(S, W, t, p, dy, factored):
                 return SINGULAR
             factored = True
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
-        if S.load_i.shape[0] == 0 or returned(S, W) <= CONVERGED:
+        if S.load_i.shape[0] == 0:
+            break
+        last = change
+        change = returned(S, W)
+        if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last):
             break
         if attempt == SUBSTITUTIONS - 1:
-            W.info[STATUS] = JAMMED
-            return JAMMED
+            W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
+            return W.info[STATUS]
         improve(S, W, attempt == 0)
     rates(S, p, v, dy)
     for d in range(nv):
