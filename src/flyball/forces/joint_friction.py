@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import field
 from types import SimpleNamespace
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from .._jit import formula
 from ..errors import ModelError
@@ -12,6 +12,10 @@ from ..math.scalar import absolute, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
+from ..model.joint import Joint
+
+if TYPE_CHECKING:
+    from ..model.model import Model
 
 KIND = 6
 STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
@@ -98,6 +102,18 @@ class JointFriction(CoordinateForce):
     def coordinate_text(self) -> str:
         """The joint's coordinate."""
         return f"{self.joint}.{self.coordinate or ('displacement' if self.radius is None else 'angle')}"
+
+    def examine(self, model: Model) -> None:
+        """It needs a joint that carries something, and the radius of a bearing that turns."""
+        found = model._names.get(self.joint)
+        if isinstance(found, Joint) and self.radius is None and self.coordinate is None:
+            has = found.measured(model.planar)
+            if "angle" in has and "displacement" not in has:
+                raise ModelError(
+                    f"{self.title}: friction about the angle of {found.title} needs the radius of the bearing; give "
+                    f"radius="
+                )
+        model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
 
     def check(self, n: SimpleNamespace) -> None:
         """Coefficients and lengths make sense."""

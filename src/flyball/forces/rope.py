@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
@@ -87,6 +88,12 @@ class Rope(CoordinateForce):
         if n.at is None:
             return None
         points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
+        for k, (a, b) in enumerate(itertools.pairwise(points)):
+            if not (a != b).any():
+                raise ModelError(
+                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.tolist())} m, where the rope "
+                    f"between them has no direction; move one, or leave it out"
+                )
         return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
@@ -94,9 +101,9 @@ class Rope(CoordinateForce):
         return tuple((f"P{k}", f"P{k + 1}", DISTANCE) for k in range(len(self.bodies) - 1))
 
     def check(self, n: SimpleNamespace) -> None:
-        """Enough points, a stiffness, and no two neighbouring points in one place."""
+        """Enough points, and a stiffness."""
         if len(self.bodies) < 2:
-            raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}")
+            raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}; name the second")
         if n.at is not None and len(n.at) != len(self.bodies):
             raise ModelError(f"{self.title}: {len(self.bodies)} bodies need as many points in 'at', got {len(n.at)}")
         positive(self, n, "stiffness", why="A rope that cannot stretch is a Distance joint or a Coupler")

@@ -42,6 +42,7 @@ class GearPair(Coupling):
     internal: bool = False
 
     drawn: ClassVar[str] = "gear"
+    dimensions: ClassVar = {"teeth": ("1", "m")}
 
     def coupled(self) -> tuple[str, ...]:
         """The two angles."""
@@ -64,5 +65,7 @@ class GearPair(Coupling):
             raise ModelError(f"{self.title}: teeth are two numbers greater than 0, got {n.teeth}")
 
     def examine(self, model: Model) -> None:
-        """The joints share a carrier."""
+        """Both are joints, and share a carrier."""
+        for name in (self.joint_1, self.joint_2):
+            model.joint(name, self, "angle")
         self._carrier(model)

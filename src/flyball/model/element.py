@@ -118,6 +118,9 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
                 lines.append(f"field {where!r} is missing")
         elif e["type"] == "unexpected_positional_argument":
             lines.append(f"give field {where!r} by its name: {where}=...")
+        elif e["type"] in ("too_long", "too_short"):
+            wanted = e["ctx"].get("max_length", e["ctx"].get("min_length"))
+            wrong.setdefault(where, []).append(f"a list of {wanted}")
         elif e["type"] in _TYPES:
             wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:
@@ -257,5 +260,5 @@ def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Calla
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):
-            unit = units[name].dimension or ""
-            raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")
+            unit = "" if units[name].dimension in (None, "1") else f" {units[name].dimension}"
+            raise ModelError(f"{e.title}: {name} is {x:g}{unit}; it must be {rule}{'. ' + why if why else ''}")

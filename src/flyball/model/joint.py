@@ -54,6 +54,7 @@ class Joint(Element):
     coordinates: ClassVar[dict[str, Coordinate]] = {}
     planar_normal: ClassVar[str] = "z"  # joint axis that points out of the plane; "" if it cannot be planar
     spatial: ClassVar[bool] = True
+    in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
     needs_axis: ClassVar[bool] = False
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
 
