@@ -2,9 +2,11 @@
 export {
   BackSide,
   Box3,
+  BoxGeometry,
   BufferAttribute,
   BufferGeometry,
   CapsuleGeometry,
+  CatmullRomCurve3,
   CircleGeometry,
   Color,
   ConeGeometry,
@@ -23,12 +25,15 @@ export {
   MeshBasicMaterial,
   MeshStandardMaterial,
   NeutralToneMapping,
+  OctahedronGeometry,
   OrthographicCamera,
   PCFShadowMap,
+  Path,
   PerspectiveCamera,
   PlaneGeometry,
   Quaternion,
   Raycaster,
+  RingGeometry,
   Scene,
   ShaderMaterial,
   ShadowMaterial,
@@ -36,6 +41,8 @@ export {
   ShapeGeometry,
   SphereGeometry,
   TOUCH,
+  TorusGeometry,
+  TubeGeometry,
   Vector2,
   Vector3,
   WebGLRenderer,
@@ -47,4 +54,5 @@ export { LineGeometry } from "three/addons/lines/LineGeometry.js";
 export { LineMaterial } from "three/addons/lines/LineMaterial.js";
 export { LineSegments2 } from "three/addons/lines/LineSegments2.js";
 export { LineSegmentsGeometry } from "three/addons/lines/LineSegmentsGeometry.js";
+export { toCreasedNormals } from "three/addons/utils/BufferGeometryUtils.js";
 export { default as uPlot } from "uplot";

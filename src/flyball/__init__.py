@@ -24,17 +24,22 @@ _HOME = {
     "ModelError": "errors",
     "UnitError": "errors",
     "ExpressionError": "errors",
+    "SingularOrientationError": "errors",
+    "SingularOrientationWarning": "errors",
     "AnalysisError": "errors",
     "AssemblyError": "errors",
     "SimulationError": "errors",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
+_MODULES = ("rotations",)
 
 
 def __getattr__(name: str) -> Any:
     """Public names are imported when first asked for: shapes, joints and forces from the folders that hold them."""
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
+    if name in _MODULES:
+        return importlib.import_module(f".{name}", __name__)
     if not name.startswith("_"):
         for room in _ROOMS:
             module = importlib.import_module(f".{room}", __name__)
@@ -50,4 +55,4 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *elements, "__version__"} - {"Solid"})
+    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid"})

@@ -108,10 +108,13 @@ def run(
     change: Annotated[list[str] | None, typer.Option("--set", help='Set a parameter: --set speed="120 rpm".')] = None,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="Write no pictures.")] = False,
     no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
+    report: Annotated[
+        bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
+    ] = None,
     as_json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Simulate a mechanism and write its motion: result.nc, result.csv, plots and animation.html."""
+    """Simulate a mechanism and write its motion: report.html, animation.html, plots, result.csv and result.nc."""
     with _reported(as_json):
         mechanism = _mechanism(model)
         _set(mechanism, change or [])
@@ -127,7 +130,8 @@ def run(
             if stopped.result is None:
                 raise
             result, error = cast("Result", stopped.result), stopped
-        files, notes = _write(result, folder, not no_plots, not no_animation)
+        pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
+        files, notes = _write(result, folder, not no_plots, [name for name, wanted in pages.items() if wanted])
         _conclude(result, error, files, notes, as_json, talk)
 
 
@@ -148,7 +152,8 @@ def _conclude(
         lines = result.health.lines()
         if error is not None:
             lines[0] = ("status", f"stopped at t = {error.t:.6g} s")
-        _table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes)])
+        page = [("open this", str(f)) for f in files if f.name == "report.html"]
+        _table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes), *page])
     if error is not None:
         _fail(str(error), type(error).__name__, FAILED, as_json, summary)
     if as_json:
@@ -166,13 +171,10 @@ def _table(lines: list[tuple[str, str]]) -> None:
         last = label
 
 
-def _write(result: Result, folder: Path, plots: bool, animation: bool) -> tuple[list[Path], list[str]]:
+def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
     """Write all files of a result; returns them, and remarks on what was left out."""
     files, notes = [], []
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
+    _make(folder)
 
     def keep(name: str, write: Callable[[Path], None]) -> None:
         write(folder / name)
@@ -190,10 +192,18 @@ def _write(result: Result, folder: Path, plots: bool, animation: bool) -> tuple[
     if plots:
         from .view.plots import standard_plots
 
-        files += standard_plots(result, folder)
-    if animation:
-        keep("animation.html", result.to_html)
+        _make(folder / "plots")
+        files += standard_plots(result, folder / "plots")
+    for name in pages:
+        keep(name, result.to_report if name == "report.html" else result.to_html)
     return files, notes
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
 
 
 @app.command()

@@ -23,6 +23,26 @@ class PerformanceNotice(UserWarning):
     """Something works, but far slower than it could."""
 
 
+class SingularOrientationError(FlyballError, ValueError):
+    """Coordinates of an orientation do not exist, or have no finite rates, where it was asked for them.
+
+    ``sequence`` names the Euler angles ("" for other coordinates), ``angle`` is the middle angle (of other coordinates
+    the angle of the turn) and ``distance`` how far it is from the singular one, both in rad.
+    """
+
+    def __init__(
+        self, message: str, sequence: str = "", angle: float = float("nan"), distance: float = float("nan")
+    ) -> None:
+        super().__init__(message)
+        self.sequence = sequence
+        self.angle = angle
+        self.distance = distance
+
+
+class SingularOrientationWarning(UserWarning):
+    """Coordinates of an orientation are not determined by it, and a choice was made."""
+
+
 class AnalysisError(FlyballError):
     """An analysis cannot be done or cannot go on."""
 

@@ -1,82 +1,214 @@
-"""Every force element, found by registry: power = -dE/dt, and the same numbers compiled, plain, real and complex."""
+"""Every force element, found by registry: power = -dE/dt, and the same on any kind of number and anywhere."""
+
+import inspect
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from flyball import forces
-from tests.contract.test_rows import moved, random_motion, record
+from flyball.math.rotation import log_gradient, rotation_vector
+from flyball.model.force import CoordinateForce
+from tests.contract.frames import moved, random_motion, record, stepped
 
-PAR = (30.0, 2.0, 0.4, 0.0, 0.0, 0.0, 0.0, 0.1)
+BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce)]
+ALONG = [k for k in forces.ALL if issubclass(k, CoordinateForce)]
+LAWS = (1.0, -2.0, 0.5)
+NO_LAWS = (0.0, 0.0, 0.0)
+PARAMETERS = {
+    "Bushing": (30.0, 50.0, 20.0, 1.0, 2.0, 0.5, 3.0, 7.0, 1.5, 0.2, 0.1, 0.4),
+    "PointForce": (1.0,),
+    "PointTorque": (1.0,),
+    "SpringDamper": (30.0, 2.0, 0.4),
+    "Actuator": (),
+    "CoordinateSpring": (30.0, 2.0, 0.4),
+    "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0),
+    "Motor": (),
+    "Rope": (30.0, 2.0, 0.4),
+    "TorsionalSpringDamper": (30.0, 2.0, 0.4),
+}
+UNDAMPED = {
+    "Bushing": (*PARAMETERS["Bushing"][:3], 0.0, 0.0, 0.0, *PARAMETERS["Bushing"][6:9], 0.0, 0.0, 0.0),
+    **dict.fromkeys(("SpringDamper", "CoordinateSpring", "Rope", "TorsionalSpringDamper"), (30.0, 0.0, 0.4)),
+}
+COORDINATES = [-3.0, -0.2, 0.0, 0.35, 0.45, 12.0]
+
+between = pytest.mark.parametrize("kind", BETWEEN, ids=lambda k: k.__name__)
+along = pytest.mark.parametrize("kind", ALONG, ids=lambda k: k.__name__)
+seeds = pytest.mark.parametrize("seed", range(4))
 
 
-def pair(kind):
-    """Two frames; a torque about an axis needs them hinged, with a common z axis."""
-    F, M = random_motion(4)
-    if kind.on_joint:
-        spin = 0.7
-        M["p"], M["v"], M["a"] = F["p"], F["v"], F["a"]
-        M["R"] = F["R"] @ Rotation.from_rotvec([0, 0, 0.9]).as_matrix()
-        M["w"] = F["w"] + spin * F["R"][:, 2]
-    return F, M
+def padded(par):
+    return (*par, *(0.0,) * (16 - len(par)))
 
 
-def power(kind, par, F, M, laws=(0.0, 0.0, 0.0)):
-    f, t = kind.wrench(par, record(F), record(M), laws, kind.inputs(par, record(F), record(M), 0.0))
+def full(kind):
+    return padded(PARAMETERS[kind.__name__])
+
+
+def undamped(kind):
+    return padded(UNDAMPED[kind.__name__])
+
+
+def wrench(kind, par, F, M, laws=NO_LAWS, dtype=float):
+    f, m = record(F, dtype), record(M, dtype)
+    return kind.wrench(par, f, m, laws, kind.inputs(par, f, m))
+
+
+def power(out, F, M):
+    """Of a wrench on M and of its reverse on F's body at the same point."""
+    f, t = (np.array(x) for x in out)
     d = M["p"] - F["p"]
-    return np.dot(f, M["v"] - F["v"] - np.cross(F["w"], d)) + np.dot(t, M["w"] - F["w"])
+    return f @ (M["v"] - F["v"] - np.cross(F["w"], d)) + t @ (M["w"] - F["w"])
 
 
-@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
-def test_power_is_minus_the_rate_of_the_energy(kind):
-    """What a spring without damping gives to the bodies it loses itself; elements without energy store nothing."""
-    F, M = pair(kind)
-    par = (PAR[0], 0.0, *PAR[2:])
+def test_every_kind_has_its_cases():
+    assert set(PARAMETERS) == {k.__name__ for k in forces.ALL}
+    assert set(UNDAMPED) == {k.__name__ for k in forces.ALL if k.energy is not None}
+
+
+@between
+@seeds
+def test_power_between_frames_is_minus_the_rate_of_the_energy(kind, seed):
+    """What a force without damping gives to the bodies it loses itself, far turned too; given forces store nothing."""
+    F, M = random_motion(seed)
     if kind.energy is None:
-        assert power(kind, par, F, M) == pytest.approx(0.0, abs=1e-12)
+        assert power(wrench(kind, full(kind), F, M), F, M) == pytest.approx(0.0, abs=1e-12)
         return
+    P = power(wrench(kind, undamped(kind), F, M), F, M)
+    e = 1e-30
+    energy = kind.energy(undamped(kind), record(stepped(F, e), complex), record(stepped(M, e), complex))
+    assert pytest.approx(-np.imag(energy) / e, rel=1e-11, abs=1e-11) == P
     h = 1e-5
-    ahead, behind = (kind.energy(par, record(moved(F, s)), record(moved(M, s)), 0.0) for s in (h, -h))
-    assert power(kind, par, F, M) == pytest.approx(-(ahead - behind) / (2 * h), rel=1e-7)
+    ahead, behind = (kind.energy(undamped(kind), record(moved(F, s)), record(moved(M, s))) for s in (h, -h))
+    assert pytest.approx(-(ahead - behind) / (2 * h), rel=1e-6) == P
 
 
-@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
-def test_damping_takes_power(kind):
-    F, M = pair(kind)
+@along
+def test_effort_is_minus_the_gradient_of_the_energy(kind):
+    if kind.energy is None:
+        assert kind.effort(full(kind), 0.3, 0.0, NO_LAWS, 5.0) == pytest.approx(0.0, abs=1e-15)
+        return
+    for x in COORDINATES:
+        slope = np.imag(kind.energy(undamped(kind), complex(x, 1e-30))) / 1e-30
+        assert kind.effort(undamped(kind), x, 7.0, NO_LAWS, 0.0) == pytest.approx(-slope, rel=1e-12, abs=1e-12)
+
+
+@between
+@seeds
+def test_damping_between_frames_takes_power(kind, seed):
+    F, M = random_motion(seed)
     if kind.energy is not None:
-        par = (0.0, *PAR[1:])
-        assert power(kind, par, F, M) < 0.0
+        P = power(wrench(kind, full(kind), F, M), F, M) - power(wrench(kind, undamped(kind), F, M), F, M)
+        assert P < 0.0
 
 
-@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
-def test_inputs_are_a_coordinate_and_its_rate(kind):
-    F, M = pair(kind)
-    h = 1e-6
-    x = [kind.inputs(PAR, record(moved(F, s)), record(moved(M, s)), 0.0)[0] for s in (h, -h)]
-    assert kind.inputs(PAR, record(F), record(M), 0.0)[1] == pytest.approx((x[0] - x[1]) / (2 * h), rel=1e-6, abs=1e-8)
+@along
+@pytest.mark.parametrize("rate", [-2.0, -1e-4, 1e-4, 2.0])
+def test_damping_and_friction_along_a_coordinate_take_power(kind, rate):
+    for x in COORDINATES:
+        rest = kind.effort(full(kind), x, 0.0, NO_LAWS, 5.0)
+        assert (kind.effort(full(kind), x, rate, NO_LAWS, 5.0) - rest) * rate <= 0.0
 
 
-@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
-def test_complex_numbers_without_imaginary_part_change_nothing(kind):
-    F, M = pair(kind)
-    laws = (1.0, -2.0, 0.5)
-    real = kind.wrench(PAR, record(F), record(M), laws, kind.inputs(PAR, record(F), record(M), 0.0))
-    F, M = record(F, complex), record(M, complex)
-    other = kind.wrench(PAR, F, M, laws, kind.inputs(PAR, F, M, 0.0))
-    for a, b in zip(real, other, strict=True):
-        assert np.asarray(b, complex) == pytest.approx(np.asarray(a, complex), rel=1e-14, abs=1e-14)
+@between
+@seeds
+def test_inputs_are_a_quantity_and_its_rate(kind, seed):
+    F, M = random_motion(seed)
+    par, e = full(kind), 1e-30
+    x = kind.inputs(par, record(stepped(F, e), complex), record(stepped(M, e), complex))[0]
+    assert kind.inputs(par, record(F), record(M))[1] == pytest.approx(np.imag(x) / e, rel=1e-12, abs=1e-14)
+
+
+@between
+@seeds
+def test_nothing_depends_on_the_world(kind, seed):
+    """The world turned and put 10 km away: the wrench turned with it, but for a force given in the world's axes."""
+    F, M = random_motion(seed)
+    Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
+    f, m = (
+        x | {"p": Q @ x["p"] + d, "R": Q @ x["R"]} | {k: Q @ x[k] for k in ("w", "v", "alpha", "a")} for x in (F, M)
+    )
+    for here, there in zip(wrench(kind, full(kind), F, M, LAWS), wrench(kind, full(kind), f, m, LAWS), strict=True):
+        assert np.array(there) == pytest.approx(Q @ np.array(here), rel=1e-9, abs=1e-9)
+
+
+@between
+def test_complex_numbers_and_arrays_change_nothing_between_frames(kind):
+    frames = [random_motion(seed) for seed in range(3)]
+    many = [
+        tuple(
+            tuple(np.array(x) for x in zip(*parts, strict=True))
+            for parts in zip(*(record(pair[side]) for pair in frames), strict=True)
+        )
+        for side in range(2)
+    ]
+    par = full(kind)
+    arrays = kind.wrench(par, *many, LAWS, kind.inputs(par, *many))
+    for k, (F, M) in enumerate(frames):
+        real, other = wrench(kind, par, F, M, LAWS), wrench(kind, par, F, M, LAWS, complex)
+        for a, b, c in zip(real, other, arrays, strict=True):
+            assert np.asarray(b, complex) == pytest.approx(np.asarray(a, complex), rel=1e-13, abs=1e-13)
+            assert [np.broadcast_to(x, 3)[k] for x in c] == pytest.approx(a, rel=1e-13, abs=1e-13)
+
+
+@along
+def test_complex_numbers_and_arrays_change_nothing_along_a_coordinate(kind):
+    x = np.array(COORDINATES)
+    rate = np.linspace(-1.0, 2.0, len(x))
+    many = np.broadcast_to(kind.effort(full(kind), x, rate, LAWS, 5.0 + x * x), x.shape)
+    for k in range(len(x)):
+        one = kind.effort(full(kind), float(x[k]), float(rate[k]), LAWS, float(5.0 + x[k] ** 2))
+        other = kind.effort(full(kind), complex(x[k]), complex(rate[k]), LAWS, complex(5.0 + x[k] ** 2))
+        assert one == pytest.approx(many[k], rel=1e-14)
+        assert complex(one) == pytest.approx(other, rel=1e-14)
+
+
+def test_a_rope_pulls_and_never_pushes():
+    par = padded((30.0, 2.0, 0.4))
+    rope = forces.Rope.effort
+    assert rope(par, 0.5, 0.0, NO_LAWS, 0.0) == pytest.approx(-3.0)
+    assert rope(par, 0.5, -1.0, NO_LAWS, 0.0) == pytest.approx(-1.0)
+    assert rope(par, 0.5, -5.0, NO_LAWS, 0.0) == 0.0, "damping does not push either"
+    assert rope(par, 0.3, 5.0, NO_LAWS, 0.0) == 0.0, "slack"
+    assert forces.Rope.energy(par, 0.3) == 0.0
+
+
+@pytest.mark.parametrize("angle", [1e-9, 9.9e-3, 1.01e-2, 0.5, 2.0, 3.1])
+def test_rotation_vector_and_its_gradient(angle):
+    """The logarithm of a rotation, and J^T a with thetadot = J omega by a complex step; near and above the series."""
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    R = Rotation.from_rotvec(angle * axis).as_matrix()
+    theta = rotation_vector(tuple(R.ravel()))
+    assert np.array(theta) == pytest.approx(angle * axis, rel=1e-12, abs=1e-15)
+    a, e = (0.3, 1.0, -0.7), 1e-30
+    slopes = []
+    for w in np.eye(3):
+        turn = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+        ahead = rotation_vector(tuple(((np.eye(3) + 1j * e * turn) @ R).ravel().tolist()))
+        slopes.append(np.dot(np.imag(ahead) / e, a))
+    assert np.array(log_gradient(theta, a)) == pytest.approx(np.array(slopes), rel=1e-9, abs=1e-9)
+
+
+def test_rotation_vector_says_nothing_at_half_a_turn():
+    R = Rotation.from_rotvec((0.0, 0.0, np.pi - 1e-4)).as_matrix()
+    assert np.isnan(rotation_vector(tuple(R.ravel()))).any()
 
 
 @pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
 def test_kind_stands_in_dispatch(kind):
     """A force that dispatch does not list would be described and never act."""
-    import inspect
-
     from flyball.system import dispatch
 
-    module = kind.__module__.rsplit(".", 1)[1]
-    assert f"F.{module}.wrench" in inspect.getsource(dispatch)
+    formula = kind.effort if kind in ALONG else kind.wrench
+    module = formula.__module__.rsplit(".", 1)[1]
+    assert f"element.{module}.{formula.__name__}" in inspect.getsource(dispatch)
+    assert kind.kind == inspect.getmodule(formula).KIND
 
 
-def test_kind_numbers_are_distinct():
-    assert sorted(k.kind for k in forces.ALL) == list(range(len(forces.ALL)))
+def test_kind_numbers_are_of_one_formula_each():
+    formulas = {}
+    for kind in forces.ALL:
+        formulas.setdefault(kind.kind, set()).add(kind.effort if kind in ALONG else kind.wrench)
+    assert sorted(formulas) == list(range(len(formulas)))
+    assert all(len(x) == 1 for x in formulas.values())

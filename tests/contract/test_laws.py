@@ -223,6 +223,14 @@ def test_many_laws_share_the_tables():
         )
 
 
+def test_zeros_keep_their_sign():
+    """Numbers in the table are used again, but atan2(0, -1) and atan2(-0, -1) lie a whole turn apart."""
+    code, const = [], [-0.0, 1.0]  # no parameters: numbers of an earlier law
+    at, depth = compile_law(Expression.parse("atan2(0, -t)"), ("t",), [], code, const)
+    found = compiled_value(np.array(code), np.array(const), at, np.zeros((depth, 3)), (1.0,), NOTHING)
+    assert found == pytest.approx(math.pi)
+
+
 def test_constant_parts_are_computed_once():
     code, const = [], []
     compile_law(Expression.parse("2*pi/3*sqrt(4)*t - (1 - 1/2)"), ("t",), [], code, const)

@@ -1,110 +1,148 @@
-"""Every constraint row, found by registry: Jacobian, acceleration term, action and reaction, plain = complex."""
+"""Every constraint row, found by registry: Jacobian, acceleration term, action and reaction, any kind of number."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flyball.constraints import alignment
-from flyball.constraints.blocks import FORMULAS
+from flyball.constraints import alignment, skew
+from flyball.constraints import angle as angle_row
+from flyball.constraints.registry import FORMULAS
+from tests.contract.frames import (
+    ASSEMBLY,
+    CASES,
+    DATA,
+    PARAMETERS,
+    WORLD,
+    elsewhere,
+    evaluated,
+    frames,
+    has_value,
+    label,
+    moved,
+    random_motion,
+    rate,
+    record,
+    stepped,
+)
 
-MOTION = [k for k in FORMULAS if k not in (alignment.KIND_AXIS, alignment.KIND_FULL)]
-PAR = {  # axes of unit length; parameter 6 a constant, 7 the coefficient (not seen by the formula)
-    kind: (0.36, 0.48, 0.8, 0.6, 0.0, -0.8, 0.3, 1.0) for kind in FORMULAS
-}
-
-
-def cross_matrix(w):
-    return np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-
-
-def random_motion(seed):
-    """Two frames with random poses, velocities and accelerations: dicts of arrays."""
-    rng = np.random.default_rng(seed)
-    keys = ("p", "w", "v", "alpha", "a")
-    return [{"R": Rotation.random(random_state=rng).as_matrix()} | {k: rng.normal(size=3) for k in keys} for _ in "FM"]
-
-
-def record(m, dtype=float):
-    return tuple(tuple(np.asarray(m[k], dtype).ravel().tolist()) for k in ("p", "R", "w", "v", "alpha", "a"))
-
-
-def moved(m, t):
-    """The frame after a time t of its motion, exact to second order."""
-    turn = m["w"] * t + 0.5 * m["alpha"] * t * t
-    return m | {
-        "p": m["p"] + m["v"] * t + 0.5 * m["a"] * t * t,
-        "R": Rotation.from_rotvec(turn).as_matrix() @ m["R"],
-        "w": m["w"] + m["alpha"] * t,
-        "v": m["v"] + m["a"] * t,
-    }
+every = pytest.mark.parametrize("case", CASES, ids=label)
+holonomic = pytest.mark.parametrize("case", [c for c in CASES if has_value(c)], ids=label)
+seeds = pytest.mark.parametrize("seed", range(3))
 
 
-def rate(out, F, M):
-    """G v of a row's record."""
-    _, f, tM, tF, _ = (np.array(x) for x in out)
-    return f @ (M["v"] - F["v"]) + tM @ M["w"] + tF @ F["w"]
+def test_every_kind_has_its_cases():
+    assert set(PARAMETERS) | set(ASSEMBLY) == set(FORMULAS)
 
 
-@pytest.mark.parametrize("kind", MOTION)
-@pytest.mark.parametrize("seed", range(3))
-def test_wrench_is_the_gradient_of_the_value(kind, seed):
-    """G v = dg/dt, off the constraint too: complex step along a first-order motion, and central differences."""
-    F, M = random_motion(seed)
-    out = FORMULAS[kind](PAR[kind], record(F), record(M))
+@holonomic
+@seeds
+def test_wrench_is_the_gradient_of_the_value(case, seed):
+    """G v = dg/dt off the constraint: by a complex step along a first-order motion, and by central differences."""
+    F, M, hint = frames(case, seed)
+    G_v = rate(evaluated(case, F, M, hint), F, M)
     e = 1e-30
-    stepped = [
-        m | {"p": m["p"] + 1j * e * m["v"], "R": (np.eye(3) + 1j * e * cross_matrix(m["w"])) @ m["R"]} for m in (F, M)
-    ]
-    value = FORMULAS[kind](PAR[kind], *(record(m, complex) for m in stepped))[0]
-    assert np.imag(value) / e == pytest.approx(rate(out, F, M), rel=1e-12, abs=1e-13)
+    value = evaluated(case, stepped(F, e), stepped(M, e), hint, complex)[0]
+    assert np.imag(value) / e == pytest.approx(G_v, rel=1e-11, abs=1e-12)
     h = 1e-5
-    ahead, behind = (FORMULAS[kind](PAR[kind], record(moved(F, s)), record(moved(M, s)))[0] for s in (h, -h))
-    assert (ahead - behind) / (2 * h) == pytest.approx(rate(out, F, M), rel=1e-7, abs=1e-8)
+    ahead, behind = (evaluated(case, moved(F, s), moved(M, s), hint)[0] for s in (h, -h))
+    assert (ahead - behind) / (2 * h) == pytest.approx(G_v, rel=1e-7, abs=1e-7)
 
 
-@pytest.mark.parametrize("kind", MOTION)
-@pytest.mark.parametrize("seed", range(3))
-def test_bias_is_the_second_derivative(kind, seed):
-    """With true accelerations in the records, the bias is d2g/dt2, off the constraint and moving."""
-    F, M = random_motion(seed)
-    bias = FORMULAS[kind](PAR[kind], record(F), record(M))[4]
+@holonomic
+def test_wrench_is_the_gradient_of_the_value_on_the_constraint(case):
+    """Where the row is fulfilled too: it is put there along its own gradient."""
+    F, M, hint = frames(case, 1)
+    hint = 0.0 if case[0] == angle_row.KIND else hint
+    for _ in range(30):
+        out = evaluated(case, F, M, hint)
+        f, t = np.array(out[1]), np.array(out[2])
+        step = -out[0] / (f @ f + t @ t)
+        M["p"], M["R"] = M["p"] + step * f, Rotation.from_rotvec(step * t).as_matrix() @ M["R"]
+    out = evaluated(case, F, M, hint)
+    assert out[0] == pytest.approx(0.0, abs=1e-12)
+    e = 1e-30
+    value = evaluated(case, stepped(F, e), stepped(M, e), hint, complex)[0]
+    assert np.imag(value) / e == pytest.approx(rate(out, F, M), rel=1e-11, abs=1e-12)
+
+
+@every
+@seeds
+def test_bias_is_the_second_derivative(case, seed):
+    """With true accelerations in the records the bias is d2g/dt2, or the derivative of the rate: off the constraint."""
+    F, M, hint = frames(case, seed)
+    bias = evaluated(case, F, M, hint)[4]
     h = 1e-4
     rates = []
-    for s in (h, -h):
+    for s in (2 * h, h, -h, -2 * h):
         f, m = moved(F, s), moved(M, s)
-        rates.append(rate(FORMULAS[kind](PAR[kind], record(f), record(m)), f, m))
-    assert (rates[0] - rates[1]) / (2 * h) == pytest.approx(bias, rel=1e-6, abs=1e-6)
+        rates.append(rate(evaluated(case, f, m, hint), f, m))
+    assert (8 * (rates[1] - rates[2]) - (rates[0] - rates[3])) / (12 * h) == pytest.approx(bias, rel=1e-7, abs=1e-6)
 
 
-@pytest.mark.parametrize("kind", MOTION)
-def test_action_equals_reaction(kind):
-    """A rigid motion of both frames together needs no power: the two wrenches balance, moments included."""
-    F, M = random_motion(7)
-    _, f, tM, tF, _ = (np.array(x) for x in FORMULAS[kind](PAR[kind], record(F), record(M)))
-    about_origin = np.cross(M["p"], f) + tM - np.cross(F["p"], f) + tF
-    if kind == 0:  # along a world axis: the axis does not turn with the frames, only forces balance off the constraint
-        F["p"] = M["p"]
-        about_origin = tM + tF
-    assert about_origin == pytest.approx(np.zeros(3), abs=1e-12)
+@every
+@seeds
+def test_bias_accelerations_count_as_accelerations(case, seed):
+    """G vdot + bias is the same whether accelerations come from vdot or, in joint coordinates, from the records."""
+    F, M, hint = frames(case, seed)
+    full = evaluated(case, F, M, hint)
+    still = [m | {"alpha": np.zeros(3), "a": np.zeros(3)} for m in (F, M)]
+    bare = evaluated(case, *still, hint)
+    assert full[4] == pytest.approx(bare[4] + rate(full, F, M, "alpha", "a"), rel=1e-11, abs=1e-12)
+    assert full[:4] == bare[:4]
 
 
-@pytest.mark.parametrize("kind", [k for k in MOTION if k != 0])
-def test_value_does_not_depend_on_the_world(kind):
-    """Turning and moving the world, 10 km away, changes no value of a row that knows only its two frames."""
-    F, M = random_motion(11)
-    Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
-    turned = [m | {"p": Q @ m["p"] + d, "R": Q @ m["R"]} for m in (F, M)]
-    one, two = (FORMULAS[kind](PAR[kind], *(record(m) for m in pair))[0] for pair in ((F, M), turned))
-    assert one == pytest.approx(two, rel=1e-11, abs=1e-11)
+@every
+def test_action_equals_reaction(case):
+    """A rigid motion of both frames together needs no power: the two wrenches balance, moments included.
+
+    Rows that speak of the world's axes do so where they are closed.
+    """
+    F, M, hint = frames(case, 7)
+    if case[0] in WORLD:
+        f, m = F["R"][:, 2], M["R"][:, 2]
+        s1, s2, k = PARAMETERS[case[0]][case[1]][3:6] if case[0] == skew.KIND else (0.0, 0.0, 0.0)
+        M["p"] = F["p"] + s1 * f + s2 * m + k * np.cross(f, m)
+    _, f, tM, tF, _ = (np.array(x) for x in evaluated(case, F, M, hint))
+    assert tM + tF + np.cross(M["p"] - F["p"], f) == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-@pytest.mark.parametrize("kind", MOTION)
-def test_complex_numbers_without_imaginary_part_change_nothing(kind):
-    F, M = random_motion(5)
-    real = FORMULAS[kind](PAR[kind], record(F), record(M))
-    complex_ = FORMULAS[kind](PAR[kind], record(F, complex), record(M, complex))
-    for a, b in zip(real, complex_, strict=True):
-        assert np.asarray(b) == pytest.approx(np.asarray(a, complex), rel=1e-14, abs=1e-14)
+@every
+def test_nothing_depends_on_the_world(case):
+    """The world turned and moved by 10 km: the same value and bias, the wrench turned with it."""
+    F, M, hint = frames(case, 11)
+    here = evaluated(case, F, M, hint)
+    f, m, par, Q = elsewhere(case, F, M)
+    there = FORMULAS[case[0]](par, record(f), record(m), hint, DATA)
+    assert there[0] == pytest.approx(here[0], rel=1e-10, abs=1e-10)
+    assert there[4] == pytest.approx(here[4], rel=1e-9, abs=1e-9)
+    for a, b in zip(here[1:4], there[1:4], strict=True):
+        assert np.array(b) == pytest.approx(Q @ np.array(a), rel=1e-9, abs=1e-9)
+
+
+@every
+def test_complex_numbers_without_imaginary_part_change_nothing(case):
+    F, M, hint = frames(case, 5)
+    real, other = evaluated(case, F, M, hint), evaluated(case, F, M, hint, complex)
+    for a, b in zip(real, other, strict=True):
+        assert np.asarray(b) == pytest.approx(np.asarray(a, complex), rel=1e-13, abs=1e-13)
+
+
+@every
+def test_arrays_over_time_are_so_many_numbers(case):
+    """Results run the rows on arrays over time: each entry is what the numbers of that time give."""
+    single = [frames(case, seed) for seed in range(4)]
+    F, M = (_over_time([record(s[side]) for s in single]) for side in range(2))
+    kind, name = case
+    out = FORMULAS[kind](PARAMETERS[kind][name], F, M, np.array([hint for _, _, hint in single]), DATA)
+    for k, (f, m, hint) in enumerate(single):
+        for a, b in zip(evaluated(case, f, m, hint), out, strict=True):
+            picked = [np.broadcast_to(x, 4)[k] for x in b] if isinstance(b, tuple) else np.broadcast_to(b, 4)[k]
+            assert np.asarray(picked) == pytest.approx(np.asarray(a), rel=1e-13, abs=1e-13)
+
+
+def _over_time(records):
+    """One record of arrays from records of single times."""
+    return tuple(tuple(np.array(x) for x in zip(*parts, strict=True)) for parts in zip(*records, strict=True))
 
 
 @pytest.mark.parametrize("angle", [1e-12, 0.4, 2.0, 3.0, np.pi])
@@ -114,8 +152,9 @@ def test_alignment_measures_the_true_angle(angle):
     axis = np.array([0.6, 0.8, 0.0])
     M["R"] = F["R"] @ Rotation.from_rotvec(angle * axis).as_matrix()
     unit = np.eye(3)
-    full = [alignment.full_row((*unit[i], 0, 0, 0, 0, 1), record(F), record(M))[0] for i in range(3)]
-    tilt = [alignment.axis_row((*unit[i], 0, 0, 0, 0, 1), record(F), record(M))[0] for i in range(2)]
+    ends = record(F), record(M), 0.0, DATA
+    full = [alignment.full_row((*unit[i], 0, 0, 0, 0, 1), *ends)[0] for i in range(3)]
+    tilt = [alignment.axis_row((*unit[i], 0, 0, 0, 0, 1), *ends)[0] for i in range(2)]
     assert np.linalg.norm(full) == pytest.approx(angle, abs=1e-7)
     assert np.linalg.norm(tilt) == pytest.approx(angle, abs=1e-7) or angle == np.pi
     if 0.1 < angle < 3.1:

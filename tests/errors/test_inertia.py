@@ -96,7 +96,7 @@ LENGTHS = [
         "its outline crosses itself",
     ),
     (fb.Box, BOX | {"position": (1, 2)}, "position of Box: expected 3 components, got 2"),
-    (fb.Box, BOX | {"orientation": (0, 0, 0, 0)}, "orientation of Box: a quaternion must not be zero"),
+    (fb.Box, BOX | {"orientation": (0, 0, 0, 0)}, "a quaternion must not be zero"),
     (fb.Box, BOX | {"name": "lid", "orientation": (1, 0)}, "orientation of Box 'lid': give a quaternion"),
     (fb.Box, BOX | {"density": -1}, "Box: density is -1 kg/m^3; it must be greater than 0"),
     (fb.Box, BOX | {"mass": -1}, "Box: mass is -1 kg; it must be greater than 0"),

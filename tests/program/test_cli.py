@@ -40,8 +40,11 @@ def test_run_writes_everything_and_says_so(here: Path) -> None:
     for words in ("freedoms", "steps", "energy balance", "violation", "animation.html"):
         assert words in said.out
     folder = here / "crank-result"
+    assert said.out.splitlines()[-1].split() == ["open", "this", str(Path("crank-result/report.html"))]
+    files = ["animation.html", "plots", "report.html", "result.csv", "result.nc"]
+    assert sorted(p.name for p in folder.iterdir()) == files
     pictures = ["actuation.png", "coordinates.png", "energy.png", "paths.png", "reactions.png"]
-    assert sorted(p.name for p in folder.iterdir()) == sorted([*pictures, "animation.html", "result.csv", "result.nc"])
+    assert sorted(p.name for p in (folder / "plots").iterdir()) == pictures
     r = fb.load_result(folder / "result.nc")
     assert len(r.t) == 21
     assert r.t[-1] == 0.2

@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from flyball.view.recording import Channel, RecordedBody, RecordedJoint, RecordedLine, Recording, Shape
+from flyball.view.recording import (
+    SHOW,
+    Channel,
+    RecordedArrow,
+    RecordedBody,
+    RecordedCurve,
+    RecordedFrame,
+    RecordedJoint,
+    RecordedLine,
+    RecordedPath,
+    Recording,
+    Shape,
+)
 
 ALONG_X = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0)  # turns a shape's z axis to x
 NASTY = "</script><script>window.hacked=1</script> \"q\" 'a' & <b> \U0001f3a1 {{boot}}"
@@ -27,9 +39,9 @@ def planar(name: str = "swing") -> Recording:
         t,
         (link, block),
         (
-            RecordedLine("spring", "spring", slide, wall),
-            RecordedLine("damper", "damper", tip, slide),
-            RecordedLine("force", "arrow", tip, tip * [1.0, 1.3, 1.0]),
+            RecordedLine("spring", "spring", (slide, wall)),
+            RecordedLine("damper", "damper", (tip, slide)),
+            RecordedLine("force", "arrow", (tip, tip * [1.0, 1.3, 1.0])),
         ),
         (
             RecordedJoint("pin", "revolute", "ground", (0, 0, 0), (0, 0, 1)),
@@ -73,7 +85,7 @@ def spatial(name: str = "tumble") -> Recording:
     joints = [RecordedJoint(kind, kind, bodies[k].name, (0, 0, 0), (0, 1, 0)) for k, kind in enumerate(kinds)]
     joints.append(RecordedJoint("base", "revolute", "ground", (0, 0, 0), (1, 0, 0)))
     lines = [
-        RecordedLine(kind, kind, bodies[k].p, bodies[k + 1].p)
+        RecordedLine(kind, kind, (bodies[k].p, bodies[k + 1].p))
         for k, kind in enumerate(("spring", "damper", "link", "rope", "arrow"))
     ]
     channels = tuple(Channel(f"signal {k}", "N", np.sin(k * t)) for k in range(120))
@@ -87,3 +99,84 @@ def nasty() -> Recording:
     body = RecordedBody(NASTY, (Shape("sphere", (0.1,)),), np.zeros((t.size, 3)), q, "no such colour")
     channel = Channel(NASTY, "m</script>", np.where(t > 0.5, np.nan, t))
     return Recording(NASTY, False, t, (body,), (), (), (channel,), (NASTY,), 0.1, {NASTY: NASTY})
+
+
+SYMBOLS = {  # every kind of symbol, with what it needs; the last one nobody knows
+    "revolute": (),
+    "prismatic": (),
+    "cylindrical": (),
+    "screw": (0.05,),
+    "spherical": (),
+    "universal": (),
+    "fixed": (),
+    "plane": (),
+    "rail": (),
+    "point": (),
+    "wheel": (0.3,),
+    "ball": (0.3,),
+    "roller": (0.1,),
+    "gear": (0.3, 20.0, 0.1, 0.0),
+    "rack": (0.3, 0.1),
+    "knife_edge": (),
+    "bushing": (),
+    "orientation": (),
+    "yet unknown": (),
+}
+
+
+def tetrahedron(edge: float = 0.3) -> Shape:
+    """A mesh of four triangles, all seen from outside."""
+    vertices = edge * np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    triangles = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
+    return Shape("mesh", (), vertices=vertices, triangles=triangles)
+
+
+def loaded(flat: bool = False) -> Recording:
+    """Bodies on a circle, one for each kind of symbol; a mesh, a cam, ropes, arrows, axes and a path."""
+    t = np.linspace(0.0, 2.0, 41)
+    turn = np.stack([np.cos(t / 2), 0 * t, 0 * t, np.sin(t / 2)], 1)
+    bodies, joints = [], []
+    for k, (kind, size) in enumerate(SYMBOLS.items()):
+        angle = 2 * np.pi * k / len(SYMBOLS)
+        p = np.tile([3 * np.cos(angle), 3 * np.sin(angle), 0.0], (t.size, 1))
+        bodies.append(RecordedBody(f"b{k}", (Shape("box", (0.3, 0.2, 0.1)),) if k % 2 else (tetrahedron(),), p, turn))
+        along = (1.0, 0.0, 0.0) if kind in ("prismatic", "rail", "plane", "knife_edge") else (0.0, 0.0, 1.0)
+        lying = (np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0) if along[0] else (1.0, 0.0, 0.0, 0.0)
+        reach = (0.0, 0.3, 0.0, 0.2, -0.1, 0.4)
+        joints.append(
+            RecordedJoint(kind, kind, f"b{k}", (0, 0, 0), along, lying, f"b{k - 1}" if k else None, reach, size)
+        )
+    joints.append(RecordedJoint("base", "revolute", "ground", tuple(bodies[1].p[0]), (0, 0, 1), mate="b1"))
+    a = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    cam = np.stack([(0.2 + 0.1 * np.cos(a)) * np.cos(a), (0.2 + 0.1 * np.cos(a)) * np.sin(a), 0 * a], 1)
+    ends = tuple(np.tile(p, (t.size, 1)).astype(float) for p in ((-1, 0, 0), (0, 0.5, 0), (1, 0, 0)))
+    distance = 2 * np.sqrt(1.25)
+    up = np.array([0.0, 1.0, 0.0]) if flat else np.array([0.0, 0.0, 1.0])
+    return Recording(
+        "loaded",
+        flat,
+        t,
+        tuple(bodies),
+        (
+            RecordedLine("taut", "rope", ends, rest=np.full(t.size, 0.9 * distance)),
+            RecordedLine("slack", "rope", ends, rest=np.linspace(0.9, 1.2, t.size) * distance),
+        ),
+        tuple(joints),
+        (Channel("b0.x", "m", np.cos(t)), Channel("b0.vx", "m/s", -np.sin(t)), Channel("revolute.angle", "rad", t)),
+        ("b0.x",),
+        1.0,
+        {"Freedoms": "1"},
+        (RecordedCurve("profile", "b2", cam, True), RecordedCurve("groove", "ground", cam[:20])),
+        (
+            RecordedArrow("push", "load", "force", "b1", (0.1, 0, 0), 50 * (np.outer(np.cos(t), (1, 0, 0)) + up)),
+            RecordedArrow("base", "reaction", "force", "b1", (0, 0, 0), -50 * np.outer(np.ones(t.size), up)),
+            RecordedArrow("base", "reaction", "moment", "b1", (0, 0, 0), np.outer(8 * np.sin(t), (0, 0, 1))),
+            RecordedArrow("motor", "element", "moment", "b3", (0, 0, 0), np.outer(-5 - t, (0, 0, 1))),
+        ),
+        (RecordedFrame("base", "joint", "b1", (0.2, 0, 0), (1, 0, 0, 0)),),
+        (RecordedPath("tip", "b1", (0.5, 0.0, 0.0)),),
+        tuple(SHOW),
+        {"b0": ("Body", "1 kg"), "base": ("Revolute", "ground – b1")},
+        (),
+        tuple(-up),
+    )

@@ -14,8 +14,8 @@ from flyball.system.values import values
 from flyball.view.animate import animation, kept, record
 from flyball.view.payload import check
 from flyball.view.plots import plot, standard_plots
-from flyball.view.recording import Recording, Shape
-from tests.results.made_up import L, R, healthy, slider_crank
+from flyball.view.recording import RecordedArrow, Recording, Shape
+from tests.results.made_up import L, R, healthy, mechanism, slider_crank
 
 
 def turned(q: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -92,12 +92,168 @@ def test_joints_ride_on_ground_where_they_are_fixed(recording: Recording) -> Non
 
 def test_springs_dampers_and_forces_are_lines(result: Result, recording: Recording) -> None:
     by_name = {line.name: line for line in recording.lines}
-    assert {k: line.kind for k, line in by_name.items()} == {"spring": "spring", "dash/pot": "damper", "push": "arrow"}
-    spring = by_name["spring"]
-    assert np.allclose(np.linalg.norm(spring.b - spring.a, axis=1), result["spring"].length)
-    push = by_name["push"]
-    assert np.allclose(push.a[:, 0], result["slider.x"])
-    assert np.allclose((push.b - push.a)[:, 1:], 0)
+    assert {k: line.kind for k, line in by_name.items()} == {"spring": "spring", "dash/pot": "damper"}
+    a, b = by_name["spring"].points
+    assert np.allclose(np.linalg.norm(b - a, axis=1), result["spring"].length)
+
+
+def arrow(recording: Recording, name: str, what: str = "force", body: str = "") -> RecordedArrow:
+    (found,) = (a for a in recording.arrows if a.name == name and a.what == what and (not body or a.body == body))
+    return found
+
+
+def test_given_forces_are_arrows_on_their_body(result: Result, recording: Recording) -> None:
+    push = arrow(recording, "push")
+    assert (push.group, push.body) == ("load", "slider")
+    assert np.allclose(push.position, 0)
+    assert np.allclose(push.vector[:, 0], 20 * np.sin(2 * np.pi * result.t))
+    assert np.allclose(push.vector[:, 1:], 0)
+
+
+def test_reactions_are_arrows_on_body_j_where_the_joint_is(result: Result, recording: Recording) -> None:
+    for name in ("A", "B", "C", "D"):
+        drawn = arrow(recording, name)
+        assert (drawn.group, drawn.body) == ("reaction", result.model[name].body_j)
+        assert np.allclose(drawn.vector[:, :2], result[name].force)
+    assert np.allclose(arrow(recording, "B").position, [-L / 2, 0, 0])
+    assert np.allclose(arrow(recording, "D", "moment").vector[:, 2], result["D"].torque)
+    assert not [a for a in recording.arrows if a.name == "A" and a.what == "moment"]  # a pin carries none
+
+
+def test_springs_pull_both_of_their_ends_and_drivers_turn_their_joint(result: Result, recording: Recording) -> None:
+    tension = result["spring"].force
+    pull = arrow(recording, "spring", body="slider").vector
+    assert np.allclose(pull[:, 0], tension)  # the spring's other end is on ground, to the right
+    assert np.allclose(pull[:, 1:], 0)
+    motor = arrow(recording, "motor", "moment")
+    assert (motor.group, motor.body) == ("element", "crank")
+    assert np.allclose(motor.vector[:, 2], result["motor"].effort)
+
+
+def test_forces_between_two_bodies_are_equal_and_opposite() -> None:
+    m = fb.Mechanism("m")
+    m.add(fb.Body("a", mass=1, inertia=(1, 1, 1)), fb.Body("b", mass=1, inertia=(1, 1, 1), position=(3, 4, 0)))
+    m.add(fb.SpringDamper("s", "a", "b", at=((0, 0, 0), (3, 4, 0)), stiffness=10, length=4))
+    recording = record(still(m))
+    one, other = arrow(recording, "s", body="a"), arrow(recording, "s", body="b")
+    assert np.allclose(one.vector, [[6, 8, 0]] * 2)  # 10 N/m, stretched by 1 m, along (3, 4) / 5
+    assert np.allclose(other.vector, -one.vector)
+
+
+def test_paths_asked_for(result: Result) -> None:
+    recording = record(result, paths=["slider", "eye", ("rod", (0.1, 0.2))])
+    assert [(p.name, p.body) for p in recording.paths] == [
+        ("slider", "slider"),
+        ("eye", "rod"),
+        ("rod (0.1, 0.2)", "rod"),
+    ]
+    assert np.allclose(recording.paths[1].position, [0, 0.1, 0])
+    assert np.allclose(recording.paths[2].position, [0.1, 0.2, 0])
+    check(recording)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"paths": ["slidr"]}, r"no part named 'slidr' \(did you mean 'slider'\?\)"),
+        ({"paths": ["motor"]}, "paths: Driver 'motor' has no path; name a body, a frame on a body"),
+        ({"paths": [3]}, "paths: 3 is no path; name a body or frame, or give a pair"),
+        ({"paths": [("eye", (0, 0))]}, "paths: Frame 'eye' is no body, so it has no points"),
+        ({"paths": [("rod", (1, 2, 3))]}, "path of 'rod': the mechanism is planar"),
+        (
+            {"show": ["reaction"]},
+            r"nothing to show named 'reaction' \(did you mean 'reactions'\?\); choose of reactions",
+        ),
+    ],
+)
+def test_what_cannot_be_shown_is_refused(result: Result, options: dict, message: str) -> None:
+    with pytest.raises(fb.ModelError, match=message):
+        result.html(**options)
+
+
+def test_frames_can_be_shown(result: Result) -> None:
+    frames = {f.name: f for f in record(result).frames}
+    assert frames["eye"].body == "rod"
+    assert np.allclose(frames["eye"].position, [0, 0.1, 0])
+    assert np.allclose(turned(np.array(frames["D"].quaternion), np.array([0, 0, 1.0])), [1, 0, 0])
+
+
+def test_facts_say_what_parts_are(recording: Recording) -> None:
+    assert recording.facts["rod"] == ("Body", "1 kg")
+    assert recording.facts["B"] == ("Revolute", "crank – rod")
+    assert recording.facts["push"] == ("PointForce", "on slider")
+    assert recording.facts["motor"] == ("Driver", "A.angle = speed*t")
+    assert np.allclose(recording.down, [0, -1, 0])
+
+
+def test_pages_go_where_they_can_be_written(result: Result, tmp_path: Path) -> None:
+    for write in (result.to_html, result.to_report):
+        with pytest.raises(
+            fb.ModelError, match=r"cannot write '.*page\.html': there is no folder '.*no'; make it first"
+        ):
+            write(tmp_path / "no" / "page.html")
+        with pytest.raises(fb.ModelError, match=r"cannot write .*: it is a folder; name a file in it"):
+            write(tmp_path)
+        write(tmp_path / "page.html")
+        assert (tmp_path / "page.html").stat().st_size > 10_000
+
+
+def test_a_result_without_times_cannot_be_drawn() -> None:
+    nothing = still(mechanism(), 0)
+    for draw in (nothing.html, nothing.report):
+        with pytest.raises(fb.ModelError, match="'slider/crank' has no output time: there is nothing to draw"):
+            draw()
+
+
+class Blob(fb.Sphere):
+    """Stands for a shape that is a mesh: a finely divided sphere of the given radius, off the body's origin."""
+
+    def vertices(self, n: object) -> np.ndarray:
+        return self._grid()[0]
+
+    def triangles(self) -> np.ndarray:
+        return self._grid()[1]
+
+    def _grid(self, rings: int = 150) -> tuple[np.ndarray, np.ndarray]:
+        u, v = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False))
+        p = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3)
+        k = np.arange(len(p)).reshape(2 * rings, rings)
+        a, b, c, d = k[:, :-1], k[:, 1:], np.roll(k, -1, 0)[:, :-1], np.roll(k, -1, 0)[:, 1:]
+        return self.radius * p + [1, 0, 0], np.concatenate(
+            [np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (c, b, d))]
+        )
+
+
+def test_meshes_are_drawn_on_their_body_and_kept_small() -> None:
+    m = fb.Mechanism("m")
+    m.add(
+        fb.Body("b", mass=1, inertia=(1, 1, 1), shape=Blob(radius=0.5)),
+        fb.Body("c", mass=1, inertia=(1, 1, 1), shape=Blob(radius=2)),
+    )
+    recording = record(still(m))
+    check(recording)
+    (mesh,) = recording.bodies[0].shapes
+    assert mesh.kind == "mesh"
+    assert np.allclose(np.sqrt(((mesh.vertices - [1, 0, 0]) ** 2).sum(1)), 0.5, rtol=0.01)
+    total = sum(len(b.shapes[0].triangles) for b in recording.bodies)
+    assert 10_000 < total <= 24_000  # of 178 800
+    assert len(animation(still(m))) < 1_000_000
+
+
+def test_symbols_are_smaller_on_slender_parts() -> None:
+    m = fb.Mechanism("m")
+    for name, width in (("slender", 0.01), ("stout", 0.3)):
+        shape = fb.Box(edges=(2, width, width))
+        m.add(
+            fb.Body(name, density=1000, shape=shape),
+            fb.Revolute(f"J {name}", "ground", name, at=(1, 0, 0), axis=(0, 0, 1)),
+        )
+    m.add(
+        fb.Body("bare", mass=1, inertia=(1, 1, 1)),
+        fb.Revolute("J bare", "ground", "bare", at=(1, 0, 0), axis=(0, 0, 1)),
+    )
+    scale = {j.name: j.scale for j in record(still(m)).joints}
+    assert scale == {"J slender": 0.5, "J stout": 1.0, "J bare": 1.0}
 
 
 def test_curves_and_notes(result: Result, recording: Recording) -> None:
@@ -139,7 +295,13 @@ def test_bodies_in_space_get_rods_and_solids() -> None:
     assert "capsule" in top
     (rod,) = shapes["rod"]
     assert np.allclose(sorted(ends(rod).tolist()), [[0, 0, -0.5], [0, 0, 0.5]])
-    assert [s.kind for s in shapes["three"]] == ["capsule"] * 3
+    (plate,) = shapes["three"]
+    assert plate.kind == "plate"
+    corners = turned(np.array(plate.quaternion), np.c_[np.array(plate.outline), np.zeros(len(plate.outline))])
+    corners = corners + plate.position
+    assert np.allclose(corners[:, 2], 0)  # it lies in the plane of its three points and encloses them
+    assert (corners.min(0)[:2] < [-1, 0]).all()
+    assert (corners.max(0)[:2] > [1, 1]).all()
     assert recording.lines[-1].kind == "link"
 
 
@@ -180,7 +342,7 @@ def test_plots_are_written(result: Result, tmp_path: Path) -> None:
     assert [f.name for f in files] == ["energy.png", "coordinates.png", "paths.png", "reactions.png", "actuation.png"]
     assert all(f.stat().st_size > 5000 for f in files)
     figure = plot(result, "slider.x", "rod.y", "motor")
-    assert [ax.get_ylabel() for ax in figure.axes] == ["[m]", "[N m]", "[J]"]
+    assert [ax.get_ylabel() for ax in figure.axes] == ["length [m]", "effort [N m]", "work [J]"]
     assert [line.get_label() for line in figure.axes[0].lines] == ["slider.x", "rod.y"]
     for suffix in ("svg", "pdf"):
         assert plot(result, "A", path=tmp_path / f"a.{suffix}") is None
@@ -194,5 +356,5 @@ def test_wrong_plots_are_refused(result: Result, tmp_path: Path) -> None:
         plot(result, "slidr")
     with pytest.raises(fb.ModelError, match=r"its suffix must be \.png, \.svg, \.pdf"):
         plot(result, path=tmp_path / "a.gif")
-    with pytest.raises(fb.ModelError, match="cannot write"):
+    with pytest.raises(fb.ModelError, match=r"cannot write .*a\.png': there is no folder '.*no'; make it first"):
         plot(result, path=tmp_path / "no" / "a.png")

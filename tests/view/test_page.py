@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,76 +12,16 @@ import pytest
 from flyball.view.notebook import iframe
 from flyball.view.page import page
 from flyball.view.recording import Recording
-from tests.view.recordings import NASTY, nasty, planar, spatial
+from tests.view.conftest import Opened
+from tests.view.recordings import NASTY, loaded, nasty, planar, spatial
 
-playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: no browser can be driven")
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-if CHROMIUM is None:
-    pytest.skip("chromium is not installed: the page cannot be opened", allow_module_level=True)
-
-FLAGS = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-background-networking"]
+Open = Callable[..., Opened]
 NO_WEBGL = """
 const getContext = HTMLCanvasElement.prototype.getContext;
 HTMLCanvasElement.prototype.getContext = function (kind, ...rest) {
   return kind.startsWith("webgl") ? null : getContext.call(this, kind, ...rest);
 };
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[playwright.Browser]:
-    with playwright.sync_playwright() as driver:
-        browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
-        yield browser
-        browser.close()
-
-
-class Opened:
-    """A page that has been opened, and everything that went wrong or out on it."""
-
-    def __init__(self, browser: playwright.Browser, address: str, script: str = "") -> None:
-        self.requests: list[str] = []
-        self.errors: list[str] = []
-        self.tab = browser.new_page(viewport={"width": 800, "height": 540}, offline=True)
-        self.tab.on("request", lambda request: self.requests.append(request.url))
-        self.tab.on("pageerror", lambda error: self.errors.append(error.message))
-        self.tab.on("console", lambda said: said.type in ("error", "warning") and self.errors.append(said.text))
-        if script:
-            self.tab.add_init_script(script)
-        self.tab.goto(address)
-        self.tab.wait_for_selector("body[data-ready]", timeout=20_000)
-
-    def __getattr__(self, name: str) -> object:
-        return getattr(self.tab, name)
-
-    @property
-    def time(self) -> float:
-        return self.tab.evaluate("flyball.time()")
-
-    def wait_until(self, reached: Callable[[], bool]) -> None:
-        for _ in range(100):
-            if reached():
-                return
-            self.tab.wait_for_timeout(50)
-        raise AssertionError(f"not reached within 5 s; the time is {self.time}")
-
-    def poses(self, time: float) -> np.ndarray:
-        return np.array(self.tab.evaluate("(t) => (flyball.seek(t), flyball.pose())", float(time)))
-
-
-@pytest.fixture
-def opened(browser: playwright.Browser, tmp_path: Path) -> Iterator[Callable[..., Opened]]:
-    tabs: list[Opened] = []
-
-    def open_page(recording: Recording, wish: str = "t=0", script: str = "") -> Opened:
-        path = tmp_path / "page.html"
-        path.write_text(page(recording), encoding="utf-8")
-        tabs.append(Opened(browser, f"{path.as_uri()}#{wish}", script))
-        return tabs[-1]
-
-    yield open_page
-    for tab in tabs:
-        tab.close()
 
 
 def between(recording: Recording, time: float) -> np.ndarray:
@@ -98,23 +38,23 @@ def between(recording: Recording, time: float) -> np.ndarray:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("make", [planar, spatial])
-def test_objects_stand_where_the_recording_says(opened: Callable[..., Opened], make: Callable[[], Recording]) -> None:
+@pytest.mark.parametrize("make", [planar, spatial, loaded])
+def test_objects_stand_where_the_recording_says(opened: Open, make: Callable[[], Recording]) -> None:
     recording = make()
-    tab = opened(recording)
+    tab = opened(page(recording))
     t = recording.t
-    for time in (t[0], t[7], t[20], t[-1], 0.3 * t[20] + 0.7 * t[21], 0.5 * (t[40] + t[41])):
+    for time in (t[0], t[7], t[20], t[-1], 0.3 * t[20] + 0.7 * t[21], 0.5 * (t[38] + t[39])):
         shown, wanted = tab.poses(time), between(recording, time)
         signs = np.sign(np.einsum("ij,ij->i", shown[:, 3:], wanted[:, 3:]))[:, None]
         np.testing.assert_allclose(shown[:, :3], wanted[:, :3], atol=1e-5)
         np.testing.assert_allclose(shown[:, 3:] * signs, wanted[:, 3:], atol=1e-5)
     assert tab.errors == []
-    assert [url for url in tab.requests if not url.startswith(("file:", "data:", "blob:"))] == []
+    assert tab.foreign == []
     assert tab.evaluate("flyball.webgl()")
 
 
-def test_picture_is_not_empty_and_follows_the_time(opened: Callable[..., Opened]) -> None:
-    tab = opened(planar())
+def test_picture_is_not_empty_and_follows_the_time(opened: Open) -> None:
+    tab = opened(page(planar()))
     shots = []
     for time in (0.0, 0.8):
         tab.evaluate("(t) => flyball.seek(t)", time)
@@ -124,9 +64,9 @@ def test_picture_is_not_empty_and_follows_the_time(opened: Callable[..., Opened]
     assert min(map(len, shots)) > 8000  # bytes of PNG: a blank picture has far fewer
 
 
-def test_plots_follow_the_time_and_lead_it(opened: Callable[..., Opened]) -> None:
+def test_plots_follow_the_time_and_lead_it(opened: Open) -> None:
     recording = planar()
-    tab = opened(recording, "t=1")
+    tab = opened(page(recording), "t=1")
     assert tab.locator(".plot").count() == 2
     assert tab.locator(".plot .value").first.inner_text() == f"{np.sin(2.0):.4g}"
     before = tab.locator(".plot .cursor").first.bounding_box()["x"]
@@ -136,8 +76,8 @@ def test_plots_follow_the_time_and_lead_it(opened: Callable[..., Opened]) -> Non
     assert tab.locator(".plot .cursor").first.bounding_box()["x"] > before + 20
 
 
-def test_channels_are_found_by_search(opened: Callable[..., Opened]) -> None:
-    tab = opened(spatial())
+def test_channels_are_found_by_search(opened: Open) -> None:
+    tab = opened(page(spatial()))
     tab.click(".pick")
     tab.fill("input[type=search]", "signal 117")
     tab.check(".choice input")
@@ -147,8 +87,8 @@ def test_channels_are_found_by_search(opened: Callable[..., Opened]) -> None:
     assert tab.locator(".plot").count() == 2
 
 
-def test_playing_moves_the_time(opened: Callable[..., Opened]) -> None:
-    tab = opened(planar(), "t=0.5")
+def test_playing_moves_the_time(opened: Open) -> None:
+    tab = opened(page(planar()), "t=0.5")
     assert not tab.evaluate("flyball.playing()")
     tab.keyboard.press("Space")
     tab.wait_until(lambda: tab.time > 0.7)
@@ -161,27 +101,31 @@ def test_playing_moves_the_time(opened: Callable[..., Opened]) -> None:
     tab.wait_until(lambda: tab.time < stopped)  # the loop has closed
 
 
-def test_a_body_can_be_hidden_and_traced(opened: Callable[..., Opened]) -> None:
-    tab = opened(planar())
-    body = tab.get_by_role("button", name="block", exact=True)
-    body.click()
-    assert body.get_attribute("aria-pressed") == "false"
+def test_a_body_can_be_hidden_and_traced(opened: Open) -> None:
+    tab = opened(page(planar()))
+    before = tab.locator(".stage").screenshot()
+    tab.locator(".legend li").nth(1).hover()
+    eye = tab.get_by_role("button", name="Show block", exact=True)
+    eye.click()
+    assert eye.get_attribute("aria-pressed") == "false"
     tab.locator(".legend li").first.hover()
     tab.locator(".legend .trail").first.click()
-    tab.wait_for_timeout(100)
+    tab.mouse.move(400, 400)
+    tab.wait_for_timeout(150)
+    assert tab.locator(".stage").screenshot() != before
     assert tab.errors == []
 
 
-def test_address_gives_time_and_theme(opened: Callable[..., Opened]) -> None:
-    tab = opened(spatial(), "t=1.25&theme=dark&view=top")
+def test_address_gives_time_and_theme(opened: Open) -> None:
+    tab = opened(page(spatial()), "t=1.25&theme=dark&view=top")
     assert tab.time == 1.25
     assert tab.evaluate("document.documentElement.dataset.theme") == "dark"
     tab.click(".theme")
     assert tab.evaluate("document.documentElement.dataset.theme") == "light"
 
 
-def test_names_of_the_user_stay_text(opened: Callable[..., Opened]) -> None:
-    tab = opened(nasty())
+def test_names_of_the_user_stay_text(opened: Open) -> None:
+    tab = opened(page(nasty()))
     assert tab.evaluate("window.hacked") is None
     assert tab.title() == NASTY
     assert tab.locator("h1").inner_text() == NASTY
@@ -192,9 +136,9 @@ def test_names_of_the_user_stay_text(opened: Callable[..., Opened]) -> None:
     assert tab.errors == []
 
 
-def test_without_webgl_the_rest_works(opened: Callable[..., Opened]) -> None:
+def test_without_webgl_the_rest_works(opened: Open) -> None:
     recording = planar()
-    tab = opened(recording, "t=1", NO_WEBGL)
+    tab = opened(page(recording), "t=1", NO_WEBGL)
     assert "WebGL" in tab.locator(".message").inner_text()
     np.testing.assert_allclose(tab.poses(recording.t[30])[:, :3], [body.p[30] for body in recording.bodies], atol=1e-5)
     area = tab.locator(".plot .u-over").first.bounding_box()
@@ -203,7 +147,7 @@ def test_without_webgl_the_rest_works(opened: Callable[..., Opened]) -> None:
     assert all("WebGL" in error for error in tab.errors)
 
 
-def test_a_notebook_frame_runs_the_page(browser: playwright.Browser, tmp_path: Path) -> None:
+def test_a_notebook_frame_runs_the_page(browser: Any, tmp_path: Path) -> None:
     path = tmp_path / "notebook.html"
     path.write_text(f"<!doctype html><body>{iframe(page(planar()), 500)}</body>", encoding="utf-8")
     tab = browser.new_page(offline=True)

@@ -13,8 +13,8 @@ import pytest
 
 from flyball.view.page import MODULES, page
 from flyball.view.payload import payload
-from flyball.view.recording import RecordedJoint, Shape
-from tests.view.recordings import planar, spatial
+from flyball.view.recording import RecordedArrow, RecordedJoint, RecordedPath, Shape
+from tests.view.recordings import loaded, planar, spatial
 
 
 def test_numbers_come_back_from_the_block() -> None:
@@ -30,9 +30,16 @@ def test_numbers_come_back_from_the_block() -> None:
         np.testing.assert_allclose(columns.T, body.p, atol=1e-6)
 
 
+def test_equal_arrays_are_stored_once() -> None:
+    recording = planar()
+    twins = tuple(replace(recording.channels[0], name=f"twin {k}") for k in range(50))
+    more = len(payload(replace(recording, channels=(*recording.channels, *twins)))) - len(payload(recording))
+    assert more < 50 * 120  # names and references, not 81 numbers each
+
+
 def test_the_page_is_compact_and_the_same_each_time() -> None:
     document = page(planar())
-    assert len(document) < 400_000
+    assert len(document) < 450_000
     assert document == page(planar())
     assert "three.js authors" in document and "Leon Sorokin" in document  # the licences travel with the libraries
 
@@ -43,6 +50,15 @@ def test_a_single_sample_is_a_picture() -> None:
     assert page(replace(recording, t=recording.t[:1], bodies=bodies, lines=(), channels=()))
 
 
+def _mesh(triangles: list[list[int]]) -> Shape:
+    return Shape("mesh", (), vertices=np.eye(3), triangles=np.array(triangles))
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_every_kind_of_symbol_is_packed_even_an_unknown_one(flat: bool) -> None:
+    assert len(page(loaded(flat))) < 450_000
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -51,6 +67,18 @@ def test_a_single_sample_is_a_picture() -> None:
         (lambda r: {"t": r.t[::-1]}, "must not decrease"),
         (lambda r: {"size": 0.0}, "size must be a positive length"),
         (lambda r: {"lines": (replace(r.lines[0], kind="chain"),)}, "line 'spring': unknown kind 'chain'"),
+        (lambda r: {"lines": (replace(r.lines[0], points=r.lines[0].points[:1]),)}, "a spring takes two points, got 1"),
+        (lambda r: {"lines": (replace(r.lines[0], kind="rope", rest=r.t[1:]),)}, r"rest must have shape \(81,\)"),
+        (lambda r: {"show": ("everything",)}, "show: unknown kind 'everything'"),
+        (lambda r: {"paths": (RecordedPath("p", "gone"),)}, "path 'p' rides on body 'gone'"),
+        (
+            lambda r: {"arrows": (RecordedArrow("a", "load", "force", "link", (0, 0, 0), r.t),)},
+            r"arrow 'a': vector must have shape \(81, 3\)",
+        ),
+        (
+            lambda r: {"bodies": (replace(r.bodies[0], shapes=(_mesh([[0, 1, 7]]),)),)},
+            "a mesh that cannot be drawn: .* its triangles name those 3",
+        ),
         (lambda r: {"joints": (RecordedJoint("j", "revolute", "gone", (0, 0, 0), (0, 0, 1)),)}, "rides on body 'gone'"),
         (lambda r: {"bodies": r.bodies[:1] * 2}, "two bodies are named 'link'"),
         (lambda r: {"bodies": (replace(r.bodies[0], shapes=(Shape("box", (1.0,)),)),)}, "a box takes 3 lengths"),

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import AssemblyError
-from ..model.body import Driver
+from ..model.body import Body, Driver, Frame
 from ..model.element import LawOf
 from ..model.expressions import number
 from ..model.model import Model
@@ -60,6 +60,7 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
     values, rates = _told(model, env)
     known = values | _driven(model, model.drivers, t, env)
     plain.follow(_turns(plain, known))
+    _wind(plain, known, q)
     holds = [i for i in model.initial if i.name in values]
     near = plain
     if holds or not all(r.holonomic for r in plain.structure.rows):
@@ -92,6 +93,19 @@ def _turns(c: Compiled, known: Mapping[str, float]) -> dict[str, float]:
         offset = joint.offset(c.values.numbers[joint.name], what) if coordinate else 0.0
         out[name] = sign * (known[name] - offset)
     return out
+
+
+def _wind(c: Compiled, known: Mapping[str, float], q: np.ndarray) -> None:
+    """Bodies in the plane that are told their angle begin with its whole turns."""
+    s = c.structure
+    for name, value in known.items():
+        owner, what = s.model.coordinate(name, s.model.bodies[0])
+        if what != "angle" or not isinstance(owner, (Body, Frame)):
+            continue
+        b = s.place[s.model.carrier(owner.name, owner)]
+        if b >= 0:
+            turns = np.round((value - c.values.poses.turned(owner)) / (2.0 * np.pi))
+            q[s.tables["body_i"][b, 2] + 2] += 2.0 * np.pi * turns
 
 
 def _told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict[str, float]]:

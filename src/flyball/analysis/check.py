@@ -11,7 +11,7 @@ import numpy as np
 
 from ..model.body import GROUND
 from ..model.element import LawOf, fields_with
-from ..model.force import BodyForce, TwoPointForce
+from ..model.force import CoordinateForce
 from ..model.model import Model
 from ..system.values import Values
 from .assemble import Assembly, assemble
@@ -195,10 +195,10 @@ def _touched(model: Model) -> tuple[set[str], set[str]]:
         owner, _ = model.coordinate(driver.coordinate, driver)
         held |= {getattr(owner, "body", getattr(owner, "name", ""))}
     for force in model.forces:
-        if isinstance(force, BodyForce):
-            pushed.add(model.carrier(force.body, force))
-        elif isinstance(force, TwoPointForce):
-            pushed |= {model.carrier(name, force) for name in (force.body_i, force.body_j)}
+        pushed |= {model.carrier(name, force) for name in force.ends().values()}
+        if isinstance(force, CoordinateForce) and force.coordinate_text():
+            owner, _ = model.coordinate(force.coordinate_text(), force)
+            pushed |= {getattr(owner, "body", getattr(owner, "name", ""))}
     return held - {GROUND}, pushed - {GROUND}
 
 

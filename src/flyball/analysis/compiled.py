@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.body import Initial
+from ..model.body import Body, Frame, Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
@@ -129,9 +129,14 @@ def compiled(
 
 
 def _places(x: Values) -> np.ndarray:
-    """States as drawn: turns and works none, places on curves those nearest to the followers."""
+    """States as drawn: joints have no turns yet and works are none; bodies are turned as drawn, places on curves are
+    those nearest to the followers.
+    """
     s = x.structure
     z = np.zeros(len(s.states))
+    for t in s.terms:
+        if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
+            z[t.hint] = x.poses.turned(t.owner)
     for joint in s.model.joints:
         if (name := f"{joint.name}.place") in s.state_at:
             z[s.state_at[name]] = joint.nearest(x.numbers[joint.name], *x.poses.ends(joint))[0]  # type: ignore[attr-defined]

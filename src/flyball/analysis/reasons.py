@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def reason(a: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
     found = fault(a.compiled.work.stack, a.compiled.structure.functions)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a) or _locked(a, clock) or _stuck(a, clock)
+    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a, clock) or _locked(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}. {kept}", None
 
 
@@ -187,15 +188,15 @@ def _locked(a: Assembly, clock: ex.Clock) -> str:
     )
 
 
-def _jammed(a: Assembly) -> str:
+def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
     if W.info[STATUS] != motion.JAMMED:
         return ""
-    e = a.compiled.structure.forces[int(W.info[GUILTY])]
+    e: Any = a.compiled.structure.forces[int(W.info[GUILTY])]
     return (
-        f"no load of {e.title} returns itself: the friction that it causes changes it by more than there is, so the "
-        f"joint jams (or there are several answers). Give a smaller coefficient, a longer guide, or the lengths over "
-        f"which moments are carried"
+        f"{e.title} jams joint {e.joint!r} at t = {clock.real[ex.T]:.6g} s: friction loads the joint by as much as the "
+        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
+        f"over which the joint carries moments (bending_length, twist_length)"
     )
 
 

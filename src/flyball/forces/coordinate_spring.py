@@ -68,7 +68,7 @@ class CoordinateSpring(CoordinateForce):
         """Numbers that the formulas see."""
         return (n.stiffness, n.damping, n.rest)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Expressions that the formulas see."""
         return (self.force,)
 
@@ -101,6 +101,6 @@ class Actuator(CoordinateForce):
         """As given."""
         return self.coordinate
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The force."""
         return (self.force,)

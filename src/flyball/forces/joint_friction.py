@@ -22,9 +22,9 @@ STICKING = 3.0  # times the stick speed: slower than this counts as sticking (th
 
 
 @formula
-def load(par, M, force, torque):
-    """What presses the surfaces together [N], from the joint's reaction on body j, axis along M's z."""
-    a = col(M[1], 2)
+def load(par, axes, force, torque):
+    """What presses the surfaces together [N], from the joint's reaction on body j; the axis is that frame's z."""
+    a = col(axes[1], 2)
     thrust = dot(a, force)
     twist = dot(a, torque)
     radial = sub(force, scale(thrust, a))
@@ -53,8 +53,9 @@ class JointFriction(CoordinateForce):
 
     The load is N = |radial force| + thrust_factor |thrust| + |bending moment| / bending_length + |twist| /
     twist_length, from the joint's actual reaction at every instant. The law is regularised: what would stick creeps
-    at less than about ``stick_speed``; ``result.health.creep`` says how far it crept. (Armstrong-Helouvry, Dupont and
-    Canudas de Wit, *A survey of models for the control of machines with friction*, 1994.)
+    at ``stick_speed`` times artanh(part of the full friction that holds it); ``result.health.creep`` says how far it
+    crept. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models for the control of machines with
+    friction*, 1994.)
 
     Parameters
     ----------
@@ -101,7 +102,10 @@ class JointFriction(CoordinateForce):
 
     def coordinate_text(self) -> str:
         """The joint's coordinate."""
-        return f"{self.joint}.{self.coordinate or ('displacement' if self.radius is None else 'angle')}"
+        return f"{self.joint}.{self._coordinate()}"
+
+    def _coordinate(self) -> str:
+        return self.coordinate or ("displacement" if self.radius is None else "angle")
 
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""
@@ -124,12 +128,12 @@ class JointFriction(CoordinateForce):
                 f"{self.title}: kinetic friction {n.kinetic:g} is greater than static friction {n.static:g}; it must "
                 f"not be. Are they swapped?"
             )
-        if self.coordinate_text().endswith(".angle") and n.radius is None:
+        if self._coordinate().startswith("angle") and n.radius is None:
             raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
-        turning = self.coordinate_text().endswith(".angle")
+        turning = self._coordinate().startswith("angle")
         kinetic = n.static if n.kinetic is None else n.kinetic
         bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
         arm = n.radius if turning else 1.0

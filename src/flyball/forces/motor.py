@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, ClassVar
 
-from ..model.element import Law, LawOf, Number, element
+from ..model.element import Law, LawOf, element
 from ..model.force import JointForce
 from .coordinate_spring import KIND, effort
 
@@ -28,6 +28,6 @@ class Motor(JointForce):
     effort: ClassVar = staticmethod(effort)
     outputs: ClassVar[dict[str, str]] = {"angle": "rad", "rate": "rad/s", "torque": "N*m"}
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The torque."""
         return (self.torque,)

@@ -8,7 +8,7 @@ from typing import Annotated, ClassVar, Literal
 from .._jit import formula
 from ..errors import ModelError
 from ..math.vec import mv
-from ..model.element import Element, LawOf, Laws, Number, Point, element
+from ..model.element import Element, Law, LawOf, Laws, Point, element
 from ..model.force import BodyForce
 from ..model.joint import WorldFrame
 
@@ -79,6 +79,6 @@ class PointForce(BodyForce):
         """Numbers that the formulas see."""
         return (1.0 if self.axes == "body" else 0.0,)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The components."""
         return tuple(self.force)

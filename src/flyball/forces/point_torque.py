@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 from .._jit import formula
 from ..errors import ModelError
-from ..model.element import Law, LawOf, Laws, Number, element
+from ..model.element import Law, LawOf, Laws, element
 from ..model.force import BodyForce
 from ..model.joint import WorldFrame
 from .point_force import components, in_world, inputs
@@ -58,7 +58,7 @@ class PointTorque(BodyForce):
         """Numbers that the formulas see."""
         return (1.0 if self.axes == "body" else 0.0,)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """The components; a single one is about the normal."""
         given = tuple(self.torque) if isinstance(self.torque, tuple) else (self.torque,)
         return given if len(given) == 3 else (None, None, *given)

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar
 
 from .._jit import formula
 from ..math.vec import dot, neg, norm, scale, sub
-from ..model.element import Damping, Law, LawOf, Length, Number, Stiffness, element, nonnegative
+from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
 
 KIND = 0
@@ -80,7 +80,7 @@ class SpringDamper(TwoPointForce):
         """Numbers that the formulas see."""
         return (n.stiffness, n.damping, separation if n.length is None else n.length)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Expressions that the formulas see."""
         return (self.force,)
 

@@ -48,7 +48,7 @@ class TorsionalSpringDamper(JointForce):
         """Numbers that the formulas see."""
         return (n.stiffness, n.damping, n.angle)
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Expressions that the formulas see."""
         return (self.torque,)
 

@@ -103,9 +103,9 @@ class Cam(Joint):
         p = F[1].T @ (M[0] - F[0])
         guess = float(s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)])
         zero = np.zeros(3)
-        records = [(tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M)]
-        at = curve.foot(par, *records, guess, data)
-        delta = curve.local(par, *records, at, data)[2]
+        i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))
+        at = curve.foot(par, i, j, guess, data)
+        delta = curve.local(par, i, j, at, data)[2]
         return at, -1.0 if delta < 0.0 else 1.0, abs(delta)
 
     def sharpest(self, n: SimpleNamespace, side: float) -> float:

@@ -66,7 +66,7 @@ class GeneralUniversal(Joint):
                 f"{self.title}: its axes are parallel; a link with parallel hinges is a Planar joint and a Distance"
             )
         if row.kind != skew.KIND:
-            return (*row.par[:6], f @ m)
+            return (*row.par[:6], np.dot(f, m))
         s1, s2, k = np.linalg.solve(np.column_stack([f, m, across]), M[0] - F[0])
         return (*row.par[:3], s1, s2, k, 0.0)
 

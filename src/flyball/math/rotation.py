@@ -21,8 +21,9 @@ def rotation_vector(R):
     s = sqrt(choose(far, s2, 1.0 + s2))
     angle = atan2(s, c)
     series = 1.0 + s2 * (1.0 / 6.0 + s2 * (3.0 / 40.0 + s2 * (15.0 / 336.0 + s2 * 105.0 / 3456.0)))  # asin(s) / s
-    ratio = angle / s
-    ratio = choose(far, choose(angle - HALF_TURN, ratio + NOT_A_NUMBER, ratio), series)
+    ratio = choose(far, angle / s, series)
+    flips = choose(far, angle - HALF_TURN, far)
+    ratio = choose(flips, ratio + NOT_A_NUMBER, ratio)
     return scale(ratio, e)
 
 

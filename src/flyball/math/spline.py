@@ -27,7 +27,8 @@ PIECE = 4  # numbers a piece
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
-    ``data`` is an array of floats; ``x`` a float, a complex number (its real part chooses the piece), or an array.
+    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats (a
+    list will do for single numbers).
     """
     start, origin = piece(data, at, x)
     s = x - origin
@@ -38,7 +39,7 @@ def spline(data, at, x):
 def piece(data, at, x):
     """Place of the coefficients that hold at x, and the x that they count from."""
     if isinstance(x, float | int | complex):
-        return found(data, at, x.real)
+        return found(data, at, x)
     count = int(data[at + 1].real)
     breaks = data[at + BREAKS : at + BREAKS + count].real
     period, x = data[at].real, np.real(x)
@@ -48,9 +49,9 @@ def piece(data, at, x):
     return at + BREAKS + count + PIECE * k, breaks[np.maximum(k - 1, 0)] + shift
 
 
-@formula
 def found(data, at, x):
-    """The same for one real number, by bisection."""
+    """The same for one number, by bisection; this is what compiled code does."""
+    x = x.real
     count = int(data[at + 1].real)
     first = at + BREAKS
     period = data[at].real
@@ -95,4 +96,4 @@ def _register() -> None:
 
     @overload(piece, jit_options={"error_model": "numpy"})
     def choose(data, at, x):
-        return lambda data, at, x: found(data, at, x.real)
+        return found

@@ -32,9 +32,9 @@ class Unit:
 
 @dataclass(frozen=True)
 class LawOf:
-    """A field that is an expression of time and measured inputs; its value has this dimension."""
+    """A field that is an expression of time and measured inputs; its value has this dimension (any, if None)."""
 
-    dimension: str
+    dimension: str | None
     inputs: tuple[str, ...] = ()
 
 

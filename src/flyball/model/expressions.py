@@ -111,6 +111,15 @@ class Expression:
         for name in sorted(self.tables - set(known)):
             raise ExpressionError(f"'{self}': there is no table '{name}'; add the Table before the law that calls it")
 
+    def require_derivatives(self) -> None:
+        """Raise `ExpressionError` if the law has no exact derivatives."""
+        if self.function is not None:
+            who = f"{self.where}: " if self.where else ""
+            raise ExpressionError(
+                f"{who}'{self}' is a Python function, and a driver's law needs its derivatives: "
+                f"give an expression or a Table"
+            )
+
     def __str__(self) -> str:
         return self.text
 

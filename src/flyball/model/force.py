@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
-from .element import Element, Number, Point, PointPair
+from .element import Element, Law, Point, PointPair
 from .geometry import vector
 from .joint import WorldFrame
 
@@ -50,7 +50,7 @@ class Force(Element):
         """Up to sixteen numbers that the formulas see."""
         return ()
 
-    def laws(self) -> tuple[Number | None, ...]:
+    def laws(self) -> tuple[Law | None, ...]:
         """Up to three expressions that the formulas see."""
         return ()
 

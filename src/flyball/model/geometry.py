@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.turns import turn
+from ..math.vec import quaternion_matrix
+from ..rotations.checks import quaternion_of, rotation_matrices, unit_quaternions
 
 
 def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.ndarray:
@@ -45,36 +48,17 @@ def triad(z: np.ndarray) -> np.ndarray:
 
 def rotation_about(axis: int, angle: float) -> np.ndarray:
     """Rotation about a coordinate axis (0, 1, 2) by an angle [rad]."""
-    c, s = np.cos(angle), np.sin(angle)
-    R = np.eye(3, dtype=np.result_type(type(c), float))
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R[i, i], R[i, j], R[j, i], R[j, j] = c, -s, s, c
-    return R
+    return np.array(turn(axis, angle)).reshape(3, 3)
 
 
 def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
     """Rotation matrix of a unit quaternion, scalar first."""
-    from ..math.vec import quaternion_matrix
-
     return np.array(quaternion_matrix(*e)).reshape(3, 3)
 
 
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
-    """Unit quaternion, scalar first and not negative, of a rotation matrix (Shepperd 1978)."""
-    t = np.array([np.trace(R), R[0, 0], R[1, 1], R[2, 2]])
-    k = int(np.argmax(t))
-    if k == 0:
-        e = np.array([1 + t[0], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    else:
-        i = k - 1
-        j, m = (i + 1) % 3, (i + 2) % 3
-        e = np.zeros(4, R.dtype)
-        e[0] = R[m, j] - R[j, m]
-        e[1 + i] = 1 + R[i, i] - R[j, j] - R[m, m]
-        e[1 + j] = R[i, j] + R[j, i]
-        e[1 + m] = R[i, m] + R[m, i]
-    e = e / np.sqrt((e * e).sum())
-    return -e if e[0].real < 0 else e
+    """Unit quaternion, scalar first and not negative, of a rotation matrix."""
+    return quaternion_of(R)
 
 
 def orientation_matrix(value: Any, what: str) -> np.ndarray:
@@ -87,14 +71,9 @@ def orientation_matrix(value: Any, what: str) -> np.ndarray:
     """
     a = np.asarray(value)
     if a.shape == (3, 3):
-        if np.abs(a.T @ a - np.eye(3)).max() > 1e-9 or np.linalg.det(a.real) < 0:
-            raise ModelError(f"{what}: the matrix is not a rotation (its columns must be orthonormal, right-handed)")
-        return a
+        return rotation_matrices(a, what)
     if a.shape == (4,):
-        size = np.sqrt((a * a).sum())
-        if not size.real > 1e-9:
-            raise ModelError(f"{what}: a quaternion must not be zero")
-        return quaternion_to_matrix(a / size)
+        return quaternion_to_matrix(unit_quaternions(a, what))
     if a.shape == (3,):
         return rotation_about(0, a[0]) @ rotation_about(1, a[1]) @ rotation_about(2, a[2])
     raise ModelError(f"{what}: give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")

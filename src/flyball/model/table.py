@@ -66,17 +66,21 @@ class Table(Element):
         ModelError
             If there are fewer than two points, x does not ascend, or a number is not finite.
         """
-        return self._array.tolist()
+        return list(self._list)
 
     def values(self, x: Any) -> tuple[Any, Any, Any]:
         """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array."""
-        return spline(self._array, 0, x)
+        return spline(self._array if isinstance(x, np.ndarray | np.generic) else self._list, 0, x)
 
     def value(self, x: Any) -> Any:
         """Value at ``x`` [SI]: a number (real or complex), an array, or a SymPy expression."""
         if isinstance(x, float | int | complex | np.ndarray | np.generic):
             return self.values(x)[0]
         return symbolic(self._array, 0, x)
+
+    @cached_property
+    def _list(self) -> list[float]:
+        return self._array.tolist()
 
     @cached_property
     def _array(self) -> np.ndarray:
@@ -104,7 +108,8 @@ class Table(Element):
                     f"{self.title}: x[{k}] = {self.x[k]:g} comes after x[{k - 1}] = {self.x[k - 1]:g}; x must ascend: "
                     f"sort the points and leave out repeated ones"
                 )
-        slopes = np.abs(np.diff(y) / np.diff(x))
+        with np.errstate(all="ignore"):
+            slopes = np.abs(np.diff(y) / np.diff(x))
         if not np.isfinite(slopes).all():
             k = int(np.argmax(slopes))
             raise ModelError(f"{self.title}: x[{k}] and x[{k + 1}] are too close, the slope between them is no number")

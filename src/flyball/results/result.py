@@ -152,16 +152,41 @@ class Result:
 
         return plot(self, *names, path=path)
 
-    def html(self) -> str:
-        """The animation page as text."""
+    def html(self, **options: Any) -> str:
+        """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animate.animation`."""
         from ..view.animate import animation
 
-        return animation(self)
+        return animation(self, **options)
 
-    def to_html(self, path: str | os.PathLike) -> None:
-        """Write the animation page: one file that opens offline in any browser."""
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self.html())
+    def to_html(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the animation page: one file that opens offline in any browser. Options as for `html`.
+
+        Raises
+        ------
+        ModelError
+            If the file cannot be written, or there is nothing to draw.
+        """
+        from ..view.writing import write
+
+        write(path, self.html(**options))
+
+    def report(self, **options: Any) -> str:
+        """The report as text: summary, animation, plots, tables of the model, and its file. Options as for `html`."""
+        from ..view.report import report
+
+        return report(self, **options)
+
+    def to_report(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write the report: one file that opens offline in any browser. Options as for `html`.
+
+        Raises
+        ------
+        ModelError
+            If the file cannot be written, or there is nothing to draw.
+        """
+        from ..view.writing import write
+
+        write(path, self.report(**options))
 
     def _repr_html_(self) -> str:
         from ..view.notebook import iframe

@@ -2,7 +2,7 @@
 
 Such a code reads its arguments from the first column of the stack, one a row, and writes its value into the second
 column of the first of these rows, where nan stands before: whatever fails inside leaves nan. The addresses stand in
-the bytecode, so that a new function compiles nothing. `functions` makes the code.
+the bytecode, so that a new function compiles nothing. `native` makes the code.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ STACK_RESERVE = 3
 """Last rows of the stack, kept for a fault: (index + 1, arguments given, value), then up to six arguments."""
 
 NATIVE: WeakValueDictionary[int, Any] = WeakValueDictionary()
-"""What stands at an address, as long as it does: the `functions.Native`."""
+"""What stands at an address, as long as it does: the `native.Native`."""
 
 
 def call(address, stack, row):
@@ -31,36 +31,26 @@ def call(address, stack, row):
 
 @formula
 def called(code, at, stack, row):
-    """Value of the function whose address and number stand at code[at], for the arguments from ``row`` on."""
+    """Value of the function whose address and number stand at code[at], for the arguments from ``row`` on.
+
+    A value that is not finite is recorded, unless an argument is not finite either: then the cause lies elsewhere.
+    """
     stack[row, 1] = math.nan
     call(code[at + ADDRESS], stack, row)
     value = stack[row, 1]
     if value - value != 0.0:
-        note(code, at, stack, row, value)
+        count = code[at + COUNT]
+        doubt = 0.0 * stack[row, 0]
+        for k in range(count):
+            doubt += stack[row + k, 0] - stack[row + k, 0]
+        if doubt == 0.0:
+            last = stack.shape[0] - STACK_RESERVE
+            stack[last, 0] = code[at + INDEX] + 1.0
+            stack[last, 1] = count
+            stack[last, 2] = value
+            for k in range(count):
+                stack[last + 1 + k // 3, k % 3] = stack[row + k, 0]
     return value
-
-
-@formula
-def note(code, at, stack, row, value):
-    """Record a value that is not finite, unless an argument is not: then the cause lies elsewhere."""
-    count = code[at + COUNT]
-    last = stack.shape[0] - STACK_RESERVE
-    for k in range(count):
-        if stack[row + k, 0] - stack[row + k, 0] != 0.0:
-            return
-    stack[last, 0] = code[at + INDEX] + 1.0
-    stack[last, 1] = count
-    stack[last, 2] = value
-    for k in range(count):
-        stack[last + 1 + k // 3, k % 3] = stack[row + k, 0]
-
-
-@formula
-def forget(stack):
-    """Mark a recorded fault as overcome: the step that met it was taken again, shorter, and got by."""
-    last = stack.shape[0] - STACK_RESERVE
-    if stack[last, 0].real > 0.0:
-        stack[last, 0] = -stack[last, 0]
 
 
 @on_numba

@@ -20,17 +20,7 @@ from ..constraints import (
 from .rows import begin, begin_biases, each_bias, each_value, end, end_biases, rare_biases, rare_values
 from .tables import TERM_KINDS
 
-RARE = 5  # kinds from here on share one loop: nearly as fast, and much less to compile
-
-
-@formula
-def each_kind(S, W, z, visit):
-    """Visit the terms of the kinds that most joints are made of, each with a loop of its own."""
-    visit(S, W, z, coincident.KIND, coincident.row)
-    visit(S, W, z, along.KIND, along.row)
-    visit(S, W, z, perpendicular.KIND, perpendicular.row)
-    visit(S, W, z, distance.KIND, distance.row)
-    visit(S, W, z, angle.KIND, angle.row)
+RARE = 5  # kinds below have loops of their own; from here on they share one: nearly as fast, much less to compile
 
 
 @formula
@@ -55,7 +45,11 @@ def rare(kind, par, F, M, hint, data):
 def row_values(S, W, t, z):
     """Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
     begin(S, W)
-    each_kind(S, W, z, each_value)
+    each_value(S, W, z, coincident.KIND, coincident.row)
+    each_value(S, W, z, along.KIND, along.row)
+    each_value(S, W, z, perpendicular.KIND, perpendicular.row)
+    each_value(S, W, z, distance.KIND, distance.row)
+    each_value(S, W, z, angle.KIND, angle.row)
     rare_values(S, W, z, RARE, TERM_KINDS, rare)
     end(S, W, t)
 
@@ -64,7 +58,11 @@ def row_values(S, W, t, z):
 def row_biases(S, W, t, v, z):
     """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
     begin_biases(S, W, v)
-    each_kind(S, W, z, each_bias)
+    each_bias(S, W, z, coincident.KIND, coincident.row)
+    each_bias(S, W, z, along.KIND, along.row)
+    each_bias(S, W, z, perpendicular.KIND, perpendicular.row)
+    each_bias(S, W, z, distance.KIND, distance.row)
+    each_bias(S, W, z, angle.KIND, angle.row)
     rare_biases(S, W, z, RARE, TERM_KINDS, rare)
     end_biases(S, W, t)
 

@@ -9,7 +9,7 @@ from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from .structure import Structure, frame
-from .term_table import coordinate_term, measured_term
+from .term_table import coordinate_frames, coordinate_term, measured_term
 
 
 def measured_quantities(s: Structure) -> None:
@@ -22,9 +22,9 @@ def measured_quantities(s: Structure) -> None:
         return
     named = _names(s)
     found = {}
-    for e in sensors:
-        if e.name in named and (what := s.model.measured(e)) is not None:
-            found[e.name] = _sensed(s, e, *what[:2]), what[2]
+    for sensor in sensors:
+        if sensor.name in named and (what := s.model.measured(sensor)) is not None:
+            found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
     values = len(s.measured)
     s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
 
@@ -87,7 +87,7 @@ def forces(s: Structure) -> None:
         if isinstance(e, CoordinateForce):
             table[k, 0] = _along(s, e)
             if hasattr(e, "load"):
-                table[k, 1] = frame(s, s.model[e.joint], "M")  # type: ignore[attr-defined]
+                table[k, 1] = _axis_frame(s, e)
                 table[k, 6] = 2 * len(s.measured) + len(s.loads)
                 s.loads.append(e)
         else:
@@ -96,6 +96,12 @@ def forces(s: Structure) -> None:
         if not e.conservative():
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
+
+
+def _axis_frame(s: Structure, e: CoordinateForce) -> int:
+    """The frame whose z is the axis of the coordinate that a force acts along."""
+    joint, what = s.model.coordinate(e.coordinate_text(), e)
+    return coordinate_frames(s, joint, what)[0]
 
 
 def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 from types import MappingProxyType
 
@@ -9,7 +10,8 @@ from ..errors import ExpressionError
 from ..model.expressions import Expression, folded
 from ..model.function import arguments
 from ..model.grammar import Node
-from .functions import Called, native
+from .functions import Called
+from .native import native
 from .opcodes import (
     ADD,
     ATAN2,
@@ -70,10 +72,9 @@ def compile_law(
     sensors
         Names of sensors, and the columns of `sensed` that hold them.
     tables
-        Names of the tables that laws may call, and where each one's `Table.data()` begins in `const`.
+        Names of the tables that laws may call, and where the `data()` of each begins in `const`.
     functions
-        List that a law which is a Python function is appended to. It has to be kept as long as the code is run: the
-        code holds addresses of what stands in it.
+        List that a law which is a Python function is appended to. Keep it as long as the code: addresses stand there.
     derivatives
         Whether the law is read by `evaluate_jet`.
 
@@ -85,8 +86,7 @@ def compile_law(
     Raises
     ------
     ExpressionError
-        If a name is not known or means two things, a constant part has no finite value, or a Python function is given
-        where derivatives are needed.
+        If a name is not known or means two things, a constant part is not finite, or a function has no derivatives.
     """
     if not inputs or inputs[0] != "t" or len(const) < len(parameters):
         raise ValueError("the first input is 't', and const begins with one value for each parameter")
@@ -94,11 +94,12 @@ def compile_law(
     known = [*inputs, *sensors, *parameters]
     expression.require(known)
     expression.require_tables(tables)
+    if derivatives:
+        expression.require_derivatives()
     tree = expression.tree
     if expression.function is not None:
-        tree = Node(
-            "function", tuple(arguments(tree, known)), _function(expression, known, code, functions, derivatives)
-        )
+        args = tuple(arguments(tree, known))
+        tree = Node("function", args, _function(expression, args, code, functions))
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
     writer.write(folded(_expand(tree, writer.varying), expression.text))
     at = len(code)
@@ -116,17 +117,11 @@ def _refuse_twins(
             raise ExpressionError(f"'{expression}': '{name}' is {what} and also {also}; rename the {also[2:]}")
 
 
-def _function(
-    expression: Expression, known: Collection[str], code: list[int], functions: list[Called] | None, derivatives: bool
-) -> int:
+def _function(expression: Expression, args: Sequence[Node], code: list[int], functions: list[Called] | None) -> int:
     """Append what a call of the law's function needs to the code; where it stands there."""
-    if derivatives:
-        raise ExpressionError(
-            f"'{expression}': a driver's law needs its derivatives: give an expression or a Table, no Python function"
-        )
     if functions is None:
         raise ValueError("a law that is a Python function needs a list to be kept in")
-    names = tuple("" if node.kind == "number" else node.value for node in arguments(expression.tree, known))
+    names = tuple("" if node.kind == "number" else node.value for node in args)
     made = native(expression, len(names))
     code += [made.address, len(functions), len(names)]
     functions.append(Called(made, names, expression.text, expression.where))
@@ -193,10 +188,11 @@ class _Writer:
 
     def slot(self, literal: float) -> int:
         """Place of a literal in the table of constants."""
-        first = len(self.parameters)
-        if literal not in self.const[first:]:
-            self.const.append(literal)
-        return self.const.index(literal, first)
+        for k in range(len(self.parameters), len(self.const)):
+            if self.const[k] == literal and math.copysign(1.0, self.const[k]) == math.copysign(1.0, literal):
+                return k
+        self.const.append(literal)
+        return len(self.const) - 1
 
 
 _SHAPES = {"step": "cubic", "step5": "quintic"}

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints import angle, curve
+from ..constraints.registry import FORMULAS
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
 from ..model.element import resolve
@@ -129,6 +130,8 @@ class Poses:
 
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         """Position, rotation and carrier of a frame in the drawn configuration."""
+        if f.element is None:
+            return np.zeros(3), np.eye(3), GROUND
         e = f.element
         n = self.numbers[e.name]
         end = e.ends()[f.role]
@@ -169,8 +172,25 @@ class Poses:
         return F, M
 
     def axis(self, joint: str) -> np.ndarray:
-        """A joint's axis in the world as drawn."""
-        return self.ends(self.model[joint])[0][1][:, 2]
+        """Axis of a joint's angle in the world as drawn."""
+        e = self.model[joint]
+        R = self.ends(e)[0][1]
+        turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
+        return (R @ np.array(turn) if len(turn) else R)[:, 2]
+
+    def drawn(self, t: TermSpec) -> float:
+        """What a term's formula gives in the drawn configuration."""
+        poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
+        F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
+        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.kind == angle.KIND else (*t.formula.par[:6], 0.0, 0.0)
+        return FORMULAS[t.formula.kind](par, F, M, self.turned(t.owner), None)[0]
+
+    def turned(self, owner: Any) -> float:
+        """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
+        if isinstance(owner, Joint) or not self.model.planar:
+            return 0.0
+        own = self.numbers[owner.name].angle
+        return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
 
 
 def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> float:
@@ -259,7 +279,7 @@ def _term_x(
             x[k, 7] *= e.weight(n, t.what, *pose.ends(e))
         elif isinstance(e, Coupling):
             x[k, 7] *= factors[e.name][t.index]
-            x[k, 6] = _coupled(e, n, t, numbers, factors[e.name])
+            x[k, 6] = _coupled(e, n, t, pose)
         elif t.owner is not None:
             x[k, 6] = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
     return x
@@ -270,13 +290,13 @@ def _offset(t: TermSpec, numbers: dict) -> float:
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
 
-def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, numbers: dict, factors: np.ndarray) -> float:
-    """What a coupled coordinate is compared with: nothing, since all are zero as drawn, unless the sum is given."""
+def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
+    """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
     total = e.total(n)
     if total is None:
-        return 0.0
+        return pose.drawn(t)
     share = total / e.first_weight(n) if t.index == 0 else 0.0
-    return t.sign * (share - _offset(t, numbers))
+    return t.sign * (share - _offset(t, pose.numbers))
 
 
 def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:

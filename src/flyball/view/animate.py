@@ -1,64 +1,122 @@
-"""From a result to a recording: poses, lines between moving points, joint symbols, curves, and what to show first."""
+"""From a result to a recording: poses, lines, symbols, arrows, curves, and what to show first."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..forces.point_force import PointForce
-from ..forces.spring_damper import SpringDamper
-from ..joints.distance import Distance
-from ..model.body import GROUND
-from ..model.force import TwoPointForce
+from ..errors import ModelError
+from ..model.body import GROUND, Body, Frame
+from ..model.geometry import matrix_to_quaternion, vector
+from ..model.model import suggest
+from .arrows import arrows, rope_ends
+from .facts import facts
 from .looks import Looks
-from .recording import Channel, RecordedBody, RecordedJoint, RecordedLine, Recording
+from .places import Places, three
+from .recording import (
+    SHOW,
+    Channel,
+    RecordedBody,
+    RecordedCurve,
+    RecordedFrame,
+    RecordedJoint,
+    RecordedLine,
+    RecordedPath,
+    Recording,
+)
+from .symbols import Drawn, symbols
 
 if TYPE_CHECKING:
-    from ..model.element import Element
     from ..results.result import Result
 
 FRAMES = 2000  # times in a recording, about
 CURVES = 60
+USUAL = ("loads", "moments", "grid")
+
+Path = str | tuple[str, Any]
 
 
-def animation(result: Result) -> str:
-    """The animation page of a result: one HTML document that needs nothing else."""
+def animation(result: Result, *, paths: Iterable[Path] = (), show: Collection[str] = USUAL) -> str:
+    """The animation page of a result: one HTML document that needs nothing else.
+
+    Parameters
+    ----------
+    result : Result
+    paths : names, or (body, point) pairs
+        Whose paths are drawn: the origins of bodies or frames of these names, or points [m] of bodies, counted from
+        their reference frames: ``paths=["P", ("coupler", (0.1, 0.2))]``.
+    show : names
+        What is switched on when the page opens; see `flyball.view.recording.SHOW`.
+
+    Raises
+    ------
+    ModelError
+        If there is no output time, no such part, or nothing of that name to show.
+    """
     from .page import page
 
-    return page(record(result))
+    return page(record(result, paths=paths, show=show))
 
 
-def record(result: Result) -> Recording:
-    """Make the recording that pictures and pages read.
+def record(result: Result, *, paths: Iterable[Path] = (), show: Collection[str] = USUAL) -> Recording:
+    """Make the recording that pictures and pages read; see `animation`.
 
     Bodies are placed by their reference frames, so that shapes lie on them as the user gave them. Bodies without
     shapes get some that follow from their joints and inertia.
     """
+    if not len(result.t):
+        raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
     every = kept(len(result.t))
-    looks = Looks(result)
+    places = Places(result)
+    looks = Looks(result, places)
+    drawn = list(_drawn(result, places, looks, every))
+    channels = _channels(result, every)
     bodies = tuple(
         RecordedBody(b.name, looks.shapes(b.name), *_poses(result, b.name, every), b.color) for b in result.model.bodies
     )
-    channels = _channels(result, every)
+    joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
     return Recording(
         name=result.model.name,
         planar=result.planar,
         t=result.t[every],
         bodies=bodies,
-        lines=tuple(_lines(result, every, looks.size)),
-        joints=tuple(_joints(result, looks)),
+        lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
+        joints=joints,
         channels=channels,
         shown=shown(result, [c.name for c in channels]),
         size=looks.size,
         notes=dict(result.health.lines()),
+        curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
+        arrows=arrows(result, places, every),
+        frames=tuple(_frames(result, places)),
+        paths=tuple(_path(result, p) for p in paths),
+        show=_chosen(show),
+        facts=facts(result),
+        down=_down(result),
     )
 
 
 def kept(n: int) -> np.ndarray:
     """Indices of the times that are shown: all, or about 2000 evenly chosen, first and last among them."""
     return np.arange(n) if n <= FRAMES * 1.25 else np.unique(np.linspace(0, n - 1, FRAMES).round().astype(int))
+
+
+def _chosen(show: Collection[str]) -> tuple[str, ...]:
+    for name in show:
+        if name not in SHOW:
+            known = ", ".join(SHOW)
+            raise ModelError(f"there is nothing to show named {name!r}{suggest(name, SHOW)}; choose of {known}")
+    return tuple(show)
+
+
+def _down(result: Result) -> tuple[float, float, float]:
+    g = np.asarray(result.values.system.glob[:3]).real
+    size = float(np.sqrt(g @ g))
+    return three(g / size if size > 0.0 else g)
 
 
 def _poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -72,46 +130,80 @@ def _poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np
     return p, np.stack([np.cos(half), 0 * half, 0 * half, np.sin(half)], axis=1)
 
 
-def _point(result: Result, name: str, role: str, every: np.ndarray) -> np.ndarray:
-    """Origin of an element's frame over time, (n, 3)."""
-    k = result.values.structure.frame_at[name, role, ""]
-    return np.stack([np.broadcast_to(c, len(result.t))[every] for c in result.records.frame(k)[0]], axis=1)
+def _drawn(result: Result, places: Places, looks: Looks, every: np.ndarray) -> Iterator[Drawn]:
+    """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
+    m = result.model
+    for e in (*m.joints, *getattr(m, "couplings", ())):
+        for drawn in symbols(e, places, every):
+            worn = looks.wear(drawn) if isinstance(drawn, RecordedJoint) else drawn
+            if worn is not None:
+                yield worn
+    for e in m.forces:
+        if e.drawn == "bushing":
+            yield from (replace(d, scale=1.0) for d in symbols(e, places, every) if isinstance(d, RecordedJoint))
+        elif (line := _line(e, places, every)) is not None:
+            yield line
 
 
-def _lines(result: Result, every: np.ndarray, size: float) -> list[RecordedLine]:
-    """Springs, dampers, links, and the arrows of given forces."""
-    out = []
+def _line(e: Any, places: Places, every: np.ndarray) -> RecordedLine | None:
+    """A force element along a line: a rope with its free length, a spring, or a damper where nothing is stiff."""
+    ends = rope_ends(places, e.name)
+    numbers = places.result.values.numbers[e.name]
+    if len(ends) > 1:
+        points = [places.track(end)[0] for end in ends]
+        return RecordedLine(e.name, "rope", tuple(p[every] for p in points), rest=_rest(numbers, points)[every])
+    pair = places.ends(e)
+    if pair is None or e.drawn not in ("spring", "damper"):
+        return None
+    kind = "spring" if getattr(numbers, "stiffness", 0.0) != 0.0 else "damper"
+    return RecordedLine(e.name, kind, tuple(places.track(end)[0][every] for end in pair))
 
-    def between(e: Element, kind: str) -> None:
-        a, b = (_point(result, e.name, role, every) for role in "FM")
-        out.append(RecordedLine(e.name, kind, a, b))
 
-    for e in result.model.forces:
-        if isinstance(e, TwoPointForce):
-            soft = isinstance(e, SpringDamper) and result.values.numbers[e.name].stiffness != 0.0
-            between(e, "spring" if soft else "damper")
-        elif isinstance(e, PointForce):
-            force = result[e.name].wrench[0][every]
-            largest = np.sqrt((force**2).sum(axis=1)).max(initial=0.0)
-            if 0.0 < largest < np.inf:
-                a = _point(result, e.name, "M", every)
-                out.append(RecordedLine(e.name, "arrow", a, a + force * (0.6 * size / largest)))
+def _rest(numbers: Any, points: list[np.ndarray]) -> np.ndarray:
+    """Free length of a rope: as given, else as drawn, for which the first time has to serve."""
+    if getattr(numbers, "length", None) is not None:
+        return np.full(len(points[0]), float(numbers.length))
+    steps = [b[:1] - a[:1] for a, b in pairwise(points)]
+    return np.full(len(points[0]), sum(float(np.sqrt((d * d).sum())) for d in steps))
+
+
+def _frames(result: Result, places: Places) -> Iterator[RecordedFrame]:
+    """Axes of joints, on their first body, and of named frames."""
     for joint in result.model.joints:
-        if isinstance(joint, Distance):
-            between(joint, "link")
-    return out
+        F = places.end(joint.name, "F")
+        if F is not None:
+            turn = tuple(matrix_to_quaternion(F.R).tolist())
+            yield RecordedFrame(joint.name, "joint", F.body, three(F.p), turn)
+    x = result.values
+    for e in result.model.frames:
+        p, R = x.poses.named(e.name)
+        body = x.bodies[e.body]
+        turn = tuple(matrix_to_quaternion((body.R.T @ R).real).tolist())
+        yield RecordedFrame(e.name, "frame", e.body, three((body.R.T @ (p - body.p)).real), turn)
 
 
-def _joints(result: Result, looks: Looks) -> list[RecordedJoint]:
-    """Symbols, riding on ground where the joint is fixed there, else on the first body."""
-    out = []
-    for e in result.model.joints:
-        if isinstance(e, Distance):
-            continue
-        ends = [looks.end(e.name, role) for role in "FM"]
-        body, p, R = ends[1] if ends[1][0] == GROUND else ends[0]
-        out.append(RecordedJoint(e.name, e.drawn, body, tuple(p.tolist()), tuple(R[:, 2].tolist())))
-    return out
+def _path(result: Result, path: Path) -> RecordedPath:
+    """A path as asked for: the origin of a body or frame, or a point of a body."""
+    m = result.model
+    if isinstance(path, str):
+        part = m[path]
+        if isinstance(part, Body):
+            return RecordedPath(path, path)
+        if isinstance(part, Frame) and part.body != GROUND:
+            x = result.values
+            body = x.bodies[part.body]
+            p, _ = x.poses.named(path)
+            return RecordedPath(path, part.body, three((body.R.T @ (p - body.p)).real))
+        raise ModelError(f"paths: {part.title} has no path; name a body, a frame on a body, or a (body, point) pair")
+    if not (isinstance(path, (tuple, list)) and len(path) == 2 and isinstance(path[0], str)):
+        remedy = "name a body or frame, or give a pair such as ('rod', (0.1, 0.2))"
+        raise ModelError(f"paths: {path!r} is no path; {remedy}")
+    name, point = path
+    if not isinstance(m[name], Body):
+        raise ModelError(f"paths: {m[name].title} is no body, so it has no points; name it alone, or name a body")
+    p = vector(point, result.planar, f"path of {name!r}")
+    where = ", ".join(f"{c:g}" for c in p[: 2 if result.planar else 3])
+    return RecordedPath(f"{name} ({where})", name, three(p))
 
 
 def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
@@ -142,7 +234,7 @@ def _main(name: str, result: Result) -> bool:
     owner, _, what = name.partition(".")
     if owner == "energy" or any(e.name == owner for e in (*result.model.drivers, *result.model.forces)):
         return True
-    return what in ("x", "y", "z", "angle") or what in getattr(result.model[owner], "coordinates", {})
+    return what in ("x", "y", "z", "angle") or what in (getattr(result.model[owner], "coordinates", None) or ())
 
 
 def _telling(names: list[str], result: Result) -> list[str]:
@@ -153,13 +245,17 @@ def _telling(names: list[str], result: Result) -> list[str]:
 
 
 def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
-    """The curves on show when a page opens: what a driver needs, a joint's coordinate (else a position), energies."""
+    """The curves on show when a page opens.
+
+    What a driver needs; a joint's coordinate of each kind (else a position); energies.
+    """
     m = result.model
-    wanted = (
-        [f"{d.name}.effort" for d in m.drivers],
-        [f"{j.name}.{k}" for j in m.joints for k in j.coordinates],
-        [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")],
-    )
-    groups = [[k for k in group if k in names][:1] for group in wanted]
-    first = [k for group in groups[:2] for k in group] or groups[2]
-    return (*first, *(k for k in ("energy.kinetic", "energy.total") if k in names))
+    kinds: dict[str, str] = {}
+    for j in m.joints:
+        for k, c in j.coordinates.items():
+            if f"{j.name}.{k}" in names:
+                kinds.setdefault(c.unit, f"{j.name}.{k}")
+    efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
+    first = [*efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
+    energies = ("energy.kinetic", "energy.potential", "energy.total")
+    return (*(k for k in first if k in names), *(k for k in energies if k in names))

@@ -2,24 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..joints.prismatic import Prismatic
-from ..model.body import GROUND
 from ..model.element import resolve
-from ..model.force import TwoPointForce
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone, Solid
-from .recording import Shape
+from ..model.shapes import Cone
+from .meshes import simplified
+from .places import End, Places, three
+from .recording import RecordedJoint, Shape
+from .symbols import BODILY, cam_outline
 
 if TYPE_CHECKING:
-    from ..model.joint import Joint
     from ..results.result import Result
 
-End = tuple[str, np.ndarray, np.ndarray]
 LINK = 0.045  # radius of a link, as part of the mechanism's typical length
+TRIANGLES = 24_000  # of all meshes of a recording
+FEWEST = 300  # triangles that a mesh keeps, however many others there are
+SMALLEST = 0.5  # a symbol on slender parts, as part of its usual size
 
 
 class Looks:
@@ -31,51 +33,57 @@ class Looks:
         A typical length of the mechanism's parts [m].
     """
 
-    def __init__(self, result: Result) -> None:
-        self.result = result
+    def __init__(self, result: Result, places: Places) -> None:
+        self.result, self.places = result, places
         self.planar = result.planar
-        x = result.values
-        self._names = {b: name for name, b in x.structure.place.items()}
-        self._env = dict(zip(result.model.parameters, x.system.const.tolist(), strict=False))
+        self._env = dict(zip(result.model.parameters, result.values.system.const.tolist(), strict=False))
         self._solids = {b.name: b.solids() for b in result.model.bodies}
+        self._numbers = {id(s): resolve(s, self._env) for solids in self._solids.values() for s in solids}
+        self._share = self._mesh_share()
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
         self.blocks: dict[str, list[End]] = {b.name: [] for b in result.model.bodies}
-        for joint in result.model.joints:
-            self._attach(joint)
-        for force in result.model.forces:
-            if isinstance(force, TwoPointForce):
-                self._attach(force)
+        self.cams: dict[str, list[Any]] = {b.name: [] for b in result.model.bodies}
+        self.worn: set[str] = set()  # bodies that a symbol such as a gear wheel shows
+        for e in (*result.model.joints, *result.model.forces):
+            self._attach(e)
         reach = {name: self._reach(name) for name in self.points}
         known = [r for r in reach.values() if r > 0.0]
-        self.size = float(np.median(known)) if known else x.length
+        self.size = float(np.median(known)) if known else result.values.length
 
-    def end(self, name: str, role: str) -> End:
-        """Body of an element's frame, and the frame's origin and axes from the body's reference frame."""
-        x = self.result.values
-        k = x.structure.frame_at[name, role, ""]
-        body = self._names[int(x.system.frame_i[k])]
-        row = x.system.frame_x[k].real
-        return body, row[:3] + x.bodies[body].com.real, row[3:].reshape(3, 3)
-
-    def _attach(self, e: Joint | TwoPointForce) -> None:
+    def _attach(self, e: Any) -> None:
         """Note an element's points on its bodies; of a slide, the block on one and the guide's ends on the other."""
-        ends = [self.end(e.name, role) for role in "FM"]
-        if isinstance(e, Prismatic):
-            guide, block = ends if ends[1][0] != GROUND else reversed(ends)
-            self.blocks[block[0]].append(block)
-            if guide[0] != GROUND:
-                s = self.result[e.name].displacement
-                s = s - self.result.values.numbers[e.name].displacement
-                sign = 1.0 if guide is ends[0] else -1.0
-                for d in (s.min(initial=0.0), s.max(initial=0.0)):
-                    self._add(guide[0], guide[1] + sign * d * guide[2][:, 2])
-            self._add(block[0], block[1])
+        ends = self.places.ends(e)
+        if ends is None:
+            k = 0
+            while (end := self.places.end(e.name, f"P{k}")) is not None:
+                self._add(end.body, end.p)
+                k += 1
             return
-        for body, p, _ in ends:
-            self._add(body, p)
+        if e.drawn == "prismatic":
+            self._slide(ends)
+            return
+        guide, runner = ends
+        if e.drawn == "cam" and not guide.grounded:
+            self.cams[guide.body].append(e)
+        if e.drawn in ("point_on_line", "screw") and not guide.grounded:
+            reach = self.places.reach(guide, runner)
+            for d in reach[4:]:
+                self._add(guide.body, guide.p + d * guide.R[:, 2])
+        elif e.drawn not in ("planar", "point_in_plane", "rolling", "cam"):
+            self._add(guide.body, guide.p)
+        self._add(runner.body, runner.p)
+
+    def _slide(self, ends: tuple[End, End]) -> None:
+        guide, block = ends if not ends[1].grounded else ends[::-1]
+        self.blocks[block.body].append(block)
+        if not guide.grounded:
+            reach = self.places.reach(guide, block)
+            for d in (min(reach[4], 0.0), max(reach[5], 0.0)):
+                self._add(guide.body, guide.p + d * guide.R[:, 2])
+        self._add(block.body, block.p)
 
     def _add(self, body: str, p: np.ndarray) -> None:
-        if body == GROUND:
+        if body not in self.points:
             return
         near = 1e-6 * self.result.values.length
         if np.isfinite(p).all() and all(np.abs(p - other).max() > near for other in self.points[body]):
@@ -97,20 +105,81 @@ class Looks:
         a = np.array(points)
         return float(np.sqrt(((a[:, None] - a[None]) ** 2).sum(axis=2)).max())
 
+    def given(self, name: str) -> bool:
+        """Whether the user gave the body a shape."""
+        return bool(self._solids.get(name))
+
+    def wear(self, symbol: RecordedJoint) -> RecordedJoint | None:
+        """A joint's symbol as it is drawn: smaller on slender parts, and none where the body has its own shape."""
+        if symbol.kind in BODILY:
+            if self.given(symbol.body):
+                return None
+            self.worn.add(symbol.body)
+            return symbol
+        widths = [self._width(name) for name in (symbol.body, symbol.mate) if name and self.given(name)]
+        if not widths:
+            return symbol
+        return replace(symbol, scale=float(np.clip(min(widths) / (2.0 * LINK * self.size), SMALLEST, 1.0)))
+
+    def _width(self, name: str) -> float:
+        """The middle one of the three extents of a body's slenderest given shape [m]."""
+        out = []
+        solids: tuple[Any, ...] = self._solids[name]
+        for s in solids:
+            n = self._numbers[id(s)]
+            if hasattr(s, "triangles"):
+                extents = np.ptp(s.vertices(n), axis=0).tolist()
+            else:
+                extents = _extents(type(s).__name__, s.size(n))
+            out.append(float(np.median(extents)))
+        return min(out)
+
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """The body's shapes."""
-        given = self._solids[name]
-        if given:
-            return tuple(_given(s, self._env) for s in given)
+        if self.given(name):
+            return tuple(self._given(s) for s in self._solids[name])
         points = self.points[name]
-        out = [self._block(end) for end in self.blocks[name]]
+        out = [self._block(end) for end in self.blocks[name] if name not in self.worn]
+        out += [shape for e in self.cams[name] for shape in self._cam(e)]
+        bare = not out and name not in self.worn
         if len(points) >= 2:
             out += self._links(points)
-        elif points and not out:
+        elif points and bare:
             out += self._hung(points[0], name)
-        elif not points:
+        elif bare:
             out += [self._solid(name)]
         return tuple(out)
+
+    def _mesh_share(self) -> float:
+        """Part of their triangles that meshes may keep, so that the page stays small."""
+        meshes = [s for solids in self._solids.values() for s in solids if hasattr(s, "triangles")]
+        total = sum(len(s.triangles()) for s in meshes)
+        return min(1.0, TRIANGLES / total) if total else 1.0
+
+    def _given(self, s: Any) -> Shape:
+        """A shape as the user gave it; a cone is counted from its middle in pictures."""
+        n = self._numbers[id(s)]
+        if hasattr(s, "triangles"):
+            t = np.asarray(s.triangles())
+            most = max(int(self._share * len(t)), min(FEWEST, len(t)))
+            v, t = simplified(s.vertices(n), t, most)
+            return Shape("mesh", (), vertices=v, triangles=t)
+        p, R = s.pose(n)
+        if isinstance(s, Cone):
+            p = p + R[:, 2] * n.height / 2
+        kind = type(s).__name__.lower()
+        return Shape(kind, tuple(map(float, s.size(n))), three(p), tuple(matrix_to_quaternion(R).tolist()))
+
+    def _cam(self, e: Any) -> list[Shape]:
+        """The disc that a cam's outline bounds."""
+        ends = self.places.ends(e)
+        n = self.result.values.numbers[e.name]
+        outline = cam_outline(n)
+        if outline is None or ends is None or not getattr(n, "closed", True):
+            return []
+        F = ends[0]
+        turn = tuple(matrix_to_quaternion(F.R).tolist())
+        return [Shape("plate", (LINK * self.size,), three(F.p), turn, tuple(map(tuple, outline[:, :2].tolist())))]
 
     def _radius(self, length: float) -> float:
         return min(LINK * self.size * (1.0 if self.planar else 0.7), 0.2 * length)
@@ -118,10 +187,10 @@ class Looks:
     def _capsule(self, a: np.ndarray, b: np.ndarray, slim: float = 1.0) -> Shape:
         d = b - a
         length = float(np.sqrt(d @ d))
-        return Shape("capsule", (slim * self._radius(length), length), _three((a + b) / 2), _along(d))
+        return Shape("capsule", (slim * self._radius(length), length), three((a + b) / 2), _along(d))
 
     def _links(self, points: list[np.ndarray]) -> list[Shape]:
-        """One link between two points (or along a line); else a plate (in the plane) or spokes."""
+        """One link between two points (or along a line), a plate between those of a plane, else spokes."""
         a = np.array(points)
         middle = a.mean(axis=0)
         _, d, Vt = np.linalg.svd(a - middle)
@@ -129,25 +198,29 @@ class Looks:
             along = (a - middle) @ Vt[0]
             return [self._capsule(a[along.argmin()], a[along.argmax()])]
         if self.planar:
-            return [self._plate(a)]
-        return [self._capsule(middle, p) for p in a]
+            return [self._plate(a, np.zeros(3), np.eye(3))]
+        if len(a) < 4 or d[2] < 0.02 * d[0]:
+            R = np.column_stack([Vt[0], Vt[1], np.cross(Vt[0], Vt[1])])
+            return [self._plate((a - middle) @ R, middle, R)]
+        hub = Shape("sphere", (0.9 * self._radius(d[0]),), three(middle))
+        return [hub, *(self._capsule(middle, p) for p in a)]
 
-    def _plate(self, a: np.ndarray) -> Shape:
-        """The outline around the points, each with room for a pin."""
+    def _plate(self, a: np.ndarray, p: np.ndarray, R: np.ndarray) -> Shape:
+        """The outline around points of the x-y plane of the axes R at p, each with room for a pin."""
         from scipy.spatial import ConvexHull
 
-        r = 1.2 * LINK * self.size
+        r = 1.2 * LINK * self.size * (1.0 if self.planar else 0.8)
         turn = np.linspace(0.0, 2 * np.pi, 24, endpoint=False)
         rim = (a[:, None, :2] + r * np.stack([np.cos(turn), np.sin(turn)], axis=1)[None]).reshape(-1, 2)
         hull = rim[ConvexHull(rim).vertices]
-        return Shape("plate", (0.5 * r,), outline=tuple(tuple(p) for p in hull.tolist()))
+        outline = tuple(tuple(x) for x in hull.tolist())
+        return Shape("plate", (0.5 * r,), three(p), tuple(matrix_to_quaternion(R).tolist()), outline)
 
     def _block(self, end: End) -> Shape:
         """The block of a slide, along its axis."""
-        _, p, R = end
         u = self.size
         edges = (0.16 * u, 0.16 * u, 0.26 * u) if not self.planar else (0.15 * u, 0.15 * u, 0.26 * u)
-        return Shape("box", edges, _three(p), tuple(matrix_to_quaternion(R).tolist()))
+        return Shape("box", edges, three(end.p), tuple(matrix_to_quaternion(end.R).tolist()))
 
     def _hung(self, p: np.ndarray, name: str) -> list[Shape]:
         """A body on one joint: a rod if its inertia is that of one, else a rod to the solid it is equivalent to."""
@@ -171,34 +244,35 @@ class Looks:
         if self.planar:
             if not self.points[name]:
                 a = max(float(np.sqrt(6.0 * J[2, 2] / m)), least)
-                return Shape("box", (a, a, 0.2 * a), _three(com))
+                return Shape("box", (a, a, 0.2 * a), three(com))
             r = min(max(float(np.sqrt(2.0 * J[2, 2] / m)), least), 3.0 * self.size)
-            return Shape("cylinder", (r, 0.2 * r), _three(com))
+            return Shape("cylinder", (r, 0.2 * r), three(com))
         w, V = np.linalg.eigh(J / m)
         if w[2] < 1e-9 * self.size**2 or w[2] - w[0] < 0.02 * w[2]:
-            return Shape("sphere", (max(float(np.sqrt(2.5 * w[0])), least),), _three(com))
+            return Shape("sphere", (max(float(np.sqrt(2.5 * w[0])), least),), three(com))
         for lone in (0, 2):
             i, j = (k for k in range(3) if k != lone)
             if abs(w[i] - w[j]) < 0.02 * w[2]:
                 r = np.sqrt(2.0 * w[lone])
                 length = np.sqrt(max(12.0 * w[i] - 3.0 * r * r, 0.0))
                 size = max(float(r), 0.2 * least), max(float(length), 0.1 * float(r), 0.2 * least)
-                return Shape("cylinder", size, _three(com), _along(V[:, lone]))
+                return Shape("cylinder", size, three(com), _along(V[:, lone]))
         edges = [float(np.sqrt(max(6.0 * (w.sum() - 2.0 * x), 0.0))) for x in w]
         V = V * np.sign(np.linalg.det(V))
         return Shape(
-            "box", tuple(max(x, 0.2 * least) for x in edges), _three(com), tuple(matrix_to_quaternion(V).tolist())
+            "box", tuple(max(x, 0.2 * least) for x in edges), three(com), tuple(matrix_to_quaternion(V).tolist())
         )
 
 
-def _given(s: Solid, env: dict[str, float]) -> Shape:
-    """A shape as the user gave it; a cone is counted from its middle in pictures."""
-    n = resolve(s, env)
-    p, R = s.pose(n)
-    if isinstance(s, Cone):
-        p = p + R[:, 2] * n.height / 2
-    kind = type(s).__name__.lower()
-    return Shape(kind, tuple(map(float, s.size(n))), _three(p), tuple(matrix_to_quaternion(R).tolist()))
+def _extents(kind: str, size: tuple[float, ...]) -> list[float]:
+    """Lengths of a primitive along its own axes [m]."""
+    if kind == "Box":
+        return [float(x) for x in size]
+    if kind == "Ellipsoid":
+        return [2.0 * float(x) for x in size]
+    r = float(size[0])
+    length = float(size[1]) if len(size) > 1 else 2.0 * r
+    return [2.0 * r, 2.0 * r, length + (2.0 * r if kind == "Capsule" else 0.0)]
 
 
 def _unit(d: np.ndarray) -> np.ndarray:
@@ -209,7 +283,3 @@ def _unit(d: np.ndarray) -> np.ndarray:
 def _along(d: np.ndarray) -> tuple[float, float, float, float]:
     """Quaternion that turns z to the direction d."""
     return tuple(matrix_to_quaternion(triad(_unit(d))).tolist())  # type: ignore[return-value]
-
-
-def _three(p: np.ndarray) -> tuple[float, float, float]:
-    return tuple(float(c) for c in p)  # type: ignore[return-value]

@@ -19,17 +19,29 @@ MODULES = (
     "theme",
     "solids",
     "flats",
+    "look",
     "coil",
+    "tube",
     "lines",
     "travel",
+    "gearshape",
     "joints3d",
+    "parts2d",
     "joints2d",
     "framing",
     "ground",
+    "arrows",
+    "triads",
+    "trails",
     "mechanism",
     "stage",
     "plots",
+    "report",
     "panels",
+    "names",
+    "select",
+    "shown",
+    "keys",
     "clock",
     "bar",
     "overlay",
@@ -56,15 +68,37 @@ def page(recording: Recording) -> str:
     ValueError
         If the recording is not complete and consistent; the message names the guilty element.
     """
+    return document(recording, f"<h1>{html.escape(recording.name)}</h1>")
+
+
+def document(recording: Recording, heading: str, before: str = "", after: str = "") -> str:
+    """Put a recording and its player into a page.
+
+    Parameters
+    ----------
+    recording : Recording
+    heading : str
+        Markup of the line above the picture.
+    before, after : str
+        Markup before and after the player.
+    """
+    title = html.escape(recording.name)
+    stage = _filled(_static("player.html"), {"heading": heading, "title": title})
     parts = {
-        "title": html.escape(recording.name),
+        "title": title,
         "licences": _static("licences.txt").replace("--", "- -"),
         "style": _static("uplot.min.css") + _static("page.css"),
+        "content": before + stage + after,
         "player": _player(),
         "recording": _packed(payload(recording)),
         "boot": _static("boot.js"),
     }
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts[match[1]], _static("page.html"))
+    return _filled(_static("page.html"), parts)
+
+
+def _filled(template: str, parts: dict[str, str]) -> str:
+    """The template with its marks replaced, once: what is put in is not looked at again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts.get(match[1], match[0]), template)
 
 
 @cache

@@ -1,21 +1,22 @@
 """A recording as the bytes that the animation page reads: a JSON header, then one block of numbers.
 
-Poses, points and curves are float32, times float64. Arrays lie column by column with their bytes shuffled (all first
-bytes, then all second bytes, ...), which makes smooth motions much smaller once compressed.
+Poses, points and curves are float32, times float64, corners of triangles integers. Arrays lie column by column with
+their bytes shuffled (all first bytes, then all second bytes, ...), which makes smooth motions much smaller once
+compressed. Equal arrays are stored once.
 """
 
 from __future__ import annotations
 
 import json
 import struct
+from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
-from .recording import RecordedBody, Recording, Shape
+from .recording import Channel, Recording, Shape
+from .recording_check import check
 
-SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "cone": 2, "ellipsoid": 3, "plate": 1}
-LINES = ("spring", "damper", "link", "rope", "arrow")
-JOINTS = ("revolute", "prismatic", "cylindrical", "spherical", "universal", "fixed")
 ALIGNMENT = 8
 
 
@@ -25,15 +26,18 @@ class _Block:
     def __init__(self) -> None:
         self.parts: list[bytes] = []
         self.length = 0
+        self.known: dict[bytes, dict[str, object]] = {}
 
     def add(self, values: np.ndarray, kind: str = "f4") -> dict[str, object]:
-        columns = np.ascontiguousarray(np.asarray(values, f"<{kind}").T).reshape(-1)
+        columns = np.ascontiguousarray(np.asarray(values).astype(f"<{kind}").T).reshape(-1)
         shuffled = columns.view(np.uint8).reshape(-1, columns.itemsize).T.tobytes()
-        padded = shuffled + bytes(-len(shuffled) % ALIGNMENT)
-        reference = {"at": self.length, "count": columns.size, "type": kind}
-        self.parts.append(padded)
-        self.length += len(padded)
-        return reference
+        if shuffled not in self.known:
+            padded = shuffled + bytes(-len(shuffled) % ALIGNMENT)
+            self.known[shuffled] = {"at": self.length, "count": columns.size, "type": kind}
+            self.parts.append(padded)
+            self.length += len(padded)
+        reference = self.known[shuffled]
+        return reference if reference["type"] == kind else reference | {"count": columns.size, "type": kind}
 
 
 def payload(recording: Recording) -> bytes:
@@ -57,21 +61,34 @@ def payload(recording: Recording) -> bytes:
         "size": float(recording.size),
         "notes": {str(term): str(text) for term, text in recording.notes.items()},
         "shown": list(recording.shown),
+        "show": list(recording.show),
+        "facts": {part: list(lines) for part, lines in recording.facts.items()},
+        "down": _numbers(recording.down),
         "t": block.add(recording.t, "f8"),
-        "bodies": [_body(body, block) for body in recording.bodies],
+        "bodies": [
+            {"name": b.name, "color": b.color, "shapes": [_shape(s, block) for s in b.shapes]}
+            | {"p": block.add(b.p), "q": block.add(_continuous(b.q))}
+            for b in recording.bodies
+        ],
         "lines": [
             {"name": line.name, "kind": line.kind, "radius": _number(line.radius)}
-            | {"a": block.add(line.a), "b": block.add(line.b)}
+            | {"points": [block.add(p) for p in line.points]}
+            | {"rest": None if line.rest is None else block.add(line.rest)}
             for line in recording.lines
         ],
-        "joints": [
-            {"name": joint.name, "kind": joint.kind, "body": joint.body}
-            | {"position": _numbers(joint.position), "axis": _numbers(joint.axis)}
-            for joint in recording.joints
+        "joints": [_riding(j, "kind", "mate", "reach", "size", "scale", "axis") for j in recording.joints],
+        "curves": [
+            {"name": c.name, "body": c.body, "closed": bool(c.closed), "points": block.add(c.points)}
+            for c in recording.curves
         ],
-        "channels": [
-            {"name": channel.name, "unit": channel.unit, "values": block.add(channel.values)}
-            for channel in recording.channels
+        "arrows": [_riding(a, "group", "what") | {"vector": block.add(a.vector)} for a in recording.arrows],
+        "frames": [_riding(f, "of") for f in recording.frames],
+        "paths": [_riding(p) for p in recording.paths],
+        "channels": _curves(recording.channels, block),
+        "figures": [
+            {"name": f.name, "title": f.title, "note": f.note}
+            | {"panels": [{"label": p.label, "note": p.note, "curves": _curves(p.curves, block)} for p in f.panels]}
+            for f in recording.figures
         ],
     }
     text = json.dumps(header, allow_nan=False, separators=(",", ":")).encode()
@@ -83,18 +100,32 @@ def _number(value: float | None) -> float | None:
     return None if value is None else float(value)
 
 
-def _numbers(values: tuple[float, ...]) -> list[float]:
+def _numbers(values: Iterable[float]) -> list[float]:
     return [float(value) for value in values]
 
 
-def _body(body: RecordedBody, block: _Block) -> dict[str, object]:
-    shapes = [
-        {"kind": shape.kind, "size": _numbers(shape.size), "position": _numbers(shape.position)}
-        | {"quaternion": _numbers(shape.quaternion), "outline": [_numbers(point) for point in shape.outline]}
-        for shape in body.shapes
-    ]
-    poses: dict[str, object] = {"p": block.add(body.p), "q": block.add(_continuous(body.q))}
-    return {"name": body.name, "color": body.color, "shapes": shapes, **poses}
+def _riding(thing: Any, *more: str) -> dict[str, object]:
+    """Something that rides on a body: name, body, place, and further fields."""
+    out: dict[str, object] = {"name": thing.name, "body": thing.body, "position": _numbers(thing.position)}
+    if hasattr(thing, "quaternion"):
+        out["quaternion"] = _numbers(thing.quaternion)
+    for name in more:
+        value = getattr(thing, name)
+        out[name] = _numbers(value) if isinstance(value, (tuple, list)) else value
+    return out
+
+
+def _curves(channels: Iterable[Channel], block: _Block) -> list[dict[str, object]]:
+    return [{"name": c.name, "unit": c.unit, "values": block.add(c.values)} for c in channels]
+
+
+def _shape(shape: Shape, block: _Block) -> dict[str, object]:
+    out: dict[str, object] = {"kind": shape.kind, "size": _numbers(shape.size), "position": _numbers(shape.position)}
+    out |= {"quaternion": _numbers(shape.quaternion), "outline": [_numbers(point) for point in shape.outline]}
+    if shape.vertices is not None and shape.triangles is not None:
+        kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
+        return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}
+    return out
 
 
 def _continuous(q: np.ndarray) -> np.ndarray:
@@ -103,55 +134,3 @@ def _continuous(q: np.ndarray) -> np.ndarray:
     apart = np.einsum("ij,ij->i", q[1:], q[:-1]) < 0
     signs = np.where(np.cumsum(apart) % 2, -1.0, 1.0)
     return q * np.concatenate([[1.0], signs])[:, None]
-
-
-def check(recording: Recording) -> None:
-    """Refuse a recording that a view cannot show, naming what is wrong with it."""
-    t = np.asarray(recording.t)
-    if t.ndim != 1 or t.size == 0:
-        raise ValueError(f"recording {recording.name!r}: t needs at least one time, got shape {t.shape}")
-    if not np.isfinite(t).all() or (np.diff(t) < 0).any():
-        raise ValueError(f"recording {recording.name!r}: times must be finite and must not decrease")
-    if not (np.isfinite(recording.size) and recording.size > 0):
-        raise ValueError(f"recording {recording.name!r}: size must be a positive length, got {recording.size}")
-    for body in recording.bodies:
-        _check_shape(f"body {body.name!r}: p", body.p, (t.size, 3))
-        _check_shape(f"body {body.name!r}: q", body.q, (t.size, 4))
-        for shape in body.shapes:
-            _check_solid(body.name, shape)
-    for line in recording.lines:
-        _check_kind(f"line {line.name!r}", line.kind, LINES)
-        _check_shape(f"line {line.name!r}: a", line.a, (t.size, 3))
-        _check_shape(f"line {line.name!r}: b", line.b, (t.size, 3))
-    for channel in recording.channels:
-        _check_shape(f"channel {channel.name!r}: values", channel.values, (t.size,))
-    _check_joints(recording)
-
-
-def _check_shape(what: str, values: np.ndarray, shape: tuple[int, ...]) -> None:
-    if np.shape(values) != shape:
-        raise ValueError(f"{what} must have shape {shape}, one row for each time, got {np.shape(values)}")
-
-
-def _check_kind(what: str, kind: str, known: tuple[str, ...]) -> None:
-    if kind not in known:
-        raise ValueError(f"{what}: unknown kind {kind!r}, known are {', '.join(known)}")
-
-
-def _check_solid(body: str, shape: Shape) -> None:
-    _check_kind(f"shape of body {body!r}", shape.kind, tuple(SIZES))
-    if len(shape.size) != SIZES[shape.kind] or min(shape.size) < 0:
-        raise ValueError(f"body {body!r}: a {shape.kind} takes {SIZES[shape.kind]} lengths, got {shape.size}")
-    if shape.kind == "plate" and len(shape.outline) < 3:
-        raise ValueError(f"body {body!r}: a plate's outline needs three points at least, got {len(shape.outline)}")
-
-
-def _check_joints(recording: Recording) -> None:
-    names = [body.name for body in recording.bodies]
-    twice = {name for name in names if names.count(name) > 1}
-    if twice:
-        raise ValueError(f"recording {recording.name!r}: two bodies are named {sorted(twice)[0]!r}")
-    for joint in recording.joints:
-        _check_kind(f"joint {joint.name!r}", joint.kind, JOINTS)
-        if joint.body != "ground" and joint.body not in names:
-            raise ValueError(f"joint {joint.name!r} rides on body {joint.body!r}, which the recording does not have")

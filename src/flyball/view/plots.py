@@ -1,4 +1,4 @@
-"""Curves of a result as Matplotlib figures: one axis for each unit, names at the curves' ends of the legend."""
+"""Curves of a result as Matplotlib figures: one axis for each unit, names beside the curves."""
 
 from __future__ import annotations
 
@@ -12,26 +12,28 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.joint import Joint
+from ..model.body import GROUND
+from .figures import _some, centre, few, figures, hidden, panels
+from .recording import Channel, Figure, Panel
+from .writing import cannot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
     from ..results.result import Result
 
-Curve = tuple[str, str, np.ndarray]  # name, unit, values
-
 # Okabe and Ito's palette, which people with any colour vision can tell apart, darkest first.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#4D4D4D", "#B8A800")
+DASHES: tuple[Any, ...] = ("-", (0, (4, 4)), (0, (1.5, 3)), (0, (6, 2, 1.5, 2)))
 STYLE: dict[str, Any] = {
     "figure.dpi": 100,
     "savefig.dpi": 150,
     "figure.facecolor": "white",
     "font.size": 10,
-    "axes.titlesize": 11,
-    "axes.titleweight": "bold",
+    "axes.titlesize": 9,
     "axes.titlelocation": "left",
+    "axes.titlecolor": "#555555",
     "axes.labelcolor": "#333333",
     "axes.edgecolor": "#8a8a8a",
     "axes.linewidth": 0.8,
@@ -47,13 +49,15 @@ STYLE: dict[str, Any] = {
     "lines.solid_joinstyle": "round",
     "legend.frameon": False,
     "legend.fontsize": 9,
+    "legend.handlelength": 2.0,
     "axes.formatter.useoffset": False,
-    "axes.formatter.limits": (-4, 5),
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.use_mathtext": True,
     "svg.hashsalt": "flyball",
 }
 SUFFIXES = (".png", ".svg", ".pdf")
-MOST = 12  # curves in one axis of a standard plot
-PRETTY = {"N*m": "N m", "rad": "rad", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
+PRETTY = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
 
 
 def plot(result: Result, *names: str, path: str | os.PathLike | None = None) -> Any:
@@ -75,26 +79,19 @@ def plot(result: Result, *names: str, path: str | os.PathLike | None = None) -> 
     Raises
     ------
     ModelError
-        If there is no such curve or part, or the suffix is of no known kind.
+        If there is no such curve or part, the suffix is of no known kind, or the file cannot be written.
     """
-    curves = [c for name in names or ("energy",) for c in _curves(result, name)]
-    groups: dict[str, list[Curve]] = {}
-    for c in {c[0]: c for c in curves}.values():
-        groups.setdefault(c[1], []).append(c)
+    curves = {c.name: c for name in names or ("energy",) for c in _curves(result, name)}
     with _drawing():
-        figure = _figure(len(groups))
-        axes = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
-        for ax, (unit, group) in zip(axes, groups.items(), strict=True):
-            _over_time(ax, result.t, group, unit)
-        axes[-1].set_xlabel("time [s]")
-        figure.suptitle(result.model.name, x=0.012, ha="left", fontsize=12, fontweight="bold")
-        return _handed_out(figure, path)
+        drawing = _stacked(result, tuple(panels(list(curves.values()), len(curves))))
+        _headed(drawing, result.model.name)
+        return _handed_out(drawing, path)
 
 
-def _curves(result: Result, name: str) -> list[Curve]:
+def _curves(result: Result, name: str) -> list[Channel]:
     if "." in name:
-        return [(name, *result.channel(name))]
-    return [(f"{name}.{k}", unit, values) for k, (unit, values) in result[name].channels().items()]
+        return [Channel(name, *result.channel(name))]
+    return [Channel(f"{name}.{k}", unit, values) for k, (unit, values) in result[name].channels().items()]
 
 
 @contextmanager
@@ -108,49 +105,103 @@ def _drawing() -> Iterator[None]:
         yield
 
 
-def _figure(rows: int, width: float = 8.0, each: float = 2.6) -> Figure:
+def _figure(height: float, width: float = 8.0) -> Drawing:
     """A figure that belongs to no window; notebooks show it all the same."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Drawing
 
-    figure = Figure(figsize=(width, 0.7 + each * rows), layout="constrained")
-    FigureCanvasAgg(figure)
-    figure._repr_png_ = partial(_png, figure)  # type: ignore[attr-defined]
-    return figure
+    drawing = Drawing(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(drawing)
+    drawing._repr_png_ = partial(_png, drawing)  # type: ignore[attr-defined]
+    return drawing
 
 
-def _png(figure: Figure) -> bytes:
+def _png(drawing: Drawing) -> bytes:
     """The picture as notebooks ask for it."""
     from io import BytesIO
 
     data = BytesIO()
-    figure.savefig(data, format="png", dpi=100)
+    drawing.savefig(data, format="png", dpi=100)
     return data.getvalue()
 
 
-def _handed_out(figure: Figure, path: str | os.PathLike | None) -> Figure | None:
+def _headed(drawing: Drawing, title: str) -> None:
+    drawing.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
+
+
+def _handed_out(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | None:
     if path is None:
-        return figure
+        return drawing
     path = Path(path)
     if path.suffix.lower() not in SUFFIXES:
         raise ModelError(f"cannot write a plot to {os.fspath(path)!r}: its suffix must be {', '.join(SUFFIXES)}")
     dated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
     try:
-        figure.savefig(path, metadata=dated[path.suffix.lower()])
+        drawing.savefig(path, metadata=dated[path.suffix.lower()])
     except OSError as error:
-        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror or error}") from None
+        raise cannot(path, error) from None
     return None
 
 
-def _over_time(ax: Axes, t: np.ndarray, curves: Sequence[Curve], unit: str) -> None:
-    """Curves of one unit, with a legend beside them."""
-    dashes = ("-", "--", ":", "-.")
-    for k, (name, _, values) in enumerate(curves):
-        ax.plot(t, values, label=name, linestyle=dashes[k // len(PALETTE) % len(dashes)])
-    _zoomed_out(ax, [values for _, _, values in curves])
-    ax.set_ylabel(f"[{PRETTY.get(unit, unit)}]")
-    ax.margins(x=0.0)
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02), handlelength=1.4, borderaxespad=0.4)
+def standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
+    """Write the pictures that tell most of a motion, into a folder that is there; returns their paths.
+
+    ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
+    in the plane or from three sides), ``reactions`` and ``actuation``: those that have something to show.
+    """
+    folder = Path(folder)
+    makers: dict[str, Callable[[], Drawing]] = {f.name: partial(_drawn, result, f) for f in figures(result)}
+    if len(result.t):
+        makers["paths"] = partial(_paths, result)
+    order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation")
+    written = []
+    for name in (k for k in order if k in makers):
+        with _drawing():
+            drawing = makers[name]()
+            _headed(drawing, f"{result.model.name}: {name}")
+            path = folder / f"{name}.png"
+            _handed_out(drawing, path)
+            written.append(path)
+    return written
+
+
+def _drawn(result: Result, figure: Figure) -> Drawing:
+    """A figure of curves over time; the balance of energies takes less room than they do."""
+    ratios = [*([1.6] if len(figure.panels) == 2 else [1.0] * (len(figure.panels) - 1)), 0.8]
+    ratios = ratios if figure.name == "energy" else []
+    drawing = _stacked(result, figure.panels, ratios)
+    if figure.note:
+        drawing.supxlabel(figure.note, fontsize=8, x=0.012, ha="left")
+    return drawing
+
+
+def _stacked(result: Result, parts: Sequence[Panel], ratios: Sequence[float] = ()) -> Drawing:
+    """Panels one below the other; high enough for their legends."""
+    each = [max(2.3, 0.5 + 0.19 * len(p.curves)) for p in parts]
+    heights = [h * r for h, r in zip(each, ratios or [1.0] * len(each), strict=False)]
+    drawing = _figure(0.9 + sum(heights))
+    axes = drawing.subplots(len(parts), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for ax, panel in zip(axes, parts, strict=True):
+        _over_time(ax, result.t, panel)
+    axes[-1].set_xlabel("time [s]")
+    drawing.align_ylabels(axes)
+    return drawing
+
+
+def _over_time(ax: Axes, t: np.ndarray, panel: Panel) -> None:
+    """Curves of one unit, with a legend beside them; a curve that lies on another one is dashed."""
+    values = [c.values for c in panel.curves]
+    for k, (c, under) in enumerate(zip(panel.curves, hidden(values), strict=True)):
+        style = DASHES[max(under, k // len(PALETTE)) % len(DASHES)]
+        single = "o" if len(t) == 1 else None
+        ax.plot(t, c.values, label=c.name, linestyle=style, marker=single)
+    _zoomed_out(ax, values)
+    ax.set_ylabel(f"{panel.label} [{PRETTY.get(panel.unit, panel.unit)}]".strip())
+    if panel.note:
+        ax.set_title(panel.note)
+    if len(t) > 1:
+        ax.margins(x=0.0)
+    ax.legend(**BESIDE)
 
 
 def _zoomed_out(ax: Axes, values: Iterable[np.ndarray]) -> None:
@@ -160,142 +211,50 @@ def _zoomed_out(ax: Axes, values: Iterable[np.ndarray]) -> None:
         return
     low, high = finite.min(), finite.max()
     middle = (low + high) / 2
-    if high - low < 1e-9 * max(abs(middle), 1e-3):
+    if high - low < 1e-9 * abs(middle) or high == low:
         room = max(abs(middle) * 0.1, 1e-3)
         ax.set_ylim(middle - room, middle + room)
 
 
-def standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
-    """Write the pictures that tell most of a motion; returns their paths.
-
-    Energies with their balance, joint coordinates, paths of the bodies, reactions, and what drivers and forces do.
-    Of a mechanism with many parts the most telling are shown.
-    """
-    folder = Path(folder)
-    makers: dict[str, Callable[[Result], Figure | None]] = {
-        "energy": _energies,
-        "coordinates": _coordinates,
-        "paths": _paths,
-        "reactions": _reactions,
-        "actuation": _actuation,
-    }
-    written = []
-    for name, make in makers.items():
-        with _drawing():
-            figure = make(result) if len(result.t) else None
-            if figure is not None:
-                figure.suptitle(f"{result.model.name}: {name}", x=0.012, ha="left", fontsize=12, fontweight="bold")
-                path = folder / f"{name}.png"
-                _handed_out(figure, path)
-                written.append(path)
-    return written
-
-
-def _energies(result: Result) -> Figure:
-    e = result.energy
-    figure = _figure(2)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    _over_time(upper, result.t, [(k, "J", getattr(e, k)) for k in ("kinetic", "potential", "total")], "J")
-    _over_time(lower, result.t, [("balance", "J", e.balance)], "J")
-    largest = max(abs(float(x)) for x in (*e.total[:1], e.drift, 1e-12))
-    room = max(1.15 * e.drift, 1e-14 * largest)
-    if np.isfinite(room):
-        lower.set_ylim(-room, room)
-    lower.set_xlabel("time [s]")
-    return figure
+def _paths(result: Result) -> Drawing:
+    """Paths of centres of mass and named frames: in the plane, or from the front, the side and above."""
+    bodies = _some(result.model.bodies)
+    points = {b.name: centre(result, b.name) for b in bodies}
+    for frame in result.model.frames if len(points) < 6 else ():
+        if frame.body != GROUND:
+            p = result[frame.name].position
+            points[frame.name] = np.column_stack([p, np.zeros((len(p), 3 - p.shape[1]))])
+    note = "; ".join(x for x in (few(len(bodies), len(result.model.bodies), "bodies"), "dots: start") if x)
+    every = np.concatenate(list(points.values()))
+    extent = np.ptp(every[np.isfinite(every).all(axis=1)], axis=0) if np.isfinite(every).all(axis=1).any() else every[0]
+    if result.planar:
+        ratio = extent[1] / max(extent[0], 1e-12)
+        drawing = _figure(1.0 + 6.0 * min(max(ratio, 0.3), 1.0))
+        ax = drawing.subplots()
+        _views(ax, points, "xy")
+        ax.set_title(note)
+        ax.legend(**BESIDE)
+        return drawing
+    drawing = _figure(7.2)
+    axes = drawing.subplots(2, 2)
+    for ax, (seen, across) in zip(axes.flat, (("front", "xz"), ("side", "yz"), ("top", "xy")), strict=False):
+        _views(ax, points, across)
+        ax.set_title(seen)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    axes[1, 1].axis("off")
+    axes[1, 1].legend(handles, labels, loc="upper left", title=note, alignment="left")
+    return drawing
 
 
-def _stacked_by_unit(result: Result, curves: Sequence[Curve]) -> Figure | None:
-    """One axis for each unit, the first curves where there are too many."""
-    groups: dict[str, list[Curve]] = {}
-    for c in curves:
-        groups.setdefault(c[1], []).append(c)
-    if not groups:
-        return None
-    figure = _figure(len(groups))
-    axes = figure.subplots(len(groups), 1, sharex=True, squeeze=False)[:, 0]
-    for ax, (unit, group) in zip(axes, groups.items(), strict=True):
-        _over_time(ax, result.t, group[:MOST], unit)
-        if len(group) > MOST:
-            ax.set_title(f"{MOST} of {len(group)}", fontsize=9, fontweight="normal")
-    axes[-1].set_xlabel("time [s]")
-    return figure
-
-
-def _coordinates(result: Result) -> Figure | None:
-    every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
-    units = dict.fromkeys(unit for _, _, unit in every)
-    chosen = [c for unit in units for c in _chosen([c for c in every if c[2] == unit])]
-    curves = [(f"{e.name}.{what}", unit, getattr(result[e.name], what)) for e, what, unit in chosen]
-    return _stacked_by_unit(result, curves)
-
-
-def _chosen(parts: Sequence[Any], most: int = MOST) -> list[Any]:
-    """Evenly chosen parts, first and last among them."""
-    if len(parts) <= most:
-        return list(parts)
-    return [parts[i] for i in np.linspace(0, len(parts) - 1, most).round().astype(int)]
-
-
-def _paths(result: Result) -> Figure | None:
-    """Paths of the centres of mass: y over x in the plane; x, y, z over time in space."""
-    bodies = _chosen(result.model.bodies)
-    place, r = result.values.structure.place, result.records
-    points = {b.name: np.stack(r.body(place[b.name])[0], axis=1) for b in bodies}
-    if not result.planar:
-        figure = _figure(3)
-        axes = figure.subplots(3, 1, sharex=True)
-        for i, ax in enumerate(axes):
-            _over_time(ax, result.t, [(k, "m", p[:, i]) for k, p in points.items()], "m")
-            ax.set_ylabel(f"{'xyz'[i]} [m]")
-            if i:
-                ax.get_legend().remove()
-        axes[-1].set_xlabel("time [s]")
-        return figure
-    figure = _figure(1, 8.0, 5.0)
-    ax = figure.subplots()
-    for k, (name, p) in enumerate(points.items()):
-        color = PALETTE[k % len(PALETTE)]
-        ax.plot(p[:, 0], p[:, 1], label=name, color=color, linestyle="-" if k < len(PALETTE) else "--")
-        ax.plot(p[0, 0], p[0, 1], "o", color=color, markersize=5)
+def _views(ax: Axes, points: dict[str, np.ndarray], across: str) -> None:
+    """Paths seen along one axis, to scale; a path on top of another one is dashed."""
+    i, j = ("xyz".index(c) for c in across)
+    flat = [p[:, [i, j]].ravel() for p in points.values()]
+    for k, ((name, p), under) in enumerate(zip(points.items(), hidden(flat), strict=True)):
+        color, style = PALETTE[k % len(PALETTE)], DASHES[max(under, k // len(PALETTE)) % len(DASHES)]
+        ax.plot(p[:, i], p[:, j], label=name, color=color, linestyle=style)
+        ax.plot(p[0, i], p[0, j], "o", color=color, markersize=4.5)
     ax.set_aspect("equal", adjustable="datalim")
-    ax.set_xlabel("x [m]")
-    ax.set_ylabel("y [m]")
-    few = f"{len(bodies)} of {len(result.model.bodies)} bodies; " if len(bodies) < len(result.model.bodies) else ""
-    ax.set_title(f"{few}centres of mass, start marked", fontsize=9, fontweight="normal")
-    ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.02), handlelength=1.4, borderaxespad=0.4)
-    return figure
-
-
-def _reactions(result: Result) -> Figure | None:
-    """Sizes of the joints' reaction forces and torques."""
-    curves = []
-    for e in _chosen(result.model.joints):
-        view = result[e.name]
-        mark = "*" if view.undetermined else ""
-        for what, unit in (("force", "N"), ("torque", "N*m")):
-            a = np.asarray(getattr(view, what))
-            size = np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))
-            if what == "force" or _matters(e, size):
-                curves.append((f"{e.name}{mark}", unit, size))
-    figure = _stacked_by_unit(result, curves)
-    if figure is not None:
-        for ax, what in zip(figure.axes, ("|force|", "|torque|"), strict=False):
-            ax.set_ylabel(f"{what} {ax.get_ylabel()}")
-        if any(name.endswith("*") for name, _, _ in curves):
-            figure.supxlabel("* redundancy leaves some components undetermined", fontsize=8, x=0.012, ha="left")
-    return figure
-
-
-def _matters(e: Joint, torque: np.ndarray) -> bool:
-    """Whether a joint carries a torque at all, rather than rounding errors."""
-    return bool(np.nanmax(torque, initial=0.0) > 1e-9)
-
-
-def _actuation(result: Result) -> Figure | None:
-    """What drivers need, and what force elements do."""
-    curves: list[Curve] = []
-    for e in (*result.model.drivers, *result.model.forces):
-        channels = result[e.name].channels()
-        curves += [(f"{e.name}.{k}", unit, v) for k, (unit, v) in channels.items() if unit in ("N", "N*m")]
-    return _stacked_by_unit(result, curves)
+    ax.margins(0.08)
+    ax.set_xlabel(f"{across[0]} [m]")
+    ax.set_ylabel(f"{across[1]} [m]")

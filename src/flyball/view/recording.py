@@ -1,7 +1,8 @@
 """The neutral recording of a motion: the one thing that every picture, page and player reads.
 
-A recording holds no physics: times, poses of bodies, end points of lines, and named curves.
-World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one has z up.
+A recording holds no physics: times, poses of bodies, lines through moving points, things that ride on bodies, vectors
+and named curves. World axes are right-handed; a planar recording lies in z = 0 with y up, a spatial one has z up.
+What rides on a body (``"ground"`` too) is given in the axes of that body, from its origin.
 """
 
 from __future__ import annotations
@@ -10,6 +11,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+Three = tuple[float, float, float]
+Four = tuple[float, float, float, float]
+UNTURNED = (1.0, 0.0, 0.0, 0.0)
+
 
 @dataclass(frozen=True)
 class Shape:
@@ -17,14 +22,17 @@ class Shape:
 
     ``kind`` and ``size`` [m]: ``box`` (x, y, z edges), ``sphere`` (radius,), ``cylinder`` (radius, length; along z),
     ``capsule`` (radius, length between the cap centres; along z), ``cone`` (radius, height; tip at +z),
-    ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness).
+    ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness), ``mesh`` (no size;
+    ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside).
     """
 
     kind: str
     size: tuple[float, ...]
-    position: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    position: Three = (0.0, 0.0, 0.0)
+    quaternion: Four = UNTURNED
     outline: tuple[tuple[float, float], ...] = ()
+    vertices: np.ndarray | None = None
+    triangles: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -40,31 +48,91 @@ class RecordedBody:
 
 @dataclass(frozen=True)
 class RecordedLine:
-    """A line between two moving points ``a`` and ``b``, each (n, 3) [m].
+    """A line through two or more moving points, each (n, 3) [m].
 
-    ``kind``: ``spring`` (drawn as a coil), ``damper``, ``link`` (a thin rod), ``rope``, ``arrow`` (a force).
+    ``kind``: ``spring`` (drawn as a coil), ``damper``, ``link`` (a thin rod), ``rope``, ``arrow``. ``rest`` (n,) [m]
+    is the length of an unloaded rope: where the points are closer it hangs loose.
     """
 
     name: str
     kind: str
-    a: np.ndarray
-    b: np.ndarray
+    points: tuple[np.ndarray, ...]
     radius: float | None = None
+    rest: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class RecordedCurve:
+    """A curve fixed on a body, such as the outline of a cam: ``points`` (k, 3) [m]."""
+
+    name: str
+    body: str
+    points: np.ndarray
+    closed: bool = False
 
 
 @dataclass(frozen=True)
 class RecordedJoint:
-    """A joint's symbol: ``revolute``, ``prismatic``, ``cylindrical``, ``spherical``, ``universal``, ``fixed``.
+    """A joint's symbol.
 
-    It rides on the body named ``body`` ("ground" too) at ``position`` and with its axis along ``axis`` in that
-    body's axes.
+    ``kind``: ``revolute``, ``prismatic``, ``cylindrical``, ``screw``, ``spherical``, ``universal``, ``fixed``;
+    ``plane`` and ``rail`` (what a point or a body slides on), ``point``, ``wheel``, ``roller``, ``gear``, ``rack``,
+    ``knife_edge``, ``bushing``; any other kind is drawn as a plain mark.
+
+    It rides on the body named ``body`` at ``position``; ``axis`` is its axis, ``quaternion`` its frame. ``mate`` is
+    the other body, ``reach`` the stretch over which the other body's point moves along x, y, z of the symbol's frame
+    (low x, high x, low y, ... [m]). ``size`` holds what a kind needs: of ``wheel`` and ``roller`` the radius; of
+    ``gear`` radius, number of teeth, angle of a tooth from x, and 1 for teeth that point inwards; of ``rack`` the
+    distance of the pitch line from the frame's origin along y, and the distance of its teeth; of ``screw`` the lead.
+    ``scale`` makes the symbol smaller where the parts it joins are slender.
     """
 
     name: str
     kind: str
     body: str
-    position: tuple[float, float, float]
-    axis: tuple[float, float, float]
+    position: Three
+    axis: Three
+    quaternion: Four = UNTURNED
+    mate: str | None = None
+    reach: tuple[float, float, float, float, float, float] | None = None
+    size: tuple[float, ...] = ()
+    scale: float = 1.0
+
+
+@dataclass(frozen=True)
+class RecordedFrame:
+    """Axes that can be shown: a frame on a body; ``of`` is ``joint`` or ``frame``. Bodies' own need no mention."""
+
+    name: str
+    of: str
+    body: str
+    position: Three
+    quaternion: Four
+
+
+@dataclass(frozen=True)
+class RecordedArrow:
+    """A force or moment on a body over time: ``vector`` (n, 3) [N] or [N m], world axes, acting at ``position``.
+
+    ``group``: ``reaction`` (of joints), ``element`` (springs, motors, drivers), ``load`` (given from outside).
+    ``what``: ``force`` or ``moment``.
+    """
+
+    name: str
+    group: str
+    what: str
+    body: str
+    position: Three
+    vector: np.ndarray
+
+
+@dataclass(frozen=True)
+class RecordedPath:
+    """The path of a point of a body is drawn."""
+
+    name: str
+    body: str
+    position: Three = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -74,6 +142,30 @@ class Channel:
     name: str
     unit: str
     values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Curves of one unit that share an axis; ``label`` is what the axis says, without its unit."""
+
+    label: str
+    curves: tuple[Channel, ...]
+    note: str = ""
+
+    @property
+    def unit(self) -> str:
+        """Unit of the axis."""
+        return self.curves[0].unit
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels one below the other, over the same time."""
+
+    name: str
+    title: str
+    panels: tuple[Panel, ...]
+    note: str = ""
 
 
 @dataclass(frozen=True)
@@ -90,3 +182,25 @@ class Recording:
     shown: tuple[str, ...] = ()  # the channels plotted when the page opens
     size: float = 1.0  # a typical length of the mechanism [m]: joint symbols and coils scale with it
     notes: dict[str, str] = field(default_factory=dict)  # summary lines shown beside the picture
+    curves: tuple[RecordedCurve, ...] = ()
+    arrows: tuple[RecordedArrow, ...] = ()
+    frames: tuple[RecordedFrame, ...] = ()
+    paths: tuple[RecordedPath, ...] = ()
+    show: tuple[str, ...] = ()  # what is switched on when the page opens: see `SHOW`
+    facts: dict[str, tuple[str, ...]] = field(default_factory=dict)  # part -> lines about it, for its card
+    figures: tuple[Figure, ...] = ()  # of a report
+    down: Three = (0.0, 0.0, 0.0)  # direction of gravity, or zero
+
+
+SHOW = {
+    "reactions": "reaction forces of joints",
+    "elements": "forces of springs, motors and drivers",
+    "loads": "given forces",
+    "moments": "moments beside forces, wherever those are shown",
+    "world": "axes of the world",
+    "bodies": "axes of bodies",
+    "frames": "axes of joints and named frames",
+    "names": "names of bodies",
+    "grid": "ground grid",
+}
+"""What can be switched on and off in a page, and what it is."""

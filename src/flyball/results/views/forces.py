@@ -10,6 +10,7 @@ from ...model.force import CoordinateForce, JointForce, TwoPointForce
 from ...system.call import STACK_RESERVE
 from ...system.laws import evaluate
 from ...system.loads import power, wide
+from ..records import coordinate_frames, turned
 from .base import View
 
 
@@ -73,8 +74,8 @@ class ForceView(View):
         """
         n = len(self._result.t)
         if isinstance(self.element, JointForce):
-            joint = self._x.structure.frame_at[self.element.joint, "F", ""]
-            axis = self._result.records.frame(joint)[1]
+            (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
+            axis = turned(self._result.records.frame(k), turn)[1]
             return np.zeros((n, 3)), np.stack([a * self._along()[2] for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
             raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self._names())}")

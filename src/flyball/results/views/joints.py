@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...constraints import angle
@@ -23,7 +25,8 @@ class JointView(View):
         r, x = self._result.records, self._x
         (i, turn_i), (j, turn_j), c = coordinate_frames(x, self.element, what)
         F, M = turned(r.frame(i), turn_i), turned(r.frame(j), turn_j)
-        par, hint = (*c.row.par[:6], 0.0, 0.0), 0.0
+        par: tuple[float, ...] = (*c.row.par[:6], 0.0, 0.0)
+        hint: Any = 0.0
         if c.row.kind == angle.KIND:
             par, hint = (1.0, *par[1:]), self._turns(what, i, j)
         value, f, tM, tF, second = FORMULAS[c.row.kind](par, F, M, hint, x.system.const)
@@ -37,13 +40,16 @@ class JointView(View):
         s = self._x.structure
         if name in s.state_at:
             return self._result.states[:, s.state_at[name]]
-        psi = []
-        for k in (i, j):
-            b = int(self._x.system.frame_i[k])
-            R = self._x.system.frame_x[k, 3:]
-            turned = self._result.q[:, self._x.system.body_i[b, Q0] + 2] if b >= 0 else 0.0
-            psi.append(np.arctan2(R[3], R[0]) + turned)
-        return psi[1] - psi[0]
+        x = self._x
+        now = self._heading(j, self._result.q) - self._heading(i, self._result.q)
+        drawn = self._heading(j, x.q[None]) - self._heading(i, x.q[None])
+        return now - 2.0 * np.pi * np.round(drawn / (2.0 * np.pi))
+
+    def _heading(self, frame: int, q: np.ndarray) -> Any:
+        """In the plane: the way that a frame's x axis points, by the turned angle of its body."""
+        S = self._x.system
+        b, R = int(S.frame_i[frame]), S.frame_x[frame, 3:]
+        return np.arctan2(R[3], R[0]) + (q[:, S.body_i[b, Q0] + 2] if b >= 0 else 0.0)
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""

@@ -4,7 +4,7 @@ import { timeDigits } from "./format.js";
 const STEP = 1 / 200; // of the whole span, for the arrow keys
 
 /** Wire the bar to the clock; returns what brings the bar up to date. */
-export function controlBar(bar, clock) {
+export function controlBar(bar, clock, keys) {
   const part = (name) => bar.querySelector(`[name=${name}]`);
   const [play, scrub, speed, loop] = ["play", "scrub", "speed", "loop"].map(part);
   const read = bar.querySelector("output");
@@ -30,7 +30,7 @@ export function controlBar(bar, clock) {
     if (resume) clock.play();
     resume = false;
   });
-  keys(clock);
+  barKeys(keys, clock, { speed, loop });
 
   return () => {
     const text = clock.time.toFixed(digits);
@@ -43,23 +43,41 @@ export function controlBar(bar, clock) {
   };
 }
 
-/** Space plays and pauses, arrows step, Home and End jump; not while something is typed or chosen. */
-function keys(clock) {
+/** The keys that do the same. */
+function barKeys(keys, clock, parts) {
   const step = STEP * (clock.end - clock.begin);
-  const actions = {
-    " ": () => clock.play(!clock.playing),
-    ArrowLeft: () => clock.seek(clock.time - step),
-    ArrowRight: () => clock.seek(clock.time + step),
-    Home: () => clock.seek(clock.begin),
-    End: () => clock.seek(clock.end),
+  const paused = (action) => () => {
+    clock.play(false);
+    action();
   };
-  document.addEventListener("keydown", (event) => {
-    const { target, key } = event;
-    const typing = target.matches?.("input:not([type=range]), select, textarea, summary");
-    const pressing = key === " " && target.matches?.("button");
-    if (typing || pressing || event.ctrlKey || event.metaKey || event.altKey || !actions[key]) return;
-    event.preventDefault();
-    if (key !== " ") clock.play(false);
-    actions[key]();
-  });
+  keys.add("Space", "play or pause", () => clock.play(!clock.playing));
+  keys.add(
+    "ArrowLeft",
+    "",
+    paused(() => clock.seek(clock.time - step)),
+  );
+  keys.add(
+    "ArrowRight",
+    "a little back or on",
+    paused(() => clock.seek(clock.time + step)),
+    "← →",
+  );
+  keys.add(
+    "Home",
+    "",
+    paused(() => clock.seek(clock.begin)),
+  );
+  keys.add(
+    "End",
+    "to the start or the end",
+    paused(() => clock.seek(clock.end)),
+    "Home End",
+  );
+  const faster = (by) => () => {
+    parts.speed.selectedIndex = Math.min(Math.max(parts.speed.selectedIndex + by, 0), parts.speed.options.length - 1);
+    parts.speed.dispatchEvent(new Event("change"));
+  };
+  keys.add("-", "", faster(-1));
+  keys.add("+ =", "slower or faster", faster(1), "− +");
+  keys.add("l", "play once or again and again", () => parts.loop.click(), "L");
 }

@@ -13,21 +13,26 @@ function unshuffled(bytes, width) {
   return out.buffer;
 }
 
+const NUMBERS = { f8: Float64Array, f4: Float32Array, u2: Uint16Array, u4: Uint32Array };
+
+const isReference = (value) => Number.isInteger(value?.at) && Number.isInteger(value.count) && value.type in NUMBERS;
+
 /** The recording with every reference to the block replaced by a typed array. */
 export function readRecording(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
-  const recording = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   const start = Math.ceil((4 + length) / ALIGNMENT) * ALIGNMENT;
+  const read = new Map(); // equal arrays are stored, and kept, once
   const numbers = ({ at, count, type }) => {
-    const Numbers = type === "f8" ? Float64Array : Float32Array;
-    const width = Numbers.BYTES_PER_ELEMENT;
-    return new Numbers(unshuffled(new Uint8Array(buffer, start + at, count * width), width));
+    const key = `${type}${at}`;
+    if (!read.has(key)) {
+      const width = NUMBERS[type].BYTES_PER_ELEMENT;
+      const bytes = new Uint8Array(buffer, start + at, count * width);
+      read.set(key, new NUMBERS[type](unshuffled(bytes, width)));
+    }
+    return read.get(key);
   };
-  recording.t = numbers(recording.t);
-  for (const body of recording.bodies) Object.assign(body, { p: numbers(body.p), q: numbers(body.q) });
-  for (const line of recording.lines) Object.assign(line, { a: numbers(line.a), b: numbers(line.b) });
-  for (const channel of recording.channels) channel.values = numbers(channel.values);
-  return recording;
+  const text = new TextDecoder().decode(new Uint8Array(buffer, 4, length));
+  return JSON.parse(text, (_, value) => (isReference(value) ? numbers(value) : value));
 }
 
 /** Where a time lies among the samples: between sample i and j, the fraction f on the way. */
@@ -78,4 +83,13 @@ export function sampleNumbers(count, limit) {
 export function poseAt(body, frame, object) {
   pointAt(body.p, frame, object.position);
   quaternionAt(body.q, frame, object.quaternion);
+}
+
+/** Points along a motion where something is that rides on a body at a place of its own. */
+export function ridden(body, position, numbers) {
+  const pose = new THREE.Group();
+  return numbers.map((i) => {
+    poseAt(body, { i, j: i, f: 0 }, pose);
+    return new THREE.Vector3(...position).applyQuaternion(pose.quaternion).add(pose.position);
+  });
 }

@@ -1,10 +1,11 @@
 // Flat bodies of planar mechanisms: silhouettes with an ink outline, drawn in a fixed order without depth.
 import * as THREE from "three";
 import { outlineColour } from "./theme.js";
-import { placed } from "./solids.js";
+import { meshGeometry, placed } from "./solids.js";
 
 // The painter's order: what comes later lies on top. A body takes two numbers, outline and fill.
-export const ORDER = { shadow: 10, ground: 20, trail: 30, guide: 40, body: 100, line: 1e5, pin: 2e5 };
+export const ORDER = { shadow: 10, ground: 20, trail: 30, guide: 40, body: 100, line: 1e5, pin: 2e5, arrow: 4e5 };
+const MANY = 60; // corners of an outline from which it is taken as a curve and not rounded
 const CIRCLE = Array.from({ length: 64 }, (_, k) => (k * Math.PI) / 32);
 
 /** The convex hull of points in the plane, anticlockwise (Andrew's monotone chain). */
@@ -62,8 +63,10 @@ export function silhouette(shape) {
   const flat = (p) => new THREE.Vector2(p.x, p.y);
   const onBody = (p) => flat(p.applyMatrix4(frame.matrix));
   const { kind, size } = shape;
+  if (kind === "mesh") return hull(corners(meshGeometry(shape)).map(onBody));
   if (kind === "plate") {
     const points = shape.outline.map(([x, y]) => onBody(new THREE.Vector3(x, y, 0)));
+    if (points.length > MANY) return points;
     return rounded(points, 0.06 * Math.max(...points.map((point) => point.distanceTo(points[0]))));
   }
   if (kind === "sphere" || kind === "capsule") {
@@ -74,6 +77,46 @@ export function silhouette(shape) {
   }
   const outline = hull(surface(shape).map(onBody));
   return kind === "box" ? rounded(outline, 0.18 * Math.min(size[0], size[1])) : outline;
+}
+
+function corners(geometry) {
+  const { position } = geometry.attributes;
+  return Array.from({ length: position.count }, (_, k) => new THREE.Vector3().fromBufferAttribute(position, k));
+}
+
+/** Edges of a mesh where it ends, seen along z: those of one triangle, or between one that looks up and one down. */
+function rimOf(geometry) {
+  const points = corners(geometry);
+  const index = geometry.index.array;
+  const seen = new Map();
+  for (let k = 0; k < index.length; k += 3) {
+    const [a, b, c] = [index[k], index[k + 1], index[k + 2]];
+    const [p, q, r] = [points[a], points[b], points[c]];
+    const up = (q.x - p.x) * (r.y - p.y) - (q.y - p.y) * (r.x - p.x) > 0;
+    for (const [i, j] of [
+      [a, b],
+      [b, c],
+      [c, a],
+    ]) {
+      const key = i < j ? `${i},${j}` : `${j},${i}`;
+      seen.set(key, [...(seen.get(key) ?? []), up]);
+    }
+  }
+  const ends = [...seen].filter(([, ups]) => ups.length === 1 || ups.includes(true) !== ups.every(Boolean));
+  return ends.map(([key]) => key.split(",").map((k) => points[k]));
+}
+
+/** A mesh in the plane: all of its triangles filled, and the edges where it ends. */
+function flatMesh(shape, colour, paint, order) {
+  const geometry = meshGeometry(shape);
+  const flat = { depthTest: false, depthWrite: false, transparent: true };
+  const lines = new THREE.LineSegmentsGeometry().setPositions(
+    rimOf(geometry).flatMap(([a, b]) => [a.x, a.y, a.z, b.x, b.y, b.z]),
+  );
+  const edge = new THREE.LineSegments2(lines, new THREE.LineMaterial({ color: colour, linewidth: 4, ...flat }));
+  Object.assign(edge, { renderOrder: order, frustumCulled: false });
+  const face = Object.assign(new THREE.Mesh(geometry, paint), { renderOrder: order + 1 });
+  return [placed(edge, shape), placed(face, shape)];
 }
 
 /** A shape that looks round in the plane: only a mark shows how it turns. */
@@ -111,6 +154,12 @@ export function flatBody(body, colour, index) {
   const dusk = flatMaterial({ color: "#0a1420", opacity: 0.12 });
   const edges = [];
   for (const shape of body.shapes) {
+    if (shape.kind === "mesh") {
+      const [edge, face] = flatMesh(shape, colour, paint, order);
+      edges.push(edge);
+      group.add(edge, face);
+      continue;
+    }
     const outline = silhouette(shape);
     edges.push(stroke(outline, { color: colour, width: 4, order, closed: true }));
     group.add(edges.at(-1), fill(outline, paint, order + 1));

@@ -13,7 +13,7 @@ export function shortNumber(value) {
   const size = Math.abs(value);
   if (size === 0) return "0";
   const text = size >= 1e5 || size < 1e-3 ? value.toExponential(2) : String(Number(value.toPrecision(4)));
-  return text.replace("e+", "e").replace("-", "−");
+  return text.replace("e+", "e").replaceAll("-", "−");
 }
 
 /** A length in the unit that suits it. */
@@ -34,4 +34,11 @@ export function element(tag, properties = {}, ...children) {
   for (const [name, value] of Object.entries(aria)) node.setAttribute(name === "role" ? name : `aria-${name}`, value);
   node.append(...children);
   return node;
+}
+
+const PRETTY = { "N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", 1: "" };
+
+/** A unit as people write it. */
+export function pretty(unit) {
+  return Object.hasOwn(PRETTY, unit) ? PRETTY[unit] : unit;
 }

@@ -15,20 +15,24 @@ function bodyPoints(body, planar) {
   return sparse.map(({ x, y }) => new THREE.Vector3(x, y, 0));
 }
 
-/** Symbols reach a little around their joint. */
+/** Symbols reach a little around their joint, wheels by their radius. */
 function jointPoints(joint, unit, planar) {
-  const reach = 0.1 * unit;
-  const around = planar
-    ? [
-        [1, 1, 0],
-        [-1, 1, 0],
-        [1, -1.2, 0],
-        [-1, -1.2, 0],
-      ]
-    : [
-        [0.6, 0.6, 0.6],
-        [-0.6, -0.6, -1.2],
-      ];
+  const bodily = ["wheel", "ball", "gear"].includes(joint.kind) ? joint.size[0] : 0;
+  const reach = Math.max(0.1 * unit * joint.scale, bodily);
+  const signs = [-1, 1];
+  const around = bodily
+    ? signs.flatMap((x) => signs.flatMap((y) => (planar ? [0] : signs).map((z) => [x, y, z])))
+    : planar
+      ? [
+          [1, 1, 0],
+          [-1, 1, 0],
+          [1, -1.2, 0],
+          [-1, -1.2, 0],
+        ]
+      : [
+          [0.6, 0.6, 0.6],
+          [-0.6, -0.6, -1.2],
+        ];
   return around.map(([x, y, z]) =>
     new THREE.Vector3(...joint.position).add(new THREE.Vector3(x, y, z).multiplyScalar(reach)),
   );
@@ -36,14 +40,20 @@ function jointPoints(joint, unit, planar) {
 
 /** Points that enclose the motion over all times. */
 export function motionPoints(recording, unit) {
-  const { bodies, lines, joints, planar, t } = recording;
+  const { bodies, lines, joints, curves, planar, t } = recording;
   const own = new Map(bodies.map((body) => [body.name, bodyPoints(body, planar)]));
   const points = [];
   for (const joint of joints) {
     const target = own.get(joint.body) ?? (joint.body === "ground" ? points : []);
     target.push(...jointPoints(joint, unit, planar));
   }
-  const each = [...own.values()].reduce((sum, list) => sum + list.length, 1) + 2 * lines.length;
+  for (const { body, points: columns } of curves) {
+    const target = own.get(body) ?? points;
+    const n = columns.length / 3;
+    for (const i of sampleNumbers(n, 24)) target.push(pointAt(columns, { i, j: i, f: 0 }, new THREE.Vector3()));
+  }
+  const ends = lines.flatMap((line) => line.points);
+  const each = [...own.values()].reduce((sum, list) => sum + list.length, 1) + ends.length;
   const pose = new THREE.Group();
   for (const i of sampleNumbers(t.length, Math.max(12, Math.min(400, Math.floor(BUDGET / each))))) {
     const frame = { i, j: i, f: 0 };
@@ -53,8 +63,7 @@ export function motionPoints(recording, unit) {
       for (const point of own.get(body.name)) points.push(point.clone().applyMatrix4(pose.matrix));
       if (!own.get(body.name).length) points.push(pose.position.clone());
     }
-    for (const { a, b } of lines)
-      points.push(pointAt(a, frame, new THREE.Vector3()), pointAt(b, frame, new THREE.Vector3()));
+    for (const end of ends) points.push(pointAt(end, frame, new THREE.Vector3()));
   }
   const finite = points.filter((point) => Number.isFinite(point.x + point.y + point.z));
   return finite.length ? finite : [new THREE.Vector3(-unit, -unit, -unit), new THREE.Vector3(unit, unit, unit)];

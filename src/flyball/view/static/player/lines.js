@@ -1,64 +1,23 @@
-// Lines between two moving points: springs, dampers, rods, ropes and arrows, in space and in the plane.
+// Lines through moving points: springs, dampers, rods, ropes and arrows, in space and in the plane.
 import * as THREE from "three";
-import { pointAt, sampleNumbers } from "./data.js";
+import { pointAt, mixed, sampleNumbers } from "./data.js";
 import { Coil, coilFor } from "./coil.js";
-import { ORDER, flatMaterial } from "./flats.js";
+import { ORDER } from "./flats.js";
+import { Look } from "./look.js";
+import { hang, Tube } from "./tube.js";
 
 const Z = new THREE.Vector3(0, 0, 1);
-const SLIM = { spring: 0.05, damper: 0.035, link: 0.014, rope: 0.006, arrow: 0.014 }; // radius over typical length
+const SLIM = { spring: 0.036, damper: 0.03, link: 0.014, rope: 0.008, arrow: 0.014 }; // radius over typical length
+const LOOSE = 0.55; // thickness of a slack rope, as part of that of a taut one
+const ALONG = 12; // samples between two points of a rope
 
-/** The shortest and the longest a line ever is. */
-function lengthRange({ a, b }, count) {
+/** The shortest and the longest a line between two points ever is. */
+function lengthRange([a, b], count) {
   const [p, q] = [new THREE.Vector3(), new THREE.Vector3()];
   const lengths = sampleNumbers(count, 2000)
     .map((i) => pointAt(a, { i, j: i, f: 0 }, p).distanceTo(pointAt(b, { i, j: i, f: 0 }, q)))
     .filter(Number.isFinite);
   return lengths.length ? [Math.min(...lengths), Math.max(...lengths)] : [0, 0];
-}
-
-/** How surfaces look: lit in space; flat with an ink rim (a slightly larger dark copy behind) in the plane. */
-class Look {
-  constructor(planar, unit, order) {
-    Object.assign(this, { planar, rim: 0.004 * unit, order, paints: [] });
-  }
-
-  material(tone) {
-    const options = { color: "#888888" };
-    const material = this.planar
-      ? flatMaterial(options)
-      : new THREE.MeshStandardMaterial({ ...options, roughness: 0.38, metalness: 0.1 });
-    this.paints.push({ material, tone });
-    return material;
-  }
-
-  mesh(geometry, material, level = 0) {
-    const mesh = new THREE.Mesh(geometry, material);
-    Object.assign(mesh, { castShadow: true, receiveShadow: true, frustumCulled: false });
-    mesh.renderOrder = this.planar ? this.order + level : 0;
-    return mesh;
-  }
-
-  /** A round bar along z from 0 to 1, to be stretched; returns the setter of its extent. */
-  bar(parent, radius, tone, level = 1) {
-    const geometry = this.planar
-      ? new THREE.PlaneGeometry(2, 1).rotateX(Math.PI / 2)
-      : new THREE.CylinderGeometry(1, 1, 1, 24).rotateX(Math.PI / 2);
-    geometry.translate(0, 0, 0.5);
-    const parts = [[this.mesh(geometry, this.material(tone), level), 0]];
-    if (this.planar && tone !== "rope") parts.push([this.mesh(geometry, this.material("rim"), level - 1), this.rim]);
-    for (const [mesh] of parts) parent.add(mesh);
-    return (from, to) => {
-      for (const [mesh, rim] of parts) {
-        mesh.visible = to > from;
-        mesh.position.z = from - rim;
-        mesh.scale.set(radius + rim, radius + rim, Math.max(to - from + 2 * rim, 1e-9));
-      }
-    };
-  }
-
-  retheme(theme) {
-    for (const { material, tone } of this.paints) material.color.set(theme[tone]);
-  }
 }
 
 function spring(look, parent, radius, [shortest, longest]) {
@@ -90,40 +49,12 @@ function damper(look, parent, radius, [shortest, longest]) {
   };
 }
 
-function arrow(look, parent, radius) {
-  const shaft = look.bar(parent, radius, "force");
-  const head = look.planar
-    ? new THREE.ShapeGeometry(
-        new THREE.Shape(
-          [
-            [0, 1],
-            [-1, 0],
-            [1, 0],
-          ].map(([x, y]) => new THREE.Vector2(x, y)),
-        ),
-      ).rotateX(Math.PI / 2)
-    : new THREE.ConeGeometry(1, 1, 28).rotateX(Math.PI / 2).translate(0, 0, 0.5);
-  const tip = look.mesh(head, look.material("force"), 2);
-  parent.add(tip);
-  return (length) => {
-    const reach = Math.min(7 * radius, 0.6 * length);
-    shaft(0, length - reach);
-    tip.position.z = length - reach;
-    const width = Math.min(2.6 * radius, 0.42 * reach);
-    tip.scale.set(width, width, reach);
-  };
-}
-
 const DRAWERS = {
   spring,
   damper,
-  arrow,
-  link(look, parent, radius) {
+  arrow: (look, parent, radius) => look.arrow(parent, radius, "load"),
+  link: (look, parent, radius) => {
     const bar = look.bar(parent, radius, "steel");
-    return (length) => bar(0, length);
-  },
-  rope(look, parent, radius) {
-    const bar = look.bar(parent, radius, "rope");
     return (length) => bar(0, length);
   },
 };
@@ -146,31 +77,58 @@ function eyes(look, parent, radius) {
 /** A recorded line, ready to be drawn at any time. */
 export function buildLine(line, recording, unit, index) {
   const look = new Look(recording.planar, unit, ORDER.line + 20 * index);
-  const group = new THREE.Group();
   const radius = line.radius ?? SLIM[line.kind] * unit;
-  const range = lengthRange(line, recording.t.length);
+  const drawn =
+    line.kind === "rope" ? rope(line, recording, look, radius) : straight(line, recording, look, radius, unit);
+  return { name: line.name, ...drawn, retheme: (theme) => look.retheme(theme), glow: (on) => look.glow(on) };
+}
+
+/** A line between two points, drawn along z and stretched. */
+function straight(line, recording, look, radius, unit) {
+  const group = new THREE.Group();
+  const range = lengthRange(line.points, recording.t.length);
   const setters = [DRAWERS[line.kind](look, group, radius, range)];
-  if (recording.planar && (line.kind === "spring" || line.kind === "damper")) {
+  if (recording.planar && (line.kind === "spring" || line.kind === "damper"))
     setters.push(eyes(look, group, 0.011 * unit));
-  }
   const [a, b] = [new THREE.Vector3(), new THREE.Vector3()];
   const update = (frame) => {
-    pointAt(line.a, frame, a);
-    const length = pointAt(line.b, frame, b).sub(a).length();
+    pointAt(line.points[0], frame, a);
+    const length = pointAt(line.points[1], frame, b).sub(a).length();
     group.visible = length > 1e-9 * unit;
     if (!group.visible) return;
     group.position.copy(a);
     aim(group, b.divideScalar(length), recording.planar);
     for (const set of setters) set(length);
   };
-  return { name: line.name, group, update, retheme: (theme) => look.retheme(theme) };
+  return { group, update };
+}
+
+/** A rope over several points: taut along straight lines; where it is longer than them it hangs, and is thinner. */
+function rope(line, recording, look, radius) {
+  const group = new THREE.Group();
+  const ends = line.points.map(() => new THREE.Vector3());
+  const tube = new Tube(ALONG * (ends.length - 1) + 1);
+  group.add(look.mesh(tube.geometry, look.material("rope"), 1));
+  const down = new THREE.Vector3(...recording.down);
+  if (!down.lengthSq()) down.set(0, recording.planar ? -1 : 0, recording.planar ? 0 : -1);
+  const state = { slack: false };
+  const update = (frame) => {
+    line.points.forEach((p, k) => pointAt(p, frame, ends[k]));
+    const length = ends.reduce((sum, p, k) => (k ? sum + p.distanceTo(ends[k - 1]) : 0), 0);
+    const rest = line.rest ? mixed(line.rest, frame) : 0;
+    state.slack = length < rest * (1 - 1e-9);
+    group.visible = Number.isFinite(length);
+    if (group.visible)
+      tube.lay(hang(ends, state.slack ? rest / length : 1, down, ALONG), radius * (state.slack ? LOOSE : 1));
+  };
+  return { group, update, state };
 }
 
 const [across, up] = [new THREE.Vector3(), new THREE.Vector3()];
 const basis = new THREE.Matrix4();
 
 /** Turn an object so that its z axis points along a unit vector; in the plane its y axis stays normal to the page. */
-function aim(object, direction, planar) {
+export function aim(object, direction, planar) {
   if (!planar) return object.quaternion.setFromUnitVectors(Z, direction);
   across.crossVectors(up.set(0, 0, -1), direction);
   return object.quaternion.setFromRotationMatrix(basis.makeBasis(across, up, direction));

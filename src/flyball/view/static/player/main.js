@@ -2,11 +2,16 @@
 import { controlBar } from "./bar.js";
 import { Clock } from "./clock.js";
 import { readRecording } from "./data.js";
+import { drawFigures, reportButtons } from "./report.js";
 import { motionPoints } from "./framing.js";
+import { Keys } from "./keys.js";
 import { Mechanism } from "./mechanism.js";
-import { axesMark, nameTip, scaleMark } from "./overlay.js";
+import { Names } from "./names.js";
+import { axesMark, partTip, scaleMark } from "./overlay.js";
 import { bodyLegend, channelPicker, summary } from "./panels.js";
 import { Plots } from "./plots.js";
+import { Card } from "./select.js";
+import { Shown } from "./shown.js";
 import { Stage } from "./stage.js";
 import { THEMES } from "./theme.js";
 
@@ -14,10 +19,11 @@ const INSET = { top: 58, right: 26, bottom: 56, left: 26 }; // px of the picture
 const GAP = 14; // px between the motion and the legend
 const ROOMY = 700; // px of width from which the legend of a few bodies opens by itself
 const FEW = 9;
+const VIEWS = ["iso", "front", "side", "top"];
 const find = (selector) => document.querySelector(selector);
 
-/** The length that symbols scale with: the recorded one, kept within what the picture can show. */
-function symbolUnit(recording) {
+/** The motion's extent, and the length that symbols scale with: the recorded one, kept within what can be seen. */
+function measures(recording) {
   const points = motionPoints({ ...recording, joints: [] }, 0);
   const low = points[0].clone();
   const high = points[0].clone();
@@ -26,15 +32,18 @@ function symbolUnit(recording) {
     high.max(point);
   }
   const extent = high.distanceTo(low);
-  return extent > 0 ? Math.min(Math.max(recording.size, extent / 7), extent / 2) : recording.size;
+  const { size } = recording;
+  return extent > 0 ? { extent, unit: Math.min(Math.max(size, extent / 7), extent / 2) } : { extent: size, unit: size };
 }
 
-/** What the page's address asks for, as #t=5&theme=dark&view=top&play=1. */
+/** What the page's address asks for, as #t=5&theme=dark&view=top&play=1&show=reactions,names&select=rod. */
 function wishes() {
   const hash = new URLSearchParams(location.hash.slice(1));
   const time = hash.has("t") ? Number(hash.get("t")) : null;
   const theme = Object.hasOwn(THEMES, hash.get("theme")) ? hash.get("theme") : null;
-  return { time: Number.isFinite(time) ? time : null, theme, view: hash.get("view"), play: hash.get("play") };
+  const show = hash.has("show") ? hash.get("show").split(",") : null;
+  const [view, play, select, arrows] = ["view", "play", "select", "arrows"].map((name) => hash.get(name));
+  return { time: Number.isFinite(time) ? time : null, theme, show, view, play, select, arrows: Number(arrows) || 1 };
 }
 
 /** Switch between the themes; the first one is the address's or the system's. */
@@ -58,15 +67,6 @@ function message(text) {
   const box = find(".message");
   box.textContent = text;
   box.hidden = false;
-}
-
-/** Camera presets; in the plane there is one, which fits the motion into the picture. */
-function viewButtons(stage) {
-  for (const button of document.querySelectorAll(".views button")) {
-    button.hidden = stage.planar ? button.value !== "iso" : false;
-    if (stage.planar) button.textContent = "Fit";
-    button.addEventListener("click", () => stage.look(button.value, true));
-  }
 }
 
 function begin(clock, { time, play }) {
@@ -99,30 +99,110 @@ function margins() {
   };
 }
 
-/** Everything that shows the mechanism, and what sets it to a time. */
+/** The picture, without what steers it. */
 function buildPicture(recording) {
-  const unit = symbolUnit(recording);
-  const mechanism = new Mechanism(recording, unit);
+  const { unit, extent } = measures(recording);
+  const mechanism = new Mechanism(recording, unit, extent);
   const stage = new Stage(find(".stage"), mechanism, motionPoints(recording, unit), margins);
-  const redraw = () => (stage.dirty = true);
   if (!stage.renderer) message("No picture: this browser has WebGL switched off. Plots and the time cursor work.");
   find(".stage").addEventListener("stage-lost", () =>
     message("The browser took the picture's WebGL away. Reload the page."),
   );
-  const legend = bodyLegend(find(".legend ul"), find(".legend > button"), mechanism.bodies, {
-    onShow: (index, on) => redraw(mechanism.show(index, on)),
-    onTrail: (index, on) => redraw(mechanism.trail(index, on)),
-    onPoint: (index, on) => redraw(mechanism.bodies[index].glow(on)),
+  return { mechanism, stage, names: new Names(find(".names"), mechanism) };
+}
+
+/** One part is selected, or none: it glows, its card is open, the camera may go along. */
+function selection({ mechanism, stage }, card, legend, follow, frame) {
+  const state = { part: null };
+  const glow = (name, on) => {
+    for (const part of mechanism.parts(name)) part.glow(on || part.name === state.part?.name);
+    stage.dirty = true;
+  };
+  const select = (part) => {
+    const before = state.part;
+    state.part = part;
+    if (before) glow(before.name, false);
+    if (part) glow(part.name, true);
+    card.show(part, frame());
+    legend.mark(part?.name);
+    follow.disabled = part?.category !== "body";
+    if (stage.followed && follow.disabled) toggleFollow(false);
+  };
+  const toggleFollow = (on = !stage.followed) => {
+    stage.follow(on && state.part?.category === "body" ? state.part : null);
+    follow.setAttribute("aria-pressed", String(Boolean(stage.followed)));
+  };
+  follow.addEventListener("click", () => toggleFollow());
+  return { state, glow, select, toggleFollow };
+}
+
+/** A click without a drag selects what lies under it. */
+function clicks(stage, onPick) {
+  const canvas = stage.element.querySelector("canvas");
+  let from = null;
+  canvas.addEventListener(
+    "pointerdown",
+    ({ clientX, clientY, button }) => (from = button === 0 ? [clientX, clientY] : null),
+  );
+  canvas.addEventListener("pointerup", ({ clientX, clientY }) => {
+    if (!from || Math.hypot(clientX - from[0], clientY - from[1]) > 4) return;
+    const { left, top } = stage.element.getBoundingClientRect();
+    onPick(stage.pick(clientX - left, clientY - top));
   });
-  legend.open(innerWidth >= ROOMY && mechanism.bodies.length <= FEW);
-  stage.resize();
-  nameTip(find(".stage"), find(".tip"), stage, (body, on) => redraw(body.glow(on)));
-  viewButtons(stage);
-  return { mechanism, stage };
+}
+
+/** Camera presets; in the plane there is one, which fits the motion into the picture. */
+function viewButtons(stage, keys, chosen) {
+  const go = (view) => {
+    chosen.toggleFollow(false);
+    stage.look(stage.planar ? "iso" : view, true);
+  };
+  for (const button of document.querySelectorAll(".views [value]")) {
+    button.hidden = stage.planar && button.value !== "fit";
+    button.addEventListener("click", () => go(button.value));
+  }
+  if (!stage.planar)
+    VIEWS.forEach((view, k) =>
+      keys.add(String(k + 1), k ? "" : "views: isometric, front, side, top", () => go(view), "1 2 3 4"),
+    );
+  keys.add("0", "fit the motion into the picture", () => go("fit"));
+}
+
+function menu(button, panel) {
+  const open = (on) => {
+    panel.hidden = !on;
+    button.setAttribute("aria-expanded", String(on));
+  };
+  button.addEventListener("click", () => open(panel.hidden));
+  document.addEventListener(
+    "pointerdown",
+    ({ target }) => !panel.contains(target) && !button.contains(target) && open(false),
+  );
+  panel.addEventListener("keydown", ({ key }) => key === "Escape" && (open(false), button.focus()));
+}
+
+/** The keys that switch things on and off. */
+function pictureKeys(keys, shown, chosen, theme) {
+  keys.add("f", "let the camera follow the selected body", () => chosen.toggleFollow(), "F");
+  keys.add("r", "joint reactions", () => shown.toggle("reactions"), "R");
+  keys.add("e", "forces of springs, motors and drivers", () => shown.toggle("elements"), "E");
+  keys.add("[ ,", "", () => shown.scale(Math.max(shown.targets.mechanism.arrows.factor / 1.5, 0.1)));
+  keys.add(
+    "] .",
+    "shorter or longer arrows",
+    () => shown.scale(Math.min(shown.targets.mechanism.arrows.factor * 1.5, 10)),
+    "[ ]",
+  );
+  keys.add("a", "axes of joints and frames", () => shown.toggle("frames"), "A");
+  keys.add("b", "axes of bodies", () => shown.toggle("bodies"), "B");
+  keys.add("n", "names", () => shown.toggle("names"), "N");
+  keys.add("g", "grid", () => shown.toggle("grid"), "G");
+  keys.add("d", "light or dark", () => theme.click(), "D");
+  keys.add("Escape", "select nothing", () => chosen.select(null), "Esc");
 }
 
 /** Draw whenever something has changed, for as long as the page lives. */
-function keepDrawing(clock, stage) {
+function keepDrawing(clock, { stage, names }) {
   const turnAxes = axesMark(find(".axes"), stage.planar);
   const showScale = scaleMark(find(".scale"));
   const draw = (now) => {
@@ -131,11 +211,36 @@ function keepDrawing(clock, stage) {
       stage.camera.updateMatrixWorld();
       turnAxes(stage.camera);
       showScale(stage.scale);
+      names.update(stage.camera, stage.size);
     }
     document.body.dataset.ready ??= "";
     requestAnimationFrame(draw);
   };
   requestAnimationFrame(draw);
+}
+
+/** The legend of bodies, the card, and what selects. */
+function choosing(picture, recording, plots, now) {
+  const { mechanism, stage } = picture;
+  const redraw = () => (stage.dirty = true);
+  const card = new Card(find(".card"), recording, {
+    onClose: () => chosen.select(null),
+    onPlot: (channel) => plots.picker.toggle(channel),
+    isPlotted: (channel) => plots.picker.has(channel),
+  });
+  const legend = bodyLegend(find(".legend ul"), find(".legend > button"), mechanism, {
+    onShow: (index, on) => redraw(mechanism.show(index, on)),
+    onTrail: (index, on) => redraw(mechanism.trace(index, on)),
+    onPath: (trail, on) => redraw(trail && (trail.root.visible = on)),
+    onPoint: (index, on) => chosen.glow(mechanism.bodies[index].name, on),
+    onSelect: (index) => chosen.select(mechanism.bodies[index]),
+  });
+  const chosen = selection(picture, card, legend, find(".follow"), now);
+  legend.open(innerWidth >= ROOMY && mechanism.bodies.length + mechanism.trails.length <= FEW);
+  stage.resize();
+  partTip(find(".stage"), find(".tip"), stage, (part, on) => chosen.glow(part.name, on));
+  clicks(stage, chosen.select);
+  return { card, chosen };
 }
 
 /** Start the player on the bytes of a recording. */
@@ -144,36 +249,53 @@ export function start(buffer) {
   const { t } = recording;
   const wanted = wishes();
   describe(recording);
-  const { mechanism, stage } = buildPicture(recording);
+  const picture = buildPicture(recording);
+  const { mechanism, stage } = picture;
   const clock = new Clock(t[0], t.at(-1), () => update());
-  const plots = new Plots(find(".plots"), t, (time) => clock.seek(time));
-  const refreshBar = controlBar(find(".bar"), clock);
+  const seek = (time) => clock.seek(time);
+  const plots = new Plots(find(".plots"), t, seek);
+  const figures = drawFigures(recording, seek);
+  const keys = new Keys(find(".player"), find(".help"), !find(".report"));
+  const refreshBar = controlBar(find(".bar"), clock, keys);
+  plots.picker = channelPicker(
+    find(".picker"),
+    find(".pick"),
+    recording.channels,
+    recording.shown,
+    (channels, together) => plots.show(channels, together),
+  );
+  const { card, chosen } = choosing(picture, recording, plots, () => mechanism.arrows.frame);
+  const shown = new Shown(find(".menu"), find(".forces"), picture, () => (stage.dirty = true));
+  for (const name of wanted.show ?? recording.show) shown.set(name, true);
+  stage.grid.visible = Boolean(shown.state.grid);
+  shown.scale(wanted.arrows);
   const update = () => {
     const frame = mechanism.seek(clock.time);
-    plots.seek(clock.time, frame);
+    for (const panel of [plots, ...figures]) panel.seek(clock.time, frame);
+    card.seek(frame);
     refreshBar();
     stage.dirty = true;
   };
-  channelPicker(find(".picker"), find(".pick"), recording.channels, recording.shown, (channels, together) =>
-    plots.show(channels, together),
-  );
   summary(find(".summary"), recording.notes);
   themeSwitch(find(".theme"), wanted.theme, (theme) => {
-    mechanism.retheme(theme);
-    stage.retheme(theme);
-    plots.retheme();
+    for (const part of [mechanism, stage, plots, ...figures]) part.retheme(theme);
   });
-  if (wanted.view && !stage.planar && find(`.views button[value="${CSS.escape(wanted.view)}"]`))
-    stage.look(wanted.view);
+  menu(find(".show"), find(".menu"));
+  viewButtons(stage, keys, chosen);
+  pictureKeys(keys, shown, chosen, find(".theme"));
+  find(".ask").addEventListener("click", () => keys.help());
+  reportButtons(stage);
+  if (VIEWS.includes(wanted.view) && !stage.planar) stage.look(wanted.view);
   document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
   update();
   begin(clock, wanted);
-  window.flyball = hooks(clock, mechanism, stage, recording);
-  keepDrawing(clock, stage);
+  if (wanted.select) chosen.select(mechanism.parts(wanted.select)[0] ?? null);
+  window.flyball = hooks(clock, picture, recording, shown, chosen);
+  keepDrawing(clock, picture);
 }
 
 /** What a script on the page may ask for; tests do. */
-function hooks(clock, mechanism, stage, recording) {
+function hooks(clock, { mechanism, stage }, recording, shown, chosen) {
   return {
     seek(time) {
       clock.play(false);
@@ -186,5 +308,22 @@ function hooks(clock, mechanism, stage, recording) {
     bodies: () => recording.bodies.map((body) => body.name),
     look: (view) => stage.look(view),
     webgl: () => Boolean(stage.renderer),
+    show: (name, on = true) => shown.set(name, on),
+    shown: () => Object.keys(shown.state).filter((name) => shown.state[name]),
+    arrows: () => mechanism.arrows.list(),
+    axes: () => mechanism.triads.list(),
+    select: (name) => chosen.select(mechanism.parts(name)[0] ?? null),
+    selected: () => chosen.state.part?.name ?? null,
+    paths: () =>
+      mechanism.trails.map(({ name, trail }) => ({ name, points: trail?.points.map((p) => p.toArray()) ?? [] })),
+    camera: () => ({ position: stage.camera.position.toArray(), target: stage.controls.target.toArray() }),
+    slack: () => mechanism.lines.filter(({ state }) => state?.slack).map(({ name }) => name),
+    /** Where something on a body is in the picture [px]. */
+    pixel(body, position = [0, 0, 0]) {
+      const p = stage.camera.position.clone();
+      mechanism.place({ body, position }, p).project(stage.camera);
+      const [width, height] = stage.size;
+      return [((p.x + 1) * width) / 2, ((1 - p.y) * height) / 2];
+    },
   };
 }

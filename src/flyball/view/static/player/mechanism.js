@@ -1,26 +1,34 @@
 // The drawn mechanism: every body, line and joint of a recording as three.js objects, set to any time.
 import * as THREE from "three";
-import { frameAt, poseAt, sampleNumbers } from "./data.js";
+import { Arrows } from "./arrows.js";
+import { frameAt, pointAt, poseAt } from "./data.js";
 import { ORDER, flatBody, stroke } from "./flats.js";
 import { flatJoint } from "./joints2d.js";
 import { solidJoint } from "./joints3d.js";
 import { buildLine } from "./lines.js";
 import { solidBody } from "./solids.js";
-import { bodyColours } from "./theme.js";
+import { bodyColours, GROUND } from "./theme.js";
+import { Trail } from "./trails.js";
+import { Triads } from "./triads.js";
 
-const TRAIL = 1500; // points of a path, at most
+const ORIGIN = [0, 0, 0];
 
 export class Mechanism {
-  /** Build everything once; `unit` is the length that symbols scale with. */
-  constructor(recording, unit) {
-    this.recording = recording;
-    this.unit = unit;
+  /** Build everything once; symbols scale with `unit`, arrows with the `extent` of the motion. */
+  constructor(recording, unit, extent) {
+    Object.assign(this, { recording, unit });
     this.root = new THREE.Group();
+    this.overlay = new THREE.Group(); // drawn on top of everything else
     const colours = bodyColours(recording.bodies);
     this.bodies = recording.bodies.map((body, k) => this.#body(body, colours[k], k));
-    this.lines = recording.lines.map((line, k) => buildLine(line, recording, unit, k));
+    this.byName = new Map(this.bodies.map((body) => [body.name, body]));
+    this.lines = recording.lines.map((line, k) => this.#line(line, k));
     this.joints = recording.joints.map((joint, k) => this.#joint(joint, k));
-    for (const line of this.lines) this.root.add(line.group);
+    this.curves = recording.curves.map((curve) => this.#curve(curve));
+    this.trails = recording.paths.map((path) => ({ name: path.name, ...this.#trail(path.body, path.position) }));
+    this.arrows = new Arrows(recording, unit, extent, (rider, out) => this.place(rider, out));
+    this.triads = new Triads(recording, unit, this.bodies);
+    this.overlay.add(this.arrows.root, this.triads.root);
     this.seek(recording.t[0]);
   }
 
@@ -28,16 +36,64 @@ export class Mechanism {
     const drawn = this.recording.planar ? flatBody(body, colour, index) : solidBody(body, colour);
     this.root.add(drawn.group);
     if (drawn.shade) this.root.add(drawn.shade);
-    drawn.group.traverse((object) => (object.userData.body = index));
-    return { ...drawn, name: body.name, colour, data: body, shown: true, trail: null };
+    const part = { ...drawn, name: body.name, category: "body", colour, data: body, shown: true, trail: null };
+    drawn.group.traverse((object) => (object.userData.part = part));
+    return part;
+  }
+
+  #line(line, index) {
+    const part = { ...buildLine(line, this.recording, this.unit, index), category: "line" };
+    part.group.traverse((object) => (object.userData.part = part));
+    this.root.add(part.group);
+    return part;
   }
 
   #joint(joint, index) {
     const make = this.recording.planar ? flatJoint : solidJoint;
-    const drawn = make(joint, this.recording, this.unit, index);
-    const carrier = this.bodies.find((body) => body.name === joint.body);
-    (carrier?.group ?? this.root).add(drawn.group);
-    return drawn;
+    const carrier = this.byName.get(joint.body);
+    const drawn = make(joint, this.recording, this.unit, index, carrier?.colour ?? GROUND);
+    const part = { ...drawn, name: joint.name, category: "joint", data: joint };
+    part.group.traverse((object) => (object.userData.part = part));
+    (carrier?.group ?? this.root).add(part.group);
+    return part;
+  }
+
+  /** A curve on its body: a thin line in the plane, a wire in space. */
+  #curve(curve) {
+    const n = curve.points.length / 3;
+    const points = Array.from({ length: n }, (_, i) => pointAt(curve.points, { i, j: i, f: 0 }, new THREE.Vector3()));
+    const carrier = this.byName.get(curve.body);
+    const flat = this.recording.planar;
+    let object;
+    if (flat) {
+      const order = carrier ? ORDER.body + 3 * this.bodies.indexOf(carrier) + 2 : ORDER.guide;
+      object = stroke(points, { color: GROUND, width: 2.4, order, closed: curve.closed });
+    } else {
+      const wire = new THREE.TubeGeometry(
+        new THREE.CatmullRomCurve3(points, curve.closed),
+        2 * n,
+        0.006 * this.unit,
+        8,
+      );
+      object = new THREE.Mesh(wire, new THREE.MeshStandardMaterial({ color: GROUND, roughness: 0.4 }));
+      object.castShadow = true;
+    }
+    (carrier?.group ?? this.root).add(object);
+    return { retheme: (theme) => object.material.color.set(flat ? theme.ink : theme.metal) };
+  }
+
+  #trail(name, position) {
+    const body = this.byName.get(name) ?? { group: new THREE.Group(), data: null, colour: GROUND };
+    const trail = body.data ? new Trail(body, position, this.recording, this.unit) : null;
+    if (trail) this.root.add(trail.root);
+    return { trail, colour: body.colour };
+  }
+
+  /** Where something is now that rides on a body. */
+  place({ body, position }, out) {
+    const group = this.byName.get(body)?.group;
+    out.set(...position);
+    return group ? out.applyQuaternion(group.quaternion).add(group.position) : out;
   }
 
   /** Put everything where it is at a time. */
@@ -53,6 +109,9 @@ export class Mechanism {
       shade.visible = group.visible;
     }
     for (const line of this.lines) line.update(frame);
+    for (const { trail } of [...this.bodies, ...this.trails]) trail?.seek();
+    this.arrows.seek(frame);
+    this.triads.seek();
     return frame;
   }
 
@@ -62,7 +121,8 @@ export class Mechanism {
   }
 
   retheme(theme) {
-    for (const part of [...this.bodies, ...this.lines, ...this.joints]) part.retheme(theme);
+    const parts = [...this.bodies, ...this.lines, ...this.joints, ...this.curves, this.arrows, this.triads];
+    for (const part of parts) part.retheme(theme);
   }
 
   show(index, on) {
@@ -73,36 +133,29 @@ export class Mechanism {
   }
 
   /** The path of a body's origin, on or off. */
-  trail(index, on) {
+  trace(index, on) {
     const body = this.bodies[index];
-    if (!body.trail) {
-      const { p } = body.data;
-      const n = p.length / 3;
-      const points = sampleNumbers(n, TRAIL).map((i) => new THREE.Vector3(p[i], p[n + i], p[2 * n + i]));
-      const flat = this.recording.planar;
-      body.trail = stroke(
-        points.filter((point) => Number.isFinite(point.x)),
-        {
-          color: body.colour,
-          width: 2,
-          order: flat ? ORDER.trail : 0,
-          depthTest: !flat,
-          opacity: 0.75,
-        },
-      );
-      this.root.add(body.trail);
-    }
-    body.trail.visible = on;
+    body.trail ??= this.#trail(body.name, ORIGIN).trail;
+    body.trail.root.visible = on;
+    body.trail.seek();
   }
 
-  /** The body under a ray, or null; in the plane the one painted last. */
+  /** Every part of a name that can be lit up: a joint may be drawn with two symbols. */
+  parts(name) {
+    return [...this.bodies, ...this.lines, ...this.joints].filter((part) => part.name === name);
+  }
+
+  /** The part under a ray, or null; in the plane the one painted last. */
   pick(raycaster) {
     const meshes = [];
-    for (const { group } of this.bodies) {
-      if (group.visible) group.traverse((object) => object.isMesh && !object.isLineSegments2 && meshes.push(object));
-    }
-    const hits = raycaster.intersectObjects(meshes, false).filter(({ object }) => object.userData.body !== undefined);
+    const visit = (object) => {
+      if (!object.visible) return;
+      if (object.isMesh && !object.isLineSegments2 && object.userData.part) meshes.push(object);
+      object.children.forEach(visit);
+    };
+    visit(this.root);
+    const hits = raycaster.intersectObjects(meshes, false);
     if (this.recording.planar) hits.sort((a, b) => b.object.renderOrder - a.object.renderOrder);
-    return hits.length ? this.bodies[hits[0].object.userData.body] : null;
+    return hits[0]?.object.userData.part ?? null;
   }
 }

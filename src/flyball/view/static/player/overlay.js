@@ -39,8 +39,8 @@ export function scaleMark(box) {
   };
 }
 
-/** The name of the body under the pointer. */
-export function nameTip(stageBox, tip, stage, onPoint) {
+/** The name of the part under the pointer. */
+export function partTip(stageBox, tip, stage, onPoint) {
   let pointed = null;
   const leave = () => {
     if (pointed) onPoint(pointed, false);
@@ -51,15 +51,15 @@ export function nameTip(stageBox, tip, stage, onPoint) {
     if (event.buttons || event.target.tagName !== "CANVAS" || event.pointerType === "touch") return leave();
     const { left, top, width } = stageBox.getBoundingClientRect();
     const [x, y] = [event.clientX - left, event.clientY - top];
-    const body = stage.pick(x, y);
-    if (body !== pointed) {
+    const part = stage.pick(x, y);
+    if (part !== pointed) {
       leave();
-      pointed = body;
-      if (body) onPoint(body, true);
+      pointed = part;
+      if (part) onPoint(part, true);
     }
-    tip.hidden = !body;
-    if (!body) return;
-    tip.textContent = body.name;
+    tip.hidden = !part;
+    if (!part) return;
+    tip.textContent = part.name;
     const flip = x > width - tip.offsetWidth - 24;
     tip.style.transform = `translate(${flip ? x - tip.offsetWidth - 8 : x + 14}px, ${y + 12}px)`;
   });

@@ -1,5 +1,5 @@
 // The panels around the picture: channels to choose from, bodies, and the summary.
-import { element } from "./format.js";
+import { element, pretty } from "./format.js";
 
 const MOST = 300; // channels listed at once
 
@@ -28,7 +28,7 @@ export function channelPicker(panel, button, channels, shown, onChange) {
       { className: "choice" },
       box,
       name,
-      element("span", { className: "unit", textContent: channel.unit }),
+      element("span", { className: "unit", textContent: pretty(channel.unit) }),
     );
   };
   const fill = () => {
@@ -71,51 +71,95 @@ export function channelPicker(panel, button, channels, shown, onChange) {
     button.focus();
   });
   report();
+  return {
+    has: (channel) => chosen.has(channel),
+    toggle(channel) {
+      if (!chosen.delete(channel)) chosen.add(channel);
+      if (!panel.hidden) fill();
+      report();
+    },
+  };
 }
 
-/** The legend: a row for each body, to hide it or to show its path. */
-export function bodyLegend(box, toggle, bodies, { onShow, onTrail, onPoint }) {
+const EYE = "M1.500 8S4 3.500 8 3.500 14.500 8 14.500 8 12 12.500 8 12.500 1.500 8 1.500 8z";
+
+/** An eye, as a picture. */
+function eye() {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  svg.innerHTML = `<path d="${EYE}"/><circle cx="8" cy="8" r="2" class="full"/>`;
+  return svg;
+}
+
+function switchButton(className, title, on, onClick, ...children) {
+  const button = element(
+    "button",
+    { type: "button", className, title, aria: { pressed: String(on), label: title } },
+    ...children,
+  );
+  button.addEventListener("click", () => {
+    const pressed = button.getAttribute("aria-pressed") !== "true";
+    button.setAttribute("aria-pressed", String(pressed));
+    onClick(pressed);
+  });
+  return button;
+}
+
+/** The legend: a row for each body, to select it, to hide it, or to show its path; then the paths asked for. */
+export function bodyLegend(box, toggle, { bodies, trails }, { onShow, onTrail, onPoint, onSelect, onPath }) {
+  const swatch = (colour, className = "swatch") => {
+    const mark = element("span", { className });
+    mark.style.background = colour;
+    return mark;
+  };
   const rows = bodies.map(({ name, colour }, index) => {
-    const swatch = element("span", { className: "swatch" });
-    swatch.style.background = colour;
-    const row = { shown: true, trail: false };
-    const show = element(
+    const text = element("span", { className: "name", textContent: name });
+    const select = element(
       "button",
-      { type: "button", className: "body", title: `Hide or show ${name}`, aria: { pressed: "true" } },
-      swatch,
-      element("span", { className: "name", textContent: name }),
+      { type: "button", className: "body", title: `Select ${name}` },
+      swatch(colour),
+      text,
     );
-    const trail = element("button", {
-      type: "button",
-      className: "trail",
-      title: `Path of the origin of ${name}`,
-      textContent: "path",
-      aria: { pressed: "false" },
-    });
-    show.addEventListener("click", () => {
-      row.shown = !row.shown;
-      show.setAttribute("aria-pressed", String(row.shown));
-      onShow(index, row.shown);
-    });
-    trail.addEventListener("click", () => {
-      row.trail = !row.trail;
-      trail.setAttribute("aria-pressed", String(row.trail));
-      onTrail(index, row.trail);
-    });
-    const item = element("li", {}, show, trail);
+    select.addEventListener("click", () => onSelect(index));
+    const trail = switchButton("trail", `Path of the origin of ${name}`, false, (on) => onTrail(index, on), "path");
+    const item = element("li", {}, select, trail);
+    const show = switchButton(
+      "eye",
+      `Show ${name}`,
+      true,
+      (on) => {
+        item.classList.toggle("off", !on);
+        onShow(index, on);
+      },
+      eye(),
+    );
+    item.append(show);
     item.addEventListener("pointerenter", () => onPoint(index, true));
     item.addEventListener("pointerleave", () => onPoint(index, false));
     return item;
   });
-  box.append(...rows);
+  const paths = trails.map(({ name, colour, trail }) => {
+    const text = element("span", { className: "name", textContent: name });
+    const label = element("span", { className: "body" }, swatch(colour, "swatch line"), text);
+    return element(
+      "li",
+      {},
+      label,
+      switchButton("eye", `Show the path ${name}`, true, (on) => onPath(trail, on), eye()),
+    );
+  });
+  box.append(...rows, ...paths);
   toggle.querySelector("span").textContent = bodies.length === 1 ? "1 body" : `${bodies.length} bodies`;
   const open = (on) => {
     box.hidden = !on;
     toggle.setAttribute("aria-expanded", String(on));
   };
   toggle.addEventListener("click", () => open(box.hidden));
-  return { open };
+  return { open, mark: (name) => rows.forEach((row, k) => row.classList.toggle("selected", bodies[k].name === name)) };
 }
+
+const unbroken = (text) => text.replace(/(\d)e-(\d)/g, "$1e\u2011$2"); // a number stays on one line
 
 /** The summary notes as a list of terms. */
 export function summary(details, notes) {
@@ -125,7 +169,7 @@ export function summary(details, notes) {
     .querySelector("dl")
     .append(
       ...entries.map(([term, text]) =>
-        element("div", {}, element("dt", { textContent: term }), element("dd", { textContent: text })),
+        element("div", {}, element("dt", { textContent: term }), element("dd", { textContent: unbroken(text) })),
       ),
     );
 }

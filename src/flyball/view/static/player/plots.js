@@ -1,19 +1,50 @@
 // Plots of channels over time, with one time cursor through all of them; pointing at a time goes there.
 import uPlot from "uplot";
 import { mixed } from "./data.js";
-import { element, shortNumber } from "./format.js";
+import { element, pretty, shortNumber } from "./format.js";
 import { CURVES } from "./theme.js";
 
 const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
-const LOWEST = 92; // px
+const LOWEST = 72; // px
 const HIGHEST = 320;
 const MOST = CURVES.length; // curves in one plot
+const DASHES = [undefined, [7, 7], [2, 5], [10, 4, 2, 4]]; // of a curve that lies on none, one, two, ... others
+const SPREAD = 15; // a plot's height over the least that a curve in it varies by, at most
+const LEVEL = 2e-3;
+const CLOSE = 0.006; // curves nearer than this part of the plot's height hide one another
 
-/** Channels that share a plot: those of one unit, or each for itself. */
+/** The least and the largest of a channel's values. */
+function rangeOf({ values }) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const v of values) {
+    if (v < low) low = v;
+    if (v > high) high = v;
+  }
+  return [low, high];
+}
+
+/** A channel that hardly changes, measured by its own size, is a straight line anyway. */
+const level = ([low, high]) => high - low <= LEVEL * Math.max(Math.abs(low), Math.abs(high));
+
+/** Whether all of these channels can be seen in one plot: none of them would be all but a straight line there. */
+function comparable(channels) {
+  const ranges = channels.map(rangeOf);
+  const [low, high] = [Math.min(...ranges.map(([a]) => a)), Math.max(...ranges.map(([, b]) => b))];
+  const noise = 1e-9 * Math.max(Math.abs(low), Math.abs(high));
+  const spans = ranges
+    .filter((range) => !level(range))
+    .map(([a, b]) => b - a)
+    .filter((span) => span > noise);
+  return !spans.length || high - low <= SPREAD * Math.min(...spans);
+}
+
+/** Channels that share a plot: those of one unit that can be seen beside one another, or each for itself. */
 export function grouped(channels, together) {
   const groups = [];
+  const fits = (group, channel) =>
+    group[0].unit === channel.unit && group.length < MOST && comparable([...group, channel]);
   for (const channel of channels) {
-    const home = together && groups.find((group) => group[0].unit === channel.unit && group.length < MOST);
+    const home = together && groups.find((group) => fits(group, channel));
     if (home) home.push(channel);
     else groups.push([channel]);
   }
@@ -34,18 +65,57 @@ function valueRange(_, low, high) {
   return [low - room, high + room];
 }
 
-class Plot {
-  /** One plot with its own head line, cursor and markers. */
-  constructor(parent, channels, times, onSeek) {
-    Object.assign(this, { channels, times });
+/** The power of ten to take out of an axis: none where plain numbers do. */
+function powerOf(values) {
+  const power = Math.floor(Math.log10(Math.max(...values.filter(Number.isFinite).map(Math.abs), 0)));
+  return Number.isFinite(power) && (power < -3 || power > 4) ? power : 0;
+}
+
+const raised = (power) => [...String(power)].map((c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]).join("");
+
+/** Labels of ticks, with as many digits as tell them apart. */
+function ticks(splits, power) {
+  const given = splits.filter((value) => value !== null).map((value) => value / 10 ** power);
+  const step = given.length > 1 ? Math.abs(given[1] - given[0]) : Math.abs(given[0]) || 1;
+  const digits = Math.min(Math.max(0, Math.ceil(-Math.log10(step) - 1e-9)), 12);
+  const exact =
+    [digits, digits + 1, digits + 2].find((d) => Math.abs(Number(step.toFixed(d)) - step) < 1e-6 * step) ?? digits;
+  return splits.map((value) =>
+    value === null
+      ? ""
+      : (value / 10 ** power)
+          .toFixed(exact)
+          .replace("-", "−")
+          .replace(/^−(0(\.0*)?)$/, "$1"),
+  );
+}
+
+/** For each curve, how many of those before it it lies on: dashed, it lets them show. */
+export function hidden(channels) {
+  const ranges = channels.map(rangeOf);
+  const [low, high] = [Math.min(...ranges.map(([a]) => a)), Math.max(...ranges.map(([, b]) => b))];
+  const near = Math.max(CLOSE * (high - low), 1e-12 * Math.max(Math.abs(low), Math.abs(high)));
+  const same = (a, b) => a.values.every((v, k) => !(Math.abs(v - b.values[k]) > near));
+  return channels.map((channel, k) => channels.slice(0, k).filter((other) => same(channel, other)).length);
+}
+
+export class Plot {
+  /** One plot with its own head line, cursor and markers; `title` says what its axis shows. */
+  constructor(parent, channels, times, onSeek, title = "") {
+    Object.assign(this, { channels, times, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
     this.values = channels.map(() => element("output", { className: "value" }));
     const names = channels.map((channel, k) => {
       const swatch = element("span", { className: "swatch" });
-      swatch.style.background = CURVES[k];
+      const colour = CURVES[k % CURVES.length];
+      swatch.style.background = this.dashes[k]
+        ? `repeating-linear-gradient(to right, ${colour} 0 4px, transparent 4px 6px)`
+        : colour;
       const name = element("span", { className: "name", textContent: channel.name, title: channel.name });
       return element("span", { className: "curve" }, swatch, name, this.values[k]);
     });
-    const unit = element("span", { className: "unit", textContent: channels[0].unit ? `[${channels[0].unit}]` : "" });
+    this.power = powerOf(channels.map(rangeOf).flat());
+    const shown = [this.power ? `10${raised(this.power)}` : "", pretty(channels[0].unit)].filter(Boolean).join(" ");
+    const unit = element("span", { className: "unit", textContent: `${title} ${shown ? `[${shown}]` : ""}`.trim() });
     const head = element("div", { className: "plot-head" }, element("div", { className: "curves" }, ...names), unit);
     this.box = element("div", { className: "plot-box" });
     const label = `Plot of ${channels.map((channel) => channel.name).join(", ")} over time`;
@@ -62,7 +132,8 @@ class Plot {
       grid: { stroke: () => css("--line"), width: 1 },
       ticks: { show: false },
     };
-    const labels = (_, splits) => splits.map((value) => (value === null ? "" : shortNumber(value)));
+    const labels = (_, splits) => ticks(splits, 0);
+    const values = (_, splits) => ticks(splits, this.power);
     return {
       width: 300,
       height: 150,
@@ -75,12 +146,13 @@ class Plot {
       },
       axes: [
         { ...axis, size: 22, gap: 4, space: 56, values: labels },
-        { ...axis, size: 54, gap: 6, space: (_, __, ___, ____, height) => Math.max(16, height / 8), values: labels },
+        { ...axis, size: 54, gap: 6, space: (_, __, ___, ____, height) => Math.max(16, height / 8), values },
       ],
       series: [
         {},
         ...this.channels.map((_, k) => ({
-          stroke: CURVES[k],
+          stroke: CURVES[k % CURVES.length],
+          dash: this.dashes[k],
           width: 1.6,
           pxAlign: 0,
           points: { show: this.times.length === 1 },
@@ -94,7 +166,7 @@ class Plot {
     this.cursor = element("div", { className: "cursor" });
     this.markers = this.channels.map((_, k) => {
       const marker = element("div", { className: "marker" });
-      marker.style.background = CURVES[k];
+      marker.style.background = CURVES[k % CURVES.length];
       return marker;
     });
     over.append(this.cursor, ...this.markers);

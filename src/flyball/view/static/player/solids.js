@@ -25,18 +25,38 @@ export function cylinderGeometry(radius, length, soft = 0.08) {
   return turned(profile);
 }
 
-function plateGeometry(outline, thickness) {
-  const shape = new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y)));
-  const bevel = thickness * 0.12;
+/** A flat part along z, its edges softened. */
+export function extruded(shape, thickness) {
+  const bevel = thickness * 0.06;
   const geometry = new THREE.ExtrudeGeometry(shape, {
     depth: thickness - 2 * bevel,
     bevelThickness: bevel,
     bevelSize: bevel,
     bevelOffset: -bevel,
     bevelSegments: 2,
+    curveSegments: 32,
   });
   return geometry.translate(0, 0, bevel - thickness / 2);
 }
+
+function plateGeometry(outline, thickness) {
+  return extruded(new THREE.Shape(outline.map(([x, y]) => new THREE.Vector2(x, y))), thickness);
+}
+
+/** Columns x, y, z one after the other become triples. */
+function triples(columns) {
+  const n = columns.length / 3;
+  return columns.map((_, k) => columns[(k % 3) * n + Math.floor(k / 3)]);
+}
+
+/** A mesh as it was recorded: shared corners, no normals. */
+export function meshGeometry({ vertices, triangles }) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(triples(vertices), 3));
+  return geometry.setIndex(new THREE.BufferAttribute(triples(triangles), 1));
+}
+
+const CREASE = 0.6; // rad; edges sharper than this are not smoothed over
 
 const MAKERS = {
   box: ([x, y, z]) => new THREE.RoundedBoxGeometry(x, y, z, 3, 0.06 * Math.min(x, y, z)),
@@ -45,11 +65,13 @@ const MAKERS = {
   capsule: ([radius, length]) => new THREE.CapsuleGeometry(radius, length, 12, 36).rotateX(Math.PI / 2),
   cone: ([radius, height]) => new THREE.ConeGeometry(radius, height, ROUND).rotateX(Math.PI / 2),
   ellipsoid: ([a, b, c]) => new THREE.SphereGeometry(1, ROUND, 32).rotateX(Math.PI / 2).scale(a, b, c),
+  plate: ([thickness], { outline }) => plateGeometry(outline, thickness),
+  mesh: (_, shape) => THREE.toCreasedNormals(meshGeometry(shape), CREASE),
 };
 
 /** The geometry of a shape, in the shape's own axes. */
-export function solidGeometry({ kind, size, outline }) {
-  return kind === "plate" ? plateGeometry(outline, size[0]) : MAKERS[kind](size);
+export function solidGeometry(shape) {
+  return MAKERS[shape.kind](shape.size, shape);
 }
 
 /** Put an object where its shape says it sits on the body. */
@@ -85,7 +107,7 @@ export function solidBody(body, colour) {
 
 /** Points that enclose a shape, in the body's axes: the corners of its box. */
 export function cornersOf(shape) {
-  const geometry = solidGeometry(shape);
+  const geometry = shape.kind === "mesh" ? meshGeometry(shape) : solidGeometry(shape);
   geometry.computeBoundingBox();
   const { min, max } = geometry.boundingBox;
   const frame = placed(new THREE.Group(), shape);

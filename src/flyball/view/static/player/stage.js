@@ -43,6 +43,9 @@ export class Stage {
     this.ball = ballAround(points);
     this.scene = new THREE.Scene();
     this.scene.add(mechanism.root);
+    this.top = new THREE.Scene(); // drawn after the scene and over it
+    this.top.add(mechanism.overlay);
+    this.followed = null;
     const canvas = element.querySelector("canvas");
     this.renderer = makeRenderer(canvas);
     if (this.planar) this.#prepareFlat();
@@ -66,6 +69,9 @@ export class Stage {
     this.camera.up.set(0, 0, 1);
     const { grid, shadow } = spatialSurroundings(this.scene, this.ball);
     Object.assign(this, { grid, shadow });
+    const light = new THREE.DirectionalLight("#ffffff", 2.2);
+    light.position.set(-0.5, -0.7, 1);
+    this.top.add(light, new THREE.HemisphereLight("#ffffff", "#d8dde4", 3.4));
     if (!this.renderer) return;
     this.renderer.shadowMap.enabled = true;
     this.renderer.shadowMap.type = THREE.PCFShadowMap;
@@ -112,9 +118,10 @@ export class Stage {
     return clear.size > 0.72 * plain.size ? clear : plain;
   }
 
-  /** Look from a preset; all of the motion is in the picture. */
+  /** Look from a preset, or from where one looks ("fit"); all of the motion is in the picture. */
   look(view, smooth = false) {
     this.view = view;
+    this.followed = null;
     const [width, height] = this.size;
     if (this.planar) {
       const { x, y, scale } = this.#fitted((inset) => fitFlat(this.points, width, height, inset));
@@ -122,8 +129,7 @@ export class Stage {
       this.camera.position.set(x, y, 500);
       this.camera.zoom = scale;
     } else {
-      const direction = new THREE.Vector3(...VIEWS[view]).normalize();
-      const up = view === "top" ? new THREE.Vector3(0, 1, 0) : this.camera.up;
+      const [direction, up] = this.#facing(view);
       const fit = (inset) => fitSpace(this.points, direction, up, TANGENT, width, height, inset);
       const goal = this.#fitted(fit);
       if (smooth && this.controls.enableDamping) this.flight = this.#flightTo(goal);
@@ -131,6 +137,34 @@ export class Stage {
     }
     this.camera.updateProjectionMatrix();
     this.dirty = true;
+  }
+
+  /** Direction of sight and what is up in the picture. */
+  #facing(view) {
+    const free = this.controls.target.clone().sub(this.camera.position);
+    const direction = VIEWS[view]
+      ? new THREE.Vector3(...VIEWS[view])
+      : free.lengthSq()
+        ? free
+        : new THREE.Vector3(...VIEWS.iso);
+    const steep = Math.abs(direction.normalize().z) > 0.9999;
+    return [direction, steep ? new THREE.Vector3(0, 1, 0) : this.camera.up];
+  }
+
+  /** Let the camera go with a drawn body, or with none. */
+  follow(body) {
+    this.followed = body ? { group: body.group, at: body.group.position.clone() } : null;
+    if (body) this.view = null;
+  }
+
+  #goAlong() {
+    const { group, at } = this.followed;
+    if (!Number.isFinite(group.position.x)) return;
+    const step = group.position.clone().sub(at);
+    at.copy(group.position);
+    this.camera.position.add(step);
+    this.controls.target.add(step);
+    if (step.lengthSq()) this.dirty = true;
   }
 
   #stand({ position, target }) {
@@ -194,15 +228,21 @@ export class Stage {
   /** Draw if anything has changed; true if it has. */
   draw(now) {
     if (this.flight) this.#fly(now);
+    if (this.followed) this.#goAlong();
     this.controls.update();
     if (!this.dirty) return false;
     this.dirty = false;
     this.#prepareDraw();
-    this.renderer?.render(this.scene, this.camera);
+    if (!this.renderer) return true;
+    this.renderer.autoClear = true;
+    this.renderer.render(this.scene, this.camera);
+    this.renderer.autoClear = false;
+    this.renderer.clearDepth();
+    this.renderer.render(this.top, this.camera);
     return true;
   }
 
-  /** The body under a point of the element (pixels from its corner), or null. */
+  /** The part under a point of the element (pixels from its corner), or null. */
   pick(x, y) {
     const [width, height] = this.size;
     const raycaster = new THREE.Raycaster();

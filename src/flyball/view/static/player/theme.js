@@ -19,7 +19,7 @@ const PALETTE = [
 // A ramp of steady lightness change, for chains of many alike bodies.
 const RAMP = ["#3a57b5", "#2569a5", "#1f8f9f", "#3fae82", "#94bf55", "#e3b93c", "#ec8b45", "#d85a5a", "#a63d72"];
 export const CURVES = ["#2f7fd1", "#e5862b", "#2aa187", "#d14d62", "#8a6fd0", "#c9a11f", "#4fb0d8", "#b0673f"];
-const GROUND = "#8b96a3";
+export const GROUND = "#8b96a3";
 
 export const THEMES = {
   light: {
@@ -33,8 +33,14 @@ export const THEMES = {
     tube: "#4a5767",
     grid: "#7f8fa3",
     gridStrength: 0.34,
-    force: "#c2263c",
-    rope: "#5a4a3a",
+    reaction: "#7a3fc4",
+    element: "#0d8a7a",
+    load: "#d3233f",
+    axisX: "#d0384c",
+    axisY: "#2b8a4b",
+    axisZ: "#2f6fd0",
+    accent: "#1f6feb",
+    rope: "#6b563f",
     shadow: 0.26,
     flatShadow: 0.13,
   },
@@ -49,7 +55,13 @@ export const THEMES = {
     tube: "#5b6878",
     grid: "#8fa3ba",
     gridStrength: 0.26,
-    force: "#ff6b7d",
+    reaction: "#b48bff",
+    element: "#35c9b4",
+    load: "#ff5f76",
+    axisX: "#ff7083",
+    axisY: "#5cc98a",
+    axisZ: "#79aaff",
+    accent: "#5a9cff",
     rope: "#cbb79b",
     shadow: 0.5,
     flatShadow: 0.35,
@@ -81,6 +93,6 @@ function hexOf(colour) {
 }
 
 /** The line around a flat body: its own colour, far towards ink. */
-export function outlineColour(colour, theme) {
+export function outlineColour(colour, theme = THEMES.light) {
   return new THREE.Color(colour).lerp(new THREE.Color(theme === THEMES.dark ? "#000000" : theme.ink), 0.72);
 }

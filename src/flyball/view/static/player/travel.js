@@ -1,8 +1,10 @@
-// How far a slider travels: found from the motion, since a recorded joint names one body only.
+// How bodies move about a joint: how far a slider travels, and whether a body hangs from its stand.
 import * as THREE from "three";
-import { poseAt, sampleNumbers } from "./data.js";
+import { poseAt, ridden, sampleNumbers } from "./data.js";
+import { cornersOf } from "./solids.js";
 
 const SAMPLES = 60;
+const HANGING = 0.5; // mean direction down, as part of the distance, from which a body counts as hanging
 
 /** Poses of a body relative to a carrier (null: the world) at the given samples. */
 function relativePoses(body, carrier, numbers) {
@@ -17,36 +19,33 @@ function relativePoses(body, carrier, numbers) {
   });
 }
 
-/** Travel of a body along an axis through a point of the carrier, or null if it moves otherwise. */
-function travelOf(poses, origin, axis, kind, size) {
-  const offsets = poses.map(({ p }) => p.clone().sub(poses[0].p));
-  const along = offsets.map((d) => d.dot(axis));
-  const strays = offsets.some((d, k) => d.addScaledVector(axis, -along[k]).length() > 2e-3 * size);
-  const turns = kind === "prismatic" && poses.some(({ q }) => Math.abs(q.dot(poses[0].q)) < 1 - 1e-5);
-  if (strays || turns || !along.every(Number.isFinite)) return null;
-  const start = poses[0].p.clone().sub(origin);
-  const first = start.dot(axis);
-  const miss = start.addScaledVector(axis, -first).length();
-  const range = [first + Math.min(...along), first + Math.max(...along)];
-  return range[1] - range[0] > 1e-4 * size ? { range, miss, first } : null;
-}
-
 /**
  * The body that slides in a joint, its pose relative to the carrier at the start, and the stretch of the joint's axis
- * (measured from the joint's point) over which its origin moves; null if no body is seen to slide.
+ * over which its origin moves, measured from where it is at the start; null if the joint does not say who slides.
  */
 export function sliderTravel(joint, recording, size) {
   const carrier = recording.bodies.find((body) => body.name === joint.body) ?? null;
-  const numbers = sampleNumbers(recording.t.length, SAMPLES);
+  const body = recording.bodies.find((candidate) => candidate.name === joint.mate);
+  if (!body) return null;
+  const poses = relativePoses(body, carrier, sampleNumbers(recording.t.length, SAMPLES));
   const origin = new THREE.Vector3(...joint.position);
   const axis = new THREE.Vector3(...joint.axis).normalize();
-  const found = recording.bodies
-    .filter((body) => body !== carrier)
-    .map((body) => {
-      const poses = relativePoses(body, carrier, numbers);
-      return { body, pose: poses[0], ...travelOf(poses, origin, axis, joint.kind, size) };
-    })
-    .filter(({ range, miss }) => range && miss < 0.5 * size)
-    .sort((a, b) => a.miss + Math.abs(a.first) - b.miss - Math.abs(b.first));
-  return found[0] ?? null;
+  const along = poses.map(({ p }) => p.clone().sub(origin).dot(axis)).filter(Number.isFinite);
+  if (!along.length) return null;
+  const range = [Math.min(...along), Math.max(...along)];
+  if (range[1] - range[0] < 1e-4 * size) [range[0], range[1]] = [range[0] - 0.05 * size, range[1] + 0.05 * size];
+  return { body, pose: poses[0], first: along[0], range };
+}
+
+/** Whether the body that a joint on ground holds is mostly on the side that `down` points to. */
+export function hangs(joint, recording, down) {
+  const body = recording.bodies.find((candidate) => candidate.name === joint.mate);
+  const corners = body?.shapes.flatMap(cornersOf) ?? [];
+  if (!corners.length) return false;
+  const middle = corners.reduce((sum, p) => sum.add(p), new THREE.Vector3()).divideScalar(corners.length);
+  const arms = ridden(body, middle.toArray(), sampleNumbers(recording.t.length, SAMPLES))
+    .map((p) => p.sub(new THREE.Vector3(...joint.position)))
+    .filter((p) => Number.isFinite(p.lengthSq()));
+  const reach = arms.reduce((sum, p) => sum + p.length(), 0);
+  return arms.reduce((sum, p) => sum + p.dot(down), 0) > HANGING * reach;
 }

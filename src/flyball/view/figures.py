@@ -1,0 +1,184 @@
+"""Which curves tell most of a motion, and which of them share an axis: for pictures and for the report alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .recording import Channel, Figure, Panel
+
+if TYPE_CHECKING:
+    from ..results.result import Result
+
+MOST = 12  # curves in one panel
+SPREAD = 15.0  # height of a panel over the least that a curve in it varies by, at most
+LEVEL = 2e-3  # a curve that varies less than this part of its own size is a straight line anyway
+WORTH = 1e-3  # work that is less than this part of the energies need not be shown
+CLOSE = 0.006  # curves that are nearer than this part of the panel's height hide one another
+LABELS = {
+    "J": "energy",
+    "N": "force",
+    "N*m": "torque",
+    "W": "power",
+    "rad": "angle",
+    "rad/s": "angular velocity",
+    "rad/s^2": "angular acceleration",
+    "m": "length",
+    "m/s": "velocity",
+    "m/s^2": "acceleration",
+    "s": "time",
+}
+
+
+def figures(result: Result) -> list[Figure]:
+    """Energies with their balance, joint coordinates, positions, reactions, and what drivers and forces do.
+
+    Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
+    """
+    if not len(result.t):
+        return []
+    makers: Sequence[Callable[[Result], Figure | None]] = (energies, coordinates, positions, reactions, actuation)
+    return [figure for make in makers if (figure := make(result)) is not None]
+
+
+def energies(result: Result) -> Figure:
+    """Kinetic, potential and total energy, the work put in, and what the balance misses."""
+    e = result.energy
+    curves = [Channel(k, "J", np.asarray(getattr(e, k))) for k in ("kinetic", "potential", "total")]
+    work = np.asarray(sum(e.work.values(), np.zeros(len(result.t))))
+    if np.ptp(work) > WORTH * max(float(np.ptp(c.values)) for c in curves):
+        curves.append(Channel("work put in", "J", work))
+    note = f"largest deviation {e.drift:.2g} J"
+    balance = Panel("balance", (Channel("balance", "J", np.asarray(e.balance)),), note)
+    panel = Panel("energy", tuple(curves))
+    parts = [panel] if _comparable(curves[:2]) else spread(panel)
+    return Figure("energy", "Energy", (*parts, balance))
+
+
+def coordinates(result: Result) -> Figure | None:
+    """Relative coordinates of the joints; those that hardly vary beside others in a panel of their own."""
+    every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
+    units = dict.fromkeys(unit for _, _, unit in every)
+    chosen = [c for unit in units for c in _some([c for c in every if c[2] == unit])]
+    known = {e.name: result[e.name].channels() for e, _, _ in chosen}
+    curves = [
+        Channel(f"{e.name}.{what}", unit, np.asarray(known[e.name][what][1]))
+        for e, what, unit in chosen
+        if what in known[e.name]
+    ]
+    parts = [p for panel in panels(curves) for p in spread(panel)]
+    return Figure("coordinates", "Joint coordinates", tuple(parts)) if parts else None
+
+
+def positions(result: Result) -> Figure | None:
+    """Centres of mass of spatial bodies, axis by axis."""
+    if result.planar:
+        return None
+    bodies = _some(result.model.bodies)
+    points = {b.name: centre(result, b.name) for b in bodies}
+    parts = [Panel(axis, tuple(Channel(k, "m", p[:, i]) for k, p in points.items())) for i, axis in enumerate("xyz")]
+    return Figure("positions", "Centres of mass", tuple(parts), few(len(bodies), len(result.model.bodies), "bodies"))
+
+
+def reactions(result: Result) -> Figure | None:
+    """Sizes of the joints' reaction forces, and of their torques where they carry any."""
+    sizes: dict[str, list[Channel]] = {"N": [], "N*m": []}
+    joints = _some(result.model.joints)
+    for e in joints:
+        view = result[e.name]
+        name = f"{e.name}*" if view.undetermined else e.name
+        for what, unit in (("force", "N"), ("torque", "N*m")):
+            a = np.asarray(getattr(view, what))
+            sizes[unit].append(Channel(name, unit, np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))))
+    force, torque = (max((float(np.nanmax(c.values, initial=0.0)) for c in x), default=0.0) for x in sizes.values())
+    least = 1e-9 * max(torque, force * result.values.length)  # below, rounding errors
+    sizes["N*m"] = [c for c in sizes["N*m"] if np.nanmax(c.values, initial=0.0) > least]
+    parts = [Panel(f"|{LABELS[unit]}|", tuple(curves)) for unit, curves in sizes.items() if curves]
+    if not parts:
+        return None
+    notes = [few(len(joints), len(result.model.joints), "joints")]
+    if any(c.name.endswith("*") for p in parts for c in p.curves):
+        notes.append("* redundancy leaves some components undetermined")
+    return Figure("reactions", "Joint reactions", tuple(parts), "; ".join(n for n in notes if n))
+
+
+def actuation(result: Result) -> Figure | None:
+    """What drivers need, and what force elements do."""
+    curves: list[Channel] = []
+    for e in (*result.model.drivers, *result.model.forces):
+        channels = result[e.name].channels()
+        curves += [Channel(f"{e.name}.{k}", u, np.asarray(v)) for k, (u, v) in channels.items() if u in ("N", "N*m")]
+    parts = panels(curves)
+    return Figure("actuation", "Drivers and forces", tuple(parts)) if parts else None
+
+
+def panels(curves: Sequence[Channel], most: int = MOST) -> list[Panel]:
+    """One panel for each unit; its first curves where there are too many."""
+    groups: dict[str, list[Channel]] = {}
+    for c in curves:
+        groups.setdefault(c.unit, []).append(c)
+    return [Panel(label(g), tuple(g[:most]), few(min(most, len(g)), len(g), "curves")) for g in groups.values()]
+
+
+def label(curves: Sequence[Channel]) -> str:
+    """What an axis shows: what all its curves are called, else what their unit measures."""
+    names = {c.name.rpartition(".")[2] for c in curves}
+    own = names.pop() if len(names) == 1 and all("." in c.name for c in curves) else ""
+    return own if len(own) > 2 else LABELS.get(curves[0].unit, own)
+
+
+def spread(panel: Panel) -> list[Panel]:
+    """The panel; or several, where a curve would be all but a straight line beside others."""
+    groups: list[list[Channel]] = []
+    for c in panel.curves:
+        home = next((g for g in groups if _comparable([*g, c])), None)
+        if home is None:
+            groups.append([c])
+        else:
+            home.append(c)
+    return [Panel(panel.label, tuple(g), "" if k else panel.note) for k, g in enumerate(groups)]
+
+
+def _comparable(curves: Sequence[Channel]) -> bool:
+    """Whether none of these curves varies much less than the panel that holds them all is high."""
+    finite = [v for c in curves if len(v := c.values[np.isfinite(c.values)])]
+    if not finite:
+        return True
+    low, high = min(v.min() for v in finite), max(v.max() for v in finite)
+    least = [max(LEVEL * np.abs(v).max(), 1e-9 * max(abs(low), abs(high))) for v in finite]
+    spans = [s for v, at_least in zip(finite, least, strict=True) if (s := np.ptp(v)) > at_least]
+    return not spans or bool(high - low <= SPREAD * min(spans))
+
+
+def hidden(curves: Sequence[np.ndarray]) -> list[int]:
+    """For each curve, how many earlier ones it would hide: drawn dashed it lets them show."""
+    finite = [v[np.isfinite(v)] for v in curves]
+    values = np.concatenate([*finite, np.zeros(0)])
+    if not len(values):
+        return [0] * len(curves)
+    near = max(CLOSE * float(np.ptp(values)), 1e-12 * float(np.abs(values).max()), 1e-300)
+    out = []
+    for k, v in enumerate(curves):
+        gaps = [np.abs(v - earlier) for earlier in curves[:k]]
+        out.append(sum(bool(np.isfinite(g).any() and np.nanmax(g) <= near) for g in gaps))
+    return out
+
+
+def centre(result: Result, name: str) -> np.ndarray:
+    """Centre of mass of a body over time (n, 3) [m]."""
+    p = result.records.body(result.values.structure.place[name])[0]
+    return np.stack([np.broadcast_to(c, len(result.t)) for c in p], axis=1)
+
+
+def few(shown: int, there: int, what: str) -> str:
+    """What to say where not all are shown."""
+    return f"{shown} of {there} {what}" if shown < there else ""
+
+
+def _some(parts: Sequence[Any], most: int = MOST) -> list[Any]:
+    """Evenly chosen parts, first and last among them."""
+    if len(parts) <= most:
+        return list(parts)
+    return [parts[i] for i in np.linspace(0, len(parts) - 1, most).round().astype(int)]

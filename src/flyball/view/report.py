@@ -1,0 +1,146 @@
+"""The report: one page with what a run says of itself, its motion, its curves, and the model that it is of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.io import dumps
+from .animate import kept, record
+from .figures import figures
+from .page import document
+from .recording import Channel, Figure
+from .tables import Table, tables
+
+if TYPE_CHECKING:
+    from ..results.result import Result
+
+
+def report(result: Result, **options: Any) -> str:
+    """Write a result as one HTML document: summary, animation, plots, tables of the model, and its file.
+
+    Parameters
+    ----------
+    result : Result
+    **options
+        ``paths`` and ``show``, as in `flyball.view.animate.animation`.
+
+    Returns
+    -------
+    str
+        A document that needs nothing else and opens offline in any browser.
+
+    Raises
+    ------
+    ModelError
+        If there is no output time, so nothing to draw.
+    """
+    recording = record(result, **options)
+    every = kept(len(result.t))
+    chosen = tuple(_thinned(f, every) for f in figures(result))
+    parts = tables(result)
+    names = {"animation": "Animation", **{f"plot-{f.name}": f.title for f in chosen}}
+    names |= {f"table-{t.name}": t.title for t in parts} | {"file": "Model file"}
+    links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in names.items())
+    before = (
+        f'<div class="report">\n<div class="top"><h1>{escape(result.model.name)}</h1>'
+        f"<p>{escape(_headline(result))}</p>\n{_verdict(result)}\n<dl class='cards'>{_cards(result)}</dl>\n"
+        f'<nav aria-label="Contents">{links}</nav></div>\n<section id="animation" class="frame">\n'
+    )
+    plots = "".join(_plot(f) for f in chosen)
+    after = (
+        f'</section>\n<section class="charts">\n{plots}</section>\n{"".join(map(_table, parts))}'
+        f"{_file(result)}\n<footer class='by'>{escape(_made_by())}</footer>\n</div>\n"
+    )
+    return document(replace(recording, figures=chosen), "<h2>Animation</h2>", before, after)
+
+
+def _thinned(figure: Figure, every: np.ndarray) -> Figure:
+    """The figure at the times that are shown."""
+    panels = tuple(
+        replace(p, curves=tuple(Channel(c.name, c.unit, np.asarray(c.values)[every]) for c in p.curves))
+        for p in figure.panels
+    )
+    return replace(figure, panels=panels)
+
+
+def _headline(result: Result) -> str:
+    m = result.model
+    counts = {"body": len(m.bodies), "joint": len(m.joints), "force": len(m.forces), "driver": len(m.drivers)}
+    many = {"body": "bodies"}
+    parts = [f"{n} {k if n == 1 else many.get(k, k + 's')}" for k, n in counts.items() if n]
+    span = f"{result.t[0]:g} to {result.t[-1]:g} s, {len(result.t)} output times"
+    return f"{'Planar' if result.planar else 'Spatial'} mechanism: {', '.join(parts)}; {span}"
+
+
+def _verdict(result: Result) -> str:
+    """One line that says whether the run came to its end."""
+    h = result.health
+    kind, text = ("good", "The run reached its end.") if h.success else ("bad", f"The run stopped: {h.message}")
+    return f'<p class="verdict {kind}" role="status">{escape(text)}</p>'
+
+
+def number(value: float) -> str:
+    """A figure with three digits, as a power of ten where it is small or large."""
+    return f"{value:.2e}" if value and not 1e-3 <= abs(value) < 1e5 else f"{value:.4g}"
+
+
+def _cards(result: Result) -> str:
+    """The figures that tell at a glance whether to trust the run; exact values in ``data-value``."""
+    h = result.health
+    largest = float(np.nanmax(np.abs(result.energy.total), initial=0.0))
+    relative = f"{h.energy_drift / largest:.1e} of the largest energy" if largest > 0.0 else ""
+    cards: list[tuple[str, str, float, str]] = [
+        ("Freedoms", str(h.freedoms), h.freedoms, "by rank, at the start"),
+        ("Redundant", str(len(h.redundant)), len(h.redundant), ", ".join(h.redundant) or "no constraint too many"),
+        ("Energy balance", f"{number(h.energy_drift)} J", h.energy_drift, relative or "largest deviation"),
+        ("Violation", number(h.violation), h.violation, "largest gap of a constraint [m or rad]"),
+        ("Velocity violation", number(h.velocity_violation), h.velocity_violation, "[m/s or rad/s]"),
+        ("Steps", str(h.steps), h.steps, f"{h.rejected} refused, {h.seconds:.2f} s of computing"),
+    ]
+    return "".join(
+        f'<div><dt>{escape(term)}</dt><dd data-value="{value!r}">{escape(text)}</dd>'
+        f'<dd class="more">{escape(more)}</dd></div>'
+        for term, text, value, more in cards
+    )
+
+
+def _plot(figure: Figure) -> str:
+    note = f"<p>{escape(figure.note)}</p>" if figure.note else ""
+    return (
+        f'<article id="plot-{figure.name}"><h2>{escape(figure.title)}</h2>{note}'
+        f'<div data-figure="{escape(figure.name)}"></div></article>\n'
+    )
+
+
+def _table(table: Table) -> str:
+    def row(cells: Iterable[str], tag: str = "td") -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(c)}</{tag}>" for c in cells) + "</tr>"
+
+    body = "".join(map(row, table.rows))
+    foot = f"<tfoot>{row(table.total)}</tfoot>" if table.total else ""
+    note = f"<p>{escape(table.note)}</p>" if table.note else ""
+    return (
+        f'<section class="listing" id="table-{table.name}"><h2>{escape(table.title)}</h2>{note}'
+        f'<div class="wide"><table>'
+        f"<thead>{row(table.columns, 'th')}</thead><tbody>{body}</tbody>{foot}</table></div></section>\n"
+    )
+
+
+def _file(result: Result) -> str:
+    """The model's file, to be opened and copied."""
+    return (
+        '<section class="listing" id="file"><h2>Model file</h2><details><summary>TOML text, as '
+        '<code>flyball.load</code> reads it</summary><button type="button" data-copy="toml">Copy</button>'
+        f'<pre id="toml">{escape(dumps(result.model))}</pre></details></section>'
+    )
+
+
+def _made_by() -> str:
+    from .. import __version__
+
+    return f"Made by flyball {__version__}"

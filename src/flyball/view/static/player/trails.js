@@ -1,0 +1,33 @@
+// Paths of points: a line over the whole motion, and a dot where the point is now.
+import * as THREE from "three";
+import { ridden, sampleNumbers } from "./data.js";
+import { ORDER, flatMaterial, stroke } from "./flats.js";
+
+const POINTS = 1500; // of a path, at most
+
+export class Trail {
+  /** The path of a point of a drawn body. */
+  constructor(body, position, recording, unit) {
+    Object.assign(this, { body, position });
+    const flat = recording.planar;
+    const numbers = sampleNumbers(recording.t.length, POINTS);
+    this.points = ridden(body.data, position, numbers).filter((p) => Number.isFinite(p.x + p.y + p.z));
+    this.root = new THREE.Group();
+    if (this.points.length > 1) {
+      const look = { color: body.colour, width: 2, order: flat ? ORDER.trail : 0, depthTest: !flat, opacity: 0.8 };
+      this.root.add(stroke(this.points, look));
+    }
+    const material = flat ? flatMaterial({ color: body.colour }) : new THREE.MeshBasicMaterial({ color: body.colour });
+    const shape = flat ? new THREE.CircleGeometry(0.016 * unit, 32) : new THREE.SphereGeometry(0.014 * unit, 20, 14);
+    this.dot = Object.assign(new THREE.Mesh(shape, material), { renderOrder: flat ? ORDER.pin + 9e4 : 0 });
+    this.root.add(this.dot);
+  }
+
+  seek() {
+    const { group } = this.body;
+    this.dot.position
+      .set(...this.position)
+      .applyQuaternion(group.quaternion)
+      .add(group.position);
+  }
+}

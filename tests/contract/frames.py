@@ -1,0 +1,134 @@
+"""Frames in arbitrary motion, and what a row of constraint says about them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+import flyball as fb
+from flyball.constraints import (
+    alignment,
+    along,
+    angle,
+    blade,
+    coincident,
+    curve,
+    distance,
+    perpendicular,
+    rolling,
+    skew,
+    spin,
+)
+from flyball.constraints.registry import FORMULAS
+from flyball.model.element import resolve
+
+OVAL = [(2.0 * np.cos(u), 1.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
+PROFILE = fb.Cam("c", "a", "b", points=OVAL, axis=(0, 0, 1))
+SPLINES = PROFILE.curves(resolve(PROFILE, {}))
+DATA = np.concatenate(SPLINES)
+
+ASSEMBLY = (alignment.KIND_AXIS, alignment.KIND_FULL)  # stand-ins while a joint is far from closed: no motion
+AXES = (0.36, 0.48, 0.8, 0.6, 0.0, -0.8, 0.3, 1.0)  # two unit axes; a constant; the coefficient, which no row reads
+PARAMETERS = {
+    coincident.KIND: {"": AXES},
+    along.KIND: {"": AXES},
+    perpendicular.KIND: {"": AXES},
+    distance.KIND: {"": AXES},
+    angle.KIND: {"": (0.0, *AXES[1:]), "unwrapped": (1.0, *AXES[1:])},
+    skew.KIND: {"": (*AXES[:3], 0.7, -0.4, 1.3, 0.3, 1.0)},
+    curve.KIND: {
+        "outside": (0.0, 0.0, len(SPLINES[0]), 1.0, 0.0, 0.0, 0.3, 1.0),
+        "inside": (0.0, 0.0, len(SPLINES[0]), -1.0, 0.0, 0.0, 0.1, 1.0),
+    },
+    rolling.KIND: {
+        "height of a disk": (0.0, 0.0, 1.0, 0.5, 0.0, 1.0, 0.3, 1.0),
+        "height of a wheel": (0.0, 0.0, 1.0, 0.5, 0.2, 1.0, 0.3, 1.0),
+        "height of a ball": (0.0, 0.0, 1.0, 0.0, 0.2, 1.0, 0.3, 1.0),
+        "slip of a disk": (0.8, -0.6, 0.0, 0.5, 0.0, 0.0, 0.0, 1.0),
+        "slip of a wheel": (0.8, -0.6, 0.0, 0.5, 0.2, 0.0, 0.0, 1.0),
+        "slip of a ball": (0.8, -0.6, 0.0, 0.0, 0.2, 0.0, 0.0, 1.0),
+    },
+    blade.KIND: {"": AXES},
+    spin.KIND: {"": AXES},
+}
+CASES = [(kind, name) for kind, sets in PARAMETERS.items() for name in sets]
+WORLD = (coincident.KIND, skew.KIND)  # they speak of an axis of the world, not of their frames
+
+
+def label(case) -> str:
+    """Name of a case in pytest's output."""
+    kind, name = case
+    return f"{FORMULAS[kind].__module__.rsplit('.', 1)[1]} {name}".strip()
+
+
+def has_value(case) -> bool:
+    """Whether the row restrains positions."""
+    kind, _ = case
+    par = PARAMETERS[kind][case[1]]
+    return kind not in (blade.KIND, spin.KIND) and not (kind == rolling.KIND and par[5] == 0.0)
+
+
+def random_motion(seed: int) -> list[dict]:
+    """Two frames with random poses, velocities and accelerations."""
+    rng = np.random.default_rng(seed)
+    keys = ("p", "w", "v", "alpha", "a")
+    return [{"R": Rotation.random(random_state=rng).as_matrix()} | {k: rng.normal(size=3) for k in keys} for _ in "FM"]
+
+
+def frames(case, seed: int) -> tuple[dict, dict, float]:
+    """F, M and what the row leans on: a whole turn too far for an angle, a place near the nearest one for a curve."""
+    F, M = random_motion(seed)
+    hint = 14.0 * np.pi
+    if case[0] == curve.KIND:
+        r, u = (1.6 if case[1] == "outside" else 0.8), 0.7 + 2.0 * seed
+        M["p"] = F["p"] + F["R"] @ (r * 2.0 * np.cos(u), r * 1.2 * np.sin(u), 0.4)
+        s = np.linspace(0.0, SPLINES[0][1 + int(SPLINES[0][1])], 400)
+        x, _, _, y, _, _ = curve.point(PARAMETERS[curve.KIND][case[1]], s, DATA)
+        p = F["R"].T @ (M["p"] - F["p"])
+        hint = s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)]
+    return F, M, hint
+
+
+def record(m: dict, dtype=float) -> tuple:
+    """The kinematic record of a frame."""
+    return tuple(tuple(np.asarray(m[k], dtype).ravel().tolist()) for k in ("p", "R", "w", "v", "alpha", "a"))
+
+
+def evaluated(case, F: dict, M: dict, hint: float, dtype=float) -> tuple:
+    """The row's value, wrench and bias."""
+    kind, name = case
+    return FORMULAS[kind](PARAMETERS[kind][name], record(F, dtype), record(M, dtype), hint, DATA)
+
+
+def moved(m: dict, t: float) -> dict:
+    """The frame after a time t of its motion, exact to second order."""
+    turn = m["w"] * t + 0.5 * m["alpha"] * t * t
+    return m | {
+        "p": m["p"] + m["v"] * t + 0.5 * m["a"] * t * t,
+        "R": Rotation.from_rotvec(turn).as_matrix() @ m["R"],
+        "w": m["w"] + m["alpha"] * t,
+        "v": m["v"] + m["a"] * t,
+    }
+
+
+def stepped(m: dict, e: float) -> dict:
+    """The frame after an imaginary time of its motion."""
+    w = m["w"]
+    turn = np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    return m | {"p": m["p"] + 1j * e * m["v"], "R": (np.eye(3) + 1j * e * turn) @ m["R"]}
+
+
+def rate(out: tuple, F: dict, M: dict, w: str = "w", v: str = "v") -> float:
+    """G v of a row's record; with other keys, G times something else."""
+    _, f, tM, tF, _ = (np.array(x) for x in out)
+    return f @ (M[v] - F[v]) + tM @ M[w] + tF @ F[w]
+
+
+def elsewhere(case, F: dict, M: dict) -> tuple[dict, dict, tuple]:
+    """Both frames after the world has been turned and put 10 km away; the row's parameters there."""
+    Q, d = Rotation.random(random_state=3).as_matrix(), np.array([1e4, -2e3, 5e2])
+    new = [m | {"p": Q @ m["p"] + d, "R": Q @ m["R"]} | {k: Q @ m[k] for k in ("w", "v", "alpha", "a")} for m in (F, M)]
+    par = PARAMETERS[case[0]][case[1]]
+    if case[0] in WORLD:
+        par = (*(Q @ par[:3]).tolist(), *par[3:])
+    return *new, par, Q

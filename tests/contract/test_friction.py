@@ -1,0 +1,177 @@
+"""Friction in joints: closed forms in motion, sticking, the load that counts, and joints that jam."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.errors import SimulationError
+
+G = 9.81
+SLOPE = 0.5
+
+
+def block(planar, mu, speed=0.0, mass=2.0, **more):
+    """A block on a slope, with its centre of mass in the slide."""
+    m = fb.Mechanism("block", planar=planar, gravity=(0, -G) if planar else (0, -G, 0))
+    axis = (np.cos(SLOPE), -np.sin(SLOPE), 0.0)[: 2 if planar else 3]
+    inertia = 0.1 if planar else (0.1, 0.2, 0.15)
+    m.add(fb.Body("block", mass=mass, inertia=inertia, velocity=tuple(speed * np.array(axis))))
+    kind = fb.Translational if planar else fb.Prismatic
+    m.add(kind("slide", "ground", "block", at=(0.0,) * len(axis), axis=axis))
+    m.add(fb.JointFriction("f", joint="slide", static=mu, **more))
+    return m
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_block_slides_on_a_slope(planar, direction):
+    """a = g (sin -+ mu cos): down, and up while it still goes up."""
+    r = block(planar, 0.3, 2.0 * direction).simulate(0.2, outputs=11)
+    a = G * (np.sin(SLOPE) - direction * 0.3 * np.cos(SLOPE))
+    assert r["slide"].acceleration == pytest.approx(np.full(11, a), rel=1e-9)
+    assert r["f"].friction == pytest.approx(np.full(11, -direction * 0.3 * 2.0 * G * np.cos(SLOPE)), rel=1e-9)
+    assert r["f"].work[-1] == pytest.approx(-0.3 * 2.0 * G * np.cos(SLOPE) * abs(r["slide"].displacement[-1]), rel=1e-6)
+    assert r.health.energy_drift < 1e-7
+
+
+def test_block_sticks_on_a_slope():
+    """tan(slope) = 0.55 of 0.9: it comes to rest and then creeps slower than the stick speed, and stays there."""
+    r = block(True, 0.9, 1.0, stick_speed=1e-3).simulate(2.0, outputs=201)
+    late = r.t > 1.0
+    creep = r["slide"].rate[late]
+    assert (np.abs(creep) < 1e-3).all()
+    assert creep == pytest.approx(np.full(late.sum(), 1e-3 * np.arctanh(np.tan(SLOPE) / 0.9)), rel=1e-4)
+    assert r["f"].friction[late] == pytest.approx(np.full(late.sum(), -2.0 * G * np.sin(SLOPE)), rel=1e-5)
+
+
+def test_stribeck_law_and_viscous_part():
+    """mu falls from static to kinetic over the Stribeck speed; viscous friction and preload add to it."""
+    more = {"kinetic": 0.2, "stribeck_speed": 0.5, "viscous": 1.5, "preload": 4.0}
+    r = block(True, 0.3, 2.0, **more).simulate(1.5, outputs=31)
+    v = r["slide"].rate
+    mu = 0.2 + 0.1 * np.exp(-((v / 0.5) ** 2))
+    expected = -mu * (2.0 * G * np.cos(SLOPE) + 4.0) * np.tanh(v / 1e-3) - 1.5 * v
+    assert r["f"].friction == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("planar", [True, False], ids=["plane", "space"])
+def test_wheel_in_a_plain_bearing(planar):
+    """A balanced wheel loaded by its weight slows down at mu m g r / J, and stands still after w J / (mu m g r)."""
+    m = fb.Mechanism("wheel", planar=planar, gravity=(0, -G) if planar else (0, 0, -G))
+    axis = {} if planar else {"axis": (0, 1, 0)}
+    inertia, w = (0.05, 6.0) if planar else ((0.03, 0.05, 0.03), (0, 6.0, 0))
+    m.add(fb.Body("wheel", mass=3.0, inertia=inertia, angular_velocity=w))
+    m.add(fb.Revolute("bearing", "ground", "wheel", at=(0, 0) if planar else (0, 0, 0), **axis))
+    m.add(fb.JointFriction("f", joint="bearing", static=0.1, radius=0.02))
+    slowing = 0.1 * 3.0 * G * 0.02 / 0.05
+    stop = 6.0 / slowing
+    r = m.simulate(1.2 * stop, outputs=121)
+    turning = r.t < 0.95 * stop
+    assert r["bearing"].rate[turning] == pytest.approx(6.0 - slowing * r.t[turning], rel=1e-6)
+    assert (np.abs(r["bearing"].rate[r.t > 1.02 * stop]) < 0.01).all()
+
+
+def test_thrust_bending_and_twist_load_a_joint():
+    """An overhung slide: the moments about the joint's point on the moving body count over the lengths given."""
+    m = fb.Mechanism("overhung", gravity=(0, 0, -G))
+    m.add(fb.Body("arm", mass=2.0, inertia=(0.1, 0.2, 0.15), position=(0.4, 0.3, 0), velocity=(1.0, 0, 0)))
+    m.add(fb.Prismatic("slide", "ground", "arm", at=(0.1, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.JointFriction("f", joint="slide", static=0.05, bending_length=0.25, twist_length=0.2))
+    r = m.simulate(0.1, outputs=5)
+    weight = 2.0 * G
+    # the friction -F e_x acts at the joint's point; the arm's inertia pulls at its centre of mass, 0.3 beside
+    F = -r["f"].friction
+    bending = np.hypot(weight * 0.3, F * 0.3)  # about y from the weight, about z from slowing the mass
+    expected = 0.05 * (weight + bending / 0.25 + weight * 0.3 / 0.2)
+    assert expected == pytest.approx(F, rel=1e-9)
+    assert r["slide"].acceleration == pytest.approx(-F / 2.0, rel=1e-9)
+
+
+def test_thrust_on_a_collar():
+    """A vertical shaft on a collar: only its weight along the axis presses, by the thrust factor."""
+    m = fb.Mechanism("shaft", gravity=(0, 0, -G))
+    m.add(fb.Body("shaft", mass=4.0, inertia=(0.1, 0.1, 0.02), angular_velocity=(0, 0, 30.0)))
+    m.add(fb.Revolute("J", "ground", "shaft", at=(0, 0, 0.3), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("f", joint="J", static=0.1, radius=0.03, thrust_factor=0.7))
+    r = m.simulate(0.5, outputs=6)
+    assert r["J"].acceleration == pytest.approx(np.full(6, -0.1 * 0.03 * 0.7 * 4.0 * G / 0.02), rel=1e-9)
+
+
+def test_both_axes_of_a_universal_joint():
+    """Each axis has its own load and bearing radius: the joint's own force, square to that axis or along it."""
+    m = fb.Mechanism("hooke", gravity=(0, 0, -G))
+    m.add(fb.Body("arm", mass=2.0, inertia=(0.1, 0.1, 0.1), position=(0.3, 0, 0), angular_velocity=(3.0, -4.0, 0)))
+    m.add(fb.Universal("U", "ground", "arm", at=(0, 0, 0), axes=((0, 1, 0), (1, 0, 0))))
+    m.add(fb.JointFriction("f1", joint="U", coordinate="angle_1", static=0.2, radius=0.02, thrust_factor=0.5))
+    m.add(fb.JointFriction("f2", joint="U", coordinate="angle_2", static=0.2, radius=0.02, thrust_factor=0.5))
+    r = m.simulate(0.3, outputs=13)
+    force = r["U"].force
+    for k, axis in (("1", np.tile((0.0, 1.0, 0.0), (13, 1))), ("2", r["arm"].rotation[:, :, 0])):
+        thrust = (force * axis).sum(axis=1)
+        load = np.sqrt((force**2).sum(axis=1) - thrust**2) + 0.5 * np.abs(thrust)
+        speed = 0.02 * getattr(r["U"], f"angle_{k}_rate")
+        assert r[f"f{k}"].friction == pytest.approx(-0.02 * 0.2 * load * np.tanh(speed / 1e-3), rel=1e-9)
+    assert r.health.energy_drift < 1e-7
+
+
+def test_a_pin_in_a_slot_has_friction_of_two_kinds():
+    """Sliding along the slot, and turning in it about the normal, from one and the same force."""
+    m = fb.Mechanism("slot", planar=True, gravity=(0, -G))
+    m.add(fb.Body("pin", mass=1.0, inertia=0.01, velocity=(2.0, 0), angular_velocity=30.0))
+    m.add(fb.PinInSlot("S", "ground", "pin", at=(0, 0), axis=(1, 0)))
+    m.add(
+        fb.JointFriction("slide", joint="S", static=0.1), fb.JointFriction("turn", joint="S", static=0.1, radius=0.01)
+    )
+    r = m.simulate(0.2, outputs=5)
+    assert r["S"].displacement_acceleration == pytest.approx(np.full(5, -0.1 * G), rel=1e-9)
+    assert r["S"].angle_acceleration == pytest.approx(np.full(5, -0.1 * G * 0.01 / 0.01), rel=1e-9)
+
+
+def test_a_joint_without_load_has_no_friction():
+    """Gravity along the slide presses nothing: what rounding leaves of a load does not matter."""
+    m = fb.Mechanism("fall", gravity=(1, 2, -2))
+    m.add(fb.Body("a", mass=1.0, inertia=(1, 2, 2.5), velocity=(0.1, 0.2, -0.2)))
+    m.add(fb.Prismatic("slide", "ground", "a", at=(0.3, 0.6, -0.6), axis=(1, 2, -2)))
+    m.add(fb.JointFriction("f", joint="slide", static=0.5, bending_length=0.1, twist_length=0.1))
+    r = m.simulate(1.0, outputs=5)
+    assert r["slide"].acceleration == pytest.approx(np.full(5, 3.0), rel=1e-9)
+
+
+def test_friction_that_outweighs_its_cause_jams():
+    """Pushed at an arm of 2 m on a guide of 0.2 m, mu = 0.9: each newton of friction makes 9 N of load."""
+    m = fb.Mechanism("drawer", planar=True)
+    m.add(fb.Body("drawer", mass=1.0, inertia=0.1, velocity=(1, 0), com=(0, -3)))
+    m.add(fb.Translational("rail", "ground", "drawer", at=(0, 0), axis=(1, 0)))
+    m.add(fb.PointForce("push", "drawer", force=(5, -1), at=(0, 2)))
+    m.add(fb.JointFriction("rub", joint="rail", static=0.9, bending_length=0.2))
+    with pytest.raises(SimulationError, match="JointFriction 'rub' jams joint 'rail'") as caught:
+        m.simulate(1.0)
+    assert "bending_length" in str(caught.value)
+    assert caught.value.t == 0.0
+
+
+def test_two_joints_that_load_one_another():
+    """A crank-slider with friction in three joints: each friction is its law of its own joint's reaction."""
+    m = fb.Mechanism("crank-slider", planar=True, gravity=(0, -G))
+    m.add(fb.Body("crank", mass=0.5, inertia=0.002, position=(0.1, 0)))
+    m.add(fb.Body("rod", mass=0.8, inertia=0.01, position=(0.4, 0)))
+    m.add(fb.Body("piston", mass=0.6, inertia=0.001, position=(0.6, 0)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=(0.2, 0)))
+    m.add(fb.Revolute("C", "rod", "piston", at=(0.6, 0)))
+    m.add(fb.Translational("P", "ground", "piston", at=(0.6, 0), axis=(1, 0)))
+    m.add(fb.Initial("A.angle", value=0.5, rate=12.0))
+    m.add(
+        fb.JointFriction("fa", joint="A", static=0.2, radius=0.02),
+        fb.JointFriction("fb", joint="B", static=0.2, radius=0.02),
+    )
+    m.add(fb.JointFriction("fp", joint="P", static=0.3, bending_length=0.1))
+    r = m.simulate(0.4, outputs=21)
+    for name, joint, arm in (("fa", "A", 0.02), ("fb", "B", 0.02)):
+        load = np.linalg.norm(r[joint].force, axis=1)
+        speed = arm * r[joint].rate
+        assert r[name].friction == pytest.approx(-arm * 0.2 * load * np.tanh(speed / 1e-3), rel=1e-9)
+    load = np.abs(r["P"].force[:, 1]) + np.abs(r["P"].torque) / 0.1
+    assert r["fp"].friction == pytest.approx(-0.3 * load * np.tanh(r["P"].rate / 1e-3), rel=1e-9)
+    assert r.health.energy_drift < 1e-6
+    # Newton for the piston along the slide: rod's pull and friction
+    assert r["C"].force[:, 0] + r["fp"].friction == pytest.approx(0.6 * r["P"].acceleration, abs=1e-8)

@@ -1,0 +1,257 @@
+"""Symbols of wheels, gears, cams, ropes and the like: where they are, how large, and that they fit one another."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.view.animate import record
+from flyball.view.payload import check
+from flyball.view.recording import RecordedJoint, Recording
+from tests.view.test_animate import turned
+
+if not hasattr(fb, "GearPair"):
+    pytest.skip("this flyball has no gears, cams and ropes yet", allow_module_level=True)
+
+
+def body(name: str, position: tuple[float, ...], **more: object) -> fb.Body:
+    inertia = 0.02 if len(position) == 2 else (0.02, 0.02, 0.02)
+    return fb.Body(name, mass=1, inertia=inertia, position=position, **more)
+
+
+def moved(m: fb.Mechanism, t_end: float = 2.0) -> Recording:
+    recording = record(m.simulate(t_end, outputs=41))
+    check(recording)
+    return recording
+
+
+def symbol(recording: Recording, name: str, kind: str, on: str = "") -> RecordedJoint:
+    (found,) = (j for j in recording.joints if (j.name, j.kind) == (name, kind) and on in ("", j.body))
+    return found
+
+
+def in_world(recording: Recording, name: str, point: np.ndarray) -> np.ndarray:
+    """A point of a body over time."""
+    if name == "ground":
+        return np.tile(point, (recording.t.size, 1))
+    b = next(b for b in recording.bodies if b.name == name)
+    return b.p + turned(b.q, np.asarray(point, float))
+
+
+def direction(recording: Recording, j: RecordedJoint, angle: float) -> np.ndarray:
+    """A direction at an angle from the x axis of a symbol's frame, over time."""
+    local = turned(np.array(j.quaternion), np.array([np.cos(angle), np.sin(angle), 0.0]))
+    b = next(b for b in recording.bodies if b.name == j.body)
+    return turned(b.q, local)
+
+
+def phase(recording: Recording, j: RecordedJoint, contact: np.ndarray) -> np.ndarray:
+    """Where the teeth of a wheel stand to a direction (n, 3), in pitches anticlockwise about z: a tooth at 0."""
+    tooth = direction(recording, j, j.size[2])
+    angle = np.arctan2(tooth[:, 1], tooth[:, 0]) - np.arctan2(contact[:, 1], contact[:, 0])
+    return angle * j.size[1] / (2 * np.pi)
+
+
+def from_whole(x: np.ndarray) -> float:
+    """How far numbers are from whole ones."""
+    return float(np.abs(x - x.round()).max())
+
+
+@pytest.mark.parametrize("flat", [True, False])
+@pytest.mark.parametrize("internal", [False, True])
+def test_gears_touch_and_their_teeth_mesh_all_along(flat: bool, internal: bool) -> None:
+    m = fb.Mechanism("gears", planar=flat)
+    z, at = (18, 30), (0.3, 0.4)
+    extra, axis = ((), {}) if flat else ((0.0,), {"axis": (0, 0, 1)})
+    for k, p in enumerate(((0.0, 0.0), at)):
+        m.add(body(f"g{k}", (*p, *extra)), fb.Revolute(f"A{k}", "ground", f"g{k}", at=(*p, *extra), **axis))
+    m.add(fb.GearPair("mesh", joint_1="A0", joint_2="A1", teeth=z, internal=internal))
+    m.add(fb.Driver("turn", "A0.angle", "2*t"))
+    r = moved(m)
+    small, large = (symbol(r, "mesh", "gear", f"g{k}") for k in (0, 1))
+    assert [small.size[1], large.size[1]] == [18, 30]
+    assert large.size[0] / small.size[0] == pytest.approx(30 / 18)
+    assert large.size[0] + (-1 if internal else 1) * small.size[0] == pytest.approx(0.5)
+    assert large.size[3] == float(internal)
+    towards = np.tile([0.6, 0.8, 0.0], (r.t.size, 1)) * (-1 if internal else 1)
+    one, other = phase(r, small, towards), phase(r, large, towards if internal else -towards)
+    # heights along the tangent, in pitches: a tooth of the one in a gap of the other
+    assert from_whole(one + (-other if internal else other) + 0.5) < 1e-5
+    assert not [b for b in r.bodies if b.shapes]  # the wheels are what one sees
+
+
+def test_planets_turn_on_their_arm() -> None:
+    m = fb.Mechanism("planetary", planar=True)
+    m.add(body("arm", (0.2, 0)), fb.Revolute("A", "ground", "arm", at=(0, 0)))
+    m.add(body("sun", (0, 0)), fb.Revolute("S", "arm", "sun", at=(0, 0)))
+    m.add(body("planet", (0.4, 0)), fb.Revolute("P", "arm", "planet", at=(0.4, 0)))
+    m.add(fb.Revolute("hold", "ground", "sun", at=(0, 0)), fb.Driver("still", "hold.angle", "0"))
+    m.add(fb.GearPair("mesh", joint_1="S", joint_2="P", teeth=(20, 20)), fb.Driver("turn", "A.angle", "t"))
+    r = moved(m)
+    assert {j.body for j in r.joints if j.kind == "gear"} == {"sun", "planet"}
+    sun, planet = symbol(r, "mesh", "gear", "sun"), symbol(r, "mesh", "gear", "planet")
+    towards = in_world(r, "planet", np.zeros(3)) - in_world(r, "sun", np.zeros(3))
+    assert from_whole(phase(r, sun, towards) + phase(r, planet, -towards) + 0.5) < 1e-5
+
+
+@pytest.mark.parametrize("radius", [0.15, -0.15])
+def test_a_rack_touches_its_pinion_where_they_move_alike(radius: float) -> None:
+    m = fb.Mechanism("rack", planar=True)
+    m.add(body("pinion", (0, 0)), fb.Revolute("A", "ground", "pinion", at=(0, 0)))
+    m.add(body("bar", (0, -0.3)), fb.Translational("S", "ground", "bar", at=(0, -0.3), axis=(1, 0)))
+    m.add(fb.RackAndPinion("drive", rack="S", pinion="A", radius=radius), fb.Driver("turn", "A.angle", "2*t"))
+    r = moved(m)
+    gear, bar = symbol(r, "drive", "gear"), symbol(r, "drive", "rack")
+    side = -np.sign(radius)  # turning to the left, the lowest point goes right, the highest left
+    assert gear.size[0] == 0.15
+    assert np.allclose(in_world(r, "bar", np.array(bar.position))[0], [0, 0.15 * side, 0], atol=1e-9)
+    # the bar's teeth: a gap at its origin, which has moved by the displacement
+    along = in_world(r, "bar", np.array(bar.position))[:, 0] * -side / bar.size[1]  # to the left seen along the contact
+    contact = np.tile([0.0, side, 0.0], (r.t.size, 1))
+    assert from_whole(phase(r, gear, contact) + along) < 1e-5 or from_whole(phase(r, gear, contact) - along) < 1e-5
+    assert bar.reach[0] <= -0.15 * 4 + 1e-6 or bar.reach[1] >= 0.15 * 4 - 1e-6  # long enough for 4 rad
+
+
+def test_bevel_gears_are_discs_that_touch() -> None:
+    m = fb.Mechanism("bevel")
+    m.add(body("a", (0, 0, 0.3)), fb.Revolute("A", "ground", "a", at=(0, 0, 0.3), axis=(0, 0, 1)))
+    m.add(body("b", (0.2, 0, 0)), fb.Revolute("B", "ground", "b", at=(0.2, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.GearPair("mesh", joint_1="A", joint_2="B", teeth=(20, 30)), fb.Driver("turn", "A.angle", "t"))
+    r = moved(m)
+    a, b = symbol(r, "mesh", "gear", "a"), symbol(r, "mesh", "gear", "b")
+    assert a.size[:2] == pytest.approx((0.2, 0))  # the cones meet where both radii end: at (0.2, 0, 0.3)
+    assert b.size[:2] == pytest.approx((0.3, 0))
+
+
+@pytest.mark.parametrize("flat", [True, False])
+def test_a_cam_touches_its_follower(flat: bool) -> None:
+    a = np.linspace(0, 2 * np.pi, 16, endpoint=False)
+    radius = 0.3 + 0.06 * np.cos(a)
+    points = np.stack([radius * np.cos(a), radius * np.sin(a)], 1)
+    m = fb.Mechanism("cam", planar=flat)
+    extra, axis = ((), {}) if flat else ((0.0,), {"axis": (0, 0, 1)})
+    slide = fb.Translational if flat else fb.Prismatic
+    m.add(body("disc", (0, 0, *extra)), fb.Revolute("A", "ground", "disc", at=(0, 0, *extra), **axis))
+    m.add(body("tappet", (0, 0.35, *extra)))
+    m.add(slide("S", "ground", "tappet", at=(0, 0.35, *extra), axis=(0, 1, *extra)))
+    m.add(fb.Cam("contact", "disc", "tappet", points=points, at=(0, 0.35, *extra), radius=0.05, **axis))
+    m.add(fb.Driver("turn", "A.angle", "3*t"))
+    r = moved(m)
+    (curve,) = r.curves
+    assert (curve.body, curve.closed) == ("disc", True)
+    gaps = np.sqrt(((curve.points[None] - np.column_stack([points, 0 * a])[:, None]) ** 2).sum(axis=2)).min(axis=1)
+    assert gaps.max() < 1e-9  # through the points given
+    roller = symbol(r, "contact", "roller")
+    assert roller.size == (0.05,)
+    centre = in_world(r, "tappet", np.array(roller.position))
+    path = np.stack([in_world(r, "disc", p) for p in curve.points], axis=1)  # (n, k, 3)
+    distance = np.sqrt(((path - centre[:, None]) ** 2).sum(axis=2)).min(axis=1)
+    assert np.allclose(distance, 0.05, atol=1e-3)  # sampled every 16 mm
+    disc = next(b for b in r.bodies if b.name == "disc").shapes[0]
+    assert disc.kind == "plate"
+
+
+def test_a_rope_runs_over_its_points_and_knows_its_length() -> None:
+    m = fb.Mechanism("rope", planar=True, gravity=(0, -9.81))
+    m.add(body("load", (0.5, 0)))
+    at = ((0, 1), (0.5, 0), (1, 1))
+    m.add(fb.Rope("rope", bodies=("ground", "load", "ground"), at=at, stiffness=2000, damping=1, length=2.3))
+    result = m.simulate(2.0, outputs=101)
+    r = record(result)
+    check(r)
+    (line,) = r.lines
+    assert line.kind == "rope"
+    assert len(line.points) == 3
+    assert np.allclose(line.points[1][:, :2], result["load"].position)
+    length = sum(np.sqrt(((b - a) ** 2).sum(axis=1)) for a, b in zip(line.points, line.points[1:]))
+    assert np.allclose(length, result["rope"].length)
+    assert (line.rest == 2.3).all()
+    (pull,) = (a for a in r.arrows if a.name == "rope")
+    slack = length < line.rest
+    assert slack.any()
+    assert not slack.all()
+    assert np.allclose(pull.vector[slack], 0)
+    # the two halves pull towards their eyes: upwards, with twice the tension times the cosine
+    wanted = 2 * result["rope"].tension * (1 - line.points[1][:, 1]) / (length / 2)
+    assert np.allclose(pull.vector[:, 1], wanted)
+
+
+@pytest.mark.parametrize("ball", [False, True])
+def test_wheels_touch_the_plane_that_is_drawn(ball: bool) -> None:
+    m = fb.Mechanism("wheel", gravity=(0, 0, -9.81))
+    m.add(body("wheel", (0, 0, 0.25), velocity=(0.5, 0, 0), angular_velocity=(0, 2, 0)))
+    where = {"at": (0, 0, 0.25), "radius": 0.25}
+    m.add(
+        fb.RollingBall("roll", "ground", "wheel", **where)
+        if ball
+        else fb.RollingDisk("roll", "ground", "wheel", axis=(0, 1, 0), **where)
+    )
+    r = moved(m)
+    plane, wheel = symbol(r, "roll", "plane"), symbol(r, "roll", "ball" if ball else "wheel")
+    assert (plane.body, wheel.body) == ("ground", "wheel")
+    assert np.allclose(plane.position, 0)
+    assert np.allclose(plane.axis, [0, 0, 1])
+    assert plane.reach[4] == pytest.approx(wheel.size[0])  # the centre is a radius above
+    assert plane.reach[1] - plane.reach[0] + plane.reach[3] - plane.reach[2] == pytest.approx(
+        1.0, rel=1e-3
+    )  # 0.5 m/s, 2 s
+    assert not r.bodies[0].shapes
+
+
+def test_a_wheel_on_a_line_in_the_plane() -> None:
+    m = fb.Mechanism("wheel", planar=True)
+    m.add(
+        body("wheel", (0, 0.2), velocity=(1, 0), angular_velocity=-5),
+        fb.WheelOnLine("roll", "ground", "wheel", at=(0, 0), axis=(1, 0), centre=(0, 0.2)),
+    )
+    r = moved(m)
+    assert symbol(r, "roll", "wheel").size == pytest.approx((0.2,))
+    line = symbol(r, "roll", "plane")
+    assert abs(line.reach[0]) == pytest.approx(0.2)
+    assert line.reach[5] - line.reach[4] == pytest.approx(2.0, rel=1e-3)
+
+
+def joints() -> dict[str, tuple[fb.Mechanism, set[tuple[str, str]]]]:
+    """Mechanisms with one joint J, and the (kind, body) of the symbols that it is to have."""
+    z = {"at": (0, 0, 0), "axis": (0, 0, 1)}
+    return {
+        "Screw": (fb.Screw("J", "ground", "b", lead=0.02, **z), {("screw", "ground")}),
+        "Planar": (fb.Planar("J", "ground", "b", **z), {("plane", "ground"), ("point", "b")}),
+        "PointInPlane": (fb.PointInPlane("J", "ground", "b", **z), {("plane", "ground"), ("point", "b")}),
+        "PointOnLine": (fb.PointOnLine("J", "ground", "b", **z), {("rail", "ground"), ("point", "b")}),
+        "KnifeEdge": (fb.KnifeEdge("J", "ground", "b", at=(0, 0, 0), axis=(1, 0, 0)), {("knife_edge", "b")}),
+        "Orientation": (fb.Orientation("J", "ground", "b", at=(0, 0, 0)), {("orientation", "ground")}),
+        "Universal": (fb.Universal("J", "ground", "b", at=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0))), {("universal", "ground")}),
+        "GeneralUniversal": (
+            fb.GeneralUniversal("J", "ground", "b", at=((0, 0, 0), (0.1, 0, 0.1)), axes=((1, 0, 0), (0, 1, 0.2))),
+            {("revolute", "ground"), ("revolute", "b")},
+        ),
+        "Bushing": (fb.Bushing("J", "ground", "b", at=(0, 0, 0), stiffness=100), {("bushing", "ground")}),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("name", list(joints()))
+def test_every_joint_has_its_symbol(name: str) -> None:
+    from tests.view.test_animate import still
+
+    element, wanted = joints()[name]
+    m = fb.Mechanism("m")
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1), position=(0.3, 0, 0)), element)
+    recording = record(still(m))
+    check(recording)
+    assert {(j.kind, j.body) for j in recording.joints} == wanted
+
+
+def test_couplers_are_not_drawn_and_slots_reach_as_far_as_their_pin() -> None:
+    m = fb.Mechanism("slot", planar=True)
+    m.add(body("crank", (0, 0)), fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Driver("turn", "A.angle", "2*t"))
+    m.add(body("arm", (0, -0.5)), fb.Revolute("B", "ground", "arm", at=(0, -0.5)))
+    m.add(fb.PinInSlot("slot", "arm", "crank", at=(0.2, 0), axis=(2, 5)))
+    m.add(body("idle", (2, 0)), fb.Revolute("C", "ground", "idle", at=(2, 0)))
+    m.add(fb.Coupler("tie", coordinates=("A.angle", "C.angle"), weights=(1, 2)))
+    r = moved(m, 3.2)
+    assert "tie" not in {j.name for j in r.joints}
+    rail = symbol(r, "slot", "rail", "arm")
+    # a crank of 0.2 m 0.5 m from the arm's pivot: the pin is between 0.3 m and 0.7 m from it
+    assert rail.reach[5] - rail.reach[4] == pytest.approx(0.4, abs=2e-3)
