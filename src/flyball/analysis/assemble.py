@@ -23,6 +23,8 @@ from .compiled import Compiled, compiled
 CLOSED = 1e-10
 RESTARTS = 12
 ITERATIONS = 200
+DENSE = 300  # rows up to which a step of assembly goes through a singular value decomposition
+NO_PART = 1e-10  # singular values below this part of the largest are taken for rounding
 
 
 @dataclass
@@ -161,19 +163,28 @@ def _weights(c: Compiled) -> np.ndarray:
     return w * _movable(c)
 
 
-def _step(c: Compiled, r: np.ndarray, W, damping: float) -> np.ndarray:
-    """Least step with G d = r, in the metric of the inverse weights W (sparse), damped."""
+def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
+    """Least step with G d = r, in the metric of the inverse weights R R^T (R sparse), damped.
+
+    Near a singular position a combination of rows may speak of a motion by a part of 1e-8 only: where the size allows
+    it the singular values of G R are used, not their squares, which would drown in rounding.
+    """
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    G = c.sparse_jacobian()
-    A = (G @ W @ G.T).tocsc()
+    B = c.sparse_jacobian() @ R
+    if B.shape[0] <= DENSE:
+        used = np.unique(B.indices)
+        U, s, Vt = np.linalg.svd(B[:, used].toarray(), full_matrices=False)
+        largest = s.max(initial=0.0) or 1.0
+        keep = s > NO_PART * largest
+        x = np.zeros(B.shape[1])
+        x[used] = Vt[keep].T @ (s[keep] / (s[keep] ** 2 + damping * largest**2) * (U[:, keep].T @ r))
+        return R @ x
+    A = (B @ B.T).tocsc()
     scale = A.diagonal().max(initial=0.0) or 1.0
-    if A.shape[0] <= 300:
-        x = np.linalg.lstsq(A.toarray() + damping * scale * np.eye(A.shape[0]), r, rcond=1e-13)[0]
-    else:
-        x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(r)
-    return W @ (G.T @ x)
+    x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(r)
+    return R @ (B.T @ x)
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -189,7 +200,7 @@ def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
     import scipy.sparse as sp
 
     w = _weights(c)
-    W = sp.diags(w)
+    R = sp.diags(np.sqrt(w)).tocsr()
     limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
     size = _misfit(c, t, q, v)
     g = c.work.row[G_VALUE].copy()
@@ -199,7 +210,7 @@ def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
         if size < 1e-13:
             return q, k
         c.at(t, q, v)
-        d = _step(c, -g, W, damping)
+        d = _step(c, -g, R, damping)
         over = np.abs(d / limit).max(initial=0.0)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
@@ -293,9 +304,9 @@ def _velocities(
     size = max(1.0, float(np.abs(v).max(initial=0.0)), float(np.abs(nu).max(initial=0.0)))
     if np.abs(r).max() < 1e-13 * size:
         return v
-    W = c.inverse_mass(_movable(c))
+    R = c.inverse_mass_root(_movable(c))
     for _ in range(4):
-        v = v + _step(c, nu - G @ v, W, 0.0)
+        v = v + _step(c, nu - G @ v, R, 0.0)
     r = nu - G @ v
     if np.abs(r).max() > 1e-9 * size:
         bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import inspect
+from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..model.body import GROUND
+from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
 from ..system.values import Values
@@ -237,4 +239,12 @@ def _names_used(model: Model) -> set[str]:
     from ..model.element import written
 
     text = repr([written(e) for e in model.elements()]) + repr(model.gravity) + repr(list(model.parameters.values()))
-    return set(re.findall(r"\w+", text))
+    return set(re.findall(r"\w+", text)).union(*(inspect.signature(f).parameters for f in _functions(model)))
+
+
+def _functions(model: Model) -> Iterator[Callable]:
+    """Python functions that are laws."""
+    for e in model.elements():
+        for name in fields_with(e.__class__, LawOf):
+            value = getattr(e, name)
+            yield from (law for law in (value if isinstance(value, tuple) else (value,)) if callable(law))

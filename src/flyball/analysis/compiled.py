@@ -11,7 +11,7 @@ from ..model.body import Body, Frame, Initial
 from ..model.model import Model
 from ..system.motion import NONE
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, Work
+from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, V0, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -74,24 +74,39 @@ class Compiled:
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
         return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
 
-    def inverse_mass(self, movable: np.ndarray):
-        """Sparse inverse mass matrix of absolute coordinates, with stand-ins for missing inertias; 0 for the fixed."""
+    def inverse_mass_root(self, movable: np.ndarray):
+        """Sparse R with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
+
+        Missing inertias have stand-ins.
+        """
         import scipy.sparse as sp
 
-        keep = sp.diags(movable)
-        return (keep @ self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS]) @ keep).tocsr()
+        return (sp.diags(movable) @ self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], True)).tocsr()
 
-    def _blocks(self, column: int, translation: np.ndarray):
-        """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table."""
+    def _blocks(self, column: int, translation: np.ndarray, root: bool = False):
+        """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table.
+
+        With ``root`` the square root of that.
+        """
         import scipy.sparse as sp
 
         S = self.values.system
-        blocks = []
-        for b, n in enumerate(S.body_i[:, NV].tolist()):
-            J = S.body_x[b, column : column + 9].reshape(3, 3)
-            k = 2 if n == 3 else 3
-            blocks.append(sp.block_diag([translation[b] * np.eye(k), J[2:, 2:] if n == 3 else J]))
-        return sp.block_diag(blocks, format="csr")
+        J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
+        if root:
+            w, V = np.linalg.eigh(J)
+            J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
+            translation = np.sqrt(translation)
+        i, j, x = [], [], []
+        for n, used in ((3, slice(2, 3)), (6, slice(0, 3))):
+            b = np.flatnonzero(S.body_i[:, NV] == n)
+            v0 = S.body_i[b, V0]
+            shifts, turns = np.arange(n // 3 + 1), np.arange(n // 3 + 1, n)
+            at = v0[:, None] + shifts
+            i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
+            j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
+            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel()]
+        nv = self.structure.nv
+        return sp.csr_matrix((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=(nv, nv))
 
 
 def compiled(

@@ -6,7 +6,6 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -15,20 +14,20 @@ from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
+from ..results import doubts
 from ..results.health import Health
 from ..results.result import Result
 from ..system import motion
+from ..system.functions import interrupts_kept
 from ..system.tables import (
     ALPHA,
     BETA,
     EVALUATIONS,
     FACTORISATIONS,
     G_VALUE,
-    GUILTY,
     PASS,
     SEMIDEFINITE,
     STABILIZE,
-    STATUS,
     TOL_G,
     TOL_V,
     WORST_G,
@@ -38,6 +37,8 @@ from .assemble import Assembly, assemble
 from .compiled import compiled
 from .entry import INTEGRATE, motion_kernel
 from .mobility import mobility
+from .reasons import reason, remarks
+from .residual import acceleration_violation
 
 STABILIZATION = {
     "projection": motion.STAGES,
@@ -225,8 +226,9 @@ def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None
         while True:
             begin = time.perf_counter()
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
-            used = motion_kernel(S, W, method, clock, buffer, INTEGRATE)
-            rows.append(buffer[:used].copy())
+            with interrupts_kept(s.functions):
+                used = motion_kernel(S, W, method, clock, buffer, INTEGRATE)
+                rows.append(buffer[:used].copy())
             if progress is not None:
                 progress((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))
             if clock.count[ex.STATUS] != ex.RUNNING:
@@ -245,11 +247,11 @@ def _finish(
     s, W = a.compiled.structure, a.compiled.work
     status = int(clock.count[ex.STATUS])
     t = float(clock.real[ex.T])
-    message = "reached the end"
+    message, cause = "reached the end", None
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
     elif status != ex.DONE:
-        message = _reason(a, clock, status, t)
+        message, cause = reason(a, clock)
     health = Health(
         success=status == ex.DONE and not interrupted,
         message=message,
@@ -261,59 +263,23 @@ def _finish(
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=seconds,
         options={k: getattr(o, k) for k in o.__dataclass_fields__},
+        remarks=remarks(a),
     )
     cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
-    health.late = {"mobility": partial(mobility, model, a), "energy_drift": partial(_energy_drift, result)}
+    health.late = {
+        "mobility": partial(mobility, model, a),
+        "energy_drift": partial(_energy_drift, result),
+        "acceleration_violation": partial(acceleration_violation, result),
+        "creep": partial(doubts.creep, result),
+        "warnings": partial(doubts.warnings, result),
+    }
     if status not in (ex.DONE, ex.RUNNING):
-        raise SimulationError(message, result, t)
+        raise SimulationError(message, result, t) from cause
     return result
 
 
 def _energy_drift(result: Result) -> float:
     return result.energy.drift
-
-
-def _reason(a: Assembly, clock: ex.Clock, status: int, t: float) -> str:
-    """Why the integration cannot go on, in words."""
-    name = a.compiled.structure.model.name
-    kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
-    wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
-    broken = a.compiled.work.info[STATUS] == motion.NOT_FINITE
-    if status == ex.TOO_MANY:
-        return f"{name!r}: max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {t:.6g} s. {kept}"
-    if status == ex.NOT_FINITE or broken:
-        return (
-            f"{name!r}: the equations of motion are not finite just after t = {t:.6g} s, first at "
-            f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range, or two "
-            f"points of a spring that coincide. {kept}"
-        )
-    guilty = int(a.compiled.work.info[GUILTY])
-    if a.compiled.work.info[STATUS] == motion.JAMMED:
-        e: Any = a.compiled.structure.forces[guilty]
-        return (
-            f"{name!r}: {e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
-            f"load that it comes from, so no finite force answers. Check its coefficients, and the lengths over which "
-            f"the joint carries moments (bending_length, twist_length). {kept}"
-        )
-    rows = a.compiled.structure.rows
-    where = f" near {rows[guilty].element.title}" if rows else ""
-    return (
-        f"{name!r}: the integration cannot go on at t = {t:.6g} s: the step width fell to {clock.real[ex.H]:.3g} s"
-        f"{where}. The mechanism may lock there (a driver asks for more than its links allow), pass a singular "
-        f"position that the tolerance asks to resolve (a looser rtol steps over it), or meet a force that changes "
-        f"abruptly. {kept}"
-    )
-
-
-def _component(a: Assembly, i: int) -> str:
-    """Name of the body that a component of the state belongs to."""
-    s = a.compiled.structure
-    for name, b in s.place.items():
-        if b >= 0:
-            _, _, q0, v0, nq, nv = s.tables["body_i"][b]
-            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
-                return f"body {name!r}"
-    return "a measured quantity"

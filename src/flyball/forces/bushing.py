@@ -99,9 +99,13 @@ class Bushing(TwoFrameForce):
     wrench: ClassVar = staticmethod(wrench)
     energy: ClassVar = staticmethod(energy)
     drawn: ClassVar[str] = "bushing"
+    fails: ClassVar[str] = (
+        "It has been turned by half a turn, where it no longer knows its axis; stop before, or use a joint with springs"
+    )
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
         """Both frames at the point."""
+        self._fit(n, planar)
         if n.at is None:
             return None
         p = vector(n.at, planar, f"'at' of {self.title}")
@@ -109,6 +113,18 @@ class Bushing(TwoFrameForce):
         if n.orientation is not None:
             R = orientation_matrix(n.orientation, f"orientation of {self.title}")
         return {"F": (p, R), "M": (p, R)}
+
+    def _fit(self, n: SimpleNamespace, planar: bool) -> None:
+        """As many numbers as there are axes, and an orientation of the right kind."""
+        for name in ("stiffness", "damping", "torsional_stiffness", "torsional_damping"):
+            wanted = 3 if not planar else 1 if name.startswith("torsional") else 2
+            value = getattr(n, name)
+            if isinstance(value, tuple) and len(value) != wanted:
+                raise ModelError(f"{self.title}: {name} is one number or {wanted} here, one for each axis; got {value}")
+        if planar and n.orientation is not None:
+            raise ModelError(f"{self.title}: in a planar mechanism give angle=, not orientation=")
+        if not planar and n.angle != 0.0:
+            raise ModelError(f"{self.title}: in a spatial mechanism give orientation=, not angle=")
 
     def check(self, n: SimpleNamespace) -> None:
         """Constants are one number, or one for each axis, and not negative."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
@@ -44,7 +45,7 @@ class CoordinateSpring(CoordinateForce):
         Added, an expression of ``t``, ``value``, ``rate``, sensors and parameters.
     """
 
-    coordinate: str
+    coordinate: str = field(kw_only=False)
     stiffness: Annotated[Number, Unit(None)] = 0.0
     damping: Annotated[Number, Unit(None)] = 0.0
     rest: Annotated[Number, Unit(None)] = 0.0
@@ -89,7 +90,7 @@ class Actuator(CoordinateForce):
         An expression of ``t``, ``value``, ``rate``, sensors and parameters: ``"kp*(0.2 - value) - kd*rate"``.
     """
 
-    coordinate: str
+    coordinate: str = field(kw_only=False)
     force: Annotated[Law, LawOf(None, ("value", "rate"))]
 
     kind: ClassVar[int] = KIND

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import field
 from types import SimpleNamespace
-from typing import Annotated, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from .._jit import formula
 from ..errors import ModelError
@@ -11,6 +12,10 @@ from ..math.scalar import absolute, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
+from ..model.joint import Joint
+
+if TYPE_CHECKING:
+    from ..model.model import Model
 
 KIND = 6
 STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
@@ -48,8 +53,9 @@ class JointFriction(CoordinateForce):
 
     The load is N = |radial force| + thrust_factor |thrust| + |bending moment| / bending_length + |twist| /
     twist_length, from the joint's actual reaction at every instant. The law is regularised: what would stick creeps
-    at ``stick_speed`` times artanh(part of the full friction that holds it). (Armstrong-Helouvry, Dupont and Canudas
-    de Wit, *A survey of models for the control of machines with friction*, 1994.)
+    at ``stick_speed`` times artanh(part of the full friction that holds it); ``result.health.creep`` says how far it
+    crept. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models for the control of machines with
+    friction*, 1994.)
 
     Parameters
     ----------
@@ -76,7 +82,7 @@ class JointFriction(CoordinateForce):
         Lengths over which bending moment and twist are carried as pairs of forces; moments count nothing if not given.
     """
 
-    joint: str
+    joint: str = field(kw_only=False)
     coordinate: str | None = None
     static: Annotated[Number, Unit("1")]
     kinetic: Annotated[Number | None, Unit("1")] = None
@@ -100,6 +106,18 @@ class JointFriction(CoordinateForce):
 
     def _coordinate(self) -> str:
         return self.coordinate or ("displacement" if self.radius is None else "angle")
+
+    def examine(self, model: Model) -> None:
+        """It needs a joint that carries something, and the radius of a bearing that turns."""
+        found = model._names.get(self.joint)
+        if isinstance(found, Joint) and self.radius is None and self.coordinate is None:
+            has = found.measured(model.planar)
+            if "angle" in has and "displacement" not in has:
+                raise ModelError(
+                    f"{self.title}: friction about the angle of {found.title} needs the radius of the bearing; give "
+                    f"radius="
+                )
+        model.joint(self.joint, self, self.coordinate_text().partition(".")[2])
 
     def check(self, n: SimpleNamespace) -> None:
         """Coefficients and lengths make sense."""

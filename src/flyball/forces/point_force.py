@@ -6,9 +6,11 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 from .._jit import formula
+from ..errors import ModelError
 from ..math.vec import mv
-from ..model.element import Law, LawOf, Numbers, Point, element
+from ..model.element import Element, Law, LawOf, Laws, Point, element
 from ..model.force import BodyForce
+from ..model.joint import WorldFrame
 
 KIND = 3
 
@@ -34,6 +36,13 @@ def wrench(par, F, M, laws, values):
     return in_world(par, F, M, laws), (o, o, o)
 
 
+def components(e: Element, given: tuple, planar: bool, example: str) -> None:
+    """Refuse a vector of laws with too few or too many components."""
+    wanted = 2 if planar else 3
+    if len(given) != wanted:
+        raise ModelError(f"{e.title}: it needs {wanted} components, such as {example}, got {given}")
+
+
 @element
 class PointForce(BodyForce):
     """A given force on a body.
@@ -44,14 +53,15 @@ class PointForce(BodyForce):
     body : str
         Body it acts on, or a frame fixed on it, at whose origin it acts.
     force : two or three laws [N]
-        Components, each a number or an expression of ``t`` and parameters.
+        Components, each a number, an expression of ``t``, sensors and parameters, or a Python
+        function of these.
     at : point [m]
         Where it acts, in world coordinates of the drawn configuration; the centre of mass if not given.
     axes : ``"world"`` or ``"body"``
         Whose axes the components are along; in the body's axes the force turns with the body.
     """
 
-    force: Annotated[Numbers, LawOf("N")]
+    force: Annotated[Laws, LawOf("N")]
     at: Point | None = None
     axes: Literal["world", "body"] = "world"
 
@@ -59,6 +69,11 @@ class PointForce(BodyForce):
     inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
     drawn: ClassVar[str] = "arrow"
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Nowhere of its own; refuses a number of components that the mechanism does not have."""
+        components(self, self.force, planar, "(0, -5)" if planar else "(0, 0, -5)")
+        return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar, Literal
 
 from .._jit import formula
-from ..model.element import Law, LawOf, Number, Numbers, element
+from ..errors import ModelError
+from ..model.element import Law, LawOf, Laws, element
 from ..model.force import BodyForce
-from .point_force import in_world, inputs
+from ..model.joint import WorldFrame
+from .point_force import components, in_world, inputs
 
 KIND = 4
 
@@ -30,17 +32,27 @@ class PointTorque(BodyForce):
     body : str
         Body it acts on.
     torque : law, or three laws [N m]
-        One component about the normal in a planar mechanism, else three; numbers or expressions of ``t``.
+        One component about the normal in a planar mechanism, else three; numbers, expressions of ``t``,
+        sensors and parameters, or Python functions of these.
     axes : ``"world"`` or ``"body"``
         Whose axes the components are along.
     """
 
-    torque: Annotated[Number | Numbers, LawOf("N*m")]
+    torque: Annotated[Law | Laws, LawOf("N*m")]
     axes: Literal["world", "body"] = "world"
 
     kind: ClassVar[int] = KIND
     inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
+
+    def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
+        """Nowhere of its own; refuses a number of components that the mechanism does not have."""
+        given = self.torque if isinstance(self.torque, tuple) else (self.torque,)
+        if planar and len(given) != 1:
+            raise ModelError(f"{self.title}: in a planar mechanism a torque is one number or law, got {given}")
+        if not planar:
+            components(self, given, planar, "(0, 0, 2)")
+        return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
@@ -48,4 +60,5 @@ class PointTorque(BodyForce):
 
     def laws(self) -> tuple[Law | None, ...]:
         """The components; a single one is about the normal."""
-        return tuple(self.torque) if isinstance(self.torque, tuple) else (None, None, self.torque)
+        given = tuple(self.torque) if isinstance(self.torque, tuple) else (self.torque,)
+        return given if len(given) == 3 else (None, None, *given)

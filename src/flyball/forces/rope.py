@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+from dataclasses import field
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -63,7 +65,7 @@ class Rope(CoordinateForce):
         Free length; the drawn length if not given.
     """
 
-    bodies: tuple[str, ...]
+    bodies: tuple[str, ...] = field(kw_only=False)
     at: Points | None = None
     stiffness: Stiffness
     damping: Damping = 0.0
@@ -75,6 +77,7 @@ class Rope(CoordinateForce):
     sign: ClassVar[float] = -1.0
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N"}
     drawn: ClassVar[str] = "rope"
+    fails: ClassVar[str] = "Two neighbouring points of it coincide, where the rope between them has no direction"
 
     def ends(self) -> dict[str, str]:
         """One frame for each point."""
@@ -85,6 +88,12 @@ class Rope(CoordinateForce):
         if n.at is None:
             return None
         points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
+        for k, (a, b) in enumerate(itertools.pairwise(points)):
+            if not (a != b).any():
+                raise ModelError(
+                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.tolist())} m, where the rope "
+                    f"between them has no direction; move one, or leave it out"
+                )
         return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
@@ -92,9 +101,9 @@ class Rope(CoordinateForce):
         return tuple((f"P{k}", f"P{k + 1}", DISTANCE) for k in range(len(self.bodies) - 1))
 
     def check(self, n: SimpleNamespace) -> None:
-        """Enough points, a stiffness, and no two neighbouring points in one place."""
+        """Enough points, and a stiffness."""
         if len(self.bodies) < 2:
-            raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}")
+            raise ModelError(f"{self.title}: a rope has two ends at least, got bodies {self.bodies}; name the second")
         if n.at is not None and len(n.at) != len(self.bodies):
             raise ModelError(f"{self.title}: {len(self.bodies)} bodies need as many points in 'at', got {len(n.at)}")
         positive(self, n, "stiffness", why="A rope that cannot stretch is a Distance joint or a Coupler")

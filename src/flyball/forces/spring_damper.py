@@ -70,6 +70,7 @@ class SpringDamper(TwoPointForce):
     energy: ClassVar = staticmethod(energy)
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "force": "N"}
     drawn: ClassVar[str] = "spring"
+    fails: ClassVar[str] = "Its two points coincide, where a force along the line between them has no direction"
 
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness, damping and free length must not be negative."""

@@ -19,6 +19,8 @@ from ..model.table import Table
 
 
 def _list(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
     return tuple(map(tuple, value.tolist() if hasattr(value, "tolist") else value))
 
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from ..errors import ModelError
 from ..model.coupling import Coupling
@@ -12,6 +13,9 @@ from ..model.element import Number, Numbers, Unit, element
 
 if TYPE_CHECKING:
     from ..model.model import Model
+
+WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # units that weights may have
+SUMS = ("1", "m", "rad")
 
 
 @element
@@ -31,9 +35,11 @@ class Coupler(Coupling):
         What the sum has to be; what it is in the drawn configuration if not given.
     """
 
-    coordinates: tuple[str, ...]
+    coordinates: tuple[str, ...] = field(kw_only=False)
     weights: Annotated[Numbers, Unit(None)]
     value: Annotated[Number | None, Unit(None)] = None
+
+    dimensions: ClassVar = {"weights": WEIGHTS, "value": SUMS}
 
     def coupled(self) -> tuple[str, ...]:
         """The coordinates."""
@@ -52,9 +58,12 @@ class Coupler(Coupling):
         return n.value
 
     def check(self, n: SimpleNamespace) -> None:
-        """A weight for each of at least two coordinates, none of them zero."""
+        """A weight for each of at least two different coordinates, none of them zero."""
         if len(self.coordinates) < 2:
             raise ModelError(f"{self.title}: it couples {len(self.coordinates)} coordinate; give two or more")
+        twice = [c for k, c in enumerate(self.coordinates) if c in self.coordinates[:k]]
+        if twice:
+            raise ModelError(f"{self.title}: it names {twice[0]!r} twice; name it once, with both weights added up")
         if len(n.weights) != len(self.coordinates):
             raise ModelError(
                 f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -35,12 +36,13 @@ class GearPair(Coupling):
         Whether the second gear is a ring with its teeth inside.
     """
 
-    joint_1: str
-    joint_2: str
+    joint_1: str = field(kw_only=False)
+    joint_2: str = field(kw_only=False)
     teeth: Annotated[Numbers, Unit(None)]
     internal: bool = False
 
     drawn: ClassVar[str] = "gear"
+    dimensions: ClassVar = {"teeth": ("1", "m")}
 
     def coupled(self) -> tuple[str, ...]:
         """The two angles."""
@@ -63,5 +65,7 @@ class GearPair(Coupling):
             raise ModelError(f"{self.title}: teeth are two numbers greater than 0, got {n.teeth}")
 
     def examine(self, model: Model) -> None:
-        """The joints share a carrier."""
+        """Both are joints, and share a carrier."""
+        for name in (self.joint_1, self.joint_2):
+            model.joint(name, self, "angle")
         self._carrier(model)

@@ -46,7 +46,7 @@ class KnifeEdge(Joint):
         if planar:
             R = self.orientation(n.axis, planar)
             return (p, R), (p, R)
-        a = vector(n.axis if n.axis is not None else (0, 0, 0), False, f"axis of {self.title}", direction=True)
+        a = self.orientation(n.axis, planar)[:, 2]
         up = vector(n.normal, False, f"normal of {self.title}", direction=True)
         x = np.cross(up, a)
         size = np.sqrt((x * x).sum())

@@ -53,3 +53,4 @@ class PinInSlot(PointOnLine):
         "angle": Coordinate(ANGLE, turn_F=Z_TO_X, turn_M=Z_TO_X, offset="angle")
     }
     spatial: ClassVar[bool] = False
+    in_space: ClassVar[str] = "PointOnLine"

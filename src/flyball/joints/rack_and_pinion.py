@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -30,8 +31,8 @@ class RackAndPinion(Coupling):
         angle moves the rack backwards.
     """
 
-    rack: str
-    pinion: str
+    rack: str = field(kw_only=False)
+    pinion: str = field(kw_only=False)
     radius: Length
 
     drawn: ClassVar[str] = "rack"

@@ -62,7 +62,9 @@ class RollingDisk(Joint):
         c = up @ M[:, 2]
         s = np.sqrt((1.0 - c) * (1.0 + c))
         if not s.real > FLAT:
-            raise ModelError(f"{self.title}: its axle is square to the plane: the wheel lies flat and cannot roll")
+            raise ModelError(
+                f"{self.title}: its axle is square to the plane: the wheel lies flat and cannot roll; lean it"
+            )
         contact = centre - n.radius / s * (up - c * M[:, 2]) - n.tread * up
         return (contact, triad(up)), (centre, M)
 

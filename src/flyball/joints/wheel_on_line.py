@@ -47,6 +47,7 @@ class WheelOnLine(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     spatial: ClassVar[bool] = False
+    in_space: ClassVar[str] = "RollingDisk, or a RackAndPinion between two joints"
     drawn: ClassVar[str] = "rolling"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:

@@ -16,6 +16,7 @@ from .element import (
     AngularVelocity,
     Density,
     Element,
+    Law,
     Mass,
     Number,
     Point,
@@ -202,11 +203,12 @@ class Driver(Element):
         ``"joint.coordinate"`` such as ``"A.angle"``, or a world coordinate of a body's or frame's origin such as
         ``"slider.x"``.
     law : expression
-        Its value [rad] or [m], a function of ``t`` and parameters; its derivatives are found exactly.
+        Its value [rad] or [m], an expression of ``t``, tables, parameters, and sensors of positions and angles; its
+        derivatives are found exactly. No Python function, whose derivatives are not known.
     """
 
     coordinate: str = field(kw_only=False)
-    law: Number = field(kw_only=False)
+    law: Law = field(kw_only=False)
 
     category: ClassVar[str] = "drivers"
 

@@ -23,6 +23,7 @@ class Coupling(Element):
 
     category: ClassVar[str] = "couplings"
     drawn: ClassVar[str] = "coupler"
+    dimensions: ClassVar[dict[str, tuple[str, ...]]] = {}  # field -> units that its numbers may have
 
     def coupled(self) -> tuple[str, ...]:
         """The coordinates: ``"joint.coordinate"``, or ``"body.x"``."""
@@ -52,6 +53,8 @@ def shared_body(e: Coupling, model: Model, first: str, second: str, remedy: str)
     ModelError
         If they share none, or both.
     """
+    if first == second:
+        raise ModelError(f"{e.title}: both its joints are {first!r}; name two")
     ends = [{model.carrier(x, e) for x in (j.body_i, j.body_j)} for j in (model[first], model[second])]
     common = ends[0] & ends[1]
     if len(common) != 1:

@@ -104,6 +104,7 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     name = kwargs.get("name", args[0] if args else None)
     who = f"{kind} {name!r}" if isinstance(name, str) else kind
     lines = []
+    by_place = {known[int(e["loc"][0])] for e in error.errors() if e["type"] == "unexpected_positional_argument"}
     wrong: dict[str, list[str]] = {}  # field -> what it may be: a union complains once for each of its members
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]
@@ -113,7 +114,13 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
             hint = getattr(cls, "hints", {}).get(where) or f"its fields are {', '.join(known)}"
             lines.append(f"unknown field {where!r}{_did_you_mean(where, known)}; {hint}")
         elif e["type"] in ("missing", "missing_argument", "missing_keyword_only_argument"):
-            lines.append(f"field {where!r} is missing")
+            if where not in by_place:
+                lines.append(f"field {where!r} is missing")
+        elif e["type"] == "unexpected_positional_argument":
+            lines.append(f"give field {where!r} by its name: {where}=...")
+        elif e["type"] in ("too_long", "too_short"):
+            wanted = e["ctx"].get("max_length", e["ctx"].get("min_length"))
+            wrong.setdefault(where, []).append(f"a list of {wanted}")
         elif e["type"] in _TYPES:
             wrong.setdefault(where, []).append(_TYPES[e["type"]])
         else:
@@ -253,5 +260,5 @@ def _compare(e: Element, n: SimpleNamespace, names: tuple[str, ...], good: Calla
     for name in names:
         x = getattr(n, name)
         if x is not None and not good(x.real):
-            unit = units[name].dimension or ""
-            raise ModelError(f"{e.title}: {name} is {x:g} {unit}; it must be {rule}{'. ' + why if why else ''}")
+            unit = "" if units[name].dimension in (None, "1") else f" {units[name].dimension}"
+            raise ModelError(f"{e.title}: {name} is {x:g}{unit}; it must be {rule}{'. ' + why if why else ''}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from ..constraints.blocks import Row
 from .element import Element, Law, Point, PointPair
 from .geometry import vector
 from .joint import WorldFrame
+
+if TYPE_CHECKING:
+    from .model import Model
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,7 @@ class Force(Element):
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
     drawn: ClassVar[str] = ""
+    fails: ClassVar[str] = "Its numbers are too large"  # where its formulas give no number, and what to do
 
     def ends(self) -> dict[str, str]:
         """Role of each of its frames -> body or frame that it is on."""
@@ -106,6 +110,13 @@ class CoordinateForce(Force):
     """A force along a measured quantity: a joint's coordinate, or a sum of distances."""
 
     effort: ClassVar[Callable]
+    dimensions: ClassVar[dict[str, tuple[str, str]]] = {  # of fields, along a displacement and about an angle
+        "stiffness": ("N/m", "N*m/rad"),
+        "damping": ("N*s/m", "N*m*s/rad"),
+        "viscous": ("N*s/m", "N*m*s/rad"),
+        "rest": ("m", "rad"),
+        "force": ("N", "N*m"),
+    }
     sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
 
     def ends(self) -> dict[str, str]:
@@ -115,6 +126,9 @@ class CoordinateForce(Force):
     def coordinate_text(self) -> str:
         """The coordinate that it acts along: ``"A.angle"``."""
         return ""
+
+    def examine(self, model: Model) -> None:
+        """Refuse what it cannot act along."""
 
     def path(self) -> tuple[tuple[str, str, Row], ...]:
         """Or the terms (role of F, role of M, formula) whose sum it acts along."""
@@ -130,3 +144,7 @@ class JointForce(CoordinateForce):
     def coordinate_text(self) -> str:
         """The joint's angle."""
         return f"{self.joint}.angle"
+
+    def examine(self, model: Model) -> None:
+        """It acts about a joint, not on a body's angle."""
+        model.joint(self.joint, self, "angle")

@@ -54,6 +54,7 @@ class Joint(Element):
     coordinates: ClassVar[dict[str, Coordinate]] = {}
     planar_normal: ClassVar[str] = "z"  # joint axis that points out of the plane; "" if it cannot be planar
     spatial: ClassVar[bool] = True
+    in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
     needs_axis: ClassVar[bool] = False
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
 
@@ -84,6 +85,8 @@ class Joint(Element):
                 example = "(1, 0)" if planar else "(0, 0, 1)"
                 raise ModelError(f"{self.title}: give its axis in world coordinates, for instance axis={example}")
             return np.eye(3)
+        if planar and self.planar_normal == "z" and len(axis) != 3:
+            raise ModelError(f"{self.title}: in a planar mechanism its axis is the normal; leave axis out")
         a = vector(axis, planar and self.planar_normal != "z", f"axis of {self.title}", direction=True)
         if planar and self.planar_normal == "z":
             if abs(a[0]) + abs(a[1]) > 1e-12:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import copy
 import difflib
 import itertools
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,8 +15,10 @@ from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
+from .examine import but_is, carriers, check_units, curves
 from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .function import function_name
 from .geometry import vector
 from .inertia import mass_properties
 from .joint import Joint
@@ -169,6 +172,7 @@ class Model:
             if self.carrier(e.body, e) == GROUND:
                 raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
         elif isinstance(e, CoordinateForce):
+            e.examine(self)
             self._check_path(e)
         elif isinstance(e, Coupling):
             for text in e.coupled():
@@ -185,9 +189,7 @@ class Model:
     def _check_path(self, e: CoordinateForce) -> None:
         """What it acts along exists, and can move."""
         if e.coordinate_text():
-            owner, what = self.coordinate(e.coordinate_text(), e)
-            if hasattr(e, "joint") and not isinstance(owner, Joint):
-                self.joint(e.joint, e, what)  # a body's angle is no joint's
+            self.coordinate(e.coordinate_text(), e)
         carriers = [self.carrier(name, e) for name in e.ends().values()]
         for k, (a, b) in enumerate(itertools.pairwise(carriers)):
             if a == b:
@@ -209,14 +211,23 @@ class Model:
         found = self._names.get(name)
         if isinstance(found, Frame):
             return found.body
-        return name if name == GROUND else self.body(name, e).name
+        if name != GROUND and not isinstance(found, Body):
+            names = carriers(self)
+            raise ModelError(
+                f"{e.title}: there is no body or frame named {name!r}{but_is(self, name, 'body or frame')}"
+                f"{suggest(name, names)}; {listing(names)}"
+            )
+        return name
 
     def joint(self, name: str, e: Element, coordinate: str) -> Joint:
         """The joint of that name, which must have the coordinate, as asked for by e."""
         found = self._names.get(name)
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
-            raise ModelError(f"{e.title}: there is no joint named {name!r}{suggest(name, names)}; {listing(names)}")
+            raise ModelError(
+                f"{e.title}: there is no joint named {name!r}{but_is(self, name, 'joint')}{suggest(name, names)}; "
+                f"{listing(names)}"
+            )
         has = found.measured(self.planar)
         if coordinate not in has:
             raise ModelError(
@@ -247,18 +258,25 @@ class Model:
         Raises
         ------
         ModelError
-            If there is no such part; its curves are known once there is a result.
+            If there is no such part, or it has no such curve.
         """
         owner, _, what = e.of.partition(".")
         found = self._names.get(owner)
-        if owner == "energy" and what:
-            return None
-        if found is None or not what:
+        if found is None and owner != "energy":
             known = list(self._names)
             raise ModelError(
                 f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
                 f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
             )
+        has = curves(self, owner)
+        if what not in has:
+            whose = "energy" if found is None else found.title
+            raise ModelError(
+                f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
+                f"{suggest(what, has)}"
+            )
+        if found is None:
+            return None
         if isinstance(found, (Body, Frame)):
             return self._measured_point(owner, what)
         if isinstance(found, Joint):
@@ -285,6 +303,7 @@ class Model:
         n = resolve(e, env)
         e.check(n)
         self._check_laws(e)
+        check_units(self, e, env)
         if isinstance(e, Body):
             self._check_body(e, n, env)
         elif isinstance(e, Joint):
@@ -302,6 +321,12 @@ class Model:
             for law in value if isinstance(value, tuple) else (value,):
                 self.law(law, of, f"{name} of {e.title}")
         if isinstance(e, Driver):
+            followed = [x for x in self.sensors if isinstance(x, Sensor) and x.of == e.coordinate]
+            if isinstance(e.law, str) and any(re.search(rf"\b{re.escape(x.name)}\b", e.law) for x in followed):
+                raise ModelError(
+                    f"{e.title}: its law names sensor {followed[0].name!r}, which measures {e.coordinate!r} itself; a "
+                    f"driver cannot follow what it drives"
+                )
             self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
     def unit(self, text: str, e: Element) -> str:
@@ -315,11 +340,17 @@ class Model:
         """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
         if value is None:
             return None
+        if driver and callable(value):
+            raise ExpressionError(
+                f"{where} is the Python function '{function_name(value)}', whose derivatives a driver cannot know; "
+                f"give an expression, or a Table that is called in one"
+            )
         tables = {x.name: x for x in self.tables}
         sensors = {x.name: x for x in self.sensors if isinstance(x, Sensor)}
         try:
             expression = law_expression(value, of.dimension, where, tables=tables)
             expression.require(["t", *of.inputs, *sensors, *self.parameters])
+            _refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
             raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
@@ -361,9 +392,12 @@ class Model:
 
     def _check_joint(self, e: Joint, n: Any) -> None:
         if self.planar and not e.planar_normal:
-            raise ModelError(f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism")
+            raise ModelError(
+                f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, "
+                f"such as Revolute, Translational, PinInSlot or Distance"
+            )
         if not self.planar and not e.spatial:
-            raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use Prismatic")
+            raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use {e.in_space}")
         if n.at is not None:
             F, M = e.world_frames(n, self.planar)
             for row in e.rows(self.planar):
@@ -375,6 +409,18 @@ class Model:
         """What is not placed by ``at`` names frames."""
         if all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
             raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
+
+
+def _refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[str], parameters: Iterable) -> None:
+    """Refuse a law that uses a name with two meanings."""
+    for name in sorted(names):
+        meant = [
+            what
+            for known, what in ((inputs, "an input of this law"), (sensors, "a sensor"), (parameters, "a parameter"))
+            if name in known
+        ]
+        if len(meant) > 1:
+            raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")
 
 
 def _measured_joint(joint: Joint, what: str, own: Mapping) -> tuple[str, str, int] | None:

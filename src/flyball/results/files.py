@@ -246,5 +246,9 @@ def _health(data: dict[str, Any]) -> Health:
         redundant=tuple(data["redundant"]),
         undetermined={k: tuple(v) for k, v in data["undetermined"].items()},
     )
-    late = {"mobility": found, "energy_drift": data["energy_drift"]}
+    late: dict[str, Any] = {"mobility": found, "energy_drift": data["energy_drift"]}
+    late["acceleration_violation"] = data.get("acceleration_violation", 0.0)
+    late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
+    late["warnings"] = tuple(data.get("warnings", ()))
+    data["remarks"] = tuple(data.get("remarks", ()))
     return Health(**{k: v for k, v in data.items() if k in known}, late=late)

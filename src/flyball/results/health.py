@@ -6,13 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
+"""Figures that are found when first asked for."""
+
 
 @dataclass
 class Health:
     """Figures that tell whether a result can be trusted.
 
-    Those that take time to find (freedoms by rank, undetermined reactions, the energy balance) are found when first
-    asked for.
+    Those that take time to find (freedoms by rank, undetermined reactions, the energy balance, creep, warnings) are
+    found when first asked for.
     """
 
     success: bool
@@ -25,6 +28,7 @@ class Health:
     factorisations: int
     seconds: float  # wall time, assembly included [s]
     options: dict[str, Any] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
 
     def _found(self, name: str) -> Any:
@@ -53,10 +57,25 @@ class Health:
         """Largest deviation from the energy balance [J]."""
         return self._found("energy_drift")
 
+    @property
+    def acceleration_violation(self) -> float:
+        """Largest |G vdot - gamma| at output times, relative to the terms that make it up."""
+        return self._found("acceleration_violation") if "acceleration_violation" in self.late else 0.0
+
+    @property
+    def creep(self) -> dict[str, tuple[float, float]]:
+        """Joint friction -> largest creep speed [m/s] and distance [m] while it should stick; see `doubts.creep`."""
+        return self._found("creep") if "creep" in self.late else {}
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to look at the result twice: energy balance, violated constraints, undetermined loads, creep."""
+        return self._found("warnings") if "warnings" in self.late else self.remarks
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late"}
-        return plain | {k: getattr(self, k) for k in ("freedoms", "redundant", "undetermined", "energy_drift")}
+        return plain | {k: getattr(self, k) for k in LATE}
 
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
@@ -73,7 +92,11 @@ class Health:
         if self.undetermined:
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in self.undetermined.items())
             out.insert(3, ("reactions not determined", text))
-        return out
+        crept = {k: c for k, c in self.creep.items() if c[1] > 0.0}
+        if crept:
+            text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())
+            out.append(("creep of friction", text))
+        return out + [(f"warning {k}", text) for k, text in enumerate(self.warnings, 1)]
 
     def __str__(self) -> str:
         width = max(len(k) for k, _ in self.lines())

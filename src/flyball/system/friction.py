@@ -40,6 +40,7 @@ NOTHING = 0.1  # times the largest force and CONVERGED: changes of loads below t
 TRIAL = 0.05  # part of the way to the returned load that tells the slope
 FLAT = 1e-6  # a step that changes the gap by less than this part of what was expected teaches nothing
 FORGOTTEN = -1
+BLURRED = 1e-6  # where redundancy leaves a reaction open, rounding over the regularisation blurs it: good enough
 
 
 @formula

@@ -43,15 +43,18 @@ class Fault(NamedTuple):
         given = zip(self.function.names, self.arguments, strict=True)
         listed = ", ".join(f"{name} = {x:.6g}" for name, x in given if name)
         at = f" for {listed}" if listed else ""
+        if isinstance(self.exception, ExpressionError):
+            return f"{self.function.title}{at}: {self.exception}"
         if self.exception is None:
             return f"{self.function.title} gives {self.value}{at}; it must give a finite number"
         return f"{self.function.title} raises {type(self.exception).__name__}{at}: {self.exception}"
 
 
-def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
+def fault(stack: np.ndarray, functions: Sequence[Called], overcome: bool = False) -> Fault | None:
     """The last call that gave no finite number, or None.
 
-    The Python function is run again with the same arguments, for the exception that compiled code does not tell.
+    The Python function is run again with the same arguments, for the exception that compiled code does not tell. A
+    function with a memory may not raise it again; then it is the one that it raised last, if that is known.
 
     Parameters
     ----------
@@ -59,11 +62,14 @@ def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
         Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
     functions : sequence of Called
         What `compile_law` appended to its list.
+    overcome : bool
+        Ask for a call in a step that was taken again, shorter, and then did without such a call.
     """
     record = np.real(stack[-STACK_RESERVE:])
-    if not record[0, 0] > 0.0:
+    at = -record[0, 0] if overcome else record[0, 0]
+    if not at > 0.0:
         return None
-    function = functions[int(record[0, 0]) - 1]
+    function = functions[int(at) - 1]
     arguments = tuple(record[1:].ravel()[: int(record[0, 1])].tolist())
     value, error = float(record[0, 2]), None
     try:
@@ -75,6 +81,8 @@ def fault(stack: np.ndarray, functions: Sequence[Called]) -> Fault | None:
             value = float(given)
         except (TypeError, ValueError):
             error = ExpressionError(f"it returned {given!r} ({type(given).__name__}); a law returns a number")
+    if error is None and np.isfinite(value) and function.native.raised:
+        error = function.native.raised[0]
     return Fault(function, arguments, error, value)
 
 

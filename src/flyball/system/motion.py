@@ -10,8 +10,9 @@ from .._jit import formula
 from ..constraints import curve
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
+from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
-from .friction import CONVERGED, SUBSTITUTIONS, improve, returned
+from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, returned
 from .kinematics import motions, poses
 from .loads import efforts, forces, gather, inertial
 from .records import load
@@ -48,7 +49,7 @@ from .tables import (
 from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
-NOT_CLOSED, NOT_FINITE, JAMMED = 2, 3, 4
+NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
@@ -174,6 +175,7 @@ def accelerate(S, W, t, p, dy, factored):
     x = W.vel[X_SOLVED]
     if factored:
         factored = reuse(S, W)
+    change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
         inertial(S, W)
@@ -184,16 +186,20 @@ def accelerate(S, W, t, p, dy, factored):
             not factored
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
         ):
-            status = factor(S, W)
-            if status != 0:
-                return status
+            if factor(S, W) != 0:
+                W.info[STATUS] = SINGULAR
+                return SINGULAR
             factored = True
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
-        if S.load_i.shape[0] == 0 or returned(S, W) <= CONVERGED:
+        if S.load_i.shape[0] == 0:
+            break
+        last = change
+        change = returned(S, W)
+        if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last):
             break
         if attempt == SUBSTITUTIONS - 1:
-            W.info[STATUS] = JAMMED
-            return JAMMED
+            W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
+            return W.info[STATUS]
         improve(S, W, attempt)
     rates(S, p, v, dy)
     for d in range(nv):
@@ -260,6 +266,7 @@ def derivative(t, y, dy, S, W):
     if W.option[STABILIZE] == STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
+            W.info[STATUS] = status
             return status
     else:
         normalise(S, q)
@@ -277,9 +284,13 @@ def arrive(t, y, dy, S, W):
     z = y[nq + W.vel.shape[1] :]
     found = 0.0
     factored = False
+    fault = W.stack.shape[0] - STACK_RESERVE
+    if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
+        W.stack[fault, 0] = -W.stack[fault, 0]
     if W.option[STABILIZE] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
+            W.info[STATUS] = status
             return status, found
     else:
         normalise(S, q)

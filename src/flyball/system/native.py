@@ -40,6 +40,7 @@ class Native:
         self.python, self.count = python, count
         self.outside: tuple[Any, ...] = ()
         self.reason = ""
+        self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
         if isinstance(python, FunctionType):
             self.outside = _outside(python, set())
             try:
@@ -49,7 +50,7 @@ class Native:
         else:
             self.reason = f"it is no plain function but a {type(python).__name__}"
         if self.reason:
-            self._code = _callback(python, count)
+            self._code = _callback(python, count, self.raised)
         code = self._code
         self.address = code.address if hasattr(code, "address") else ctypes.cast(code, ctypes.c_void_p).value or 0
         NATIVE[self.address] = self
@@ -85,7 +86,7 @@ def _compiled(function: FunctionType, count: int) -> Any:
     from numba.core.errors import NumbaWarning
 
     if getattr(config, "DISABLE_JIT", False):
-        return _callback(function, count)
+        return _callback(function, count, [])
     if MOST != 6:
         raise RuntimeError("the arguments below are six")
     f = _translatable(function, {})
@@ -104,14 +105,15 @@ def _compiled(function: FunctionType, count: int) -> Any:
         return cfunc(types.void(types.CPointer(types.float64)))(law)
 
 
-def _callback(function: Callable[..., Any], count: int) -> Any:
-    """A way from compiled code back into Python."""
+def _callback(function: Callable[..., Any], count: int, raised: list[Exception]) -> Any:
+    """A way from compiled code back into Python; what the function raises last is kept in a list."""
     places = [3 * k for k in range(count)]
 
     def law(p: Any) -> None:
         try:
             p[1] = function(*[p[k] for k in places])
-        except BaseException:  # nothing may escape into compiled code; `fault` runs the function again
+        except BaseException as error:  # nothing may escape into compiled code; `fault` runs the function again
+            raised[:] = [error] if isinstance(error, Exception) else raised
             p[1] = np.nan
 
     return ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double))(law)

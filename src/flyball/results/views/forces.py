@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...errors import AnalysisError
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce, TwoPointForce
 from ...system.call import STACK_RESERVE
@@ -51,9 +52,16 @@ class ForceView(View):
         stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)
-        return np.array(
-            [evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i]) for i in range(len(t))], float
-        )
+        out = np.zeros(len(t))
+        for i in range(len(t)):
+            try:
+                out[i] = evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i])
+            except Exception as error:  # a user's function may raise anything
+                raise AnalysisError(
+                    f"{self.element.title}: its law raises {type(error).__name__} at t = {t[i]:.6g} s: {error}. A law "
+                    f"must give the same number whenever it is asked; give a function without a memory"
+                ) from error
+        return out
 
     @property
     def wrench(self) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,119 @@
+"""What a result says against itself: an energy balance that does not close, friction that crept, open reactions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..forces.joint_friction import STICKING, JointFriction
+from ..system.loads import wide
+from ..system.tables import MASS
+
+if TYPE_CHECKING:
+    from .result import Result
+
+UNBALANCED = 1e-4  # part of the energy moved above which the balance is worth a word
+OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
+UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
+AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
+CREPT = 1e-3  # part of the mechanism's length above which creep is
+
+
+def warnings(result: Result) -> tuple[str, ...]:
+    """Reasons to look at a result twice, each with what can be done; none for a sound one."""
+    texts = [
+        *result.health.remarks,
+        _balance(result),
+        _violation(result),
+        _accelerations(result),
+        *_open_loads(result),
+        *_creep(result),
+    ]
+    return tuple(text for text in texts if text)
+
+
+def energy_moved(result: Result) -> float:
+    """How much energy the motion shifted about [J]: what the balance is measured by.
+
+    The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
+    """
+    if not len(result.t):
+        return 0.0
+    e = result.energy
+    return float(e.kinetic.max() + sum(np.ptp(x) for x in (e.gravity, e.elastic, *e.work.values())))
+
+
+def _balance(result: Result) -> str:
+    moved, drift = energy_moved(result), result.health.energy_drift
+    if drift <= UNBALANCED * moved + _rest(result):
+        return ""
+    return (
+        f"the energy balance is off by {drift:.3g} J where {moved:.3g} J were moved; a smaller rtol may tell whether "
+        f"the motion can be trusted"
+    )
+
+
+def _rest(result: Result) -> float:
+    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies."""
+    rounding = 1e-12 * float(np.abs(result.energy.potential).max(initial=0.0))
+    return rounding + float(result.values.system.body_x[:, MASS].sum()) * (AT_REST * result.values.length) ** 2
+
+
+def _violation(result: Result) -> str:
+    worst, length = result.health.violation, result.values.length
+    if not worst > OPEN * length:
+        return ""
+    return f"constraints are violated by up to {worst:.3g} (m or rad); stabilization='projection' keeps them"
+
+
+def _accelerations(result: Result) -> str:
+    worst = result.health.acceleration_violation
+    if not worst > UNSOLVED:
+        return ""
+    return (
+        f"accelerations miss the constraints by a part of {worst:.1e}: a position is all but singular, or masses "
+        f"differ too much. Reactions are as uncertain there"
+    )
+
+
+def _open_loads(result: Result) -> list[str]:
+    found = []
+    for f in result.model.forces:
+        if isinstance(f, JointFriction) and f.joint in result.health.undetermined:
+            what = ", ".join(result.health.undetermined[f.joint])
+            found.append(
+                f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
+                f"({what}): its load is one choice of many. Replace a joint by one that holds less, such as Spherical"
+            )
+    return found
+
+
+def _creep(result: Result) -> list[str]:
+    limit = CREPT * result.values.length
+    return [
+        f"JointFriction {name!r} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a smaller "
+        f"stick_speed makes it less"
+        for name, (speed, distance) in result.health.creep.items()
+        if distance > limit
+    ]
+
+
+def creep(result: Result) -> dict[str, tuple[float, float]]:
+    """Joint friction -> (largest speed [m/s], distance [m]) of its surfaces while it should stick.
+
+    It should stick while it slides at less than `STICKING` times its stick speed, for two output times running or
+    more; what passes through rest between two output times is no creep.
+    """
+    found = {}
+    for k, f in enumerate(result.values.structure.forces):
+        if isinstance(f, JointFriction):
+            par = wide(result.values.system.force_x, k)
+            x, rate = result.measured.quantity(int(result.values.system.force_i[k, 0]))
+            speed = np.abs(par[0] * rate)
+            slow = speed < STICKING * par[4]
+            both = slow[1:] & slow[:-1]
+            stuck = np.r_[both, False] | np.r_[False, both]
+            distance = (par[0] * np.abs(np.diff(x)))[both].sum()
+            found[f.name] = float(speed[stuck].max(initial=0.0)), float(distance)
+    return found

@@ -1,0 +1,138 @@
+"""A maker for every joint and coupling of the registry: drawn closed at a point, everything else by the dice."""
+
+from __future__ import annotations
+
+import math
+
+import flyball as fb
+
+from .dice import Dice, plus
+
+
+def _at(kind: str):
+    """A joint that needs a point only."""
+    return lambda d, name, i, j, p: getattr(fb, kind)(name, i, j, at=p)
+
+
+def _axis(kind: str):
+    """A joint that needs a point and, where it has a meaning, an axis."""
+    return lambda d, name, i, j, p: getattr(fb, kind)(name, i, j, at=p, axis=d.direction())
+
+
+def _revolute(d: Dice, name: str, i: str, j: str, p):
+    return fb.Revolute(name, i, j, at=p, axis=None if d.planar else d.direction(), angle=d.pick([0.0, 0.0, 1.0, 30.0]))
+
+
+def _distance(d: Dice, name: str, i: str, j: str, p):
+    return fb.Distance(name, i, j, at=(p, plus(p, d.size(1e-3, 1.0), d.direction())))
+
+
+def _universal(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    return fb.Universal(name, i, j, at=p, axes=(a, d.square_to(a)))
+
+
+def _general_universal(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    b = plus(d.square_to(a), d.number(-1, 1), a)
+    return fb.GeneralUniversal(name, i, j, at=(p, d.near(p, d.pick([0.0, 0.2]))), axes=(a, b))
+
+
+def _screw(d: Dice, name: str, i: str, j: str, p):
+    return fb.Screw(name, i, j, at=p, axis=d.direction(), lead=d.pick([-1, 1]) * d.size(1e-3, 1.0))
+
+
+def _wheel(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    centre = plus(p, d.pick([-1, 1]) * d.size(0.01, 0.5), d.square_to(a))
+    return fb.WheelOnLine(name, i, j, at=p, axis=a, centre=centre)
+
+
+def _knife_edge(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    return fb.KnifeEdge(name, i, j, at=p, axis=a, **({} if d.planar else {"normal": d.square_to(a)}))
+
+
+def _rolling_disk(d: Dice, name: str, i: str, j: str, p):
+    a = d.direction()
+    up = plus(d.square_to(a), d.number(-1.0, 1.0), a)
+    tread = d.pick([0.0, 0.02])
+    return fb.RollingDisk(name, i, j, at=p, axis=a, radius=d.size(0.02, 0.5), tread=tread, normal=up)
+
+
+def _rolling_ball(d: Dice, name: str, i: str, j: str, p):
+    return fb.RollingBall(name, i, j, at=p, radius=d.size(0.02, 0.5), normal=d.direction())
+
+
+def _cam(d: Dice, name: str, i: str, j: str, p):
+    n, r = d.whole(5, 16), d.size(0.1, 0.5)
+    wave, count = d.number(0.0, 0.2), d.whole(1, 3)
+    angles = [2 * math.pi * k / n for k in range(n)]
+    lengths = [r * (1 + wave * math.sin(count * a)) for a in angles]
+    points = [(s * math.cos(a), s * math.sin(a)) for s, a in zip(lengths, angles, strict=True)]
+    off = plus((0.0,) * (2 if d.planar else 3), -1.2 * r, d.direction())
+    axis = {} if d.planar else {"axis": d.direction()}
+    return fb.Cam(name, i, j, points=points, centre=plus(p, 1.0, off), at=p, radius=d.pick([0.0, 0.02]), **axis)
+
+
+PLANAR = {
+    "Revolute": _revolute,
+    "Translational": _axis("Translational"),
+    "Prismatic": _axis("Prismatic"),
+    "PointOnLine": _axis("PointOnLine"),
+    "PinInSlot": _axis("PinInSlot"),
+    "Distance": _distance,
+    "Orientation": _at("Orientation"),
+    "Fixed": _at("Fixed"),
+    "WheelOnLine": _wheel,
+    "KnifeEdge": _knife_edge,
+    "Cam": _cam,
+}
+SPATIAL = {
+    "Revolute": _revolute,
+    "Spherical": _at("Spherical"),
+    "Universal": _universal,
+    "GeneralUniversal": _general_universal,
+    "Cylindrical": _axis("Cylindrical"),
+    "Prismatic": _axis("Prismatic"),
+    "Fixed": _at("Fixed"),
+    "Orientation": _at("Orientation"),
+    "Planar": _axis("Planar"),
+    "PointInPlane": _axis("PointInPlane"),
+    "PointOnLine": _axis("PointOnLine"),
+    "Screw": _screw,
+    "Distance": _distance,
+    "RollingDisk": _rolling_disk,
+    "RollingBall": _rolling_ball,
+    "KnifeEdge": _knife_edge,
+    "Cam": _cam,
+}
+COUPLINGS = ("GearPair", "RackAndPinion", "Coupler")
+
+
+def joint(d: Dice, name: str, i: str, j: str, p, kinds=None):
+    """A joint of a random kind (or of one of ``kinds``) between two bodies, closed at p as drawn."""
+    makers = PLANAR if d.planar else SPATIAL
+    return makers[d.pick(kinds or makers)](d, name, i, j, p)
+
+
+def coordinates(m: fb.Mechanism, ending: str = "") -> list[str]:
+    """Names of all joint coordinates, or of those with this ending."""
+    found = [f"{j.name}.{c}" for j in m.joints for c in j.measured(m.planar)]
+    return [c for c in found if c.endswith(ending)]
+
+
+def coupling(d: Dice, m: fb.Mechanism, name: str):
+    """A coupling between joints that are there, or None if there are too few."""
+    angles, slides, both = coordinates(m, ".angle"), coordinates(m, ".displacement"), coordinates(m)
+    kind = d.pick(COUPLINGS)
+    if kind == "GearPair" and len(angles) > 1:
+        one, two = (c.removesuffix(".angle") for c in d.random.sample(angles, 2))
+        return fb.GearPair(name, one, two, teeth=(d.whole(10, 60), d.whole(10, 60)), internal=d.chance(0.3))
+    if kind == "RackAndPinion" and angles and slides:
+        rack, pinion = d.pick(slides).removesuffix(".displacement"), d.pick(angles).removesuffix(".angle")
+        return fb.RackAndPinion(name, rack, pinion, radius=d.pick([-1, 1]) * d.size(0.01, 0.5))
+    if kind == "Coupler" and len(both) > 1:
+        chosen = d.random.sample(both, min(len(both), d.whole(2, 3)))
+        return fb.Coupler(name, chosen, weights=[d.pick([-1, 1]) * d.size(0.1, 10.0) for _ in chosen])
+    return None
