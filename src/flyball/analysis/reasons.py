@@ -158,7 +158,11 @@ def _broken_force(a: Assembly, t: float) -> str:
                     f"that it leaves"
                 )
             pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
-            out = e.effort(par, x, y, laws, pressed) if along else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            out = (
+                e.effort(par, x, y, laws, pressed)
+                if isinstance(e, CoordinateForce)
+                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            )
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"
     return ""

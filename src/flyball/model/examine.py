@@ -19,11 +19,12 @@ from .sensor import IMU, Sensor
 
 if TYPE_CHECKING:
     from .model import Model
+    from .names import Names
 
 ENERGIES = ("kinetic", "potential", "total", "balance")
 
 
-def curves(model: Model, name: str) -> list[str]:
+def curves(model: Names, name: str) -> list[str]:
     """Names of the curves that a result has of a part (or of ``"energy"``)."""
     if name == "energy":
         return list(ENERGIES)
@@ -53,12 +54,12 @@ def _of_joint(e: Joint, axes: str) -> list[str]:
     return [*out, *(f"f{a}" for a in axes), *(["torque"] if len(axes) == 2 else (f"t{a}" for a in axes))]
 
 
-def carriers(model: Model) -> list[str]:
+def carriers(model: Names) -> list[str]:
     """Names of what can carry something: bodies, frames, ground."""
     return [*(b.name for b in model.bodies), *(f.name for f in model.frames), GROUND]
 
 
-def but_is(model: Model, name: str, wanted: str) -> str:
+def but_is(model: Names, name: str, wanted: str) -> str:
     """'; 'A' is a Revolute' where a name means something else than was wanted."""
     found = model._names.get(name)
     return "" if found is None else f" ({name!r} is a {type(found).__name__}, no {wanted})"
