@@ -15,6 +15,7 @@ from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from .arrows import arrows, rope_ends
 from .facts import facts
+from .gears import Wheel
 from .looks import Looks
 from .places import Places, three
 from .recording import (
@@ -133,14 +134,17 @@ def _poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np
 def _drawn(result: Result, places: Places, looks: Looks, every: np.ndarray) -> Iterator[Drawn]:
     """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
     m = result.model
+    wheels: list[Wheel] = []
     for e in (*m.joints, *getattr(m, "couplings", ())):
-        for drawn in symbols(e, places, every):
+        for drawn in symbols(e, places, every, wheels):
             worn = looks.wear(drawn) if isinstance(drawn, RecordedJoint) else drawn
             if worn is not None:
                 yield worn
     for e in m.forces:
         if e.drawn == "bushing":
-            yield from (replace(d, scale=1.0) for d in symbols(e, places, every) if isinstance(d, RecordedJoint))
+            yield from (
+                replace(d, scale=1.0) for d in symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
+            )
         elif (line := _line(e, places, every)) is not None:
             yield line
 
