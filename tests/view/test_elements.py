@@ -11,9 +11,6 @@ from flyball.view.payload import check
 from flyball.view.recording import RecordedJoint, Recording
 from tests.view.test_animate import turned
 
-if not hasattr(fb, "GearPair"):
-    pytest.skip("this flyball has no gears, cams and ropes yet", allow_module_level=True)
-
 
 def body(name: str, position: tuple[float, ...], **more: object) -> fb.Body:
     inertia = 0.02 if len(position) == 2 else (0.02, 0.02, 0.02)

@@ -135,7 +135,7 @@ def _drawn(result: Result, places: Places, looks: Looks, every: np.ndarray) -> I
     """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
     m = result.model
     wheels: list[Wheel] = []
-    for e in (*m.joints, *getattr(m, "couplings", ())):
+    for e in (*m.joints, *m.couplings):
         for drawn in symbols(e, places, every, wheels):
             worn = looks.wear(drawn) if isinstance(drawn, RecordedJoint) else drawn
             if worn is not None:
@@ -230,7 +230,7 @@ def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
 
 def _parts(result: Result) -> list:
     m = result.model
-    return [*getattr(m, "sensors", ()), *m.drivers, *m.forces, *m.joints, *m.bodies]
+    return [*m.sensors, *m.drivers, *m.forces, *m.joints, *m.bodies]
 
 
 def _main(name: str, result: Result) -> bool:
@@ -254,7 +254,7 @@ def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
     What is measured; what a driver needs; a joint's coordinate of each kind (else a position); energies.
     """
     m = result.model
-    measured = [f"{s.name}.value" for s in getattr(m, "sensors", ())][:2]
+    measured = [f"{s.name}.value" for s in m.sensors][:2]
     kinds: dict[str, str] = {}
     for j in m.joints:
         for k, c in j.coordinates.items():
