@@ -157,6 +157,8 @@ class Model:
             raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
         if e.name in RESERVED:
             raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
+        if isinstance(e, (Sensor, Table)) and e.name in self.parameters:
+            raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
         if e.name in self._names:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
 
@@ -434,7 +436,8 @@ def _measured_joint(joint: Joint, what: str, own: Mapping) -> tuple[str, str, in
 
 def suggest(name: str, known: Any) -> str:
     """' (did you mean ...?)' where something close is known."""
-    close = difflib.get_close_matches(name, list(known), 1)
+    same = [k for k in known if k.lower() == name.lower() and k != name]
+    close = same or difflib.get_close_matches(name, list(known), 1)
     return f" (did you mean {close[0]!r}?)" if close else ""
 
 
