@@ -75,7 +75,7 @@ BRICARD_AXES = [(0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 0)
 
 
 def bricard() -> fb.Mechanism:
-    """Bricard's mechanism, IFToMM benchmark A03: five rods and ground, six hinges, movable by its special lengths only."""
+    """Bricard's mechanism, IFToMM benchmark A04: five rods and ground, six hinges, movable by its special lengths only."""
     P = BRICARD_POINTS
     m = fb.Mechanism("Bricard", gravity=(0, -G, 0))
     names = ["ground", *(f"rod {i}" for i in range(1, 6)), "ground"]

@@ -162,3 +162,10 @@ def test_laws_are_numbers_quantities_or_formulas():
     assert law_expression("2*t", "rad/s", "law").names == {"t"}
     formula = Expression.parse("t")
     assert law_expression(formula, "rad/s", "law") is formula
+
+
+@pytest.mark.parametrize("text", ["1e6*t", "-2.5E3*max(t, 0)", "1e-3*(t - 1)", "4e2/t"])
+def test_formulas_may_begin_with_an_exponent(text):
+    """A number written with an exponent is not a quantity with an unknown unit."""
+    t = 1.75
+    assert law_expression(text, "N*m", "law").evaluate({"t": t}) == eval(text, {"t": t, "max": max})

@@ -137,17 +137,33 @@ def test_a_joint_without_load_has_no_friction():
     assert r["slide"].acceleration == pytest.approx(np.full(5, 3.0), rel=1e-9)
 
 
-def test_friction_that_outweighs_its_cause_jams():
-    """Pushed at an arm of 2 m on a guide of 0.2 m, mu = 0.9: each newton of friction makes 9 N of load."""
-    m = fb.Mechanism("drawer", planar=True)
-    m.add(fb.Body("drawer", mass=1.0, inertia=0.1, velocity=(1, 0), com=(0, -3)))
+def drawer(ahead, arm, mu=0.3, length=0.1):
+    """A drawer on a rail with its centre of mass ahead of and under the point that rubs."""
+    m = fb.Mechanism("drawer", planar=True, gravity=(0, -G))
+    m.add(fb.Body("drawer", mass=1.0, inertia=0.1, velocity=(1, 0), com=(ahead, -arm)))
     m.add(fb.Translational("rail", "ground", "drawer", at=(0, 0), axis=(1, 0)))
-    m.add(fb.PointForce("push", "drawer", force=(5, -1), at=(0, 2)))
-    m.add(fb.JointFriction("rub", joint="rail", static=0.9, bending_length=0.2))
+    m.add(fb.JointFriction("rub", joint="rail", static=mu, bending_length=length))
+    return m
+
+
+@pytest.mark.parametrize(("ahead", "arm"), [(-1.0, 1.0), (-0.1, 0.34), (0.2, 1.0)])
+def test_friction_that_outweighs_its_cause_jams(ahead, arm):
+    """F = mu (m g + |m g x - F h| / L) has no solution where mu h / L > 1, unless the weight tilts it back enough."""
     with pytest.raises(SimulationError, match="JointFriction 'rub' jams joint 'rail'") as caught:
-        m.simulate(1.0)
+        drawer(ahead, arm).simulate(1.0)
     assert "bending_length" in str(caught.value)
     assert caught.value.t == 0.0
+
+
+@pytest.mark.parametrize(("ahead", "arm"), [(0.5, 0.1), (-0.5, 0.1), (1.0, 0.32), (-1.0, 0.32), (1.0, 0.5), (1.0, 1.0)])
+def test_friction_that_eases_or_adds_to_its_own_load(ahead, arm):
+    """The same with a solution; of two the smaller one holds, which grows from no friction at all."""
+    r = drawer(ahead, arm).simulate(0.001, outputs=2)
+    side = 1.0 if ahead > 0.0 else -1.0  # that the rail is pressed on
+    F = 0.3 * G * (1.0 + side * ahead / 0.1) / (1.0 + side * 0.3 * arm / 0.1)
+    assert side * (G * ahead - F * arm) > 0.0
+    assert r["rub"].friction[0] == pytest.approx(-F, rel=1e-9)
+    assert r["rail"].acceleration[0] == pytest.approx(-F, rel=1e-9)
 
 
 def test_two_joints_that_load_one_another():
@@ -175,3 +191,29 @@ def test_two_joints_that_load_one_another():
     assert r.health.energy_drift < 1e-6
     # Newton for the piston along the slide: rod's pull and friction
     assert r["C"].force[:, 0] + r["fp"].friction == pytest.approx(0.6 * r["P"].acceleration, abs=1e-8)
+
+
+@pytest.mark.parametrize("seed", [1, 9, 28, 50])
+def test_frictions_that_load_one_another(seed):
+    """A slide and a hinge on it, in any direction: each friction loads the other joint; both laws hold at once."""
+    rng = np.random.default_rng(seed)
+    n, p = rng.normal(size=3), rng.normal(size=3)
+    n /= np.linalg.norm(n)
+    m = fb.Mechanism("two", gravity=tuple(3.0 * n))
+    for name, more in (("a", {"velocity": 0.3 * n}), ("b", {"velocity": 0.3 * n, "angular_velocity": n})):
+        m.add(fb.Body(name, mass=1.0, inertia=(1, 2, 2.5), position=p, **more))
+    m.add(fb.Prismatic("slide", "ground", "a", at=p, axis=n), fb.Revolute("hinge", "a", "b", at=p, axis=n))
+    for name, radius in (("slide", None), ("hinge", 0.1)):
+        m.add(
+            fb.JointFriction(f"f {name}", joint=name, static=0.5, radius=radius, bending_length=0.1, twist_length=0.1)
+        )
+    r = m.simulate(0.2, outputs=5)
+    for name, radius in (("slide", 1.0), ("hinge", 0.1)):
+        force, torque = r[name].reaction()
+        thrust, twist = force @ n, torque @ n
+        load = np.linalg.norm(force - np.outer(thrust, n), axis=1) + np.abs(thrust)
+        load += np.linalg.norm(torque - np.outer(twist, n), axis=1) / 0.1 + np.abs(twist) / 0.1
+        expected = -radius * 0.5 * load * np.tanh(radius * r[name].rate / 1e-3)
+        assert r[f"f {name}"].friction == pytest.approx(expected, rel=1e-8, abs=1e-9)
+    total = 2.0 * (r["a"].acceleration @ n)
+    assert total == pytest.approx(2.0 * 3.0 + r["f slide"].friction, rel=1e-8)

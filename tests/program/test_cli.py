@@ -64,6 +64,22 @@ def test_run_as_json_prints_one_object(here: Path) -> None:
     assert said.err == ""
 
 
+@pytest.mark.parametrize(
+    ("flags", "pages"),
+    [
+        ([], ["report.html", "animation.html"]),
+        (["--no-report"], ["animation.html"]),
+        (["--no-animation"], []),
+        (["--no-animation", "--report"], ["report.html"]),
+    ],
+)
+def test_the_pages_that_are_wanted_are_written(here: Path, flags: list[str], pages: list[str]) -> None:
+    said = Said("run", "crank.toml", "--t-end", 0.1, "--outputs", 3, "--no-plots", "--json", "--out", "o", *flags)
+    files = [Path(f).name for f in json.loads(said.out)["files"]]
+    assert files == ["result.nc", "result.csv", *pages]
+    assert all((here / "o" / name).stat().st_size > 10_000 for name in pages)
+
+
 def test_quiet_says_nothing(here: Path) -> None:
     said = Said("run", "crank.toml", "--t-end", 0.1, "--quiet", "--no-plots", "--no-animation")
     assert (said.code, said.out, said.err) == (0, "", "")

@@ -2,7 +2,8 @@
 
 The linkage is Bricard's trihedral one with threefold symmetry and hinges at right angles. Its closure condition is that
 of Chen, You and Tarnai, Threefold-symmetric Bricard linkages for deployable structures (Int. J. Solids Struct. 42,
-2005), eq. (6), for a twist of 90 degrees; with angles counted from the cube it reads sin a sin b + sin a + sin b = 0.
+2005), for a twist of 90 degrees; with angles counted from the cube it reads sin a sin b + sin a + sin b = 0. That it
+closes the loop is checked here as well.
 """
 
 import functools
@@ -64,6 +65,14 @@ def rods(a):
         p = p + R @ (POINTS[k] - step @ POINTS[k])
         R = R @ step
         yield p + R @ (POINTS[k] + POINTS[k + 1]) / 2, R
+
+
+@pytest.mark.parametrize("a", np.linspace(0.0, np.pi, 7))
+def test_closed_form_closes(a):
+    """The fifth rod ends in the sixth hinge: its point and its axis stay where they are."""
+    c, R = list(rods(a))[-1]
+    assert c + R @ (POINTS[5] - POINTS[4]) / 2 == pytest.approx(POINTS[5], abs=1e-15)
+    assert R @ AXES[5] == pytest.approx(AXES[5], abs=1e-15)
 
 
 def inertia_and_height(a):

@@ -192,4 +192,4 @@ def test_andrews_by_the_command(tmp_path):
     r = fb.load_result(tmp_path / "result.nc")
     assert hinges(r, "angle", -1) == pytest.approx(ANGLES, abs=1e-7)
     pictures = {"energy.png", "coordinates.png", "paths.png", "reactions.png", "actuation.png"}
-    assert pictures <= {p.name for p in tmp_path.iterdir()}
+    assert pictures <= {p.name for p in (tmp_path / "plots").iterdir()}

@@ -101,7 +101,7 @@ def test_spatial_four_bar_runs_free():
 
 
 def test_bricard():
-    """IFToMM A03: movable although Gruebler counts 0; rank 29 of 30 rows, every hinge part of the redundancy."""
+    """IFToMM A04: movable although Gruebler counts 0; rank 29 of 30 rows, every hinge part of the redundancy."""
     m = bricard()
     found = m.check()
     assert (found.gruebler, found.freedoms, found.redundancy) == (0, 1, 1)

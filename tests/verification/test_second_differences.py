@@ -18,8 +18,11 @@ from tests.verification.test_moving_bases import gyroscope, shaken_pendulum, tur
 from tests.verification.test_reactions import actuated, cantilever
 
 
-def arm():
-    """A chain of hinges with a driven last link, a slide and a rod to ground, every axis askew."""
+def arm(turned_round=False):
+    """A chain of hinges with a slide and rods to ground at its end, all driven, every axis askew.
+
+    Turned round, the slide and one rod have the chain's last link as their ``body_j`` instead of ``body_i``.
+    """
     m = fb.Mechanism("arm", gravity=(0, 0, -9.81))
     points = np.array([[0, 0, 0], [0.5, 0.1, 0.2], [1, -0.3, 0.1], [1.2, 0.2, 0.7]])
     axes = [(0, 0, 1), (1, 2, 0), (0.3, -1, 0.5)]
@@ -31,8 +34,12 @@ def arm():
         m.add(fb.Revolute(f"J{i}", before, f"link {i}", at=points[i], axis=axes[i]))
         before = f"link {i}"
     m.add(fb.Body("slider", mass=1, inertia=(0.1, 0.1, 0.15), position=(1.3, 0.3, 0.8)))
-    m.add(fb.Prismatic("slide", "link 2", "slider", at=points[3], axis=(1, 1, -1)))
+    ends = ("slider", "link 2") if turned_round else ("link 2", "slider")
+    m.add(fb.Prismatic("slide", *ends, at=points[3], axis=(1, 1, -1)))
     m.add(fb.Distance("rod", "ground", "slider", at=((2, 0, 0), (1.4, 0.4, 0.8))))
+    between = (tuple(points[3]), (0.3, -1.0, 1.0))
+    ends, between = (("ground", "link 2"), between[::-1]) if turned_round else (("link 2", "ground"), between)
+    m.add(fb.Distance("stay", *ends, at=between))
     m.add(fb.Frame("tip", "slider", position=(0.1, 0.05, -0.02)))
     m.add(fb.Driver("wave", "J1.angle", "0.3*sin(4*t)"), fb.Driver("lift", "tip.z", "0.8 + 0.1*t**3"))
     m.add(fb.Driver("push", "slide.displacement", "0.1*exp(-t)"))
@@ -45,6 +52,7 @@ CASES = {
     "arm": (arm, ()),
     "arm, all hinges coordinates": (arm, ("J0", "J1", "J2")),
     "arm, middle hinge a row": (arm, ("J0", "J2")),
+    "arm turned round, all hinges coordinates": (lambda: arm(turned_round=True), ("J0", "J1", "J2")),
     "bricard, all but one coordinates": (bricard, ("R1", "R2", "R3", "R4", "R5")),
     "cantilever": (cantilever, ()),
     "four-bar": (four_bar, ()),

@@ -205,39 +205,48 @@ def test_a_result_without_times_cannot_be_drawn() -> None:
             draw()
 
 
-class Blob(fb.Sphere):
-    """Stands for a shape that is a mesh: a finely divided sphere of the given radius, off the body's origin."""
-
-    def vertices(self, n: object) -> np.ndarray:
-        return self._grid()[0]
-
-    def triangles(self) -> np.ndarray:
-        return self._grid()[1]
-
-    def _grid(self, rings: int = 150) -> tuple[np.ndarray, np.ndarray]:
-        u, v = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False))
-        p = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3)
-        k = np.arange(len(p)).reshape(2 * rings, rings)
-        a, b, c, d = k[:, :-1], k[:, 1:], np.roll(k, -1, 0)[:, :-1], np.roll(k, -1, 0)[:, 1:]
-        return self.radius * p + [1, 0, 0], np.concatenate(
-            [np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (c, b, d))]
-        )
+def sphere(rings: int = 150) -> tuple[np.ndarray, np.ndarray]:
+    """A finely divided unit sphere about (1, 0, 0)."""
+    u, v = np.meshgrid(np.linspace(0, np.pi, rings), np.linspace(0, 2 * np.pi, 2 * rings, endpoint=False))
+    p = np.stack([np.sin(u) * np.cos(v), np.sin(u) * np.sin(v), np.cos(u)], -1).reshape(-1, 3) + [1, 0, 0]
+    k = np.arange(len(p)).reshape(2 * rings, rings)
+    a, b, c, d = k[:, :-1], k[:, 1:], np.roll(k, -1, 0)[:, :-1], np.roll(k, -1, 0)[:, 1:]
+    return p, np.concatenate([np.stack(t, -1).reshape(-1, 3) for t in ((a, b, c), (c, b, d))])
 
 
 def test_meshes_are_drawn_on_their_body_and_kept_small() -> None:
     m = fb.Mechanism("m")
-    m.add(
-        fb.Body("b", mass=1, inertia=(1, 1, 1), shape=Blob(radius=0.5)),
-        fb.Body("c", mass=1, inertia=(1, 1, 1), shape=Blob(radius=2)),
-    )
+    vertices, triangles = sphere()
+    for name, radius in (("b", 0.5), ("c", 2.0)):
+        mesh = fb.Mesh(vertices=radius * vertices, faces=triangles)
+        m.add(fb.Body(name, mass=1, inertia=(1, 1, 1), shape=mesh))
     recording = record(still(m))
     check(recording)
     (mesh,) = recording.bodies[0].shapes
     assert mesh.kind == "mesh"
-    assert np.allclose(np.sqrt(((mesh.vertices - [1, 0, 0]) ** 2).sum(1)), 0.5, rtol=0.01)
+    assert np.allclose(np.sqrt(((mesh.vertices - [0.5, 0, 0]) ** 2).sum(1)), 0.5, rtol=0.01)
     total = sum(len(b.shapes[0].triangles) for b in recording.bodies)
     assert 10_000 < total <= 24_000  # of 178 800
     assert len(animation(still(m))) < 1_000_000
+
+
+def test_holes_are_drawn_as_holes() -> None:
+    m = fb.Mechanism("m")
+    plate = fb.Box(edges=(1, 1, 0.1))
+    bore = fb.Cylinder(radius=0.2, length=0.1, position=(0.2, 0, 0), hole=True)
+    m.add(fb.Body("b", density=1, shape=[plate, bore]))
+    shapes = record(still(m)).bodies[0].shapes
+    assert [(s.kind, s.hole) for s in shapes] == [("box", False), ("cylinder", True)]
+
+
+def test_a_joint_that_nobody_can_draw_gets_a_mark(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fb.Spherical, "drawn", "strange")
+    m = fb.Mechanism("m")
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)), fb.Spherical("J", "ground", "b", at=(1, 2, 3)))
+    r = still(m)
+    (joint,) = record(r).joints
+    assert (joint.kind, joint.position) == ("strange", (1, 2, 3))
+    assert r.html()
 
 
 def test_symbols_are_smaller_on_slender_parts() -> None:

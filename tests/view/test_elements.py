@@ -255,3 +255,22 @@ def test_couplers_are_not_drawn_and_slots_reach_as_far_as_their_pin() -> None:
     rail = symbol(r, "slot", "rail", "arm")
     # a crank of 0.2 m 0.5 m from the arm's pivot: the pin is between 0.3 m and 0.7 m from it
     assert rail.reach[5] - rail.reach[4] == pytest.approx(0.4, abs=2e-3)
+
+
+def test_sensors_are_shown_first_and_listed() -> None:
+    from flyball.view.figures import figures
+    from flyball.view.tables import tables
+
+    m = fb.Mechanism("m", planar=True, gravity=(0, -10))
+    m.add(body("b", (1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)), fb.Sensor("height", "b.y"), fb.IMU("imu", "b"))
+    result = m.simulate(1.0, outputs=21)
+    recording = record(result)
+    check(recording)
+    assert recording.shown[0] == "height.value"
+    assert recording.facts["height"] == ("Sensor", "of b.y")
+    drawn = {f.name: f for f in figures(result)}["sensors"]
+    curves = {c.name: c.values for p in drawn.panels for c in p.curves}
+    assert np.array_equal(curves["height"], result["b.y"])
+    assert set(curves) == {"height", "imu.fx", "imu.fy", "imu.w"}
+    listed = {t.name: t for t in tables(result)}["sensors"].rows
+    assert listed[0] == ("height", "Sensor", "of b.y", "value", f"{result['b.y'].min():.4g}", "0", "m")

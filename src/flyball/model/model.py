@@ -184,9 +184,7 @@ class Model:
             self.measured(e)
         elif isinstance(e, IMU):
             if self.carrier(e.frame, e) == GROUND:
-                raise ModelError(
-                    f"{e.title}: on ground it would show nothing but gravity; name a body or a frame of one"
-                )
+                raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
         elif isinstance(e, (Driver, Initial)):
             self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
 

@@ -13,7 +13,9 @@ from typing import Any
 from ..errors import UnitError
 
 _NUMBER = r"[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
-_QUANTITY = re.compile(rf"\s*(?P<number>{_NUMBER})\s*(?P<unit>(?:1\s*/\s*)?[^\W\d_].*|[°%µ].*|)\s*", re.DOTALL)
+_QUANTITY = re.compile(  # a number keeps its exponent: "1e6*t" is a formula, not 1 of a unit "e6*t"
+    rf"\s*(?P<number>{_NUMBER})(?![eE][+-]?\d)\s*(?P<unit>(?:1\s*/\s*)?[^\W\d_].*|[°%µ].*|)\s*", re.DOTALL
+)
 _UNIT = re.compile(r"[\w\s°%µ²³·*/^().-]{1,60}")
 _TOWER = re.compile(r"\d{3,}|(?:\*\*|\^)[\s(+-]*[\d.]+[\s)]*(?:\*\*|\^)")
 

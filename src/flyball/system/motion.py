@@ -200,7 +200,7 @@ def accelerate(S, W, t, p, dy, factored):
         if attempt == SUBSTITUTIONS - 1:
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
             return W.info[STATUS]
-        improve(S, W, attempt == 0)
+        improve(S, W, attempt)
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]

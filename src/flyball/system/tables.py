@@ -32,12 +32,13 @@ G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 F_APPLIED, X_SOLVED, V1, V2, V3 = range(5)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
-# in the columns after those, of each load of a joint: the load now, the one returned, and both of the pass before
-LOAD, RETURNED, LOAD_BEFORE, RETURNED_BEFORE = range(4)
+# in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
+# scratch; and the inverse Jacobian of the gaps
+LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 # entries of Work.info
-STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS = range(6)
+STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT = range(7)
 
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
@@ -88,14 +89,14 @@ class Work(NamedTuple):
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (5, nv)
-    sensed: np.ndarray  # (4, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
+    sensed: np.ndarray  # (6 + nl, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
     stack: np.ndarray  # law evaluation
     y: np.ndarray  # (3, ny): states in the making
     option: np.ndarray  # (8,): choices of the analysis, largest violations reported
-    info: np.ndarray  # (6,): status, guilty row, counters
+    info: np.ndarray  # (7,): status, guilty row, counters, how many loads' slopes are known
 
 
 # kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24

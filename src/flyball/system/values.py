@@ -343,8 +343,8 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
-        z(4, 2 * len(s.measured) + len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3),
-        z(3, ny), np.zeros(8), np.zeros(6, np.int64),
+        z(4, 2 * len(s.measured) + len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
+        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(6, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames
 

@@ -226,13 +226,13 @@ def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
 
 def _parts(result: Result) -> list:
     m = result.model
-    return [*m.drivers, *m.forces, *m.joints, *m.bodies]
+    return [*getattr(m, "sensors", ()), *m.drivers, *m.forces, *m.joints, *m.bodies]
 
 
 def _main(name: str, result: Result) -> bool:
     """Whether a curve says where something is, or what a driver or force does: no derivative, no reaction."""
     owner, _, what = name.partition(".")
-    if owner == "energy" or any(e.name == owner for e in (*result.model.drivers, *result.model.forces)):
+    if owner == "energy" or result.model[owner].category in ("drivers", "forces", "sensors"):
         return True
     return what in ("x", "y", "z", "angle") or what in (getattr(result.model[owner], "coordinates", None) or ())
 
@@ -247,15 +247,16 @@ def _telling(names: list[str], result: Result) -> list[str]:
 def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
     """The curves on show when a page opens.
 
-    What a driver needs; a joint's coordinate of each kind (else a position); energies.
+    What is measured; what a driver needs; a joint's coordinate of each kind (else a position); energies.
     """
     m = result.model
+    measured = [f"{s.name}.value" for s in getattr(m, "sensors", ())][:2]
     kinds: dict[str, str] = {}
     for j in m.joints:
         for k, c in j.coordinates.items():
             if f"{j.name}.{k}" in names:
                 kinds.setdefault(c.unit, f"{j.name}.{k}")
     efforts = [f"{d.name}.effort" for d in m.drivers if f"{d.name}.effort" in names][:1]
-    first = [*efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
+    first = [*measured, *efforts, *kinds.values()] or [f"{b.name}.{k}" for b in m.bodies for k in ("x", "z")][:1]
     energies = ("energy.kinetic", "energy.potential", "energy.total")
     return (*(k for k in first if k in names), *(k for k in energies if k in names))

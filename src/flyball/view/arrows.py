@@ -10,6 +10,7 @@ import numpy as np
 
 from ..model.force import BodyForce
 from ..model.joint import Joint
+from .figures import some
 from .places import End, Places, three
 from .recording import RecordedArrow
 
@@ -21,20 +22,20 @@ NUMBERS = 600_000  # in the arrows of a recording, at most
 
 
 def arrows(result: Result, places: Places, every: np.ndarray) -> tuple[RecordedArrow, ...]:
-    """Every arrow that can be seen; of a mechanism with many parts and times the largest ones.
+    """Every arrow that can be seen; of a mechanism with very many parts those of evenly chosen ones.
 
     Reactions are those on ``body_j`` at the joint's point there. What acts along a line, a spring for instance, acts
     on both of its ends; ends on ground are left out.
     """
+    most = max(1, NUMBERS // (3 * len(every)))
     out = [
         RecordedArrow(name, group, what, end.body, three(end.p), vector[every])
-        for name, group, what, end, vector in _all(result, places)
+        for name, group, what, end, vector in _all(result, places, most)
         if np.isfinite(vector).any()
     ]
     size = [float(np.nanmax(np.abs(a.vector), initial=0.0)) for a in out]
     largest = {what: max((s for a, s in zip(out, size) if a.what == what), default=0.0) for what in ("force", "moment")}
     seen = [k for k, a in enumerate(out) if size[k] > FAINT * largest[a.what]]
-    most = max(1, NUMBERS // max(3 * len(every), 1))
     rank = sorted(seen, key=lambda k: -size[k] / largest[out[k].what])
     return tuple(out[k] for k in sorted(rank[:most]))
 
@@ -42,13 +43,13 @@ def arrows(result: Result, places: Places, every: np.ndarray) -> tuple[RecordedA
 Found = tuple[str, str, str, End, np.ndarray]
 
 
-def _all(result: Result, places: Places) -> Iterator[Found]:
-    for joint in result.model.joints:
+def _all(result: Result, places: Places, most: int) -> Iterator[Found]:
+    for joint in some(result.model.joints, most):
         M = places.end(joint.name, "M")
         if M is not None:
             force, torque = result[joint.name].reaction()
             yield from _pair(joint.name, "reaction", M, force, torque)
-    for e in result.model.forces:
+    for e in some(result.model.forces, most):
         yield from _force(result, places, e)
     for driver in result.model.drivers:
         yield from _along(result, places, driver.name, driver.coordinate, result[driver.name].effort)

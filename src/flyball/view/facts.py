@@ -36,4 +36,7 @@ def between(e: Any) -> str:
     if callable(coupled):
         return ", ".join(coupled())
     about = getattr(e, "joint", None) or getattr(e, "coordinate", None)
-    return f"on {about}" if isinstance(about, str) else ""
+    if isinstance(about, str):
+        return f"on {about}"
+    measured = getattr(e, "of", None) or getattr(e, "frame", None)
+    return f"of {measured}" if isinstance(measured, str) else ""

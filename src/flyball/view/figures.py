@@ -33,13 +33,14 @@ LABELS = {
 
 
 def figures(result: Result) -> list[Figure]:
-    """Energies with their balance, joint coordinates, positions, reactions, and what drivers and forces do.
+    """Energies with their balance, joint coordinates, positions, reactions, what drivers and forces do, sensors.
 
     Those that have nothing to show are left out; of many parts evenly chosen ones are shown.
     """
     if not len(result.t):
         return []
-    makers: Sequence[Callable[[Result], Figure | None]] = (energies, coordinates, positions, reactions, actuation)
+    makers: Sequence[Callable[[Result], Figure | None]]
+    makers = (energies, coordinates, positions, reactions, actuation, sensors)
     return [figure for make in makers if (figure := make(result)) is not None]
 
 
@@ -61,7 +62,7 @@ def coordinates(result: Result) -> Figure | None:
     """Relative coordinates of the joints; those that hardly vary beside others in a panel of their own."""
     every = [(e, what, c.unit) for e in result.model.joints for what, c in e.coordinates.items()]
     units = dict.fromkeys(unit for _, _, unit in every)
-    chosen = [c for unit in units for c in _some([c for c in every if c[2] == unit])]
+    chosen = [c for unit in units for c in some([c for c in every if c[2] == unit])]
     known = {e.name: result[e.name].channels() for e, _, _ in chosen}
     curves = [
         Channel(f"{e.name}.{what}", unit, np.asarray(known[e.name][what][1]))
@@ -76,7 +77,7 @@ def positions(result: Result) -> Figure | None:
     """Centres of mass of spatial bodies, axis by axis."""
     if result.planar:
         return None
-    bodies = _some(result.model.bodies)
+    bodies = some(result.model.bodies)
     points = {b.name: centre(result, b.name) for b in bodies}
     parts = [Panel(axis, tuple(Channel(k, "m", p[:, i]) for k, p in points.items())) for i, axis in enumerate("xyz")]
     return Figure("positions", "Centres of mass", tuple(parts), few(len(bodies), len(result.model.bodies), "bodies"))
@@ -85,7 +86,7 @@ def positions(result: Result) -> Figure | None:
 def reactions(result: Result) -> Figure | None:
     """Sizes of the joints' reaction forces, and of their torques where they carry any."""
     sizes: dict[str, list[Channel]] = {"N": [], "N*m": []}
-    joints = _some(result.model.joints)
+    joints = some(result.model.joints)
     for e in joints:
         view = result[e.name]
         name = f"{e.name}*" if view.undetermined else e.name
@@ -112,6 +113,18 @@ def actuation(result: Result) -> Figure | None:
         curves += [Channel(f"{e.name}.{k}", u, np.asarray(v)) for k, (u, v) in channels.items() if u in ("N", "N*m")]
     parts = panels(curves)
     return Figure("actuation", "Drivers and forces", tuple(parts)) if parts else None
+
+
+def sensors(result: Result) -> Figure | None:
+    """What sensors measure."""
+    curves = []
+    for e in getattr(result.model, "sensors", ()):
+        channels = result[e.name].channels()
+        for k, (unit, values) in channels.items():
+            name = e.name if len(channels) == 1 else f"{e.name}.{k}"
+            curves.append(Channel(name, unit, np.asarray(values)))
+    parts = [p for panel in panels(curves) for p in spread(panel)]
+    return Figure("sensors", "Sensors", tuple(parts)) if parts else None
 
 
 def panels(curves: Sequence[Channel], most: int = MOST) -> list[Panel]:
@@ -177,7 +190,7 @@ def few(shown: int, there: int, what: str) -> str:
     return f"{shown} of {there} {what}" if shown < there else ""
 
 
-def _some(parts: Sequence[Any], most: int = MOST) -> list[Any]:
+def some(parts: Sequence[Any], most: int = MOST) -> list[Any]:
     """Evenly chosen parts, first and last among them."""
     if len(parts) <= most:
         return list(parts)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.element import resolve
 from ..model.geometry import matrix_to_quaternion, triad
-from ..model.shapes import Cone
+from ..model.shapes import Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere
 from .meshes import simplified
 from .places import End, Places, three
 from .recording import RecordedJoint, Shape
@@ -37,7 +37,7 @@ class Looks:
         self.result, self.places = result, places
         self.planar = result.planar
         self._env = dict(zip(result.model.parameters, result.values.system.const.tolist(), strict=False))
-        self._solids = {b.name: b.solids() for b in result.model.bodies}
+        self._solids = {b.name: b.shapes() for b in result.model.bodies}
         self._numbers = {id(s): resolve(s, self._env) for solids in self._solids.values() for s in solids}
         self._share = self._mesh_share()
         self.points: dict[str, list[np.ndarray]] = {b.name: [] for b in result.model.bodies}
@@ -126,13 +126,15 @@ class Looks:
         out = []
         solids: tuple[Any, ...] = self._solids[name]
         for s in solids:
+            if s.hole:
+                continue
             n = self._numbers[id(s)]
-            if hasattr(s, "triangles"):
-                extents = np.ptp(s.vertices(n), axis=0).tolist()
+            if _meshed(s):
+                extents = np.ptp(s.mesh(n)[0], axis=0).tolist()
             else:
-                extents = _extents(type(s).__name__, s.size(n))
+                extents = _extents("Cylinder" if isinstance(s, Rod) else type(s).__name__, s.size(n))
             out.append(float(np.median(extents)))
-        return min(out)
+        return min(out, default=np.inf)
 
     def shapes(self, name: str) -> tuple[Shape, ...]:
         """The body's shapes."""
@@ -152,23 +154,25 @@ class Looks:
 
     def _mesh_share(self) -> float:
         """Part of their triangles that meshes may keep, so that the page stays small."""
-        meshes = [s for solids in self._solids.values() for s in solids if hasattr(s, "triangles")]
-        total = sum(len(s.triangles()) for s in meshes)
+        total = sum(
+            len(s.mesh(self._numbers[id(s)])[1]) for solids in self._solids.values() for s in solids if _meshed(s)
+        )
         return min(1.0, TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
         """A shape as the user gave it; a cone is counted from its middle in pictures."""
         n = self._numbers[id(s)]
-        if hasattr(s, "triangles"):
-            t = np.asarray(s.triangles())
+        if _meshed(s):
+            v, t = s.mesh(n)
             most = max(int(self._share * len(t)), min(FEWEST, len(t)))
-            v, t = simplified(s.vertices(n), t, most)
-            return Shape("mesh", (), vertices=v, triangles=t)
+            v, t = simplified(v, np.asarray(t), most)
+            return Shape("mesh", (), vertices=v, triangles=t, hole=s.hole)
         p, R = s.pose(n)
         if isinstance(s, Cone):
             p = p + R[:, 2] * n.height / 2
-        kind = type(s).__name__.lower()
-        return Shape(kind, tuple(map(float, s.size(n))), three(p), tuple(matrix_to_quaternion(R).tolist()))
+        kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
+        turn = tuple(matrix_to_quaternion(R).tolist())
+        return Shape(kind, tuple(map(float, s.size(n))), three(p), turn, hole=s.hole)
 
     def _cam(self, e: Any) -> list[Shape]:
         """The disc that a cam's outline bounds."""
@@ -283,3 +287,8 @@ def _unit(d: np.ndarray) -> np.ndarray:
 def _along(d: np.ndarray) -> tuple[float, float, float, float]:
     """Quaternion that turns z to the direction d."""
     return tuple(matrix_to_quaternion(triad(_unit(d))).tolist())  # type: ignore[return-value]
+
+
+def _meshed(s: Any) -> bool:
+    """Whether the player has no figure of its own for a shape."""
+    return type(s) not in (Box, Capsule, Cone, Cylinder, Ellipsoid, Rod, Sphere)

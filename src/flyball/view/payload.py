@@ -122,6 +122,7 @@ def _curves(channels: Iterable[Channel], block: _Block) -> list[dict[str, object
 def _shape(shape: Shape, block: _Block) -> dict[str, object]:
     out: dict[str, object] = {"kind": shape.kind, "size": _numbers(shape.size), "position": _numbers(shape.position)}
     out |= {"quaternion": _numbers(shape.quaternion), "outline": [_numbers(point) for point in shape.outline]}
+    out["hole"] = bool(shape.hole)
     if shape.vertices is not None and shape.triangles is not None:
         kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
         return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.body import GROUND
-from .figures import _some, centre, few, figures, hidden, panels
+from .figures import centre, few, figures, hidden, panels, some
 from .recording import Channel, Figure, Panel
 from .writing import cannot
 
@@ -147,13 +147,13 @@ def standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
     """Write the pictures that tell most of a motion, into a folder that is there; returns their paths.
 
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
-    in the plane or from three sides), ``reactions`` and ``actuation``: those that have something to show.
+    in the plane or from three sides), ``reactions``, ``actuation`` and ``sensors``: those that have something to show.
     """
     folder = Path(folder)
     makers: dict[str, Callable[[], Drawing]] = {f.name: partial(_drawn, result, f) for f in figures(result)}
     if len(result.t):
         makers["paths"] = partial(_paths, result)
-    order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation")
+    order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation", "sensors")
     written = []
     for name in (k for k in order if k in makers):
         with _drawing():
@@ -218,7 +218,7 @@ def _zoomed_out(ax: Axes, values: Iterable[np.ndarray]) -> None:
 
 def _paths(result: Result) -> Drawing:
     """Paths of centres of mass and named frames: in the plane, or from the front, the side and above."""
-    bodies = _some(result.model.bodies)
+    bodies = some(result.model.bodies)
     points = {b.name: centre(result, b.name) for b in bodies}
     for frame in result.model.frames if len(points) < 6 else ():
         if frame.body != GROUND:

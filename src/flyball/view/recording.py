@@ -24,6 +24,8 @@ class Shape:
     ``capsule`` (radius, length between the cap centres; along z), ``cone`` (radius, height; tip at +z),
     ``ellipsoid`` (three semi-axes), ``plate`` (planar outline given in ``outline``, thickness), ``mesh`` (no size;
     ``vertices`` (k, 3) [m] and ``triangles`` (m, 3), indices of vertices, anticlockwise seen from outside).
+
+    A ``hole`` is drawn as a dark opening in the body's other shapes.
     """
 
     kind: str
@@ -33,6 +35,7 @@ class Shape:
     outline: tuple[tuple[float, float], ...] = ()
     vertices: np.ndarray | None = None
     triangles: np.ndarray | None = None
+    hole: bool = False
 
 
 @dataclass(frozen=True)

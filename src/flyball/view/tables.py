@@ -31,7 +31,15 @@ class Table:
 
 def tables(result: Result) -> list[Table]:
     """Every table that has a row."""
-    made = [health(result), parameters(result), bodies(result), joints(result), forces(result), drivers(result)]
+    made = [
+        health(result),
+        parameters(result),
+        bodies(result),
+        joints(result),
+        forces(result),
+        drivers(result),
+        sensors(result),
+    ]
     return [_cut(t) for t in made if t.rows]
 
 
@@ -150,3 +158,13 @@ def drivers(result: Result) -> Table:
         rows.append((e.name, e.coordinate, str(e.law), effort, f"{fixed(view.work[-1])} J"))
     columns = ("driver", "coordinate", "law", "largest |effort|", "work given")
     return Table("drivers", "Drivers", columns, tuple(tuple(r) for r in rows))
+
+
+def sensors(result: Result) -> Table:
+    """What sensors measure, and between which values it stayed."""
+    rows = []
+    for e in getattr(result.model, "sensors", ()):
+        for k, (unit, v) in result[e.name].channels().items():
+            low, high = (fixed(x) for x in (np.nanmin(v), np.nanmax(v)))
+            rows.append((e.name, type(e).__name__, between(e), k, low, high, unit.replace("*", " ")))
+    return Table("sensors", "Sensors", ("sensor", "kind", "of", "curve", "least", "largest", "unit"), tuple(rows))

@@ -153,7 +153,14 @@ export function flatBody(body, colour, index) {
   const paint = flatMaterial({ color: colour });
   const dusk = flatMaterial({ color: "#0a1420", opacity: 0.12 });
   const edges = [];
+  const paper = flatMaterial({ color: "#ffffff" });
   for (const shape of body.shapes) {
+    if (shape.hole) {
+      const outline = silhouette(shape);
+      edges.push(stroke(outline, { color: colour, width: 2, order: order + 2, closed: true }));
+      group.add(fill(outline, paper, order + 2), edges.at(-1));
+      continue;
+    }
     if (shape.kind === "mesh") {
       const [edge, face] = flatMesh(shape, colour, paint, order);
       edges.push(edge);
@@ -181,6 +188,7 @@ export function flatBody(body, colour, index) {
   const retheme = (theme) => {
     for (const edge of edges) edge.material.color.copy(outlineColour(colour, theme));
     dusk.opacity = theme.flatShadow;
+    paper.color.set(theme.pin);
   };
   const glow = (on) => paint.color.set(colour).lerp(new THREE.Color("#ffffff"), on ? 0.18 : 0);
   return { group, shade, retheme, glow };

@@ -2,6 +2,7 @@
 import { element, pretty } from "./format.js";
 
 const MOST = 300; // channels listed at once
+const ENOUGH = 600; // px: in a lower panel the summary is closed, for the plots
 
 /** The list of channels: search, tick, and whether those of one unit share a plot. */
 export function channelPicker(panel, button, channels, shown, onChange) {
@@ -165,6 +166,7 @@ const unbroken = (text) => text.replace(/(\d)e-(\d)/g, "$1e\u2011$2"); // a numb
 export function summary(details, notes) {
   const entries = Object.entries(notes);
   details.hidden = !entries.length;
+  details.open = details.parentElement.clientHeight >= ENOUGH || document.body.classList.contains("plotless");
   details
     .querySelector("dl")
     .append(

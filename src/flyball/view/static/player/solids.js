@@ -2,6 +2,7 @@
 import * as THREE from "three";
 
 const ROUND = 48;
+const PROUD = 1.004; // a hole is a dark plug that stands out by so little that only its openings show
 
 /** A turned part along z from its profile of (radius, z) pairs, going up. */
 function turned(profile) {
@@ -96,9 +97,14 @@ export function solidBody(body, colour) {
   const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.48, metalness: 0.08 });
   const dark = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.7 });
   dark.color.multiplyScalar(0.3);
+  const opening = new THREE.MeshStandardMaterial({ color: colour, roughness: 1 });
+  opening.color.multiplyScalar(0.12);
   for (const shape of body.shapes) {
     const holder = placed(new THREE.Group(), shape);
-    holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
+    if (shape.hole) {
+      holder.add(new THREE.Mesh(solidGeometry(shape), opening));
+      holder.children[0].scale.setScalar(PROUD);
+    } else holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
     group.add(holder);
   }
   group.traverse((object) => Object.assign(object, { castShadow: true, receiveShadow: true }));
