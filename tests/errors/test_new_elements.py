@@ -151,7 +151,7 @@ PLANAR = {
     "Sensor as parameter": ({"of": "A.angle", "name": "r"}, "the name 'r' is a parameter's"),
     "IMU unknown": ({"frame": "eyes"}, "no body or frame named 'eyes'.*mean 'eye'"),
     "IMU of a joint": ({"frame": "A"}, "'A' is a Revolute, no body or frame"),
-    "IMU on ground": ({"frame": "ground"}, "on ground it would show nothing but gravity; name a body"),
+    "IMU on ground": ({"frame": "ground"}, "it is fixed on ground, which never moves; name a body"),
     "IMU bare": ({}, "field 'frame' is missing"),
     # tables
     "Table of one": ({"x": [0], "y": [0]}, "1 point makes no curve; give two points or more"),
