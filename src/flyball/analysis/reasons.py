@@ -137,8 +137,9 @@ def _broken_force(a: Assembly, t: float) -> str:
     """The force that is no number at the kinematics that the compiled loop has left, and why."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     stack = np.zeros_like(W.stack)
+    forces: list[Any] = list(s.forces)
     with np.errstate(all="ignore"):
-        for k, e in enumerate(s.forces):
+        for k, e in enumerate(forces):
             F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
             along = isinstance(e, CoordinateForce)
             m = S.force_i[k, FORCE_F]

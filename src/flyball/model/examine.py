@@ -16,15 +16,15 @@ from .expressions import law_expression, number
 from .force import CoordinateForce, Force, TwoPointForce
 from .joint import Joint
 from .sensor import IMU, Sensor
+from .words import listing, suggest
 
 if TYPE_CHECKING:
     from .model import Model
-    from .names import Names
 
 ENERGIES = ("kinetic", "potential", "total", "balance")
 
 
-def curves(model: Names, name: str) -> list[str]:
+def curves(model: Model, name: str) -> list[str]:
     """Names of the curves that a result has of a part (or of ``"energy"``)."""
     if name == "energy":
         return list(ENERGIES)
@@ -54,12 +54,54 @@ def _of_joint(e: Joint, axes: str) -> list[str]:
     return [*out, *(f"f{a}" for a in axes), *(["torque"] if len(axes) == 2 else (f"t{a}" for a in axes))]
 
 
-def carriers(model: Names) -> list[str]:
+def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
+    """What a sensor measures; see `Model.measured`."""
+    owner, _, what = e.of.partition(".")
+    found = model._names.get(owner)
+    if found is None and owner != "energy":
+        known = list(model._names)
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
+            f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
+        )
+    has = curves(model, owner)
+    if what not in has:
+        whose = "energy" if found is None else found.title
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
+            f"{suggest(what, has)}"
+        )
+    if isinstance(found, (Body, Frame)):
+        return _of_point(owner, what, "xy" if model.planar else "xyz")
+    if isinstance(found, Joint):
+        own = found.measured(model.planar)
+        if what in own:
+            return "coordinate", f"{owner}.{what}", 0
+        name = next(iter(own)) if what == "rate" and len(own) == 1 else what.removesuffix("_rate")
+        return ("coordinate", f"{owner}.{name}", 1) if name in own else None
+    if isinstance(found, (TwoPointForce, CoordinateForce)):
+        order = list(found.outputs).index(what)
+        return ("force", owner, order) if order < 2 else None
+    return None
+
+
+def _of_point(owner: str, what: str, axes: str) -> tuple[str, str, int] | None:
+    planar = len(axes) == 2
+    if what in tuple(axes) or (planar and what == "angle"):
+        return "coordinate", f"{owner}.{what}", 0
+    if len(what) == 2 and what[0] == "v":
+        return "coordinate", f"{owner}.{what[1]}", 1
+    if planar and what == "omega":
+        return "coordinate", f"{owner}.angle", 1
+    return ("spin", f"{owner}.{what[-1]}", 1) if what.startswith("omega_") else None
+
+
+def carriers(model: Model) -> list[str]:
     """Names of what can carry something: bodies, frames, ground."""
     return [*(b.name for b in model.bodies), *(f.name for f in model.frames), GROUND]
 
 
-def but_is(model: Names, name: str, wanted: str) -> str:
+def but_is(model: Model, name: str, wanted: str) -> str:
     """'; 'A' is a Revolute' where a name means something else than was wanted."""
     found = model._names.get(name)
     return "" if found is None else f" ({name!r} is a {type(found).__name__}, no {wanted})"

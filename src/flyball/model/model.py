@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,22 +14,23 @@ from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
-from .examine import check_units
+from .examine import but_is, carriers, check_units, measured
 from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
 from .function import function_name
 from .geometry import vector
-from .inertia import mass_properties
 from .joint import Joint
-from .names import Names, listing, suggest
 from .sensor import IMU, Sensor
 from .table import Table
+from .validity import check_body, check_by_frames, check_joint, refuse_twins
+from .words import listing as listing
+from .words import suggest as suggest
 
 CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
 RESERVED = (GROUND, "energy", "t", "time")
 
 
-class Model(Names):
+class Model:
     """A mechanism as described.
 
     Parameters
@@ -118,6 +119,12 @@ class Model(Names):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __getitem__(self, name: str) -> Any:
+        """The part with that name."""
+        if name not in self._names:
+            raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(name, self._names)}")
+        return self._names[name]
+
     def add(self, *elements: Element) -> Any:
         """Add parts and check them against what is there. Returns the (last) part added.
 
@@ -151,6 +158,8 @@ class Model(Names):
             raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
         if e.name in RESERVED:
             raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
+        if isinstance(e, (Sensor, Table)) and e.name in self.parameters:
+            raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
         if e.name in self._names:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
 
@@ -192,6 +201,70 @@ class Model(Names):
                     f"its length; leave one out"
                 )
 
+    def body(self, name: str, e: Element) -> Body:
+        """The body of that name, as asked for by e."""
+        found = self._names.get(name)
+        if not isinstance(found, Body):
+            names = [b.name for b in self.bodies]
+            raise ModelError(f"{e.title}: there is no body named {name!r}{suggest(name, names)}; {listing(names)}")
+        return found
+
+    def carrier(self, name: str, e: Element) -> str:
+        """Name of the body (or ground) that carries what e attaches to."""
+        found = self._names.get(name)
+        if isinstance(found, Frame):
+            return found.body
+        if name != GROUND and not isinstance(found, Body):
+            names = carriers(self)
+            raise ModelError(
+                f"{e.title}: there is no body or frame named {name!r}{but_is(self, name, 'body or frame')}"
+                f"{suggest(name, names)}; {listing(names)}"
+            )
+        return name
+
+    def joint(self, name: str, e: Element, coordinate: str) -> Joint:
+        """The joint of that name, which must have the coordinate, as asked for by e."""
+        found = self._names.get(name)
+        if not isinstance(found, Joint):
+            names = [j.name for j in self.joints]
+            raise ModelError(
+                f"{e.title}: there is no joint named {name!r}{but_is(self, name, 'joint')}{suggest(name, names)}; "
+                f"{listing(names)}"
+            )
+        has = found.measured(self.planar)
+        if coordinate not in has:
+            raise ModelError(
+                f"{e.title}: {found.title} has no coordinate {coordinate!r}{suggest(coordinate, has)}; it has "
+                f"{', '.join(has) or 'none'}"
+            )
+        return found
+
+    def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
+        """(joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
+        owner, _, what = text.partition(".")
+        found = self._names.get(owner)
+        if isinstance(found, (Body, Frame)):
+            axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
+            if what not in axes:
+                raise ModelError(f"{e.title}: {owner!r} has the coordinates {', '.join(axes)}, not {what!r}")
+            return found, what
+        if not what:
+            raise ModelError(f"{e.title}: {text!r} is no coordinate; write joint.coordinate, for instance 'A.angle'")
+        return self.joint(owner, e, what), what
+
+    def measured(self, e: Sensor) -> tuple[str, str, int] | None:
+        """What a sensor measures, as (kind, coordinate or name, order): order 0 the value, 1 its rate.
+
+        The kind is ``"coordinate"``, ``"force"`` (the quantity that a force acts along), ``"spin"`` (angular velocity
+        in space), or None for an output that laws cannot use.
+
+        Raises
+        ------
+        ModelError
+            If there is no such part, or it has no such curve.
+        """
+        return measured(self, e)
+
     def validate(self, e: Element, env: dict[str, float]) -> None:
         """Resolve the element's numbers and refuse those that make no sense."""
         n = resolve(e, env)
@@ -199,13 +272,13 @@ class Model(Names):
         self._check_laws(e)
         check_units(self, e, env)
         if isinstance(e, Body):
-            self._check_body(e, n, env)
+            check_body(self, e, n, env)
         elif isinstance(e, Joint):
-            self._check_joint(e, n)
+            check_joint(self, e, n)
         elif isinstance(e, Force):
             e.placed(n, self.planar)
             if isinstance(e, TwoFrameForce) and n.at is None:
-                self._check_by_frames(e)
+                check_by_frames(self, e)
         elif isinstance(e, (Driver, Initial)):
             self._check_told(e, env)
 
@@ -223,6 +296,13 @@ class Model(Names):
                 )
             self.law(e.law, LawOf(self.unit(e.coordinate, e)), f"law of {e.title}", driver=True)
 
+    def unit(self, text: str, e: Element) -> str:
+        """Unit of a coordinate."""
+        owner, what = self.coordinate(text, e)
+        if isinstance(owner, Joint):
+            return owner.coordinates[what].unit
+        return "rad" if what == "angle" else "m"
+
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False) -> Any:
         """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
         if value is None:
@@ -237,7 +317,7 @@ class Model(Names):
         try:
             expression = law_expression(value, of.dimension, where, tables=tables)
             expression.require(["t", *of.inputs, *sensors, *self.parameters])
-            _refuse_twins(expression.names, of.inputs, sensors, self.parameters)
+            refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
             raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
@@ -263,48 +343,3 @@ class Model(Names):
         """An initial condition says something."""
         if isinstance(e, Initial) and e.value is None and e.rate is None:
             raise ModelError(f"{e.title}: it gives neither value nor rate; give value=, rate=, or both")
-
-    def _check_body(self, e: Body, n: Any, env: dict[str, float]) -> None:
-        mass_properties(e, n, env, self.planar)
-        vector(n.position, self.planar, f"position of {e.title}")
-        vector(n.velocity, self.planar, f"velocity of {e.title}")
-        if self.planar and n.orientation is not None:
-            raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
-        if not self.planar and n.angle != 0.0:
-            raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
-        if isinstance(n.angular_velocity, tuple) == self.planar and n.angular_velocity is not None:
-            wanted = "one number" if self.planar else "three components"
-            raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {n.angular_velocity}")
-        e.rotation(n)
-
-    def _check_joint(self, e: Joint, n: Any) -> None:
-        if self.planar and not e.planar_normal:
-            raise ModelError(
-                f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, "
-                f"such as Revolute, Translational, PinInSlot or Distance"
-            )
-        if not self.planar and not e.spatial:
-            raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use {e.in_space}")
-        if n.at is not None:
-            F, M = e.world_frames(n, self.planar)
-            for row in e.rows(self.planar):
-                e.constants(n, row, F, M)
-        else:
-            self._check_by_frames(e)
-
-    def _check_by_frames(self, e: Joint | TwoFrameForce) -> None:
-        """What is not placed by ``at`` names frames."""
-        if all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
-            raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
-
-
-def _refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[str], parameters: Iterable) -> None:
-    """Refuse a law that uses a name with two meanings."""
-    for name in sorted(names):
-        meant = [
-            what
-            for known, what in ((inputs, "an input of this law"), (sensors, "a sensor"), (parameters, "a parameter"))
-            if name in known
-        ]
-        if len(meant) > 1:
-            raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")

@@ -31,6 +31,7 @@ from .tables import (
     EXCESS,
     INERTIA,
     INVERSE,
+    INVERSE_JACOBIAN,
     MASS,
     PER_COMPACT,
     PER_MASS,
@@ -335,7 +336,7 @@ def _drawn_state(s: Structure, bodies: dict, pose: Poses) -> tuple[np.ndarray, n
 def work(s: Structure, system: System, dtype: type = float) -> Work:
     """Scratch arrays for one run."""
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
-    n, ny = len(system.ldl.perm), s.nq + nv + len(s.states)
+    n, ny, nl = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads)
 
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
@@ -343,8 +344,8 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
-        z(4, 2 * len(s.measured) + len(s.loads)), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
-        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(6, np.int64),
+        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
+        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(7, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames
 
