@@ -18,7 +18,7 @@ from ..results import doubts
 from ..results.health import Health
 from ..results.result import Result
 from ..system import motion
-from ..system.functions import interrupts_kept
+from ..system.functions import forget, interrupts_kept
 from ..system.tables import (
     ALPHA,
     BETA,
@@ -222,6 +222,7 @@ def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
+    forget(W.stack)
     try:
         while True:
             begin = time.perf_counter()

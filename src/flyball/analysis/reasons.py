@@ -137,8 +137,9 @@ def _broken_force(a: Assembly, t: float) -> str:
     """The force that is no number at the kinematics that the compiled loop has left, and why."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     stack = np.zeros_like(W.stack)
+    forces: list[Any] = list(s.forces)
     with np.errstate(all="ignore"):
-        for k, e in enumerate(s.forces):
+        for k, e in enumerate(forces):
             F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
             along = isinstance(e, CoordinateForce)
             m = S.force_i[k, FORCE_F]
@@ -158,7 +159,11 @@ def _broken_force(a: Assembly, t: float) -> str:
                     f"that it leaves"
                 )
             pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
-            out = e.effort(par, x, y, laws, pressed) if along else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            out = (
+                e.effort(par, x, y, laws, pressed)
+                if isinstance(e, CoordinateForce)
+                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            )
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"
     return ""

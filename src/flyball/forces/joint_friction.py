@@ -131,6 +131,11 @@ class JointFriction(CoordinateForce):
         if self._coordinate().startswith("angle") and n.radius is None:
             raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
 
+    @staticmethod
+    def sticking(par: tuple[float, ...]) -> tuple[float, float]:
+        """Arm of the surfaces about the coordinate, and the sliding speed [m/s] below which they should stick."""
+        return par[0], STICKING * par[4]
+
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
         turning = self._coordinate().startswith("angle")

@@ -68,8 +68,5 @@ class Coupler(Coupling):
             raise ModelError(
                 f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"
             )
-        for text in self.coordinates:
-            if self.coordinates.count(text) > 1:
-                raise ModelError(f"{self.title}: {text!r} is coupled twice; name it once, with the sum of its weights")
         if not all(w != 0.0 for w in n.weights):
             raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")

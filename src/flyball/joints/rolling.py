@@ -63,7 +63,7 @@ class RollingDisk(Joint):
         s = np.sqrt((1.0 - c) * (1.0 + c))
         if not s.real > FLAT:
             raise ModelError(
-                f"{self.title}: its axle is square to the plane: the wheel lies flat and cannot roll; lean it"
+                f"{self.title}: its axle is square to the plane: the wheel lies flat and cannot roll; turn its axis"
             )
         contact = centre - n.radius / s * (up - c * M[:, 2]) - n.tread * up
         return (contact, triad(up)), (centre, M)

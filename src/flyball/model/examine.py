@@ -16,6 +16,7 @@ from .expressions import law_expression, number
 from .force import CoordinateForce, Force, TwoPointForce
 from .joint import Joint
 from .sensor import IMU, Sensor
+from .words import listing, suggest
 
 if TYPE_CHECKING:
     from .model import Model
@@ -51,6 +52,48 @@ def _of_joint(e: Joint, axes: str) -> list[str]:
     out = [x for what in own for x in (what, "rate" if len(own) == 1 else f"{what}_rate")]
     out += ["place"] if hasattr(e, "nearest") else []
     return [*out, *(f"f{a}" for a in axes), *(["torque"] if len(axes) == 2 else (f"t{a}" for a in axes))]
+
+
+def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
+    """What a sensor measures; see `Model.measured`."""
+    owner, _, what = e.of.partition(".")
+    found = model._names.get(owner)
+    if found is None and owner != "energy":
+        known = list(model._names)
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
+            f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
+        )
+    has = curves(model, owner)
+    if what not in has:
+        whose = "energy" if found is None else found.title
+        raise ModelError(
+            f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
+            f"{suggest(what, has)}"
+        )
+    if isinstance(found, (Body, Frame)):
+        return _of_point(owner, what, "xy" if model.planar else "xyz")
+    if isinstance(found, Joint):
+        own = found.measured(model.planar)
+        if what in own:
+            return "coordinate", f"{owner}.{what}", 0
+        name = next(iter(own)) if what == "rate" and len(own) == 1 else what.removesuffix("_rate")
+        return ("coordinate", f"{owner}.{name}", 1) if name in own else None
+    if isinstance(found, (TwoPointForce, CoordinateForce)):
+        order = list(found.outputs).index(what)
+        return ("force", owner, order) if order < 2 else None
+    return None
+
+
+def _of_point(owner: str, what: str, axes: str) -> tuple[str, str, int] | None:
+    planar = len(axes) == 2
+    if what in tuple(axes) or (planar and what == "angle"):
+        return "coordinate", f"{owner}.{what}", 0
+    if len(what) == 2 and what[0] == "v":
+        return "coordinate", f"{owner}.{what[1]}", 1
+    if planar and what == "omega":
+        return "coordinate", f"{owner}.angle", 1
+    return ("spin", f"{owner}.{what[-1]}", 1) if what.startswith("omega_") else None
 
 
 def carriers(model: Model) -> list[str]:

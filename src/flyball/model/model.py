@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import copy
-import difflib
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,15 +14,17 @@ from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
-from .examine import but_is, carriers, check_units, curves
+from .examine import but_is, carriers, check_units, measured
 from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
 from .function import function_name
 from .geometry import vector
-from .inertia import mass_properties
 from .joint import Joint
 from .sensor import IMU, Sensor
 from .table import Table
+from .validity import check_body, check_by_frames, check_joint, refuse_twins
+from .words import listing as listing
+from .words import suggest as suggest
 
 CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
 RESERVED = (GROUND, "energy", "t", "time")
@@ -157,6 +158,8 @@ class Model:
             raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
         if e.name in RESERVED:
             raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
+        if isinstance(e, (Sensor, Table)) and e.name in self.parameters:
+            raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
         if e.name in self._names:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
 
@@ -260,43 +263,7 @@ class Model:
         ModelError
             If there is no such part, or it has no such curve.
         """
-        owner, _, what = e.of.partition(".")
-        found = self._names.get(owner)
-        if found is None and owner != "energy":
-            known = list(self._names)
-            raise ModelError(
-                f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
-                f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
-            )
-        has = curves(self, owner)
-        if what not in has:
-            whose = "energy" if found is None else found.title
-            raise ModelError(
-                f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
-                f"{suggest(what, has)}"
-            )
-        if found is None:
-            return None
-        if isinstance(found, (Body, Frame)):
-            return self._measured_point(owner, what)
-        if isinstance(found, Joint):
-            return _measured_joint(found, what, found.measured(self.planar))
-        if isinstance(found, (TwoPointForce, CoordinateForce)):
-            order = list(found.outputs).index(what) if what in found.outputs else 2
-            return ("force", owner, order) if order < 2 else None
-        return None
-
-    def _measured_point(self, owner: str, what: str) -> tuple[str, str, int] | None:
-        axes = "xy" if self.planar else "xyz"
-        if what in tuple(axes) or (self.planar and what == "angle"):
-            return "coordinate", f"{owner}.{what}", 0
-        if len(what) == 2 and what[0] == "v" and what[1] in axes:
-            return "coordinate", f"{owner}.{what[1]}", 1
-        if self.planar and what == "omega":
-            return "coordinate", f"{owner}.angle", 1
-        if not self.planar and what in ("omega_x", "omega_y", "omega_z"):
-            return "spin", f"{owner}.{what[-1]}", 1
-        return None
+        return measured(self, e)
 
     def validate(self, e: Element, env: dict[str, float]) -> None:
         """Resolve the element's numbers and refuse those that make no sense."""
@@ -305,13 +272,13 @@ class Model:
         self._check_laws(e)
         check_units(self, e, env)
         if isinstance(e, Body):
-            self._check_body(e, n, env)
+            check_body(self, e, n, env)
         elif isinstance(e, Joint):
-            self._check_joint(e, n)
+            check_joint(self, e, n)
         elif isinstance(e, Force):
             e.placed(n, self.planar)
             if isinstance(e, TwoFrameForce) and n.at is None:
-                self._check_by_frames(e)
+                check_by_frames(self, e)
         elif isinstance(e, (Driver, Initial)):
             self._check_told(e, env)
 
@@ -350,7 +317,7 @@ class Model:
         try:
             expression = law_expression(value, of.dimension, where, tables=tables)
             expression.require(["t", *of.inputs, *sensors, *self.parameters])
-            _refuse_twins(expression.names, of.inputs, sensors, self.parameters)
+            refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
             raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
@@ -376,69 +343,3 @@ class Model:
         """An initial condition says something."""
         if isinstance(e, Initial) and e.value is None and e.rate is None:
             raise ModelError(f"{e.title}: it gives neither value nor rate; give value=, rate=, or both")
-
-    def _check_body(self, e: Body, n: Any, env: dict[str, float]) -> None:
-        mass_properties(e, n, env, self.planar)
-        vector(n.position, self.planar, f"position of {e.title}")
-        vector(n.velocity, self.planar, f"velocity of {e.title}")
-        if self.planar and n.orientation is not None:
-            raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
-        if not self.planar and n.angle != 0.0:
-            raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
-        if isinstance(n.angular_velocity, tuple) == self.planar and n.angular_velocity is not None:
-            wanted = "one number" if self.planar else "three components"
-            raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {n.angular_velocity}")
-        e.rotation(n)
-
-    def _check_joint(self, e: Joint, n: Any) -> None:
-        if self.planar and not e.planar_normal:
-            raise ModelError(
-                f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, "
-                f"such as Revolute, Translational, PinInSlot or Distance"
-            )
-        if not self.planar and not e.spatial:
-            raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use {e.in_space}")
-        if n.at is not None:
-            F, M = e.world_frames(n, self.planar)
-            for row in e.rows(self.planar):
-                e.constants(n, row, F, M)
-        else:
-            self._check_by_frames(e)
-
-    def _check_by_frames(self, e: Joint | TwoFrameForce) -> None:
-        """What is not placed by ``at`` names frames."""
-        if all(name == GROUND or isinstance(self._names[name], Body) for name in (e.body_i, e.body_j)):
-            raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
-
-
-def _refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[str], parameters: Iterable) -> None:
-    """Refuse a law that uses a name with two meanings."""
-    for name in sorted(names):
-        meant = [
-            what
-            for known, what in ((inputs, "an input of this law"), (sensors, "a sensor"), (parameters, "a parameter"))
-            if name in known
-        ]
-        if len(meant) > 1:
-            raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")
-
-
-def _measured_joint(joint: Joint, what: str, own: Mapping) -> tuple[str, str, int] | None:
-    if what in own:
-        return "coordinate", f"{joint.name}.{what}", 0
-    name = next(iter(own)) if what == "rate" and len(own) == 1 else what.removesuffix("_rate")
-    return ("coordinate", f"{joint.name}.{name}", 1) if name in own else None
-
-
-def suggest(name: str, known: Any) -> str:
-    """' (did you mean ...?)' where something close is known."""
-    close = difflib.get_close_matches(name, list(known), 1)
-    return f" (did you mean {close[0]!r}?)" if close else ""
-
-
-def listing(names: list[str]) -> str:
-    """What there is, for messages."""
-    if not names:
-        return "there is none yet; add it first"
-    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
-    return f"known: {shown}"

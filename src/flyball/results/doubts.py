@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..forces.joint_friction import STICKING, JointFriction
 from ..system.loads import wide
-from ..system.tables import MASS
+from ..system.tables import FORCE_F, MASS
 
 if TYPE_CHECKING:
     from .result import Result
@@ -79,8 +78,8 @@ def _accelerations(result: Result) -> str:
 
 def _open_loads(result: Result) -> list[str]:
     found = []
-    for f in result.model.forces:
-        if isinstance(f, JointFriction) and f.joint in result.health.undetermined:
+    for f in _with_loads(result):
+        if f.joint in result.health.undetermined:
             what = ", ".join(result.health.undetermined[f.joint])
             found.append(
                 f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
@@ -92,8 +91,8 @@ def _open_loads(result: Result) -> list[str]:
 def _creep(result: Result) -> list[str]:
     limit = CREPT * result.values.length
     return [
-        f"JointFriction {name!r} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a smaller "
-        f"stick_speed makes it less"
+        f"{result.model[name].title} crept {distance:.3g} m, at up to {speed:.3g} m/s, while it should stick; a "
+        f"smaller stick_speed makes it less"
         for name, (speed, distance) in result.health.creep.items()
         if distance > limit
     ]
@@ -102,18 +101,24 @@ def _creep(result: Result) -> list[str]:
 def creep(result: Result) -> dict[str, tuple[float, float]]:
     """Joint friction -> (largest speed [m/s], distance [m]) of its surfaces while it should stick.
 
-    It should stick while it slides at less than `STICKING` times its stick speed, for two output times running or
-    more; what passes through rest between two output times is no creep.
+    It should stick while it slides at less than three times its stick speed, for two output times running or more;
+    what passes through rest between two output times is no creep.
     """
     found = {}
-    for k, f in enumerate(result.values.structure.forces):
-        if isinstance(f, JointFriction):
-            par = wide(result.values.system.force_x, k)
-            x, rate = result.measured.quantity(int(result.values.system.force_i[k, 0]))
-            speed = np.abs(par[0] * rate)
-            slow = speed < STICKING * par[4]
-            both = slow[1:] & slow[:-1]
-            stuck = np.r_[both, False] | np.r_[False, both]
-            distance = (par[0] * np.abs(np.diff(x)))[both].sum()
-            found[f.name] = float(speed[stuck].max(initial=0.0)), float(distance)
+    S, forces = result.values.system, result.values.structure.forces
+    for f in _with_loads(result):
+        k = next(k for k, e in enumerate(forces) if e is f)
+        arm, limit = f.sticking(wide(S.force_x, k))
+        x, rate = result.measured.quantity(int(S.force_i[k, FORCE_F]))
+        speed = np.abs(arm * rate)
+        slow = speed < limit
+        both = slow[1:] & slow[:-1]
+        stuck = np.r_[both, False] | np.r_[False, both]
+        distance = (arm * np.abs(np.diff(x)))[both].sum()
+        found[f.name] = float(speed[stuck].max(initial=0.0)), float(distance)
     return found
+
+
+def _with_loads(result: Result) -> list[Any]:
+    """Forces that follow what a joint carries: friction."""
+    return result.values.structure.loads

@@ -28,8 +28,8 @@ class Health:
     factorisations: int
     seconds: float  # wall time, assembly included [s]
     options: dict[str, Any] = field(default_factory=dict)
-    remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
+    remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
 
     def _found(self, name: str) -> Any:
         value = self.late[name]

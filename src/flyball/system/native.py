@@ -127,7 +127,7 @@ def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
         return done[function]
     scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
     closure = tuple(CellType() for _ in function.__closure__ or ())
-    made = done[function] = njit(_by_place(_twin(function, scope, closure)))
+    made = done[function] = njit(boundscheck=True)(_by_place(_twin(function, scope, closure)))
 
     def known(name: str, value: Any) -> Any:
         if isinstance(value, list | set | dict):  # Numba would take a copy, for good

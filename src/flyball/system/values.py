@@ -336,7 +336,7 @@ def _drawn_state(s: Structure, bodies: dict, pose: Poses) -> tuple[np.ndarray, n
 def work(s: Structure, system: System, dtype: type = float) -> Work:
     """Scratch arrays for one run."""
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
-    n, ny = len(system.ldl.perm), s.nq + nv + len(s.states)
+    n, ny, nl = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads)
 
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)

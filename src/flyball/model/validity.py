@@ -1,0 +1,66 @@
+"""Whether the numbers of a body or joint make sense in the plane or in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ExpressionError, ModelError
+from .body import GROUND, Body
+from .force import TwoFrameForce
+from .geometry import vector
+from .inertia import mass_properties
+from .joint import Joint
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
+    """Mass properties, pose and velocities of a body."""
+    mass_properties(e, n, env, model.planar)
+    vector(n.position, model.planar, f"position of {e.title}")
+    vector(n.velocity, model.planar, f"velocity of {e.title}")
+    if model.planar and n.orientation is not None:
+        raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
+    if not model.planar and n.angle != 0.0:
+        raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
+    if isinstance(n.angular_velocity, tuple) == model.planar and n.angular_velocity is not None:
+        wanted = "one number" if model.planar else "three components"
+        raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {n.angular_velocity}")
+    e.rotation(n)
+
+
+def check_joint(model: Model, e: Joint, n: Any) -> None:
+    """A joint has a meaning here, and its frames can be made."""
+    if model.planar and not e.planar_normal:
+        raise ModelError(
+            f"{e.title}: {type(e).__name__} has no meaning in a planar mechanism; use a joint of the plane, such as "
+            f"Revolute, Translational, PinInSlot or Distance"
+        )
+    if not model.planar and not e.spatial:
+        raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use {e.in_space}")
+    if n.at is None:
+        check_by_frames(model, e)
+        return
+    F, M = e.world_frames(n, model.planar)
+    for row in e.rows(model.planar):
+        e.constants(n, row, F, M)
+
+
+def check_by_frames(model: Model, e: Joint | TwoFrameForce) -> None:
+    """What is not placed by ``at`` names frames."""
+    if all(name == GROUND or isinstance(model[name], Body) for name in (e.body_i, e.body_j)):
+        raise ModelError(f"{e.title}: say where it is: at=... in world coordinates, or name frames of the bodies")
+
+
+def refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[str], parameters: Iterable) -> None:
+    """Refuse a law that uses a name with two meanings."""
+    for name in sorted(names):
+        meant = [
+            what
+            for known, what in ((inputs, "an input of this law"), (sensors, "a sensor"), (parameters, "a parameter"))
+            if name in known
+        ]
+        if len(meant) > 1:
+            raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")

@@ -1,0 +1,22 @@
+"""Parts of messages: what may have been meant, and what there is."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+def suggest(name: str, known: Iterable[str]) -> str:
+    """' (did you mean ...?)' where something close is known."""
+    names = list(known)
+    same = [k for k in names if k.lower() == name.lower() and k != name]
+    close = same or difflib.get_close_matches(name, names, 1)
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+def listing(names: list[str]) -> str:
+    """What there is, for messages."""
+    if not names:
+        return "there is none yet; add it first"
+    shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
+    return f"known: {shown}"

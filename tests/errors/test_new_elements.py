@@ -1,0 +1,349 @@
+"""Bad input for couplings, the newer joints and forces, sensors and tables: the message names element, value and rule.
+
+Every case is given twice, from Python and from a model file; the file's message also says where.
+"""
+
+import math
+
+import pytest
+
+import flyball as fb
+from flyball.model.io import _value, dumps, loads
+
+Z = (0, 0, 1)
+SQUARE = [(1, 0), (0, 1), (-1, 0), (0, -1)]
+NAN = math.nan
+
+
+def plane() -> fb.Mechanism:
+    m = fb.Mechanism("plane", planar=True, gravity=(0, -9.81), parameters={"r": 0.1})
+    for name, x in (("arm", 0.5), ("cart", 2), ("wheel", 1)):
+        m.add(fb.Body(name, mass=1, inertia=1, position=(x, 0)))
+    m.add(fb.Frame("eye", "arm", position=(0.1, 0)))
+    m.add(fb.Revolute("A", "ground", "arm", at=(0, 0)), fb.Revolute("W", "arm", "wheel", at=(1, 0)))
+    m.add(fb.Translational("S", "ground", "cart", at=(2, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("spring", "arm", "cart", at=((0.5, 0), (2, 0)), stiffness=10))
+    return m
+
+
+def space() -> fb.Mechanism:
+    m = fb.Mechanism("space", gravity=(0, 0, -9.81), parameters={"r": 0.1})
+    for k, name in enumerate(("a", "b", "c", "d")):
+        m.add(fb.Body(name, mass=1, inertia=(1, 1, 1), position=(k, 0, 1)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0, 0), axis=Z), fb.Revolute("D", "c", "d", at=(0, 0, 0), axis=Z))
+    m.add(fb.Prismatic("P", "ground", "b", at=(1, 0, 0), axis=(1, 0, 0)), fb.Spherical("ball", "b", "c", at=(0, 0, 0)))
+    return m
+
+
+AT3 = {"body_i": "ground", "body_j": "a", "at": (0, 0, 1)}
+AT2 = {"body_i": "arm", "body_j": "cart", "at": (2, 0)}
+
+PLANAR = {
+    # couplings: what they name
+    "GearPair unknown joint": ({"joint_1": "A", "joint_2": "w"}, "no joint named 'w'.*mean 'W'.*known: A, W, S"),
+    "GearPair of a slide": ({"joint_1": "A", "joint_2": "S"}, "Translational 'S' has no coordinate 'angle'; it has"),
+    "GearPair of a force": ({"joint_1": "A", "joint_2": "spring"}, "no joint named 'spring'.*known: A, W, S"),
+    "GearPair of a body": ({"joint_1": "A", "joint_2": "arm"}, "'arm' is a Body, no joint"),
+    "GearPair with itself": ({"joint_1": "A", "joint_2": "A"}, "both its joints are 'A'; name two"),
+    "RackAndPinion swapped": ({"rack": "A", "pinion": "S", "radius": 1}, "Revolute 'A' has no coordinate 'displ"),
+    "RackAndPinion unknown": ({"rack": "SS", "pinion": "A", "radius": 1}, "no joint named 'SS'.*mean 'S'"),
+    "Coupler of a force": ({"coordinates": ["A.angle", "spring.length"]}, "no joint named 'spring'.*known: A, W, S"),
+    "Coupler misspelt": ({"coordinates": ["A.angel", "W.angle"]}, "no coordinate 'angel'.*mean 'angle'"),
+    "Coupler without a dot": ({"coordinates": ["A", "W.angle"]}, "'A' is no coordinate; write joint.coordinate"),
+    "Coupler twice the same": ({"coordinates": ["A.angle", "A.angle"]}, "names 'A.angle' twice; name it once"),
+    "Coupler of one": ({"coordinates": ["A.angle"], "weights": [1]}, "couples 1 coordinate; give two or more"),
+    "Coupler of a text": ({"coordinates": "A.angle"}, "'coordinates' must be a list, got 'A.angle'"),
+    # their numbers
+    "GearPair no teeth": ({"joint_1": "A", "joint_2": "W", "teeth": (10, 0)}, r"greater than 0, got \(10.0, 0.0\)"),
+    "GearPair one tooth": ({"joint_1": "A", "joint_2": "W", "teeth": (10,)}, "teeth are two numbers"),
+    "GearPair text": ({"joint_1": "A", "joint_2": "W", "teeth": ("ten", 20)}, "teeth of.*unknown name 'ten'"),
+    "GearPair a number": ({"joint_1": "A", "joint_2": "W", "teeth": 10}, "'teeth' must be a list, got 10"),
+    "GearPair units": ({"joint_1": "A", "joint_2": "W", "teeth": ("1 kg", 2)}, "teeth of.*'1 kg': expected a plain"),
+    "GearPair field": ({"joint_1": "A", "joint_2": "W", "inside": True}, "unknown field 'inside'; its fields are"),
+    "RackAndPinion radius": ({"rack": "S", "pinion": "A", "radius": 0}, "radius is 0 m; give the rolling radius"),
+    "RackAndPinion unit": ({"rack": "S", "pinion": "A", "radius": "3 kg"}, "radius of.*'3 kg': expected a length"),
+    "RackAndPinion bare": ({"rack": "S", "pinion": "A"}, "field 'radius' is missing"),
+    "Coupler weights": ({"coordinates": ["A.angle", "W.angle"], "weights": [1]}, "as many weights, got 1"),
+    "Coupler zero": ({"coordinates": ["A.angle", "W.angle"], "weights": [1, 0]}, "a weight is 0, which couples"),
+    "Coupler nan": ({"coordinates": ["A.angle", "W.angle"], "weights": [1, NAN]}, "nan, a finite number is wanted"),
+    "Coupler value": ({"coordinates": ["A.angle", "W.angle"], "value": "3 kg"}, "value of.*'3 kg': expected"),
+    # joints
+    "WheelOnLine flat": ({**AT2, "axis": (1, 0), "centre": (3, 0)}, "centre lies on the line; the wheel has no rad"),
+    "WheelOnLine off": ({**AT2, "axis": (1, 0), "centre": (2.5, 1)}, "square to the line; the centre is 0.5 m fur"),
+    "WheelOnLine bare": ({**AT2, "axis": (1, 0)}, "field 'centre' is missing"),
+    "WheelOnLine axis": ({**AT2, "centre": (2, 1)}, r"give its axis in world coordinates.*axis=\(1, 0\)"),
+    "KnifeEdge axis": (AT2, r"give its axis in world coordinates, for instance axis=\(1, 0\)"),
+    "Cam of three": ({**AT2, "points": SQUARE[:3]}, "needs four points or more, each.*got 3"),
+    "Cam repeated": ({**AT2, "points": [*SQUARE, (0, -1)]}, "points 3 and 4 of its profile coincide at.*leave one out"),
+    "Cam closed": ({**AT2, "points": [*SQUARE, (1, 0)]}, "points 4 and 0 of its profile coincide"),
+    "Cam roller": ({**AT2, "at": (0.1, 0), "points": SQUARE, "radius": 2}, "roller of 2 m does not fit.*smaller"),
+    "Cam radius": ({**AT2, "points": SQUARE, "radius": -1}, "radius is -1 m; it must be zero or greater"),
+    "Cam nan": ({**AT2, "points": [*SQUARE, (NAN, 0)]}, "points of Cam 'x': the value is nan"),
+    "Cam text": ({**AT2, "points": "circle"}, "'points' must be a list, got 'circle'"),
+    "Cam nowhere": ({"body_i": "arm", "body_j": "cart", "points": SQUARE}, "say where it is: at="),
+    "Screw in the plane": ({**AT2, "lead": 1}, "no meaning in a planar mechanism; use a joint of the plane"),
+    "RollingDisk in the plane": ({**AT2, "radius": 1}, "no meaning in a planar mechanism"),
+    "GeneralUniversal in the plane": (
+        {**AT2, "at": ((0, 0), (1, 0)), "axes": (Z, (1, 0, 0))},
+        "no meaning in a planar mechanism",
+    ),
+    "PointInPlane in the plane": ({**AT2, "axis": (1, 0)}, "no meaning in a planar mechanism"),
+    "Revolute with an axis": ({**AT2, "axis": (1, 0)}, "its axis is the normal; leave axis out"),
+    # ropes and bushings
+    "Rope of one point": ({"bodies": ["arm"], "at": [(0, 0)]}, r"two ends at least, got bodies \('arm',\); name"),
+    "Rope on one body": ({"bodies": ["arm", "arm"], "at": [(0, 0), (1, 0)]}, "points 1 and 2 are both on 'arm'.*leave"),
+    "Rope by a frame": ({"bodies": ["cart", "eye", "arm"], "at": None}, "points 2 and 3 are both on 'arm'"),
+    "Rope short of points": ({"bodies": ["arm", "cart"], "at": [(0, 0)]}, "2 bodies need as many points.*got 1"),
+    "Rope coincident": ({"bodies": ["arm", "cart"], "at": [(1, 0), (1, 0)]}, "points 1 and 2 are both at.*direction"),
+    "Rope unknown": ({"bodies": ["arm", "crat"], "at": None}, "no body or frame named 'crat'.*mean 'cart'"),
+    "Rope of a joint": ({"bodies": ["arm", "A"], "at": None}, "'A' is a Revolute, no body or frame"),
+    "Rope soft": ({"bodies": ["arm", "cart"], "stiffness": 0}, "stiffness is 0 N/m; it must be greater than 0. A rope"),
+    "Rope bare": ({"bodies": ["arm", "cart"], "stiffness": None, "at": None}, "field 'stiffness' (is missing|must be)"),
+    "Rope of text": ({"bodies": "arm"}, "'bodies' must be a list, got 'arm'"),
+    "Rope in space": ({"bodies": ["arm", "cart"], "at": [(0, 0, 1), (1, 0)]}, "planar, its third component must be 0"),
+    "Bushing negative": ({**AT2, "stiffness": -1}, r"stiffness is one number or one for each axis, none negative"),
+    "Bushing of three": ({**AT2, "stiffness": (1, 2, 3)}, r"stiffness is one number or 2 here.*got \(1.0, 2.0, 3.0\)"),
+    "Bushing turned": ({**AT2, "orientation": (1, 0, 0, 0)}, "in a planar mechanism give angle=, not orientation="),
+    "Bushing on itself": ({**AT2, "body_j": "eye"}, "both its ends are on 'arm'; it must join two different bodies"),
+    # friction
+    "JointFriction bearing": (
+        {"joint": "A"},
+        "the angle of Revolute 'A' needs the radius of the bearing; give radius=",
+    ),
+    "JointFriction angle": ({"joint": "A", "coordinate": "angle"}, "needs the radius of the bearing; give radius="),
+    "JointFriction slide": ({"joint": "S", "radius": 0.1}, "Translational 'S' has no coordinate 'angle'; it has dis"),
+    "JointFriction unknown": ({"joint": "AA", "radius": 0.1}, "no joint named 'AA'.*mean 'A'"),
+    "JointFriction of a body": ({"joint": "arm", "radius": 0.1}, "'arm' is a Body, no joint"),
+    "JointFriction of a force": ({"joint": "spring", "radius": 0.1}, "'spring' is a SpringDamper, no joint"),
+    "JointFriction swapped": (
+        {"joint": "S", "kinetic": 0.2},
+        "kinetic friction 0.2 is greater than static friction 0.1",
+    ),
+    "JointFriction negative": ({"joint": "S", "static": -0.1}, "static is -0.1; it must be zero or greater"),
+    "JointFriction unit": ({"joint": "S", "static": "0.1 N"}, "'0.1 N': expected a plain number"),
+    "JointFriction viscous": ({"joint": "S", "viscous": "1 N*m*s/rad"}, "viscous of.*expected a damping"),
+    "JointFriction rest": ({"joint": "S", "stick_speed": 0}, "stick_speed is 0 m/s; it must be greater than 0"),
+    "JointFriction lengths": ({"joint": "S", "bending_length": 0}, "bending_length is 0 m; it must be greater than 0"),
+    # along coordinates
+    "CoordinateSpring misspelt": ({"coordinate": "S.displacment"}, "'displacment'.*mean 'displacement'"),
+    "CoordinateSpring negative": ({"coordinate": "cart.x", "stiffness": -1}, "stiffness is -1; it must be zero or gr"),
+    "CoordinateSpring unit": ({"coordinate": "S.displacement", "stiffness": "1 kg"}, "'1 kg': expected a stiffness"),
+    "CoordinateSpring torsion": ({"coordinate": "A.angle", "stiffness": "1 N/m"}, "expected a torsional stiffness"),
+    "CoordinateSpring rest": ({"coordinate": "A.angle", "rest": "3 mm"}, "rest of.*expected an angle"),
+    "CoordinateSpring of a force": ({"coordinate": "spring.length"}, "'spring' is a SpringDamper, no joint"),
+    "Actuator name": (
+        {"coordinate": "cart.x", "force": "foo*t"},
+        "unknown name 'foo'(.|\n)*known names: r, rate, t, val",
+    ),
+    "Actuator unit": ({"coordinate": "S.displacement", "force": "3 N*m"}, "force of.*'3 N\\*m': expected a force"),
+    "Actuator torque": ({"coordinate": "A.angle", "force": "3 N"}, "force of.*'3 N': expected a torque"),
+    "Actuator nowhere": ({"force": 3}, "field 'coordinate' is missing"),
+    "Actuator upwards": ({"coordinate": "cart.z", "force": 3}, "'cart' has the coordinates x, y, angle, not 'z'"),
+    "Motor of a slide": ({"joint": "S", "torque": 3}, "Translational 'S' has no coordinate 'angle'"),
+    "Motor of a body": ({"joint": "arm", "torque": 3}, "'arm' is a Body, no joint"),
+    "PointForce of three": ({"body": "arm", "force": (1, 2, 3)}, "needs 2 components, such as"),
+    "PointTorque of three": ({"body": "arm", "torque": (1, 2, 3)}, "in a planar mechanism a torque is one number"),
+    # sensors
+    "Sensor unknown": ({"of": "B.angle"}, "'B.angle' is no curve of a part.*no part named 'B'.*known: arm, cart"),
+    "Sensor without a curve": ({"of": "A"}, "'A' is no curve; Revolute 'A' has A.angle, A.rate, A.fx"),
+    "Sensor misspelt": ({"of": "A.angel"}, "'A.angel' is no curve.*mean 'angle'"),
+    "Sensor of energy": ({"of": "energy.kinetik"}, "energy has energy.kinetic.*mean 'kinetic'"),
+    "Sensor as parameter": ({"of": "A.angle", "name": "r"}, "the name 'r' is a parameter's"),
+    "IMU unknown": ({"frame": "eyes"}, "no body or frame named 'eyes'.*mean 'eye'"),
+    "IMU of a joint": ({"frame": "A"}, "'A' is a Revolute, no body or frame"),
+    "IMU on ground": ({"frame": "ground"}, "it is fixed on ground, which never moves; name a body"),
+    "IMU bare": ({}, "field 'frame' is missing"),
+    # tables
+    "Table of one": ({"x": [0], "y": [0]}, "1 point makes no curve; give two points or more"),
+    "Table lengths": ({"x": [0, 1], "y": [0]}, "x has 2 numbers and y has 1; give pairs"),
+    "Table order": ({"x": [0, 1, 1], "y": [0, 1, 2]}, r"x\[2\] = 1 comes after x\[1\] = 1; x must ascend: sort"),
+    "Table nan": ({"x": [0, 1], "y": [0, NAN]}, r"y\[1\] is nan; give a finite number, or leave the point out"),
+    "Table name": ({"x": [0, 1], "y": [0, 1], "name": "my lift"}, "use letters, digits and _ only"),
+    "Table sin": ({"x": [0, 1], "y": [0, 1], "name": "sin"}, "has a meaning in expressions; call it 'sin_curve'"),
+    "Table as parameter": ({"x": [0, 1], "y": [0, 1], "name": "r"}, "the name 'r' is a parameter's"),
+    "Table period": ({"x": [0, 1], "y": [0, 1], "outside": "periodic"}, "a periodic table ends where it starts"),
+    "Table kind": ({"x": [0, 1], "y": [0, 1], "interpolation": "spline"}, "'cubic', 'monotone' or 'linear'.*'spline'"),
+    "Table outside": ({"x": [0, 1], "y": [0, 1], "outside": "zero"}, "'linear', 'hold' or 'periodic'.*'zero'"),
+    "Table unit": ({"x": [0, 1], "y": [0, 1], "x_unit": "furlongg"}, "x_unit: .*unknown unit 'furlongg'"),
+    "Table text": ({"x": [0, "1 mm"], "y": [0, 1]}, "field 'x' must be a number"),
+    # drivers
+    "Driver of a table unknown": ({"coordinate": "A.angle", "law": "lift(t)"}, "unknown function 'lift'"),
+    "Driver of a force": ({"coordinate": "spring.length", "law": "t"}, "'spring' is a SpringDamper, no joint"),
+}
+SPATIAL = {
+    "GearPair without a carrier": (
+        {"joint_1": "A", "joint_2": "D"},
+        r"'A' \(a - ground\) and 'D' \(c - d\) have no body in common; both gears must turn on one carrier",
+    ),
+    "Screw lead": ({**AT3, "axis": Z, "lead": 0}, "lead is 0 m; without one it is a Revolute"),
+    "Screw bare": ({**AT3, "axis": Z}, "field 'lead' is missing"),
+    "Screw unit": ({**AT3, "axis": Z, "lead": "5 deg"}, "lead of.*'5 deg': expected a length"),
+    "Screw axis": ({**AT3, "lead": 1}, r"give its axis in world coordinates, for instance axis=\(0, 0, 1\)"),
+    "Screw no axis": ({**AT3, "axis": (0, 0, 0), "lead": 1}, "has no length; a direction must not be zero"),
+    "GeneralUniversal parallel": ({**AT3, "at": ((0, 0, 0), (0, 0, 1)), "axes": (Z, Z)}, "axes are parallel; a link"),
+    "GeneralUniversal axes": ({**AT3, "at": ((0, 0, 0), (0, 0, 1))}, "give its two axes, for instance axes="),
+    "GeneralUniversal one point": ({**AT3, "axes": (Z, (1, 0, 0))}, r"'at' must be a list of 2, got .0, 0, 1"),
+    "KnifeEdge along": ({**AT3, "axis": Z, "normal": (0, 0, 2)}, "its normal is along its edge; give the direction"),
+    "KnifeEdge bare": (AT3, "give its axis in world coordinates"),
+    "RollingDisk flat": ({**AT3, "axis": Z, "radius": 1}, "the wheel lies flat and cannot roll; turn its axis"),
+    "RollingDisk radius": (
+        {**AT3, "axis": (1, 0, 0), "radius": -1},
+        "radius is -1 m; it must be greater than 0. For a",
+    ),
+    "RollingDisk tread": ({**AT3, "axis": (1, 0, 0), "radius": 1, "tread": -1}, "tread is -1 m; it must be zero or"),
+    "RollingDisk bare": ({**AT3, "axis": (1, 0, 0)}, "field 'radius' is missing"),
+    "RollingBall radius": ({**AT3, "radius": "0 mm"}, "radius is 0 m; it must be greater than 0"),
+    "RollingBall unit": ({**AT3, "radius": "1 s"}, "radius of.*'1 s': expected a length"),
+    "RollingBall nowhere": ({"body_i": "ground", "body_j": "a", "radius": 1}, "say where it is: at="),
+    "WheelOnLine in space": (
+        {**AT3, "axis": (1, 0, 0), "centre": Z},
+        "for planar mechanisms; in space use RollingDisk",
+    ),
+    "PinInSlot in space": ({**AT3, "axis": Z}, "for planar mechanisms; in space use PointOnLine"),
+    "Cam of three numbers": ({**AT3, "axis": Z, "points": [(*p, 0) for p in SQUARE]}, r"each \(x, y\)"),
+    "Cam axis": ({**AT3, "points": SQUARE}, "give its axis in world coordinates"),
+    "Bushing of two": ({**AT3, "stiffness": (1, 2)}, r"stiffness is one number or 3 here.*got \(1.0, 2.0\)"),
+    "Bushing of four": ({**AT3, "stiffness": (1, 2, 3, 4)}, "one number or one for each axis"),
+    "Bushing unit": ({**AT3, "stiffness": "3 N"}, "stiffness of.*'3 N': expected a stiffness"),
+    "Bushing angle": ({**AT3, "angle": 1}, "in a spatial mechanism give orientation=, not angle="),
+    "Bushing nowhere": ({"body_i": "ground", "body_j": "a"}, "say where it is: at="),
+    "JointFriction of a ball": ({"joint": "ball", "radius": 0.1}, "Spherical 'ball' has no coordinate 'angle'"),
+    "PointForce of two": ({"body": "a", "force": (1, 2)}, "needs 3 components, such as"),
+    "PointTorque of one": ({"body": "a", "torque": 1}, "needs 3 components, such as"),
+    "Sensor of a freedom": ({"of": "P.angle"}, "'P.angle' is no curve; Prismatic 'P' has P.displacement, P.rate"),
+}
+NEEDED = {
+    "GearPair": {"teeth": (10, 20)},
+    "Coupler": {"weights": [1, -1]},
+    "JointFriction": {"static": 0.1},
+    "Rope": {"stiffness": 1, "at": [(0, 0), (1, 0)]},
+}
+CATEGORY = {"Sensor": "sensors", "IMU": "sensors", "Table": "tables", "Driver": "drivers"}
+CASES = [(plane, k, *v) for k, v in PLANAR.items()] + [(space, k, *v) for k, v in SPATIAL.items()]
+
+
+def fields_of(case: str, given: dict) -> tuple[str, dict]:
+    """Class and fields; what is not said of a class that needs it is sound, and None leaves it out."""
+    kind = case.partition(" ")[0]
+    fields = {"name": "x"} | NEEDED.get(kind, {}) | given
+    return kind, {k: v for k, v in fields.items() if v is not None}
+
+
+@pytest.mark.parametrize(("model", "case", "given", "message"), CASES, ids=[f"{c[0].__name__}-{c[1]}" for c in CASES])
+def test_it_is_refused_and_said_why(model, case, given, message):
+    kind, fields = fields_of(case, given)
+    m = model()
+    with pytest.raises(fb.ModelError, match=message) as error:
+        m.add(getattr(fb, kind)(**fields))
+    assert f"{kind} {fields['name']!r}" in str(error.value)
+    assert "x" not in m._names
+
+
+@pytest.mark.parametrize(("model", "case", "given", "message"), CASES, ids=[f"{c[0].__name__}-{c[1]}" for c in CASES])
+def test_a_file_is_refused_and_said_where(model, case, given, message):
+    kind, fields = fields_of(case, given)
+    category = CATEGORY.get(kind) or getattr(fb, kind).category
+    lines = [f"[[{category}]]", *([f'type = "{kind}"'] if kind not in ("Sensor", "Table", "Driver") else [])]
+    text = "\n".join([dumps(model()), *lines, *(f"{k} = {_value(v)}" for k, v in fields.items())])
+    with pytest.raises(fb.ModelError, match=message) as error:
+        loads(text, fb.Mechanism, "bad.toml")
+    assert str(error.value).startswith(f"bad.toml: [[{category}]]")
+    assert repr(fields["name"]) in str(error.value)
+
+
+LAWS = {
+    "reaction": ("A.fx", "known only after the accelerations are; laws can use positions, angles, lengths"),
+    "acceleration": ("arm.ax", "known only after the accelerations are"),
+    "energy": ("energy.kinetic", "known only after the accelerations are"),
+    "spring's force": ("spring.force", "known only after the accelerations are"),
+}
+
+
+@pytest.mark.parametrize("what", LAWS)
+def test_a_law_cannot_use_what_depends_on_accelerations(what):
+    of, message = LAWS[what]
+    m = plane()
+    m.add(fb.Sensor("s", of))
+    with pytest.raises(fb.ModelError, match=f"force of Actuator 'k': sensor 's' measures '{of}', which is {message}"):
+        m.add(fb.Actuator("k", "S.displacement", force="2*s"))
+
+
+def test_a_driver_follows_no_rate_nor_itself():
+    m = plane()
+    m.add(fb.Sensor("turn", "A.rate"), fb.Sensor("place", "S.displacement"))
+    with pytest.raises(fb.ModelError, match=r"law of Driver 'k': sensor 'turn' measures 'A.rate', a rate;.*controller"):
+        m.add(fb.Driver("k", "S.displacement", "turn"))
+    with pytest.raises(fb.ModelError, match=r"Driver 'k': its law names sensor 'place'.*cannot follow what it drives"):
+        m.add(fb.Driver("k", "S.displacement", "place + 1"))
+
+
+def test_a_name_with_two_meanings_is_refused_where_it_is_used():
+    m = plane()
+    m.add(fb.Sensor("value", "A.angle"))
+    with pytest.raises(fb.ModelError, match=r"force of Actuator 'k': 'value' is an input.*and also a sensor; rename"):
+        m.add(fb.Actuator("k", "S.displacement", force="value"))
+
+
+def test_misused_tables():
+    m = plane()
+    m.add(fb.Table("lift", x=[0, 1], y=[0, 1]))
+    for law, message in {
+        "3*lift": r"'lift' is a table(.|\n)*give its argument: lift\(x\)",
+        "lift(t, 2)": r"wrong arguments: 2 given(.|\n)*write lift\(x\)",
+        "lift()": "wrong arguments: 0 given",
+    }.items():
+        with pytest.raises(fb.ExpressionError, match=f"force of Actuator 'k': {message}"):
+            m.add(fb.Actuator("k", "S.displacement", force=law))
+    m.add(fb.Table("kinked", x=[0, 0.5, 1], y=[0, 1, 0], interpolation="linear"))
+    m.add(fb.Driver("D", "S.displacement", "kinked(t)"))
+    with pytest.raises(
+        fb.SimulationError, match=r"Driver 'D' cannot be followed beyond t = 0.5 s.*jumps in its rate, f"
+    ):
+        m.simulate(1.0)
+
+
+PYTHON = {
+    "unknown argument": (lambda t, lenght: t, r"unknown name 'lenght'(.|\n)*arguments say what it is given"),
+    "any arguments": (lambda *a: a, r"takes any number of arguments \(\*a\); name those"),
+    "a class": (float, "'float' is a class; give a function"),
+    "too many": (lambda t, value, rate, r, a=1, b=2, c=3, *, d: t, "'d' by keyword only; remove the"),
+}
+
+
+@pytest.mark.parametrize("what", PYTHON)
+def test_python_functions_that_are_no_laws(what):
+    law, message = PYTHON[what]
+    with pytest.raises(fb.ModelError, match=f"force of Actuator 'k': (.|\n)*{message}"):
+        plane().add(fb.Actuator("k", "S.displacement", force=law))
+
+
+def test_a_driver_takes_no_python_function():
+    with pytest.raises(
+        fb.ModelError, match=r"law of Driver 'k' is the Python function 'lambda', whose derivatives.*Table"
+    ):
+        plane().add(fb.Driver("k", "A.angle", lambda t: t))
+
+
+def test_fields_given_by_place_that_go_by_name():
+    with pytest.raises(fb.ModelError, match="Actuator 'k': give field 'force' by its name: force="):
+        fb.Actuator("k", "S.displacement", "3*t")
+
+
+def test_sensors_name_curves_that_results_have():
+    """What a sensor may name is what the result shows, part by part."""
+    from flyball.model.examine import curves
+
+    m = plane()
+    m.add(fb.GearPair("G", "A", "W", teeth=(1, 2)), fb.Driver("D", "S.displacement", "0.1*t"), fb.IMU("imu", "eye"))
+    m.add(fb.Sensor("s", "A.angle"), fb.Motor("M", "A", torque=1), fb.JointFriction("F", "S", static=0.1))
+    m.add(fb.Cam("C", "cart", "ground", points=[(2 + x, y) for x, y in SQUARE], at=(3, 0)))
+    m.joints.remove(m["C"])
+    r = m.simulate(0.1, outputs=3)
+    for e in m.elements():
+        assert list(r[e.name].channels()) == curves(m, e.name), e.name
+    assert list(r.energy.channels()) == curves(m, "energy")
+    m = space()
+    m.add(fb.Cylindrical("cyl", "a", "d", at=(0, 0, 0), axis=Z), fb.IMU("imu", "b"))
+    r = m.simulate(0.1, outputs=3)
+    for e in m.elements():
+        assert list(r[e.name].channels()) == curves(m, e.name), e.name

@@ -1,0 +1,122 @@
+"""What a result says against itself, and how far friction crept."""
+
+import math
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+G = 9.81
+
+
+def incline(angle: float, static: float, stick_speed: float = 1e-3, **friction) -> fb.Mechanism:
+    """A block of 2 kg on an inclined slide through its centre of mass, gravity downwards."""
+    m = fb.Mechanism("incline", planar=True, gravity=(0, -G))
+    m.add(fb.Body("block", mass=2, inertia=0.01))
+    m.add(fb.Translational("slide", "ground", "block", at=(0, 0), axis=(math.cos(angle), -math.sin(angle))))
+    m.add(fb.JointFriction("rub", "slide", static=static, stick_speed=stick_speed, **friction))
+    return m
+
+
+@pytest.mark.parametrize(("angle", "static"), [(0.1, 0.2), (0.2, 0.5), (0.4, 0.45)])
+def test_creep_below_the_friction_angle(angle, static):
+    """mu N tanh(v / v0) = m g sin a with N = m g cos a: it creeps at v0 artanh(tan a / mu)."""
+    v0 = 1e-3
+    r = incline(angle, static, v0).simulate(2.0)
+    v = v0 * math.atanh(math.tan(angle) / static)
+    speed, distance = r.health.creep["rub"]
+    assert speed == pytest.approx(v, rel=1e-4)
+    # it reaches that speed within a few v0 / (mu g cos a)
+    assert distance == pytest.approx(2.0 * v, abs=10 * v * v0 / (static * G))
+    assert r["slide"].displacement[-1] == pytest.approx(distance)
+    assert dict(r.health.lines())["creep of friction"].startswith("rub: ")
+
+
+def test_creep_is_counted_at_the_bearing():
+    """A wheel held by friction against a torque T: mu N r tanh(r w / v0) = T, and r w is what creeps."""
+    radius, v0, static, torque = 0.05, 2e-3, 0.3, 0.1
+    m = fb.Mechanism("brake", planar=True, gravity=(0, -G))
+    m.add(fb.Body("wheel", mass=3, inertia=0.02), fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    m.add(fb.Motor("motor", "axle", torque=torque))
+    m.add(fb.JointFriction("rub", "axle", static=static, radius=radius, stick_speed=v0))
+    v = v0 * math.atanh(torque / (static * 3 * G * radius))
+    speed, distance = m.simulate(1.0).health.creep["rub"]
+    assert speed == pytest.approx(v, rel=1e-4)
+    assert distance == pytest.approx(v, rel=1e-2)
+
+
+def test_sliding_is_no_creep():
+    r = incline(0.5, 0.1).simulate(1.0)
+    assert r["slide"].displacement[-1] > 1.0
+    assert r.health.creep == {"rub": (0.0, 0.0)}
+    assert "creep of friction" not in dict(r.health.lines())
+
+
+def test_passing_through_rest_is_no_creep():
+    """A block that swings on a spring passes through rest twice a period, between two output times."""
+    m = incline(0.0, 0.02)
+    m.add(
+        fb.CoordinateSpring("spring", "slide.displacement", stiffness=50), fb.Initial("slide.displacement", value=0.3)
+    )
+    speed, distance = m.simulate(1.0, outputs=101).health.creep["rub"]
+    assert distance < 1e-4
+
+
+def test_creep_that_matters_is_a_warning():
+    m = incline(0.4, 0.45, 0.1)
+    (warning,) = m.simulate(5.0).health.warnings
+    assert warning.startswith("JointFriction 'rub' crept ")
+    assert "a smaller stick_speed" in warning
+    assert incline(0.4, 0.45, 1e-5).simulate(0.1).health.warnings == ()
+
+
+def pendulum() -> fb.Mechanism:
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -G))
+    m.add(fb.Body("rod", mass=1, inertia=1 / 12, position=(0.5, 0)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    return m
+
+
+def test_a_sound_motion_has_no_warnings():
+    r = pendulum().simulate(3.0)
+    assert r.health.warnings == ()
+    assert r.health.acceleration_violation < 1e-12
+    assert not any(label.startswith("warning") for label, _ in r.health.lines())
+
+
+def test_an_energy_balance_that_does_not_close_is_a_warning():
+    """Baumgarte's stabilisation with lazy rates and a rough tolerance loses energy."""
+    m = pendulum()
+    r = m.simulate(10.0, stabilization="baumgarte", alpha=0.1, beta=0.1, rtol=1e-2, atol=1e-2, method="rk45")
+    moved = np.ptp(r.energy.gravity) + r.energy.kinetic.max()
+    assert r.health.energy_drift > 1e-4 * moved
+    assert any(w.startswith("the energy balance is off by ") for w in r.health.warnings)
+    assert any(w.startswith("constraints are violated by up to ") for w in r.health.warnings)
+
+
+def test_a_structure_at_rest_has_no_energy_to_lose():
+    m = pendulum()
+    m.add(fb.Fixed("weld", "ground", "rod", at=(0.5, 0)))
+    r = m.simulate(1.0)
+    assert not any("energy" in w for w in r.health.warnings)
+
+
+def test_friction_of_an_undetermined_reaction_is_a_warning():
+    """A door on two hinges: either may carry the weight, so the friction of one is one choice of many."""
+    m = fb.Mechanism("door", gravity=(0, 0, -G))
+    m.add(fb.Body("leaf", mass=30.0, inertia=(10.0, 11.6, 1.6), position=(0.4, 0, 1), angular_velocity=(0, 0, 1)))
+    for name, z in (("upper", 1.8), ("lower", 0.2)):
+        m.add(fb.Revolute(name, "ground", "leaf", at=(0, 0, z), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("rub", "upper", static=0.1, radius=0.02))
+    (warning,) = m.simulate(0.2).health.warnings
+    assert warning.startswith("JointFriction 'rub' follows the reaction of 'upper', which redundant constraints leave")
+    assert "force z" in warning
+
+
+def test_warnings_and_creep_are_kept_in_files(tmp_path):
+    r = incline(0.4, 0.45, 0.1).simulate(5.0, outputs=51)
+    r.save(tmp_path / "r.nc")
+    again = fb.load_result(tmp_path / "r.nc")
+    assert again.health.creep == r.health.creep
+    assert again.health.warnings == r.health.warnings
+    assert again.health.as_dict() == r.health.as_dict()
