@@ -136,11 +136,13 @@ def redundant(d: Dice) -> Case:
     case, m = _case(d, "redundant", 0.5)
     tree(d, m, case, d.whole(1, 4), kinds=["Revolute", "Prismatic"] if d.chance(0.7) else None)
     for k, j in enumerate(list(m.joints)):
-        if d.chance(0.7) and j.axis is not None:
+        if d.chance(0.7) and j.axis is not None and not isinstance(j, fb.Screw):
             at = plus(j.at, d.number(0.05, 0.4), j.axis)
             case.add(lambda k=k, j=j, at=at: type(j)(f"R{k}", j.body_i, j.body_j, at=at, axis=j.axis))
         elif d.chance(0.5):
-            case.add(lambda k=k, j=j: fb.Revolute(f"R{k}", j.body_i, j.body_j, at=j.at, axis=j.axis))
+            axis = {} if d.planar else {"axis": j.axis or d.direction()}
+            at = j.at if len(j.at) != 2 or d.planar else j.at[0]
+            case.add(lambda k=k, j=j, at=at, axis=axis: fb.Revolute(f"R{k}", j.body_i, j.body_j, at=at, **axis))
     dress(d, m, case, most=2)
     return case
 
@@ -207,8 +209,8 @@ def extremes(d: Dice) -> Case:
 def drivers(d: Dice) -> Case:
     case, m = _case(d, "drivers", 0.5)
     tree(d, m, case, d.whole(1, 4))
-    close(d, m, case, d.whole(0, 2))
-    drive(d, m, case, d.whole(1, 3))
+    close(d, m, case, d.pick([0, 0, 1]))
+    drive(d, m, case, d.pick([1, 1, 1, 2, 3]))
     dress(d, m, case, most=1)
     return case
 

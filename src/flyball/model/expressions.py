@@ -11,7 +11,7 @@ import keyword
 import operator
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from numbers import Complex, Integral, Real
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ class Expression:
         ExpressionError
             If the text is not an expression of the known operators, functions, tables and constants.
         """
-        return cls(*read(text, tables))
+        return _parsed(text, frozenset(tables))
 
     @classmethod
     def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
@@ -122,6 +122,12 @@ class Expression:
 
     def __str__(self) -> str:
         return self.text
+
+
+@lru_cache(maxsize=8192)
+def _parsed(text: str, tables: frozenset[str]) -> Expression:
+    """The same text is read when an element is added, and again for each analysis."""
+    return Expression(*read(text, tables))
 
 
 def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str) -> Any:

@@ -56,6 +56,7 @@ class Model:
             raise ModelError(f"the name of a mechanism is a text, not {name!r}")
         self.name = name
         self.planar = bool(planar)
+        self._resolved: tuple[dict, dict[str, float]] | None = None
         try:
             self.parameters = {k: _plain(v) for k, v in (parameters or {}).items()}
             g = _plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)
@@ -90,7 +91,11 @@ class Model:
             if name not in self.parameters:
                 known = list(self.parameters)
                 raise ModelError(f"{self.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
-        return resolve_parameters({**self.parameters, **(changed or {})})
+        if changed:
+            return resolve_parameters({**self.parameters, **changed})
+        if self._resolved is None or self._resolved[0] != self.parameters:
+            self._resolved = dict(self.parameters), resolve_parameters(self.parameters)
+        return dict(self._resolved[1])
 
     def snapshot(self) -> Any:
         """A copy that later additions to this one do not touch."""
@@ -313,15 +318,18 @@ class Model:
                 f"give an expression, or a Table that is called in one"
             )
         tables = {x.name: x for x in self.tables}
-        sensors = {x.name: x for x in self.sensors if isinstance(x, Sensor)}
         try:
             expression = law_expression(value, of.dimension, where, tables=tables)
-            expression.require(["t", *of.inputs, *sensors, *self.parameters])
+            sensors = {k: x for k in expression.names if isinstance(x := self._names.get(k), Sensor)}
+            known = {"t", *of.inputs, *sensors, *self.parameters}
+            if not expression.names <= known:  # for the message, all that there are
+                known |= {x.name for x in self.sensors if isinstance(x, Sensor)}
+            expression.require(known)
             refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
             raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
-        for name in sorted(expression.names & set(sensors)):
+        for name in sorted(sensors):
             self._check_sensed(sensors[name], where, driver)
         return expression
 

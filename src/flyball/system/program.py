@@ -41,6 +41,7 @@ _BINARY = {
     **{"+": ADD, "-": SUBTRACT, "*": MULTIPLY, "/": DIVIDE, "**": POWER, "atan2": ATAN2},
     **{"min": MINIMUM, "max": MAXIMUM, "<": LESS, "<=": LESS_EQUAL, "and": MINIMUM, "or": MAXIMUM},
 }
+AMONG = 64  # constants in which a literal is looked for
 _LARGEST_WHOLE_POWER = 64
 _NONE: Mapping[str, int] = MappingProxyType({})
 
@@ -187,8 +188,8 @@ class _Writer:
                 self.emit(_BINARY[node.kind], 0, -1)
 
     def slot(self, literal: float) -> int:
-        """Place of a literal in the table of constants."""
-        for k in range(len(self.parameters), len(self.const)):
+        """Place of a literal in the table of constants; a new one if it is not among the last ones."""
+        for k in range(max(len(self.parameters), len(self.const) - AMONG), len(self.const)):
             if self.const[k] == literal and math.copysign(1.0, self.const[k]) == math.copysign(1.0, literal):
                 return k
         self.const.append(literal)

@@ -122,7 +122,7 @@ class Structure:
             list(self.model.parameters),
             self.code,
             self.const,
-            sensors=self.slots,
+            sensors={name: self.slots[name] for name in law.names if name in self.slots},
             tables=self.table_at,
             functions=self.functions,
             derivatives=derivatives,
