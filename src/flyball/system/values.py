@@ -341,7 +341,6 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
 
-    nl = len(s.loads)
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
