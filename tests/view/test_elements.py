@@ -298,3 +298,23 @@ def test_sensors_are_shown_first_and_listed() -> None:
     assert set(curves) == {"height", "imu.fx", "imu.fy", "imu.w"}
     listed = {t.name: t for t in tables(result)}["sensors"].rows
     assert listed[0] == ("height", "Sensor", "of b.y", "value", f"{result['b.y'].min():.4g}", "0", "m")
+
+
+ALONG = {
+    "friction of a slide": lambda: fb.JointFriction("f", "S", static=0.1),
+    "a driven planar body": lambda: fb.Driver("f", "a.angle", "t"),
+    "a torque on a planar body": lambda: fb.Actuator("f", "a.angle", force=0.1),
+    "a force on a point": lambda: fb.Actuator("f", "b.x", force=0.1),
+    "a spring on a slide": lambda: fb.CoordinateSpring("f", "S.displacement", stiffness=3),
+}
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_what_acts_along_a_coordinate_is_an_arrow(kind):
+    """Forces and drivers along every kind of coordinate: a force along it, or a moment about it."""
+    m = fb.Mechanism("m", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1), fb.Body("b", mass=2, inertia=0.1, position=(1, 0), velocity=(1, 0)))
+    m.add(fb.Revolute("R", "ground", "a", at=(0, 0)), fb.Translational("S", "ground", "b", at=(1, 0), axis=(1, 0)))
+    m.add(ALONG[kind]())
+    found = [a for a in record(m.simulate(0.1, outputs=3)).arrows if a.name == "f"]
+    assert [a.what for a in found] == ["moment" if "planar body" in kind else "force"]
