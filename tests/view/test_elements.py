@@ -302,7 +302,7 @@ def test_sensors_are_shown_first_and_listed() -> None:
 
 ALONG = {
     "friction of a slide": lambda: fb.JointFriction("f", "S", static=0.1),
-    "a driven planar body": lambda: fb.Driver("f", "a.angle", "t"),
+    "a driven planar body": lambda: fb.Driver("f", "a.angle", "t**2"),
     "a torque on a planar body": lambda: fb.Actuator("f", "a.angle", force=0.1),
     "a force on a point": lambda: fb.Actuator("f", "b.x", force=0.1),
     "a spring on a slide": lambda: fb.CoordinateSpring("f", "S.displacement", stiffness=3),

@@ -70,7 +70,13 @@ def _thinned(figure: Figure, every: np.ndarray) -> Figure:
 
 def _headline(result: Result) -> str:
     m = result.model
-    counts = {"body": m.bodies, "joint": m.joints, "coupling": m.couplings, "force": m.forces, "driver": m.drivers}
+    counts: dict[str, list] = {
+        "body": m.bodies,
+        "joint": m.joints,
+        "coupling": m.couplings,
+        "force": m.forces,
+        "driver": m.drivers,
+    }
     many = {"body": "bodies"}
     parts = [f"{len(x)} {k if len(x) == 1 else many.get(k, k + 's')}" for k, x in counts.items() if x]
     span = f"{result.t[0]:g} to {result.t[-1]:g} s, {len(result.t)} output times"
