@@ -113,6 +113,7 @@ def _case(d: Dice, name: str, t_end: float, **options) -> tuple[Case, fb.Mechani
 def chains(d: Dice) -> Case:
     case, m = _case(d, "chain", 0.5)
     tree(d, m, case, d.whole(1, 6), chain=True)
+    case.options["stabilization"] = d.pick(["projection", "projection", "projection-steps", "baumgarte"])
     return case
 
 
@@ -235,10 +236,39 @@ def friction(d: Dice) -> Case:
     return case
 
 
+def windows(d: Dice) -> Case:
+    """The N-four-bar, which passes positions where all its windows are flat, at any tolerance."""
+    case, m = _case(d, "windows", d.pick([1.0, 3.0]), rtol=d.pick([1e-4, 1e-6, 1e-8, 1e-10, 1e-12]))
+    case.options["atol"] = case.options["rtol"] / 100
+    case.options["method"] = d.pick(["dop853", "rk45"])
+    flat = (lambda *p: p) if d.planar else (lambda *p: (*p, 0.0))
+    turn, inertia = ({}, 1 / 12) if d.planar else ({"axis": (0, 0, 1)}, (1e-7, 1 / 12, 1 / 12))
+    n = d.whole(1, 4)
+    for k in range(n + 1):
+        rod = {} if d.planar else {"orientation": (math.sqrt(0.5), 0, 0, math.sqrt(0.5))}
+        m.add(fb.Body(f"post {k}", mass=1, inertia=inertia, position=flat(k, 0.5), **rod))
+        m.add(fb.Revolute(f"A{k}", "ground", f"post {k}", at=flat(k, 0.0), **turn))
+    for k in range(n):
+        m.add(fb.Body(f"beam {k}", mass=1, inertia=inertia, position=flat(k + 0.5, 1.0)))
+        m.add(fb.Revolute(f"B{k}", f"post {k}", f"beam {k}", at=flat(k, 1.0), **turn))
+        m.add(fb.Revolute(f"C{k}", f"beam {k}", f"post {k + 1}", at=flat(k + 1, 1.0), **turn))
+    m.add(fb.Initial("A0.angle", rate=d.pick([-1.0, -1.0, -5.0, 0.0])))
+    return case
+
+
+def crowds(d: Dice) -> Case:
+    """Many bodies for a short time."""
+    case, m = _case(d, "crowd", 0.05)
+    tree(d, m, case, d.whole(20, 60), chain=d.chance(0.5))
+    close(d, m, case, d.whole(0, 4))
+    return case
+
+
 FAMILIES = {
     f.__name__: f
     for f in (
-        chains, trees, loops, redundant, parallel_cranks, singular, extremes, drivers, couplings, friction,
+        chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, drivers, couplings, friction,
+        crowds,
     )
 }  # fmt: skip
 

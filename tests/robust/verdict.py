@@ -55,7 +55,7 @@ def _judged(case: Case) -> Verdict:
         except Exception as error:
             return Verdict("broken", f"raised {type(error).__name__}: {error}")
         try:
-            return _healthy(result)
+            return _healthy(result, case)
         except Exception as error:
             return Verdict("broken", f"the result raises {type(error).__name__}: {error}")
 
@@ -82,7 +82,7 @@ def _partial(error: fb.SimulationError) -> str:
     return ""
 
 
-def _healthy(r: Result) -> Verdict:
+def _healthy(r: Result, case: Case) -> Verdict:
     for name, (_, values) in r.channels().items():
         if not np.isfinite(values).all():
             return Verdict("broken", f"{name} is not finite")
@@ -92,7 +92,7 @@ def _healthy(r: Result) -> Verdict:
     moved = energy_moved(r)
     energy = r.health.energy_drift / moved if moved > 0.0 else 0.0
     out = Verdict("healthy", "", r.health.violation / r.values.length, energy, r.health.acceleration_violation)
-    if out.violation > VIOLATION:
+    if out.violation > VIOLATION and case.options.get("stabilization") != "baumgarte":
         return Verdict("broken", f"violation {out.violation:.2e}", out.violation, energy, out.residual)
     if out.residual > RESIDUAL:
         told = any("accelerations miss" in w for w in r.health.warnings)

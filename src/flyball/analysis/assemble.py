@@ -24,6 +24,7 @@ CLOSED = 1e-10
 RESTARTS = 12
 ITERATIONS = 200
 DENSE = 300  # rows up to which a step of assembly goes through a singular value decomposition
+NO_PIVOT = 1e-14  # added for redundant rows of large mechanisms; iterations take it out again
 NO_PART = 1e-10  # singular values below this part of the largest are taken for rounding
 
 
@@ -181,10 +182,12 @@ def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
         x = np.zeros(B.shape[1])
         x[used] = Vt[keep].T @ (s[keep] / (s[keep] ** 2 + damping * largest**2) * (U[:, keep].T @ r))
         return R @ x
-    A = (B @ B.T).tocsc()
-    scale = A.diagonal().max(initial=0.0) or 1.0
-    x = splu(A + (damping + 1e-13) * scale * sp.eye(A.shape[0], format="csc")).solve(r)
-    return R @ (B.T @ x)
+    # [1 B^T; B -delta] with B of unit size: B B^T would square the spread of singular values here too
+    m, n = B.shape
+    size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
+    B = B / size
+    K = sp.bmat([[sp.identity(n), B.T], [B, -(damping + NO_PIVOT) * sp.identity(m)]], format="csc")
+    return R @ splu(K).solve(np.r_[np.zeros(n), r / size])[:n]
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
@@ -305,15 +308,22 @@ def _velocities(
     if np.abs(r).max() < 1e-13 * size:
         return v
     R = c.inverse_mass_root(_movable(c))
-    for _ in range(4):
-        v = v + _step(c, nu - G @ v, R, 0.0)
-    r = nu - G @ v
+    last = np.inf
+    for _ in range(ITERATIONS):
+        worst = float(np.abs(r).max())
+        size = max(size, float(np.abs(v).max()))
+        if worst < 1e-13 * size or worst > 0.9 * last:
+            break
+        v, last = v + _step(c, r, R, 0.0), worst
+        r = nu - G @ v
     if np.abs(r).max() > 1e-9 * size:
-        bad = [k for k, rows in c.structure.slices.items() if np.abs(r[rows]).max(initial=0.0) > 1e-9 * size]
+        gaps = {k: float(np.abs(r[rows]).max(initial=0.0)) for k, rows in c.structure.slices.items()}
+        bad = sorted((k for k in gaps if gaps[k] > 1e-9 * size), key=lambda k: -gaps[k])
+        listed = ", ".join(bad[:8]) + (f" and {len(bad) - 8} more" if len(bad) > 8 else "")
         raise AssemblyError(
-            f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {', '.join(bad)} disagree. "
+            f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {listed} disagree. "
             f"Check drivers, initial rates and bodies with as_drawn=True",
-            gaps={k: float(np.abs(r[c.structure.slices[k]]).max()) for k in bad},
+            gaps={k: gaps[k] for k in bad},
         )
     return v
 

@@ -13,6 +13,8 @@ from .assemble import Assembly
 
 TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
 DENSE = 1500  # velocities up to which the rank comes from a singular value decomposition
+WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
+SHOWN = 64  # dependencies of a large mechanism whose elements are named
 
 
 @dataclass(frozen=True)
@@ -64,8 +66,8 @@ def mobility(model: Model, a: Assembly) -> Mobility:
     size = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
     G = sp.diags(1.0 / np.maximum(size, 1e-300)) @ G
     rank, dependent, motions = _dense(G.toarray()) if max(nr, nv) <= DENSE else _sparse(G)
-    if S.glob[SEMIDEFINITE] > 0.0 and motions is not None:
-        _check_inertia(model, a, motions * scale[:, None])
+    if S.glob[SEMIDEFINITE] > 0.0:
+        _check_inertia(model, a, _massless(a, G, scale) if motions is None else motions * scale[:, None])
     names: list[str] = []
     for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6).tolist():
         if (name := s.rows[k].element.name) not in names:
@@ -84,29 +86,52 @@ def _dense(G: np.ndarray) -> tuple[int, np.ndarray, np.ndarray]:
 
 
 def _sparse(G) -> tuple[int, np.ndarray, None]:
-    """The same from a sparse factorisation of G G^T: rows whose pivot vanishes depend on those before."""
+    """The same for a large mechanism: the null space of G G^T; of the free motions there would be too many."""
+    count, dependent = _null_space(G @ G.T)
+    return G.shape[0] - count, dependent, None
+
+
+def _null_space(A) -> tuple[int, np.ndarray]:
+    """Dimension of the null space of a sparse positive semidefinite matrix, and up to `SHOWN` vectors of its basis.
+
+    From A = L D L^T in a pattern and order of its own: where a pivot is nothing but what was added to the diagonal,
+    L^T x = e_k gives a vector of the null space.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import spsolve_triangular
+
     from ..numerics.ldl import analyse
 
-    A = (G @ G.T).tocoo()
-    P, place = analyse(A.shape[0], A.row, A.col)
-    x = np.zeros(len(P.Ai))
-    x[place[: A.nnz]] = A.data
+    A = A.tocoo()
     n = A.shape[0]
+    P, place = analyse(n, A.row, A.col)
+    upper = P.perm[A.row] <= P.perm[A.col]  # each pair of entries counts once
+    x = np.zeros(len(P.Ai))
+    np.add.at(x, place[: A.nnz][upper], A.data[upper])
     x[P.Ap[1:] - 1] += 1e-13
     D, L = np.zeros(n), np.zeros(len(P.Li))
     _factor_entry()(P, x, L, D, np.zeros(n))
-    weak = 1.0 / D < 1e-10
-    rows = np.flatnonzero(weak[P.perm])
-    dependent = np.zeros((n, min(len(rows), 64)))
-    for j, k in enumerate(rows[: dependent.shape[1]]):
-        dependent[k, j] = 1.0
-    return n - len(rows), dependent, None
+    weak = np.flatnonzero(~(1.0 / D > WEAK))
+    ends = np.zeros((n, min(len(weak), SHOWN)))
+    ends[weak[: ends.shape[1]], np.arange(ends.shape[1])] = 1.0
+    if len(weak):
+        transposed = (sp.csc_matrix((L, P.Li, P.Lp), shape=(n, n)) + sp.identity(n, format="csc")).T.tocsr()
+        ends = spsolve_triangular(transposed, ends, lower=False)
+    return len(weak), ends[P.perm] / np.maximum(np.abs(ends).max(axis=0, initial=0.0), 1e-300)
 
 
 def _factor_entry():
     from .entry import factor_kernel
 
     return factor_kernel
+
+
+def _massless(a: Assembly, G, scale: np.ndarray) -> np.ndarray:
+    """Motions (nv, k) that the constraints allow and no mass resists, from M + G^T G."""
+    import scipy.sparse as sp
+
+    M = sp.diags(scale) @ a.compiled.mass() @ sp.diags(scale)
+    return _null_space(M / M.diagonal().max() + G.T @ G)[1] * scale[:, None]
 
 
 def _check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:

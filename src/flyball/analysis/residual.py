@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..system.tables import GAMMA
+from ..system.tables import G_VALUE, GAMMA, NU
 from .compiled import Compiled, compiled
 
 if TYPE_CHECKING:
@@ -18,7 +18,8 @@ MOST = 100  # output times that are looked at
 def acceleration_violation(result: Result) -> float:
     """Largest |G vdot - gamma| at up to `MOST` output times, relative to the terms that make it up.
 
-    These are |G| |vdot|, |gamma|, and what the reactions alone would make of a row: |G| M^-1 |G^T lam|.
+    With Baumgarte's stabilization gamma is what that makes of it. The terms are |G| |vdot|, |gamma|, and what the
+    reactions alone would make of a row: |G| M^-1 |G^T lam|.
     """
     n = len(result.t)
     if not n or not result.multipliers.shape[1]:
@@ -38,6 +39,9 @@ def _at(result: Result, c: Compiled, R, k: int) -> float:
     c.z = result.states[k].copy()
     c.at(result.t[k], result.q[k].copy(), result.v[k].copy())
     G, gamma, x = c.sparse_jacobian(), c.work.row[GAMMA], result.vdot[k]
+    o = result.health.options
+    if o.get("stabilization") == "baumgarte":
+        gamma = gamma - 2 * o["alpha"] * (G @ result.v[k] - c.work.row[NU]) - o["beta"] ** 2 * c.work.row[G_VALUE]
     size = abs(G) @ np.abs(x) + np.abs(gamma)
     if R is not None:
         B = abs(G @ R)

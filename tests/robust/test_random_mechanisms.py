@@ -1,0 +1,93 @@
+"""Random mechanisms reach the end in good health, or are refused by name; the bench `fuzz.py` runs many more."""
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import flyball as fb
+from flyball.forces import ALL as FORCE_CLASSES
+from tests.robust.families import FAMILIES, Case, made
+from tests.robust.forces import FORCES
+from tests.robust.joints import COUPLINGS, PLANAR, SPATIAL
+from tests.robust.verdict import judge
+
+EACH = 17  # mechanisms of each family: two hundred in all
+
+
+@pytest.mark.filterwarnings("ignore::flyball.PerformanceNotice")
+@pytest.mark.parametrize("family", FAMILIES)
+def test_healthy_or_refused_by_name(family):
+    """A failure names its seed: ``python benchmarks/fuzz.py --families FAMILY --first SEED --count 1`` shows it again."""
+    kinds = []
+
+    @settings(max_examples=EACH, derandomize=True, database=None, deadline=None, suppress_health_check=HealthCheck)
+    @given(seed=st.integers(0, 10**6))
+    def run(seed):
+        verdict = judge(made(family, seed))
+        assert verdict.kind != "broken", f"{family} {seed}: {verdict.text}"
+        kinds.append(verdict.kind)
+
+    run()
+    assert "healthy" in kinds, "a family of which nothing runs tests nothing"
+
+
+def test_every_element_of_the_registry_takes_part():
+    from flyball.model.coupling import Coupling
+    from flyball.model.element import Element
+    from flyball.model.joint import Joint
+
+    rooms = ("flyball.joints.", "flyball.forces.")
+    known = {k for k, c in Element.registry.items() if c.__module__.startswith(rooms)}
+    joints = {k for k in known if issubclass(Element.registry[k], Joint)}
+    assert joints == set(PLANAR) | set(SPATIAL)
+    assert {k for k in known if issubclass(Element.registry[k], Coupling)} == set(COUPLINGS)
+    assert {c.__name__ for c in FORCE_CLASSES} == set(FORCES)
+
+
+def test_a_seed_says_everything():
+    one, two = made("trees", 7), made("trees", 7)
+    assert one.mechanism == two.mechanism
+    assert made("trees", 8).mechanism.planar
+    assert not one.mechanism.planar
+
+
+def bad_case(**law) -> Case:
+    m = fb.Mechanism("bad", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(1, 0)))
+    return Case(m, 1.0)
+
+
+def test_the_judge_sees_what_is_wrong(monkeypatch):
+    """A result that is not finite, or off its constraints, or whose energy does not close, does not pass for healthy."""
+    from tests.robust import verdict
+
+    simulate = fb.Mechanism.simulate
+    for spoil, said in {
+        "v": "not finite",
+        "q": "not finite",
+        "violation": "violation",
+        "energy": "energy off by",
+    }.items():
+
+        def spoilt(self, t_end, spoil=spoil, **options):
+            self.add(fb.Actuator("A", "P.displacement", force="cos(t)"))
+            r = simulate(self, t_end, outputs=11)
+            if spoil == "violation":
+                r.health.violation = 1e-3
+            elif spoil == "energy":
+                r.v[5:, 0] *= 2.0
+                r.health.late["warnings"] = ()
+            else:
+                getattr(r, spoil)[3] = np.nan
+            return r
+
+        monkeypatch.setattr(fb.Mechanism, "simulate", spoilt)
+        found = verdict.judge(bad_case())
+        assert (found.kind, said in found.text) == ("broken", True), (spoil, found)
+
+    def raises(self, t_end, **options):
+        raise ZeroDivisionError("somewhere")
+
+    monkeypatch.setattr(fb.Mechanism, "simulate", raises)
+    assert verdict.judge(bad_case()).text.startswith("raised ZeroDivisionError")
