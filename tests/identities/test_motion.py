@@ -55,11 +55,12 @@ def test_compiled_is_plain_python(name):
     c, y = ready(name, motion.STAGES)
     plain, _ = ready(name, motion.STAGES)
     clock = explicit.Clock(
-        np.r_[1e-3, np.zeros(8)],
+        np.r_[1e-3, np.zeros(9)],
         np.zeros(8, np.int64),
         np.zeros(0),
         np.vstack([y, 0 * y, 0 * y]),
         np.zeros((1, len(y))),
+        np.zeros(0, np.int64),
     )
     status = motion_kernel(c.values.system, c.work, tableau("rk45"), clock, np.zeros((0, 0)), MOTION)
     dy = np.zeros(len(y))

@@ -221,3 +221,12 @@ def test_the_added_joint_and_force_work(runs):
     assert np.array(r["position"]) == pytest.approx(exact, abs=1e-8)
     assert np.array(r["force"]) == pytest.approx(np.tile(-n * (pull @ n), (11, 1)), abs=1e-8)
     assert np.all(np.diff(r["work"]) < 0)
+
+
+def test_every_element_is_in_the_reference():
+    """docs/elements.md names every element a user can add, and none that does not exist."""
+    text = (PACKAGE.parents[1] / "docs" / "elements.md").read_text(encoding="utf-8")
+    told = set(re.findall(r"`([A-Z]\w+)", text))
+    elements = {n for n in dir(fb) if isinstance(getattr(fb, n), type) and issubclass(getattr(fb, n), Element)}
+    assert elements - told == {"Body", "Frame", "Initial", "Driver"} - told
+    assert {n for n in told if not hasattr(fb, n)} == set()

@@ -62,6 +62,10 @@ class Opened:
             self.tab.wait_for_timeout(50)
         raise AssertionError(f"not reached within 5 s; the time is {self.time}")
 
+    def settle(self) -> None:
+        """Wait until what has changed is drawn: two frames."""
+        self.tab.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))")
+
     def poses(self, time: float) -> np.ndarray:
         return np.array(self.tab.evaluate("(t) => (flyball.seek(t), flyball.pose())", float(time)))
 
@@ -70,7 +74,7 @@ class Opened:
         from PIL import Image
 
         self.tab.add_style_tag(content=".stage > :not(canvas) { visibility: hidden !important; }")
-        self.tab.wait_for_timeout(150)
+        self.settle()
         data = self.tab.locator(".stage").screenshot()
         return np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
 

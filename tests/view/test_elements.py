@@ -11,9 +11,6 @@ from flyball.view.payload import check
 from flyball.view.recording import RecordedJoint, Recording
 from tests.view.test_animate import turned
 
-if not hasattr(fb, "GearPair"):
-    pytest.skip("this flyball has no gears, cams and ropes yet", allow_module_level=True)
-
 
 def body(name: str, position: tuple[float, ...], **more: object) -> fb.Body:
     inertia = 0.02 if len(position) == 2 else (0.02, 0.02, 0.02)
@@ -81,18 +78,45 @@ def test_gears_touch_and_their_teeth_mesh_all_along(flat: bool, internal: bool) 
     assert not [b for b in r.bodies if b.shapes]  # the wheels are what one sees
 
 
-def test_planets_turn_on_their_arm() -> None:
+def test_a_train_of_gears_meshes_everywhere() -> None:
+    """A planetary train: the planet, drawn once, meshes with the sun inside it and with the ring around it."""
     m = fb.Mechanism("planetary", planar=True)
     m.add(body("arm", (0.2, 0)), fb.Revolute("A", "ground", "arm", at=(0, 0)))
     m.add(body("sun", (0, 0)), fb.Revolute("S", "arm", "sun", at=(0, 0)))
     m.add(body("planet", (0.4, 0)), fb.Revolute("P", "arm", "planet", at=(0.4, 0)))
-    m.add(fb.Revolute("hold", "ground", "sun", at=(0, 0)), fb.Driver("still", "hold.angle", "0"))
-    m.add(fb.GearPair("mesh", joint_1="S", joint_2="P", teeth=(20, 20)), fb.Driver("turn", "A.angle", "t"))
+    m.add(body("ring", (0, 0)), fb.Revolute("R", "arm", "ring", at=(0, 0)))
+    m.add(fb.Revolute("hold", "ground", "ring", at=(0, 0)), fb.Driver("still", "hold.angle", "0"))
+    m.add(fb.GearPair("inner", joint_1="S", joint_2="P", teeth=(21, 19)))
+    m.add(fb.GearPair("outer", joint_1="P", joint_2="R", teeth=(19, 59), internal=True))
+    m.add(fb.Driver("turn", "A.angle", "t"))
     r = moved(m)
-    assert {j.body for j in r.joints if j.kind == "gear"} == {"sun", "planet"}
-    sun, planet = symbol(r, "mesh", "gear", "sun"), symbol(r, "mesh", "gear", "planet")
-    towards = in_world(r, "planet", np.zeros(3)) - in_world(r, "sun", np.zeros(3))
-    assert from_whole(phase(r, sun, towards) + phase(r, planet, -towards) + 0.5) < 1e-5
+    assert sorted(j.body for j in r.joints if j.kind == "gear") == ["planet", "ring", "sun"]
+    sun, planet = symbol(r, "inner", "gear", "sun"), symbol(r, "inner", "gear", "planet")
+    ring = symbol(r, "outer", "gear", "ring")
+    outwards = in_world(r, "planet", np.zeros(3)) - in_world(r, "sun", np.zeros(3))
+    assert from_whole(phase(r, sun, outwards) + phase(r, planet, -outwards) + 0.5) < 1e-5
+    assert from_whole(phase(r, planet, outwards) - phase(r, ring, outwards) + 0.5) < 1e-5
+
+
+def test_axes_that_point_against_one_another_mesh_too() -> None:
+    m = fb.Mechanism("gears")
+    m.add(body("a", (0, 0, 0)), fb.Revolute("A", "ground", "a", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(body("b", (0.5, 0, 0)), fb.Revolute("B", "ground", "b", at=(0.5, 0, 0), axis=(0, 0, -1)))
+    m.add(body("bar", (0.5, 0.5, 0)), fb.Prismatic("S", "ground", "bar", at=(0.5, 0.5, 0), axis=(1, 0, 0)))
+    m.add(fb.GearPair("mesh", joint_1="A", joint_2="B", teeth=(17, 23)), fb.Driver("turn", "A.angle", "2*t"))
+    m.add(fb.RackAndPinion("drive", rack="S", pinion="B", radius=0.5 * 23 / 40))
+    r = moved(m)
+    assert sorted(j.body for j in r.joints if j.kind == "gear") == ["a", "b"]  # the pinion is the second gear
+    towards = np.tile([1.0, 0, 0], (r.t.size, 1))
+    one, other = (phase(r, symbol(r, "mesh", "gear", k), s * towards) for k, s in (("a", 1), ("b", -1)))
+    assert from_whole(one + other + 0.5) < 1e-5
+    bar = symbol(r, "drive", "rack")
+    assert bar.size[1] == pytest.approx(2 * np.pi * bar.size[0] / 23)
+    gap = in_world(r, "bar", np.array(bar.position))
+    side = np.tile([0, np.sign(gap[0, 1]), 0.0], (r.t.size, 1))
+    # a tooth of the pinion in a gap of the bar: in pitches along x, seen from where they meet
+    along = (gap[:, 0] - 0.5) / bar.size[1] * -side[:, 1]
+    assert from_whole(phase(r, symbol(r, "mesh", "gear", "b"), side) - along) < 1e-5
 
 
 @pytest.mark.parametrize("radius", [0.15, -0.15])
@@ -274,3 +298,23 @@ def test_sensors_are_shown_first_and_listed() -> None:
     assert set(curves) == {"height", "imu.fx", "imu.fy", "imu.w"}
     listed = {t.name: t for t in tables(result)}["sensors"].rows
     assert listed[0] == ("height", "Sensor", "of b.y", "value", f"{result['b.y'].min():.4g}", "0", "m")
+
+
+ALONG = {
+    "friction of a slide": lambda: fb.JointFriction("f", "S", static=0.1),
+    "a driven planar body": lambda: fb.Driver("f", "a.angle", "t**2"),
+    "a torque on a planar body": lambda: fb.Actuator("f", "a.angle", force=0.1),
+    "a force on a point": lambda: fb.Actuator("f", "b.x", force=0.1),
+    "a spring on a slide": lambda: fb.CoordinateSpring("f", "S.displacement", stiffness=3),
+}
+
+
+@pytest.mark.parametrize("kind", ALONG)
+def test_what_acts_along_a_coordinate_is_an_arrow(kind):
+    """Forces and drivers along every kind of coordinate: a force along it, or a moment about it."""
+    m = fb.Mechanism("m", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1), fb.Body("b", mass=2, inertia=0.1, position=(1, 0), velocity=(1, 0)))
+    m.add(fb.Revolute("R", "ground", "a", at=(0, 0)), fb.Translational("S", "ground", "b", at=(1, 0), axis=(1, 0)))
+    m.add(ALONG[kind]())
+    found = [a for a in record(m.simulate(0.1, outputs=3)).arrows if a.name == "f"]
+    assert [a.what for a in found] == ["moment" if "planar body" in kind else "force"]

@@ -58,7 +58,7 @@ def test_picture_is_not_empty_and_follows_the_time(opened: Open) -> None:
     shots = []
     for time in (0.0, 0.8):
         tab.evaluate("(t) => flyball.seek(t)", time)
-        tab.wait_for_timeout(120)
+        tab.settle()
         shots.append(tab.locator(".stage").screenshot())
     assert shots[0] != shots[1]
     assert min(map(len, shots)) > 8000  # bytes of PNG: a blank picture has far fewer
@@ -94,7 +94,7 @@ def test_playing_moves_the_time(opened: Open) -> None:
     tab.wait_until(lambda: tab.time > 0.7)
     tab.click("button[name=play]")
     stopped = tab.time
-    tab.wait_for_timeout(100)
+    tab.settle()
     assert tab.time == stopped
     tab.select_option("select[name=speed]", "10")
     tab.click("button[name=play]")
@@ -111,7 +111,7 @@ def test_a_body_can_be_hidden_and_traced(opened: Open) -> None:
     tab.locator(".legend li").first.hover()
     tab.locator(".legend .trail").first.click()
     tab.mouse.move(400, 400)
-    tab.wait_for_timeout(150)
+    tab.settle()
     assert tab.locator(".stage").screenshot() != before
     assert tab.errors == []
 

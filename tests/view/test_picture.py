@@ -174,12 +174,12 @@ def test_the_camera_follows_a_body(opened: Open) -> None:
     tab.keyboard.press("f")
     before = tab.evaluate(where)
     tab.evaluate("flyball.seek(1.5)")
-    tab.wait_for_timeout(150)
+    tab.settle()
     assert tab.evaluate(where) == pytest.approx(before, abs=0.5)
     tab.keyboard.press("0")  # fit: follows no more
-    tab.wait_for_timeout(100)
+    tab.settle()
     tab.evaluate("flyball.seek(3)")
-    tab.wait_for_timeout(150)
+    tab.settle()
     moved = tab.evaluate(where)
     assert np.hypot(moved[0] - before[0], moved[1] - before[1]) > 5
 

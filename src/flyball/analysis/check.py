@@ -63,6 +63,7 @@ class Report:
     redundancy: int  # how many rows say nothing new
     undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
     moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
+    sped: dict[str, float]  # body -> how much assembly changed a velocity described for it [m/s or rad/s]
     mass: float  # of all bodies together [kg]
     com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
@@ -103,11 +104,17 @@ class Report:
         return text
 
     def _assembly(self) -> str:
-        if not self.moved:
-            return "closed as drawn"
-        worst = max(self.moved, key=self.moved.__getitem__)
-        count = _count(len(self.moved), "body", "bodies")
-        return f"closed after moving {count}, {worst} farthest: {self.moved[worst]:.3g} m"
+        text = "closed as drawn"
+        if self.moved:
+            worst = max(self.moved, key=self.moved.__getitem__)
+            count = _count(len(self.moved), "body", "bodies")
+            text = f"closed after moving {count}, {worst} farthest: {self.moved[worst]:.3g} m"
+        if self.sped:
+            worst = max(self.sped, key=self.sped.__getitem__)
+            text += (
+                f"; velocities described for {', '.join(self.sped)} changed, {worst} most: by {self.sped[worst]:.3g}"
+            )
+        return text
 
     def __str__(self) -> str:
         width = max(len(k) for k, _ in self.lines())
@@ -154,6 +161,7 @@ def check(model: Model) -> Report:
         redundancy=m.redundancy,
         undetermined=m.undetermined,
         moved=a.moved,
+        sped=a.sped,
         mass=weights.total.mass,
         com=tuple(weights.total.com.tolist()),
         warnings=tuple(_warnings(model, a, bodies, m.freedoms)),
@@ -173,7 +181,7 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
         if b.name not in held | pushed:
             kept = "; as_drawn keeps assembly from moving it, it does not weld it to ground" if b.as_drawn else ""
             yield f"body {b.name!r} has neither a joint nor a force: it moves on its own{kept}"
-    if not model.gravity_vector().any():
+    if not model.gravity_told and not model.gravity_vector().any():
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         yield f"no gravity; if that is not meant, give gravity={example}"
     if model.drivers and freedoms == 0:
@@ -223,7 +231,7 @@ def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
         numbers = f"body {name!r}: its principal moments {p:g}, {q:g}, {r:g} kg m^2"
         if p > 0.0 and p + q - r < -1e-15 * r:
             yield f"{numbers} break the triangle inequality, though within rounding"
-        elif p > BARELY * r and abs(p + q - r) < BARELY * r and not _flat(x, name):
+        elif q - p > BARELY * r and abs(p + q - r) < BARELY * r and p > BARELY * r and not _flat(x, name):
             yield f"{numbers} are those of a flat plate (the first two add up to the third)"
 
 

@@ -25,6 +25,7 @@ from ..system.tables import (
     EVALUATIONS,
     FACTORISATIONS,
     G_VALUE,
+    MASS,
     PASS,
     SEMIDEFINITE,
     STABILIZE,
@@ -46,6 +47,7 @@ STABILIZATION = {
     "baumgarte": motion.BAUMGARTE,
     "none": motion.NONE,
 }
+FINEST = 1e-13  # relative tolerance below which rounding decides
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
@@ -72,6 +74,10 @@ class Options:
             value = getattr(self, name)
             if not isinstance(value, (int, float, np.number)) or not value > 0:
                 raise ModelError(f"{name} must be greater than 0, got {value!r}")
+        if self.rtol < FINEST:
+            raise ModelError(
+                f"rtol must not be smaller than {FINEST:g}, got {self.rtol!r}: rounding is larger than that"
+            )
         if self.stabilization not in STABILIZATION:
             known = ", ".join(STABILIZATION)
             raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
@@ -196,11 +202,12 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
 def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray, o: Options) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     s, W = a.compiled.structure, a.compiled.work
-    real, count = np.zeros(9), np.zeros(8, np.int64)
+    real, count = np.zeros(10), np.zeros(8, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LARGEST] = max(abs(t), abs(t_end))
+    real[ex.LEDGER] = _energy_size(a, t_end - t)
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
     count[ex.CONTROLLED] = s.nq + s.nv
@@ -212,7 +219,20 @@ def _clock(a: Assembly, t: float, t_end: float, times: np.ndarray, y: np.ndarray
     W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
     W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
     W.option[PASS] = 1e-13
-    return ex.Clock(real, count, times, Y, np.zeros((len(tableau(o.method).c), len(y))))
+    works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
+    K = np.zeros((len(tableau(o.method).c), len(y)))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64))
+
+
+def _energy_size(a: Assembly, span: float) -> float:
+    """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
+    much in the time there is, besides what it has.
+    """
+    S, length = a.compiled.values.system, a.compiled.values.length
+    mass = S.body_x[:, MASS].sum()
+    g = np.sqrt((S.glob[:3] ** 2).sum())
+    moving = 0.5 * float(a.v @ (a.compiled.mass() @ a.v))
+    return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
 def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None) -> tuple[np.ndarray, bool]:

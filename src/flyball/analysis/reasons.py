@@ -84,9 +84,10 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
         if not isinstance(row.element, Driver):
             continue
         law = int(S.row_i[k, ROW_LAW])
-        before, *after = (
-            evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
-        )
+        with np.errstate(all="ignore"):
+            before, *after = (
+                evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
+            )
         problem = _no_number(after) or _jump(before, after[0], NEAR * span, bool(S.row_i[k, ROW_WRAP]))
         if problem:
             return f"{row.element.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
@@ -159,7 +160,11 @@ def _broken_force(a: Assembly, t: float) -> str:
                     f"that it leaves"
                 )
             pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
-            out = e.effort(par, x, y, laws, pressed) if along else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            out = (
+                e.effort(par, x, y, laws, pressed)
+                if isinstance(e, CoordinateForce)
+                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            )
             if not np.isfinite(out).all():
                 return f"the force of {e.title} is no number. {e.fails}"
     return ""

@@ -63,7 +63,7 @@ class JointFriction(CoordinateForce):
     joint : str
         Joint with a coordinate ``angle`` or ``displacement``.
     coordinate : str
-        Which one, if it has both.
+        Which one, if it has both; not given: ``angle`` if there is a radius, else ``displacement``.
     static, kinetic : number
         Coefficients of friction at rest and in motion; the kinetic one equals the static one if not given.
     radius : number [m]

@@ -20,6 +20,7 @@ FLAT = 1e-6  # a disk whose axle is this close to the plane's normal lies flat
 class RollingDisk(Joint):
     """``body_j`` is a wheel that touches a plane fixed in ``body_i`` and rolls on it without slip.
 
+    The plane lies where the wheel touches it as drawn: ``radius + tread`` below the centre of an upright wheel.
     Two of its three rows restrain velocities only (non-holonomic). It carries pull as well as push: see that
     the reaction along the normal keeps pushing.
 

@@ -65,7 +65,8 @@ def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
             f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
         )
     has = curves(model, owner)
-    if what not in has:
+    only = isinstance(found, Joint) and "rate" in has and what.endswith("_rate") and what.removesuffix("_rate") in has
+    if what not in has and not only:
         whose = "energy" if found is None else found.title
         raise ModelError(
             f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"

@@ -67,6 +67,7 @@ class Model:
             example = "(0, -9.81)" if planar else "(0, 0, -9.81)"
             raise ModelError(f"gravity of {name!r} is a vector, for instance {example}, not {g!r}")
         self.gravity = tuple(g)
+        self.gravity_told = gravity is not None
         self.gravity_vector()
         self.bodies: list[Body] = []
         self.frames: list[Frame] = []

@@ -97,6 +97,8 @@ class Result:
         """
         owner, _, what = name.partition(".")
         curves = self[owner].channels()
+        if what not in curves and what.endswith("_rate") and what.removesuffix("_rate") in curves and "rate" in curves:
+            what = "rate"  # a joint's only coordinate
         if what not in curves:
             raise ModelError(f"{owner!r} has no curve {what!r}{suggest(what, curves)}; it has {', '.join(curves)}")
         return curves[what]

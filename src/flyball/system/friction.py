@@ -117,6 +117,12 @@ def improve(S, W, attempt):
 
 
 @formula
+def learnt(S, W):
+    """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
+    return W.info[LEARNT] >= W.sensed.shape[1] - 2 * measured(S)
+
+
+@formula
 def learn(W, first, last):
     """Broyden's update B += (dx - B dr) (dx^T B) / (dx^T B dr), r = load - returned load (Broyden, 1965)."""
     moved = 0.0

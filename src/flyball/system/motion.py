@@ -12,7 +12,7 @@ from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
 from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
-from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, returned
+from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
 from .loads import efforts, forces, gather, inertial
 from .records import load
@@ -195,7 +195,7 @@ def accelerate(S, W, t, p, dy, factored):
             break
         last = change
         change = returned(S, W)
-        if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last):
+        if change <= CONVERGED or (change <= BLURRED and change > 0.5 * last and learnt(S, W)):
             break
         if attempt == SUBSTITUTIONS - 1:
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE

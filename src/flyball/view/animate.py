@@ -15,6 +15,7 @@ from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from .arrows import arrows, rope_ends
 from .facts import facts
+from .gears import Wheel
 from .looks import Looks
 from .places import Places, three
 from .recording import (
@@ -133,14 +134,17 @@ def _poses(result: Result, name: str, every: np.ndarray) -> tuple[np.ndarray, np
 def _drawn(result: Result, places: Places, looks: Looks, every: np.ndarray) -> Iterator[Drawn]:
     """Symbols of joints and couplings; lines of springs, dampers, ropes and links."""
     m = result.model
-    for e in (*m.joints, *getattr(m, "couplings", ())):
-        for drawn in symbols(e, places, every):
+    wheels: list[Wheel] = []
+    for e in (*m.joints, *m.couplings):
+        for drawn in symbols(e, places, every, wheels):
             worn = looks.wear(drawn) if isinstance(drawn, RecordedJoint) else drawn
             if worn is not None:
                 yield worn
     for e in m.forces:
         if e.drawn == "bushing":
-            yield from (replace(d, scale=1.0) for d in symbols(e, places, every) if isinstance(d, RecordedJoint))
+            yield from (
+                replace(d, scale=1.0) for d in symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
+            )
         elif (line := _line(e, places, every)) is not None:
             yield line
 
@@ -226,7 +230,7 @@ def _channels(result: Result, every: np.ndarray) -> tuple[Channel, ...]:
 
 def _parts(result: Result) -> list:
     m = result.model
-    return [*getattr(m, "sensors", ()), *m.drivers, *m.forces, *m.joints, *m.bodies]
+    return [*m.sensors, *m.drivers, *m.forces, *m.joints, *m.bodies]
 
 
 def _main(name: str, result: Result) -> bool:
@@ -250,7 +254,7 @@ def shown(result: Result, names: Collection[str]) -> tuple[str, ...]:
     What is measured; what a driver needs; a joint's coordinate of each kind (else a position); energies.
     """
     m = result.model
-    measured = [f"{s.name}.value" for s in getattr(m, "sensors", ())][:2]
+    measured = [f"{s.name}.value" for s in m.sensors][:2]
     kinds: dict[str, str] = {}
     for j in m.joints:
         for k, c in j.coordinates.items():

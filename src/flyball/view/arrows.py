@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..model.force import BodyForce
+from ..model.force import BodyForce, CoordinateForce
 from ..model.joint import Joint
 from .figures import some
 from .places import End, Places, three
@@ -69,7 +69,7 @@ def _force(result: Result, places: Places, e: Any) -> Iterator[Found]:
         return
     M = places.end(e.name, "M")
     if M is None:
-        coordinate = f"{e.joint}.angle" if hasattr(e, "joint") else getattr(e, "coordinate", "")
+        coordinate = e.coordinate_text() if isinstance(e, CoordinateForce) else ""
         if coordinate:
             yield from _along(result, places, e.name, coordinate, getattr(view, list(e.outputs)[-1]))
         return
@@ -111,7 +111,9 @@ def _along(result: Result, places: Places, name: str, coordinate: str, effort: n
     owner, what = result.model.coordinate(coordinate, result.model[name])
     if not isinstance(owner, Joint):
         end = places.end(name, "M") or places.end(owner.name, "M")
-        if end is not None:
+        if end is not None and what == "angle":
+            yield name, "element", "moment", end, effort[:, None] * np.array([0.0, 0.0, 1.0])
+        elif end is not None:
             yield name, "element", "force", end, effort[:, None] * np.eye(3)["xyz".index(what)]
         return
     c = owner.coordinates[what]

@@ -118,7 +118,7 @@ def actuation(result: Result) -> Figure | None:
 def sensors(result: Result) -> Figure | None:
     """What sensors measure."""
     curves = []
-    for e in getattr(result.model, "sensors", ()):
+    for e in result.model.sensors:
         channels = result[e.name].channels()
         for k, (unit, values) in channels.items():
             name = e.name if len(channels) == 1 else f"{e.name}.{k}"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,21 @@ TEETH = 18  # of the smaller wheel of a pair, where the user gave radii, or too 
 MOST = 120
 
 
-def gear_pair(e: Any, places: Places) -> Iterator[RecordedJoint]:
-    """Two wheels that touch between their axes; plain discs where the axes are not parallel (bevel gears)."""
+@dataclass(frozen=True)
+class Wheel:
+    """A wheel that is drawn: on which body, of what radius, how many teeth, and which way one points at the start."""
+
+    body: str
+    radius: float
+    teeth: int
+    tooth: np.ndarray
+
+
+def gear_pair(e: Any, places: Places, drawn: list[Wheel]) -> Iterator[RecordedJoint]:
+    """Two wheels that touch between their axes; plain discs where the axes are not parallel (bevel gears).
+
+    Wheels that are ``drawn`` already, for another pair, are left as they are, and the other one fits them.
+    """
     model = places.result.model
     wheels = _movers(places, model[e.joint_1], model[e.joint_2])
     if wheels is None or not len(places.result.t):
@@ -29,22 +43,70 @@ def gear_pair(e: Any, places: Places) -> Iterator[RecordedJoint]:
     distance = float(np.sqrt(across[0] @ across[0]))
     if distance <= 1e-9 * places.result.values.length or (inside and z[1] <= z[0]):
         return
-    if abs(a @ b) > 1.0 - 1e-6:
-        radii = distance * z / (z[1] - z[0] if inside else z.sum())
-        counts = _teeth(z)
-        towards = across[0] / distance * (-1.0 if inside else 1.0)
-        contacts = (towards, towards if inside else -towards)
-    else:
-        radii = np.array([np.sqrt(x @ x) for x in across])
-        counts, contacts = np.zeros(2, int), (across[0], -across[1])
-    for k, wheel in enumerate(wheels):
-        x = _seen(places, wheel, contacts[k])
-        gap = np.pi / counts[k] if k and counts[k] else 0.0  # a tooth of the first meets a gap of the second
-        size = float(radii[k]), float(counts[k]), float(np.arctan2(x[1], x[0]) + gap), float(inside and k == 1)
-        yield _symbol(e.name, "gear", wheel, wheel.R, wheels[1 - k].body, size)
+    if abs(a @ b) <= 1.0 - 1e-6:
+        for wheel, other, arm in zip(wheels, wheels[::-1], across, strict=True):
+            yield _symbol(e.name, "gear", wheel, wheel.R, other.body, (float(np.sqrt(arm @ arm)), 0.0, 0.0, 0.0))
+        return
+    radii = distance * z / (z[1] - z[0] if inside else z.sum())
+    towards = across[0] / distance * (-1.0 if inside else 1.0)
+    pair = _Pair(a, b, (towards, towards if inside else -towards), inside)
+    counts = _teeth(z)
+    known = [_known(drawn, w.body, float(r), int(n)) for w, r, n in zip(wheels, radii, counts, strict=True)]
+    for k, tooth in enumerate(pair.teeth(known, counts)):
+        if known[k] is not None:
+            continue
+        drawn.append(Wheel(wheels[k].body, float(radii[k]), int(counts[k]), tooth))
+        x = _seen(places, wheels[k], tooth)
+        size = float(radii[k]), float(counts[k]), float(np.arctan2(x[1], x[0])), float(inside and k == 1)
+        yield _symbol(e.name, "gear", wheels[k], wheels[k].R, wheels[1 - k].body, size)
 
 
-def rack(e: Any, places: Places) -> Iterator[RecordedJoint]:
+@dataclass(frozen=True)
+class _Pair:
+    """Where two wheels with parallel axes a and b meet, seen from the centre of each."""
+
+    a: np.ndarray
+    b: np.ndarray
+    contacts: tuple[np.ndarray, np.ndarray]
+    inside: bool
+
+    def teeth(self, known: Sequence[Wheel | None], counts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """A tooth of each, so that they mesh.
+
+        With f the angle from the contact to a tooth in pitches, and s = +1 or -1 as the axes point alike or not: teeth
+        meet gaps where f_1 + s f_2 = 1/2 for wheels that turn against one another, f_1 - s f_2 = 1/2 inside a ring.
+        """
+        s = (-1.0 if self.inside else 1.0) * np.sign(self.a @ self.b)
+        f = [self.offset(k, w.tooth, w.teeth) if w is not None else None for k, w in enumerate(known)]
+        one = f[0] if f[0] is not None else 0.5 - s * f[1] if f[1] is not None else 0.0
+        other = f[1] if f[1] is not None else s * (0.5 - one)
+        return self.turned(0, one / counts[0]), self.turned(1, other / counts[1])
+
+    def offset(self, k: int, tooth: np.ndarray, count: int) -> float:
+        """Angle from the contact to a tooth, in pitches, about the wheel's axis."""
+        return _angle((self.a, self.b)[k], self.contacts[k], tooth) * count / (2.0 * np.pi)
+
+    def turned(self, k: int, turns: float) -> np.ndarray:
+        """The direction of the contact turned about the wheel's axis."""
+        return _turned((self.a, self.b)[k], self.contacts[k], 2.0 * np.pi * turns)
+
+
+def _known(drawn: Sequence[Wheel], body: str, radius: float, teeth: int) -> Wheel | None:
+    return next(
+        (w for w in drawn if w.body == body and w.teeth == teeth and abs(w.radius - radius) < 1e-3 * radius), None
+    )
+
+
+def _angle(axis: np.ndarray, start: np.ndarray, end: np.ndarray) -> float:
+    """Angle from one direction to another about an axis that is square to both [rad]."""
+    return float(np.arctan2(np.cross(start, end) @ axis, start @ end))
+
+
+def _turned(axis: np.ndarray, direction: np.ndarray, angle: float) -> np.ndarray:
+    return np.cos(angle) * direction + np.sin(angle) * np.cross(axis, direction)
+
+
+def rack(e: Any, places: Places, drawn: list[Wheel]) -> Iterator[RecordedJoint]:
     """The pinion, and the toothed bar whose pitch line passes the pinion's centre at its radius."""
     model = places.result.model
     movers = _movers(places, model[e.pinion], model[e.rack])
@@ -58,19 +120,25 @@ def rack(e: Any, places: Places) -> Iterator[RecordedJoint]:
             radius = -radius
     # displacement = radius * angle: the rim that goes along +a lies at a x n
     side = np.cross(a, n) * np.sign(radius)
-    x = _seen(places, pinion, side)
-    size = abs(radius), float(TEETH), float(np.arctan2(x[1], x[0])), 0.0
-    yield _symbol(e.name, "gear", pinion, pinion.R, bar.body, size)
-    # the bar's frame: origin where the two meet as drawn, x along the slide, y towards the pinion
+    radius = abs(radius)
+    same = [w for w in drawn if w.body == pinion.body and abs(w.radius - radius) < 1e-3 * radius]
+    wheel = same[0] if same else Wheel(pinion.body, radius, TEETH, side)
+    if not same:
+        drawn.append(wheel)
+        x = _seen(places, pinion, side)
+        size = radius, float(TEETH), float(np.arctan2(x[1], x[0])), 0.0
+        yield _symbol(e.name, "gear", pinion, pinion.R, bar.body, size)
+    # the bar's frame: origin in a gap where the two meet as drawn, x along the slide, y towards the pinion
     q, S = places.track(bar)
     body = S[0] @ bar.R.T
     axes = body.T @ np.column_stack([a, -side, np.cross(a, -side)])
-    at = bar.p + body.T @ (p + abs(radius) * side - q[0])
+    shift = radius * _angle(n, side, wheel.tooth) * np.cross(n, side)
+    at = bar.p + body.T @ (p + radius * side + shift - q[0])
     moved = np.einsum("ni,ni->n", q - places.track(pinion)[0], S[:, :, 2])
-    moved = moved - moved[0]
+    moved = moved - moved[0] + shift @ a
     reach = (float(-np.nanmax(moved)), float(-np.nanmin(moved)), 0.0, 0.0, 0.0, 0.0)
-    pitch = 2.0 * np.pi * abs(radius) / TEETH
-    yield _symbol(e.name, "rack", End(bar.body, at, axes, bar.frame), axes, pinion.body, (abs(radius), pitch), reach)
+    pitch = 2.0 * np.pi * radius / wheel.teeth
+    yield _symbol(e.name, "rack", End(bar.body, at, axes, bar.frame), axes, pinion.body, (radius, pitch), reach)
 
 
 def _movers(places: Places, first: Any, second: Any) -> tuple[End, End] | None:

@@ -70,9 +70,15 @@ def _thinned(figure: Figure, every: np.ndarray) -> Figure:
 
 def _headline(result: Result) -> str:
     m = result.model
-    counts = {"body": len(m.bodies), "joint": len(m.joints), "force": len(m.forces), "driver": len(m.drivers)}
+    counts: dict[str, list] = {
+        "body": m.bodies,
+        "joint": m.joints,
+        "coupling": m.couplings,
+        "force": m.forces,
+        "driver": m.drivers,
+    }
     many = {"body": "bodies"}
-    parts = [f"{n} {k if n == 1 else many.get(k, k + 's')}" for k, n in counts.items() if n]
+    parts = [f"{len(x)} {k if len(x) == 1 else many.get(k, k + 's')}" for k, x in counts.items() if x]
     span = f"{result.t[0]:g} to {result.t[-1]:g} s, {len(result.t)} output times"
     return f"{'Planar' if result.planar else 'Spatial'} mechanism: {', '.join(parts)}; {span}"
 
@@ -96,7 +102,7 @@ def _cards(result: Result) -> str:
     relative = f"{h.energy_drift / largest:.1e} of the largest energy" if largest > 0.0 else ""
     cards: list[tuple[str, str, float, str]] = [
         ("Freedoms", str(h.freedoms), h.freedoms, "by rank, at the start"),
-        ("Redundant", str(len(h.redundant)), len(h.redundant), ", ".join(h.redundant) or "no constraint too many"),
+        ("Redundant parts", str(len(h.redundant)), len(h.redundant), ", ".join(h.redundant) or "none too many"),
         ("Energy balance", f"{number(h.energy_drift)} J", h.energy_drift, relative or "largest deviation"),
         ("Violation", number(h.violation), h.violation, "largest gap of a constraint [m or rad]"),
         ("Velocity violation", number(h.velocity_violation), h.velocity_violation, "[m/s or rad/s]"),

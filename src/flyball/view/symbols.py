@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..model.geometry import matrix_to_quaternion
-from .gears import gear_pair, rack
+from .gears import Wheel, gear_pair, rack
 from .places import End, Places, three
 from .recording import RecordedCurve, RecordedJoint, RecordedLine
 
@@ -21,7 +21,7 @@ Drawn = RecordedJoint | RecordedCurve | RecordedLine
 BODILY = ("gear", "rack", "wheel", "ball")  # symbols that are the body itself, where it has no shape of its own
 
 
-def symbols(e: Any, places: Places, every: np.ndarray) -> Iterator[Drawn]:
+def symbols(e: Any, places: Places, every: np.ndarray, wheels: list[Wheel]) -> Iterator[Drawn]:
     """What shows a joint, a coupling or a bushing.
 
     Parameters
@@ -30,12 +30,14 @@ def symbols(e: Any, places: Places, every: np.ndarray) -> Iterator[Drawn]:
     places : Places
     every : ndarray of int
         The times that are shown.
+    wheels : list of Wheel
+        Toothed wheels that are drawn already; new ones are added.
     """
     kind = getattr(e, "drawn", "")
     if kind == "gear":
-        yield from gear_pair(e, places)
+        yield from gear_pair(e, places, wheels)
     elif kind == "rack":
-        yield from rack(e, places)
+        yield from rack(e, places, wheels)
     ends = places.ends(e)
     if ends is None or kind in ("coupler", ""):
         return

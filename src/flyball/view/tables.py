@@ -97,7 +97,7 @@ def joints(result: Result) -> Table:
     sizes = {e.name: _largest(result[e.name]) for e in result.model.joints}
     force, torque = (max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1))
     least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # below, rounding errors
-    for e in (*result.model.joints, *getattr(result.model, "couplings", ())):
+    for e in (*result.model.joints, *result.model.couplings):
         k = s.frame_at.get((e.name, "M", ""))
         at = axis = ""
         if k is not None:
@@ -163,7 +163,7 @@ def drivers(result: Result) -> Table:
 def sensors(result: Result) -> Table:
     """What sensors measure, and between which values it stayed."""
     rows = []
-    for e in getattr(result.model, "sensors", ()):
+    for e in result.model.sensors:
         for k, (unit, v) in result[e.name].channels().items():
             low, high = (fixed(x) for x in (np.nanmin(v), np.nanmax(v)))
             rows.append((e.name, type(e).__name__, between(e), k, low, high, unit.replace("*", " ")))

@@ -18,21 +18,23 @@ from ..._jit import formula
 from ...math.scalar import sqrt
 
 # entries of Clock.real
-T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE = range(9)
+T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER = range(10)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT = range(8)
 SAFETY = 0.85
+LOOSER = 10.0  # accounts are held to this many times the relative tolerance
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
 
 
 class Clock(NamedTuple):
     """Everything an interrupted integration needs to go on."""
 
-    real: np.ndarray  # (9,)
+    real: np.ndarray  # (10,)
     count: np.ndarray  # type: ignore[assignment]  # (8,)
     times: np.ndarray  # output times, ascending
     y: np.ndarray  # (3, ny): state, state in the making, interpolated state
     K: np.ndarray  # (stages, ny): derivatives of the stages
+    accounts: np.ndarray  # components that are integrals of the motion: works
 
 
 @formula
@@ -112,10 +114,38 @@ def attempt(derivative, arrive, S, W, R, c, h):
         s = c.real[ATOL] + c.real[RTOL] * size
         e5 += (a / s) ** 2
         e3 += (b / s) ** 2
+    moved = max(moved, accounting_error(R, c, h))
     if e5 == 0.0 and e3 == 0.0:
         return 0, moved
     error = h * e5 / sqrt((e5 + 0.01 * e3) * max(n, 1))
     return 0, moved if error <= moved else error  # an error that is no number stays one, and is refused
+
+
+@formula
+def accounting_error(R, c, h):
+    """Error of the accounts in units of the tolerance: relative to all that stands in them and to c.real[LEDGER].
+
+    Where coordinates follow a driver their errors say nothing of forces that change abruptly; works do.
+    """
+    n = c.accounts.shape[0]
+    size = c.real[LEDGER]
+    for k in range(n):
+        size += abs(c.y[1, c.accounts[k]])
+    s = LOOSER * c.real[RTOL] * size
+    e5 = 0.0
+    e3 = 0.0
+    for k in range(n):
+        i = c.accounts[k]
+        a = 0.0
+        b = 0.0
+        for j in range(R.order_i[1] + 1):
+            a += R.E[0, j] * c.K[j, i]
+            b += R.E[1, j] * c.K[j, i]
+        e5 += (a / s) ** 2
+        e3 += (b / s) ** 2
+    if e5 == 0.0 and e3 == 0.0:
+        return 0.0
+    return h * e5 / sqrt((e5 + 0.01 * e3) * n)
 
 
 @formula

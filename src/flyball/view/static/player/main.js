@@ -86,15 +86,17 @@ function describe(recording) {
 /** Margins of the picture: the least, the corner that the open legend covers, and ways to keep clear of it. */
 function margins() {
   const list = find(".legend ul");
-  if (list.hidden) return { least: INSET, covered: null, ways: [] };
+  const forces = find(".forces");
+  const least = forces.hidden ? INSET : { ...INSET, bottom: Math.max(INSET.bottom, forces.offsetHeight + 2 * GAP) };
+  if (list.hidden) return { least, covered: null, ways: [] };
   const [stage, box] = [find(".stage"), list].map((part) => part.getBoundingClientRect());
   const covered = { right: box.right - stage.left + GAP, bottom: box.bottom - stage.top + GAP };
   return {
-    least: INSET,
+    least,
     covered,
     ways: [
-      { ...INSET, left: covered.right },
-      { ...INSET, top: covered.bottom },
+      { ...least, left: covered.right },
+      { ...least, top: covered.bottom },
     ],
   };
 }
@@ -269,6 +271,7 @@ export function start(buffer) {
   for (const name of wanted.show ?? recording.show) shown.set(name, true);
   stage.grid.visible = Boolean(shown.state.grid);
   shown.scale(wanted.arrows);
+  stage.resize(); // the legend of forces takes room
   const update = () => {
     const frame = mechanism.seek(clock.time);
     for (const panel of [plots, ...figures]) panel.seek(clock.time, frame);

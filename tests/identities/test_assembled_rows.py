@@ -1,0 +1,60 @@
+"""The rows as a whole, in both coordinate layers: G v - nu is the rate of g, and G vdot - gamma the rate of that.
+
+At a state and velocities that fulfil nothing: by differences along a motion, for every joint, coupling and driver.
+"""
+
+import numpy as np
+import pytest
+
+from flyball.analysis.assemble import assemble
+from flyball.analysis.compiled import compiled
+from flyball.system.tables import G_VALUE, GAMMA, NU
+from flyball.system.tree import retract
+from tests.contract.zoo import CASES
+from tests.identities.test_coordinates import joint_coordinates
+from tests.identities.test_joint_layer import HINGES, PARTS, coupled, with_joint
+
+T, H = 0.4, 1e-5
+
+
+def layers(model):
+    """The assembled state, moved a little off the constraints, in absolute and in joint coordinates."""
+    a = assemble(model)
+    tree = compiled(model, tree=HINGES)
+    tree.follow(a.compiled.hints)
+    for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, joint_coordinates(a.compiled, a.q, a.v, tree))):
+        rng = np.random.default_rng(5)
+        q = q.copy()
+        retract(c.values.system, q, 0.03 * rng.normal(size=len(v)))
+        yield c, q, v + 0.3 * rng.normal(size=len(v)), rng.normal(size=len(v))
+
+
+def moved(c, q, v, a, s):
+    """Values and rates of the rows after a time s of the motion with velocities v and accelerations a."""
+    there, u = q.copy(), v + s * a
+    retract(c.values.system, there, s * v)
+    c.at(T + s, there, u)
+    return c.work.row[G_VALUE].copy(), c.jacobian() @ u - c.work.row[NU]
+
+
+def examine(model, close=1e-6):
+    for c, q, v, a in layers(model):
+        (ahead, ahead_rate), (behind, behind_rate) = (moved(c, q, v, a, s) for s in (H, -H))
+        c.at(T, q, v)
+        G, nu, gamma = c.jacobian(), c.work.row[NU].copy(), c.work.row[GAMMA].copy()
+        valued = np.array([r.holonomic for r in c.structure.rows])
+        assert (ahead - behind)[valued] / (2 * H) == pytest.approx((G @ v - nu)[valued], rel=1e-6, abs=1e-6)
+        second = G @ a - gamma
+        assert (ahead_rate - behind_rate) / (2 * H) == pytest.approx(
+            second, rel=close, abs=close * np.abs(second).max()
+        )
+
+
+@pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
+def test_every_joint(where, name):
+    examine(with_joint(where, name), 1e-4 if name == "Cam" else 1e-6)  # a spline's curvature has kinks
+
+
+@pytest.mark.parametrize("case", [k for k in PARTS if k in ("coupler", "gears", "rack", "driver by sensors")])
+def test_couplings_and_drivers(case):
+    examine(coupled(*PARTS[case]()))
