@@ -38,6 +38,7 @@ class Assembly:
     v: np.ndarray
     moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
     iterations: int = 0
+    sped: dict[str, float] = field(default_factory=dict)  # body -> change of the velocities described for it [1/s]
 
     @property
     def y(self) -> np.ndarray:
@@ -80,8 +81,9 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         if _misfit(near, t, q, v) > CLOSED or _misfit(far, t, q, v) > 1e-6:
             raise _disagreement(far, t, q, v)
     plain.follow(near.hints)
+    described = v.copy()
     v = _velocities(model, plain, parameters, t, q, v, rates)
-    return Assembly(plain, t, q, v, _moved(plain, start, q), count)
+    return Assembly(plain, t, q, v, _moved(plain, start, q), count, _sped(plain, described, v))
 
 
 def _turns(c: Compiled, known: Mapping[str, float]) -> dict[str, float]:
@@ -326,6 +328,19 @@ def _velocities(
             gaps={k: gaps[k] for k in bad},
         )
     return v
+
+
+def _sped(c: Compiled, before: np.ndarray, after: np.ndarray) -> dict[str, float]:
+    """How much velocities that were described were changed, relative to the body's largest; the rest was free."""
+    out = {}
+    for name, b in c.structure.place.items():
+        if b >= 0:
+            v0, n = c.structure.tables["body_i"][b, [3, 5]]
+            told = before[v0 : v0 + n]
+            change = np.abs(after[v0 : v0 + n] - told)[told != 0.0].max(initial=0.0)
+            if change > 1e-6 * np.abs(told).max(initial=0.0):
+                out[name] = float(change)
+    return out
 
 
 def _moved(c: Compiled, before: np.ndarray, after: np.ndarray) -> dict[str, float]:
