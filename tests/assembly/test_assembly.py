@@ -344,3 +344,39 @@ def test_fixed_bodies_that_cannot_meet():
     framed(m, fb.Revolute, "J", "a", (0, 0), "b", (0, 0))
     with pytest.raises(fb.AssemblyError, match="J is 1 m from closed"):
         assemble(m)
+
+
+@pytest.mark.parametrize("off", [1e-5, 1e-7, 1e-9])
+def test_velocities_all_but_at_a_singular_position(off):
+    """A parallelogram a hair from flat: its cranks can only turn at the same rate, and rest is always allowed."""
+    m = fb.Mechanism("flat", planar=True)
+    tip = (0.3 * np.cos(off), 0.3 * np.sin(off))
+    m.add(fb.Body("bar", mass=1, inertia=0.01, position=(tip[0] + 0.25, tip[1])))
+    for name, x in (("left", 0.0), ("right", 0.5)):
+        m.add(fb.Body(name, mass=1, inertia=0.01, position=(x, 0), angular_velocity=4.0))
+        m.add(fb.Revolute(f"A {name}", "ground", name, at=(x, 0)))
+        m.add(fb.Revolute(f"B {name}", name, "bar", at=(x + tip[0], tip[1])))
+    a = assemble(m)
+    c = a.compiled
+    c.at(0.0, a.q, a.v)
+    assert np.abs(c.jacobian() @ a.v).max() < 1e-11
+    turn = a.v.reshape(3, 3)[:, 2]  # of the bar and both cranks
+    # the momentum of the two cranks, 2 x 0.01 x 4, is shared with the bar of 1 kg that they carry at 0.3 m
+    w = 2 * 0.01 * 4.0 / (2 * 0.01 + 1.0 * 0.3**2)
+    assert turn == pytest.approx([0.0, w, w], abs=1e-4)
+
+
+def test_a_rate_at_every_hinge_of_a_long_chain():
+    """Relative rates w add up along the chain: body k turns at (k + 1) w, its middle follows the hinges before it."""
+    n, w = 800, 0.01
+    m = fb.Mechanism("chain", planar=True)
+    for k in range(n):
+        m.add(fb.Body(f"b{k}", mass=1, inertia=0.1, position=(k + 0.5, 0)))
+        m.add(
+            fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)), fb.Initial(f"J{k}.angle", rate=w)
+        )
+    v = assemble(m).v.reshape(n, 3)
+    turning = w * np.arange(1, n + 1)
+    assert v[:, 2] == pytest.approx(turning, rel=1e-7)
+    assert v[:, 1] == pytest.approx(np.cumsum(turning) - 0.5 * turning, rel=1e-7)
+    assert np.abs(v[:, 0]).max() < 1e-7 * v[:, 1].max()

@@ -156,3 +156,32 @@ def test_a_long_chain_is_counted_by_the_sparse_rank():
     assert found.velocities == 1560
     assert (found.freedoms, found.redundancy) == (links - 1, 2)
     assert set(found.redundant) & {"J0", "wall"}
+
+
+@pytest.mark.parametrize("make", [bricard, door, spatial_four_bar, four_bar, lambda: parallelogram(3)])
+def test_large_mechanisms_are_told_the_same(make, monkeypatch):
+    """The sparse way, which large mechanisms take, names the same joints and reactions as the dense one."""
+    from flyball.analysis import mobility as module
+
+    m = make()
+    a = assemble(m)
+    dense = mobility(m, a)
+    monkeypatch.setattr(module, "DENSE", 0)
+    assert mobility(m, a) == dense
+
+
+def links(end: float) -> fb.Mechanism:
+    """520 links; the last is a point mass, this far from its hinge."""
+    m = fb.Mechanism("long", planar=True)
+    for i in range(520):
+        last = i == 519
+        m.add(fb.Body(f"b{i}", mass=1, inertia=0.0 if last else 0.1, position=(i + (end if last else 0.5), 0)))
+        m.add(fb.Revolute(f"J{i}", f"b{i - 1}" if i else "ground", f"b{i}", at=(i, 0)))
+    return m
+
+
+def test_a_large_mechanism_may_not_move_without_inertia_either():
+    """A point mass in its own hinge turns without inertia: refused by name; off the hinge, turning moves it."""
+    with pytest.raises(fb.ModelError, match=r"body 'b519' can turn .* without any inertia"):
+        links(0.0).simulate(0.01)
+    assert links(0.5).check().freedoms == 520

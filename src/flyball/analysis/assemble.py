@@ -189,7 +189,7 @@ def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
     size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
     B = B / size
     K = sp.bmat([[sp.identity(n), B.T], [B, -(damping + NO_PIVOT) * sp.identity(m)]], format="csc")
-    return R @ splu(K, permc_spec="MMD_AT_PLUS_A").solve(np.r_[np.zeros(n), r / size])[:n]
+    return R @ splu(K).solve(np.r_[np.zeros(n), r / size])[:n]
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
