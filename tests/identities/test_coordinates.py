@@ -93,13 +93,13 @@ def joint_coordinates(absolute, q, v, tree):
     for name, b in new.place.items():
         if b < 0:
             continue
-        _, kind, q0, v0, nq, nv = new.tables["body_i"][b]
+        _, kind, q0, v0, nq, nv = new.tables["body_i"][b, :6]
         if kind == REVOLUTE:
             F, M = (load(absolute.work.FK, old.frame_at[hinges[name], role, ""]) for role in "FM")
             value, _, n, _, _ = angle.row((0.0,) * 8, F, M, 0.0, None)
             Q[q0], V[v0] = value, np.dot(n, np.subtract(M[2], F[2]))
         else:
-            _, _, p0, u0, _, _ = old.tables["body_i"][old.place[name]]
+            _, _, p0, u0 = old.tables["body_i"][old.place[name], :4]
             Q[q0 : q0 + nq], V[v0 : v0 + nv] = q[p0 : p0 + nq], v[u0 : u0 + nv]
     return Q, V
 

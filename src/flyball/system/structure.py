@@ -195,7 +195,7 @@ def _body_table(s: Structure) -> dict[int, Joint]:
             done[n] = len(done) - 1
     s.place = done
     s.order = [names.index(n) for n in list(done)[1:]]
-    body_i = np.zeros((len(names), 6), np.int64)
+    body_i = np.zeros((len(names), 8), np.int64)
     q0 = v0 = 0
     joints = {}
     for name, b in done.items():
@@ -203,7 +203,7 @@ def _body_table(s: Structure) -> dict[int, Joint]:
             continue
         kind = REVOLUTE if name in hung else PLANAR if model.planar else FREE
         parent = done[hung[name][1]] if name in hung else -1
-        body_i[b] = parent, kind, q0, v0, NQ[kind], NV[kind]
+        body_i[b] = parent, kind, q0, v0, NQ[kind], NV[kind], -1, -1
         q0, v0 = q0 + NQ[kind], v0 + NV[kind]
         if name in hung:
             joints[b] = hung[name][0]

@@ -14,7 +14,8 @@ from ..constraints.registry import FORMULAS
 from ..numerics.ldl import Pattern
 
 # columns of System.body_i
-PARENT, TREE, Q0, V0, NQ, NV = range(6)
+# (law and work state: of the driver that prescribes the body's one coordinate, or -1)
+PARENT, TREE, Q0, V0, NQ, NV, BODY_LAW, BODY_WORK = range(8)
 # columns of System.body_x
 MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
 PER_MASS, PER_COMPACT, BODY_WIDTH = 52, 53, 54
@@ -49,7 +50,7 @@ TERM_KINDS = len(FORMULAS)
 class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
-    body_i: np.ndarray  # (nb, 6): parent, tree joint kind, first q, first v, number of q, of v
+    body_i: np.ndarray  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
     body_x: np.ndarray  # (nb, 54): mass properties, their inverses and stand-ins; frames of tree joints
     frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
     frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
