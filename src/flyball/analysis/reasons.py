@@ -244,7 +244,7 @@ def _component(a: Assembly, i: int) -> str:
     s = a.compiled.structure
     for name, b in s.place.items():
         if b >= 0:
-            _, _, q0, v0, nq, nv = s.tables["body_i"][b]
+            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
             if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
                 return f"body {name!r}"
     return "a measured quantity"
