@@ -42,6 +42,8 @@ from .tables import (
     R2,
     RESIDUAL,
     ROW_WORK,
+    SCHUR,
+    SOLVER,
     STABILIZE,
     STATUS,
     TERM_F,
@@ -59,6 +61,7 @@ from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
+OLD, NEAR, HERE = range(3)
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
@@ -133,8 +136,8 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
     lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
-    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W
-    is good for a solve here).
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
+    OLD, of poses NEARby or of those HERE).
     """
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
@@ -142,22 +145,22 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     place(S, W, t, q, z)
     if r.shape[0] == 0:
         move(S, W, t, v, z)
-        return 0, 0.0, False
+        return 0, 0.0, OLD
     worst = violation(W, r)
     found = worst
     last = 1e300
-    factored = False
+    factored = OLD
     for _ in range(PASSES):
         if worst <= tol_g or (worst > 0.7 * last and worst <= CLOSED):
             break
         if not worst <= FAR:
-            return NOT_CLOSED, found, False
-        if not factored or worst > SLOW * last:
+            return NOT_CLOSED, found, OLD
+        if factored == OLD or worst > SLOW * last:
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, False
-            factored = True
+                return NOT_CLOSED, found, OLD
         else:
-            factored = reuse(S, W)
+            reuse(S, W)
+        factored = NEAR
         last = worst
         solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         retract(S, q, step)
@@ -165,15 +168,18 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
-        return NOT_CLOSED, found, False
+        return NOT_CLOSED, found, OLD
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (1.0 + size):
-        if factored:
-            factored = reuse(S, W)
-        if not factored or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
+        if factored == NEAR:
+            reuse(S, W)
+        if (
+            factored == OLD
+            or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]
+        ):
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, False
-            factored = True
+                return NOT_CLOSED, found, OLD
+            factored = HERE
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
@@ -194,8 +200,11 @@ def accelerate(S, W, t, p, dy, factored):
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
     x = W.vel[X_SOLVED]
-    if factored:
-        factored = reuse(S, W)
+    if factored == NEAR:
+        if S.kinds[SOLVER] == SCHUR:
+            reuse(S, W)
+        else:
+            factored = OLD  # M is another one here
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
@@ -204,13 +213,13 @@ def accelerate(S, W, t, p, dy, factored):
         gather(S, W, W.vel[F_APPLIED])
         efforts(S, W, t, work, W.vel[F_APPLIED])
         if (
-            not factored
+            factored == OLD
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
         ):
             if factor(S, W) != 0:
                 W.info[STATUS] = SINGULAR
                 return SINGULAR
-            factored = True
+            factored = HERE
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
         if S.load_i.shape[0] == 0:
             break
@@ -290,7 +299,7 @@ def derivative(t, y, dy, S, W):
     v = p[nq : nq + W.vel.shape[1]]
     z = p[nq + W.vel.shape[1] :]
     prepare(S, W, t, q, v)
-    factored = False
+    factored = OLD
     if W.option[STABILIZE] == STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
@@ -310,7 +319,7 @@ def arrive(t, y, dy, S, W):
     v = y[nq : nq + W.vel.shape[1]]
     z = y[nq + W.vel.shape[1] :]
     found = 0.0
-    factored = False
+    factored = OLD
     fault = W.stack.shape[0] - STACK_RESERVE
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]

@@ -67,8 +67,6 @@ def inverse_mass(S, b, x, at, out, to):
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
     W.info[FACTORISATIONS] += 1
-    for e in range(W.A.shape[0]):
-        W.A[e] = 0.0
     if S.kinds[SOLVER] == SCHUR:
         return factor_schur(S, W)
     return factor_coupled(S, W)
@@ -103,17 +101,17 @@ def natural_size(S, W):
 
 @formula
 def reuse(S, W):
-    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement. Says whether."""
-    if S.kinds[SOLVER] != SCHUR:
-        return False
-    turn_rows(S, W)
-    return True
+    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
+    if S.kinds[SOLVER] == SCHUR:
+        turn_rows(S, W)
 
 
 @formula
 def factor_schur(S, W):
     """S = G M^-1 G^T, block by block."""
     turn_rows(S, W)
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
     for e in range(S.pair_i.shape[0]):
         i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
         s = W.G[i] * W.H[j]
@@ -131,20 +129,20 @@ def factor_schur(S, W):
 def factor_coupled(S, W):
     """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta."""
     nv = W.vel.shape[1]
+    per = W.vel[V1]
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
-        W.A[S.mass_i[e, 2]] += W.M[e]
-    for e in range(S.pair_i.shape[0]):
-        W.A[S.pair_i[e, 3]] += W.G[S.pair_i[e, 0]]
+        W.A[S.mass_i[e, 2]] = W.M[e]
+        if S.mass_i[e, 0] == S.mass_i[e, 1]:
+            per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
         for e in range(S.row_p[k], S.row_p[k + 1]):
+            W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
-                d = S.ldl.Ap[S.ldl.perm[S.col_i[e]] + 1] - 1
-                s += W.G[e] * W.G[e] / W.A[d]
+                s += W.G[e] * W.G[e] * per[S.col_i[e]]
         W.row[DIAGONAL, k] = s
-    for k in range(S.row_i.shape[0]):
-        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * W.row[DIAGONAL, k]
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -224,16 +222,11 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     nv = x.shape[0]
     worst = 1.0
     last = 1e300
-    for attempt in range(refinements + 1):
-        if attempt > 0 or loaded:
-            worst = remainder(S, W, f, x, lam, rhs, loaded)
-            worst = max(worst, residual(S, W, gamma, x))
-        else:
-            for d in range(nv):
-                rhs[d] = 0.0
-        if not worst > W.option[PASS] or (attempt > 1 and worst > STALLED * last) or attempt == refinements:
-            break
-        last = worst
+    for d in range(nv):
+        rhs[d] = 0.0
+    if loaded:
+        remainder(S, W, f, gamma, x, lam, rhs, loaded)
+    for attempt in range(refinements):
         for d in range(nv):
             z[S.ldl.perm[d]] = rhs[d]
         for k in range(lam.shape[0]):
@@ -243,6 +236,10 @@ def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
             x[d] += z[S.ldl.perm[d]]
         for k in range(lam.shape[0]):
             lam[k] -= z[S.ldl.perm[nv + k]]
+        worst = remainder(S, W, f, gamma, x, lam, rhs, loaded)
+        if not worst > W.option[PASS] or (attempt > 0 and worst > STALLED * last):
+            break
+        last = worst
     return worst
 
 
@@ -265,10 +262,11 @@ def residual(S, W, gamma, x):
 
 
 @formula
-def remainder(S, W, f, x, lam, rhs, loaded):
-    """rhs = f - M x + G^T lam, for the coupled matrix; returns its largest entry relative to its terms.
+def remainder(S, W, f, gamma, x, lam, rhs, loaded):
+    """Both lines of the coupled equations: gamma - G x into W.row[R1], f - M x + G^T lam into rhs.
 
-    The lines of prescribed velocities say what their drivers have to do: that goes to W.vel[EFFORT].
+    Returns the largest entry of either relative to its terms. What is left in the lines of prescribed velocities is
+    what their drivers have to do: it goes to W.vel[EFFORT].
     """
     size = 1e-300
     for d in range(x.shape[0]):
@@ -281,11 +279,22 @@ def remainder(S, W, f, x, lam, rhs, loaded):
         size = max(size, magnitude(p))
         if i != j:
             rhs[j] -= W.M[e] * x[i]
+    wide = 1e-300
+    off = 0.0
     for k in range(lam.shape[0]):
+        s = gamma[k]
+        a = magnitude(s)
         for e in range(S.row_p[k], S.row_p[k + 1]):
+            d = S.col_i[e]
             p = W.G[e] * lam[k]
-            rhs[S.col_i[e]] += p
+            rhs[d] += p
             size = max(size, magnitude(p))
+            p = W.G[e] * x[d]
+            s -= p
+            a += magnitude(p)
+        W.row[R1, k] = s
+        off = max(off, magnitude(s))
+        wide = max(wide, a)
     for b in range(S.body_i.shape[0]):
         if S.body_i[b, BODY_LAW] >= 0:
             d = S.body_i[b, V0]
@@ -294,7 +303,7 @@ def remainder(S, W, f, x, lam, rhs, loaded):
     worst = 0.0
     for d in range(x.shape[0]):
         worst = max(worst, magnitude(rhs[d]))
-    return worst / size
+    return max(worst / size, off / wide)
 
 
 @formula
