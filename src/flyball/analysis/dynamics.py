@@ -16,7 +16,8 @@ from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assemble import Assembly
-from .entry import INTEGRATE, motion_kernel
+from .driven import integrate_powers, leaves_no_freedom
+from .entry import FOLLOW, INTEGRATE, motion_kernel
 from .options import STABILIZATION, Options, options_from, output_times
 from .outcome import outcome
 from .start import Start, begin
@@ -71,7 +72,10 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
     clock = _clock(begun, t_start, float(t_end), times, chosen)
-    rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress)
+    follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
+    rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
+    if follow:
+        rows = integrate_powers(begun.assembly, clock, rows)
     try:
         result = outcome(model, begun, clock, rows, chosen, interrupted)
     except SimulationError as error:
@@ -118,7 +122,7 @@ def _energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
-def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None) -> tuple[np.ndarray, bool]:
+def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     width = 1 + len(a.y) + s.nv + len(S.row_i) + len(s.prescribed)
@@ -131,7 +135,7 @@ def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None
             begin = time.perf_counter()
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
-                used = motion_kernel(S, W, method, clock, buffer, INTEGRATE)
+                used = motion_kernel(S, W, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
             if progress is not None:
                 progress((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))

@@ -173,10 +173,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     if worst > tol_v * (1.0 + size):
         if factored == NEAR:
             reuse(S, W)
-        if (
-            factored == OLD
-            or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]
-        ):
+        if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, OLD
             factored = HERE
@@ -339,10 +336,17 @@ def arrive(t, y, dy, S, W):
 @formula
 def report(t, y, out, S, W):
     """Write t, the state (projected first), vdot and lam to a row of the output."""
+    status, _ = arrive(t, y, W.y[1], S, W)
+    write_row(t, y, out, S, W)
+    return status
+
+
+@formula
+def write_row(t, y, out, S, W):
+    """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     ny = y.shape[0]
-    status, _ = arrive(t, y, W.y[1], S, W)
     if S.row_i.shape[0] > 0:
         W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
         W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
@@ -359,4 +363,3 @@ def report(t, y, out, S, W):
         if S.body_i[b, BODY_LAW] >= 0:
             out[to] = W.vel[EFFORT, S.body_i[b, V0]]
             to += 1
-    return status
