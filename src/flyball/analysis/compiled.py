@@ -42,6 +42,9 @@ class Compiled:
 
         Turns and places are those nearest to the last ones.
         """
+        s = self.structure
+        if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
+            raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.r_[q, v, self.z]
         out = evaluate(self.values.system, self.work, float(t), y, task)
         z = y[len(q) + len(v) :]
