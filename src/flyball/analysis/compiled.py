@@ -9,7 +9,10 @@ import numpy as np
 
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
+from ..system.coordinates import BodyState, coordinates, turned_angle
+from ..system.kinematics import motions, poses
 from ..system.motion import NONE
+from ..system.records import load
 from ..system.structure import Structure, structure
 from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, V0, Work
 from ..system.values import Values, values, work
@@ -56,6 +59,24 @@ class Compiled:
         for name, k in self.structure.state_at.items():
             if name in hints and not name.endswith(".work"):
                 self.z[k] = hints[name]
+
+    def moving(self, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
+        """How every body moves at a state."""
+        S, W = self.values.system, self.work
+        poses(S, W, q)
+        motions(S, W, v)
+        out = {}
+        for name, b in self.structure.place.items():
+            if b >= 0:
+                p, R, w, u, _, _ = (np.array(part) for part in load(W.BK, b))
+                angle = float(turned_angle(self.values, W, b, q)) if self.structure.model.planar else 0.0
+                out[name] = BodyState(p, R.reshape(3, 3), u, w, angle)
+        return out
+
+    def take(self, other: Compiled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, v) of this mechanism in the state (q, v) of the same one in other coordinates; turns and places too."""
+        self.follow(other.hints)
+        return coordinates(self.values, other.moving(q, v), other.hints)
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""

@@ -9,7 +9,7 @@ from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
 from ..system.motion import arrive, derivative, move, place, remember, report
-from ..system.tables import System, Work
+from ..system.tables import COORDINATES, System, Work
 
 POSITION, MOTION, INTEGRATE = 0, 1, 2
 
@@ -20,7 +20,7 @@ def perform(S, W, R, clock, out, task):
     y = clock.y[0]
     if task == POSITION:
         t = clock.real[0]
-        nq = S.kinds[-2]
+        nq = S.kinds[COORDINATES]
         z = y[nq + W.vel.shape[1] :]
         place(S, W, t, y[:nq], z)
         move(S, W, t, y[nq : nq + W.vel.shape[1]], z)

@@ -47,7 +47,7 @@ def composite(S, W):
         put3(C, b, 7, (J[4], J[5], J[8]))
     for b in range(n - 1, -1, -1):
         a = S.body_i[b, PARENT]
-        if a >= 0:
+        if a >= 0 and C[b, 0] > 0.0:
             m = C[a, 0] + C[b, 0]
             p, q = load3(C, a, 1), load3(C, b, 1)
             c = scale(1.0 / m, add(scale(C[a, 0], p), scale(C[b, 0], q)))

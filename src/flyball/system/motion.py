@@ -14,23 +14,31 @@ from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
+from .laws import evaluate_jet
 from .loads import efforts, forces, gather, inertial
 from .records import load
-from .rows import parameters, row_times
+from .rows import BY_TIME, parameters, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
     BETA,
+    BODY_LAW,
+    BODY_WORK,
+    COORDINATES,
+    EFFORT,
     EVALUATIONS,
     F_APPLIED,
     G_VALUE,
     GAMMA,
+    GIVEN,
     GUILTY,
     LAM,
     LENGTH,
     NU,
+    OFFSET,
     PASS,
     PROJECTIONS,
+    Q0,
     R2,
     RESIDUAL,
     ROW_WORK,
@@ -41,6 +49,7 @@ from .tables import (
     TERM_M,
     TOL_G,
     TOL_V,
+    V0,
     V3,
     WORST_G,
     WORST_V,
@@ -56,6 +65,19 @@ TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that a
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
+
+
+@formula
+def prepare(S, W, t, q, v):
+    """Unit quaternions; prescribed coordinates, velocities and accelerations (W.vel[GIVEN]) as their laws say."""
+    normalise(S, q)
+    for b in range(S.body_i.shape[0]):
+        law = S.body_i[b, BODY_LAW]
+        if law >= 0:
+            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+            q[S.body_i[b, Q0]] = f - S.body_x[b, OFFSET]
+            v[S.body_i[b, V0]] = f1
+            W.vel[GIVEN, S.body_i[b, V0]] = f2
 
 
 @formula
@@ -117,7 +139,6 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
-    normalise(S, q)
     place(S, W, t, q, z)
     if r.shape[0] == 0:
         move(S, W, t, v, z)
@@ -163,7 +184,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
 @formula
 def accelerate(S, W, t, p, dy, factored):
     """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
@@ -207,6 +228,12 @@ def accelerate(S, W, t, p, dy, factored):
     for k in range(S.row_i.shape[0]):
         if S.row_i[k, ROW_WORK] >= 0:
             work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:  # not for the integrator: the law says
+            d = S.body_i[b, V0]
+            work[S.body_i[b, BODY_WORK]] = W.vel[EFFORT, d] * v[d]
+            dy[S.body_i[b, Q0]] = 0.0
+            dy[nq + d] = 0.0
     progress(S, W, p[nq + nv :], work)
     W.info[STATUS] = finite(dy)
     return W.info[STATUS]
@@ -255,13 +282,14 @@ def finite(dy):
 @formula
 def derivative(t, y, dy, S, W):
     """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     p = W.y[0]
     for i in range(y.shape[0]):
         p[i] = y[i]
     q = p[:nq]
     v = p[nq : nq + W.vel.shape[1]]
     z = p[nq + W.vel.shape[1] :]
+    prepare(S, W, t, q, v)
     factored = False
     if W.option[STABILIZE] == STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
@@ -269,7 +297,6 @@ def derivative(t, y, dy, S, W):
             W.info[STATUS] = status
             return status
     else:
-        normalise(S, q)
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     return accelerate(S, W, t, p, dy, factored)
@@ -278,7 +305,7 @@ def derivative(t, y, dy, S, W):
 @formula
 def arrive(t, y, dy, S, W):
     """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]
     z = y[nq + W.vel.shape[1] :]
@@ -287,13 +314,13 @@ def arrive(t, y, dy, S, W):
     fault = W.stack.shape[0] - STACK_RESERVE
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]
+    prepare(S, W, t, q, v)
     if W.option[STABILIZE] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
             W.info[STATUS] = status
             return status, found
     else:
-        normalise(S, q)
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     remember(S, W, z)
@@ -303,7 +330,7 @@ def arrive(t, y, dy, S, W):
 @formula
 def report(t, y, out, S, W):
     """Write t, the state (projected first), vdot and lam to a row of the output."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     ny = y.shape[0]
     status, _ = arrive(t, y, W.y[1], S, W)
@@ -315,6 +342,12 @@ def report(t, y, out, S, W):
         out[1 + i] = y[i]
     for d in range(nv):
         out[1 + ny + d] = W.vel[X_SOLVED, d]
+    to = 1 + ny + nv
     for k in range(S.row_i.shape[0]):
-        out[1 + ny + nv + k] = W.row[LAM, k]
+        out[to + k] = W.row[LAM, k]
+    to += S.row_i.shape[0]
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:
+            out[to] = W.vel[EFFORT, S.body_i[b, V0]]
+            to += 1
     return status
