@@ -229,7 +229,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     except KeyError as error:
         raise ModelError(f"{where} is no complete result of flyball: {error} is missing") from None
     s = x.structure
-    wanted = {"q": s.nq, "v": s.nv, "multipliers": len(s.rows) + len(getattr(s, "prescribed", ()))}
+    wanted = {"q": s.nq, "v": s.nv, "multipliers": len(s.rows) + len(s.prescribed)}
     wanted["states"] = len(s.states)
     for name, n in wanted.items():
         if arrays[name].shape[1] != n:

@@ -20,7 +20,6 @@ from ..system.call import STACK_RESERVE
 from ..system.laws import evaluate_jet
 from ..system.loads import act, inertial
 from ..system.tables import PARENT
-from .records import tree_joint
 from .terms import Wrench, along, coefficient, nothing, term
 
 if TYPE_CHECKING:
@@ -41,7 +40,7 @@ class Reactions:
         """
         if joint not in self._known:
             force, torque = self._of_rows(joint)
-            if tree_joint(self._result.values.structure, joint) is not None:
+            if joint in self._result.values.structure.tree_joints:
                 more = self._of_tree(joint)
                 force, torque = add(force, more[0]), add(torque, more[1])
             self._known[joint] = force, torque
@@ -63,13 +62,13 @@ class Reactions:
     def _of_tree(self, name: str) -> Wrench:
         """What passes through a tree joint, less what drivers that prescribe its coordinates do."""
         result, s = self._result, self._result.values.structure
-        joint, tree = s.model[name], tree_joint(s, name)
+        joint, tree = s.model[name], s.tree_joints[name]
         force, torque = load3(self.through, tree.child, 0), load3(self.through, tree.child, 3)
         at = result.records.frame(s.frame_at[name, "M", ""])[0]
         torque = add(torque, cross(sub(result.records.body(tree.child)[0], at), force))
         if tree.reversed:
             force, torque = neg(force), neg(torque)
-        for driver in getattr(s, "prescribed", ()):
+        for driver in s.prescribed:
             owner, what = s.model.coordinate(s.model[driver].coordinate, s.model[driver])
             if owner is joint:
                 f, t = along(result, joint, what)

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.angle import unwrapped
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.joint import Coordinate, Joint
+from ..system.coordinates import turned_angle
 from ..system.records import at_rest, carried, load
-from ..system.structure import Structure
-from ..system.tables import NV, PARENT, Q0, TREE, V0
-from ..system.tree import PLANAR, column, motion, pose
+from ..system.tables import NV, PARENT, V0
+from ..system.tree import column, motion, pose
 from ..system.values import Values
 
 Record = tuple
@@ -99,27 +98,11 @@ class Records:
         """
         if b < 0:
             return np.zeros(self.n)
-        S = self.x.system
-        if S.body_i[b, TREE] == PLANAR:
-            return self.q[:, S.body_i[b, Q0] + 2]
-        R = load9(self.W.BK, b, 3)
-        return unwrapped(np.arctan2(R[3], R[0]), self._turning(b) - self._wound.get(self._names[b], 0.0))
-
-    def _turning(self, b: int) -> np.ndarray:
-        """The drawn angle and what the coordinates along the body's chain have turned it since."""
-        S = self.x.system
-        k, total = b, np.full(self.n, self.drawn_angle(b))
-        while k >= 0:
-            for i in range(S.body_i[k, NV]):
-                about_z = column(S, self.W, k, i)[0][2]  # in the plane as many coordinates as velocities
-                at = S.body_i[k, Q0] + i
-                total = total + about_z * (self.q[:, at] - self.x.q[at])
-            k = int(S.body_i[k, PARENT])
-        return total
+        return turned_angle(self.x, self.W, b, self.q.T) - self._wound.get(self._names[b], 0.0)
 
     def drawn_angle(self, b: int) -> float:
         """Angle [rad] of body b (-1: ground) of a planar mechanism as drawn, whole turns counted."""
-        return 0.0 if b < 0 else self.x.poses.turned(self.x.structure.model[self._names[b]])
+        return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
 
 
 def wound(x: Values, q: np.ndarray, angles: Mapping[str, float]) -> dict[str, float]:
@@ -142,26 +125,10 @@ def wound(x: Values, q: np.ndarray, angles: Mapping[str, float]) -> dict[str, fl
     dict
         Body -> how far its coordinates are ahead [rad]; those that are not are left out.
     """
-    nv = x.structure.nv
-    records = Records(x, q[None], np.zeros((1, nv)), np.zeros((1, nv)))
-    ahead = {
-        name: TURN * np.round((records._turning(x.structure.place[name])[0] - a) / TURN) for name, a in angles.items()
-    }
+    still = np.zeros((1, x.structure.nv))
+    records = Records(x, q[None], still, still)
+    ahead = {k: TURN * np.round((records.angle(x.structure.place[k])[0] - a) / TURN) for k, a in angles.items()}
     return {name: float(more) for name, more in ahead.items() if more != 0.0}
-
-
-def tree_joint(s: Structure, name: str) -> Any:
-    """What is known of a joint that is a tree joint (``child``, ``reversed``); None if it has rows only."""
-    return getattr(s, "tree_joints", {}).get(name)
-
-
-def tree_row(s: Structure, name: str, coordinate: str) -> int | None:
-    """Row of the body table whose one coordinate is that of a joint, if there is one."""
-    found = tree_joint(s, name)
-    if found is None:
-        return None
-    steps = zip(found.links, found.primitives, strict=False)
-    return next((row for row, p in steps if p.coordinate == coordinate and p.kind != "S"), None)
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:

@@ -10,8 +10,9 @@ from ...constraints import angle
 from ...constraints.registry import FORMULAS
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
+from ...system.forest import step_of
 from ...system.tables import Q0
-from ..records import TURN, coordinate_frames, tree_row, turned
+from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
 from .points import PointView
@@ -37,7 +38,7 @@ class JointView(View):
     def _turns(self, what: str, i: int, j: int) -> Any:
         """Something close to the measured angle that knows its whole turns."""
         s, S = self._x.structure, self._x.system
-        row = tree_row(s, self.element.name, what)
+        row = step_of(s, self.element.name, what)
         if row is not None:
             return self.element.coordinates[what].sign * self._result.q[:, S.body_i[row, Q0]]
         name = f"{self.element.name}.{what}"
