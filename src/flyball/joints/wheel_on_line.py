@@ -12,7 +12,7 @@ from ..constraints.blocks import ANGLE, SLIDE, STRAIGHT_LINE, Row
 from ..errors import ModelError
 from ..model.element import Angle, Length, Point, element
 from ..model.geometry import vector
-from ..model.joint import Z_TO_X, Coordinate, Joint, Primitive, WorldFrame
+from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
 
 
 @element
@@ -44,8 +44,6 @@ class WheelOnLine(Joint):
         "angle": Coordinate(ANGLE, turn_F=Z_TO_X, turn_M=Z_TO_X, offset="angle"),
         "displacement": Coordinate(SLIDE, offset="displacement"),
     }
-    chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("R", "y", "angle"))
-    kept: ClassVar = blocks[-1:]
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     spatial: ClassVar[bool] = False
