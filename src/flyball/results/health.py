@@ -29,8 +29,8 @@ class Health:
     seconds: float  # wall time, assembly included [s]
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
+    coordinates: str = ""  # "absolute: why", or "joint: why"
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
-    coordinates: str = ""  # "absolute", or "joint: why"
 
     def _found(self, name: str) -> Any:
         value = self.late[name]

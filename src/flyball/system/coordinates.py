@@ -133,7 +133,7 @@ def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tu
 
 def _about(a: np.ndarray, angle: float) -> np.ndarray:
     """Rotation about one of the three axes."""
-    K = np.cross(np.eye(3), a).T
+    K = np.cross(np.eye(3), a)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
