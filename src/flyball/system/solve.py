@@ -1,9 +1,10 @@
 """The one solve: [M G^T; G 0] [x; -lam] = [f; gamma], redundant and singular rows included.
 
 Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
-quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are regularised by a small part of each row's natural size D, and
-refined against the true equations until the residual of G x = gamma passes or stops falling (a proximal-point
-iteration: redundant rows cost nothing, and of all multipliers it finds those with least sum of D_k lam_k^2).
+quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are
+regularised by a small part of each row's natural size D, and refined against the true equations until the residual of
+G x = gamma passes or stops falling (a proximal-point iteration: redundant rows cost nothing, and of all multipliers it
+finds those with least sum of D_k lam_k^2).
 
 The regularisation is not small beyond need. Near a singular position a row combination with singular value s answers
 a rounding error e with e / s; refinement takes the regularisation out of everything that is well determined within a
@@ -19,7 +20,6 @@ from .mass import mass_entries
 from .rows import row_times
 from .tables import (
     BODY_LAW,
-    COUPLED,
     DIAGONAL,
     EFFORT,
     EXCESS,
@@ -218,9 +218,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 
 @formula
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
-    """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving.
-
-    """
+    """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.vel[V2]
     z = W.D[2]
     nv = x.shape[0]

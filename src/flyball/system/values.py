@@ -250,7 +250,9 @@ def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -
         start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
         if t.reversed:
             start, end = (pM, RM @ rest.T), (-RF.T @ pF, RF.T)
-        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [np.eye(3)]
+        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [
+            np.eye(3)
+        ]
         for k, (link, turn) in enumerate(zip(t.links, turns, strict=True)):
             p, R = start if k == 0 else (np.zeros(3), np.eye(3))
             body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
