@@ -10,11 +10,12 @@ import numpy as np
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
 from ..system.coordinates import BodyState, coordinates, turned_angle
+from ..system.forest import steps
 from ..system.kinematics import motions, poses
 from ..system.motion import NONE
 from ..system.records import load
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, V0, Work
+from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -78,8 +79,18 @@ class Compiled:
 
     def take(self, other: Compiled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(q, v) of this mechanism in the state (q, v) of the same one in other coordinates; turns and places too."""
-        self.follow(other.hints)
-        return coordinates(self.values, other.moving(q, v), other.hints)
+        hints = other.hints | other.turned(q)
+        self.follow(hints)
+        return coordinates(self.values, other.moving(q, v), hints)
+
+    def turned(self, q: np.ndarray) -> dict[str, float]:
+        """Angles of joints that are coordinates, by name, as the states that count turns have them."""
+        s = self.structure
+        return {
+            f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["body_i"][row, Q0]]
+            for t, row, p in steps(s)
+            if p.kind == "R" and p.coordinate in t.joint.coordinates
+        }
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""

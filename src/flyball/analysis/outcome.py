@@ -45,6 +45,7 @@ def outcome(
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
+    result.wound = start.wound
     health.late = {
         "mobility": partial(mobility, model, start.base),
         "energy_drift": partial(_energy_drift, result),

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..results.records import wound
 from ..results.result import Result
-from ..system.tables import G_VALUE, SEMIDEFINITE
+from ..system.tables import G_VALUE, Q0, SEMIDEFINITE
 from .assemble import Assembly, assemble
 from .compiled import compiled
 from .layer import in_coordinates
@@ -25,6 +26,7 @@ class Start:
     assembly: Assembly
     y: np.ndarray
     coordinates: str  # which they are, and why
+    wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
 
 
 def begin(
@@ -43,7 +45,16 @@ def begin(
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base)  # refuses bodies that can move without inertia
     a, why = in_coordinates(base, coordinates, parameters)
-    return Start(base, a, a.y if before is None else _gone_on(before, a), why)
+    y = a.y if before is None else _gone_on(before, a)
+    return Start(base, a, y, why, _wound(base, a, y))
+
+
+def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
+    s = a.compiled.structure
+    if not s.tree or not s.model.planar:
+        return {}
+    moving = base.compiled.moving(base.q, base.v)
+    return wound(a.compiled.values, y[: s.nq], {name: state.angle for name, state in moving.items()})
 
 
 def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
@@ -65,6 +76,8 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, q, v)
+    for name, more in before.wound.items():
+        q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
     return Assembly(plain, t, q, v)
 
 

@@ -69,20 +69,23 @@ def coordinates(
     return q, v
 
 
-def turned_angle(x: Values, W: Any, b: int, q: np.ndarray) -> float:
-    """Turned angle of body b of a planar mechanism, whole turns counted, at the poses in W, which belong to q."""
+def turned_angle(x: Values, W: Any, b: int, q: np.ndarray) -> Any:
+    """Turned angle of body b of a planar mechanism, whole turns counted, at the poses in W, which belong to q.
+
+    A number for q (nq,), an array over time for (nq, n).
+    """
     S = x.system
     if S.body_i[b, TREE] == PLANAR:
-        return float(q[S.body_i[b, Q0] + 2])
+        return q[S.body_i[b, Q0] + 2]
     name = next(k for k, row in x.structure.place.items() if row == b)
     near, k = x.bodies[name].angle, b
     while k >= 0:
         for i in range(S.body_i[k, NV]):
             at = S.body_i[k, Q0] + i
-            near += column(S, W, k, i)[0][2] * (q[at] - x.q[at])
+            near = near + column(S, W, k, i)[0][2] * (q[at] - x.q[at])
         k = S.body_i[k, PARENT]
     angle = np.arctan2(W.BK[b, 6], W.BK[b, 3])
-    return float(angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi)))
+    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
 
 
 def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
@@ -130,7 +133,7 @@ def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tu
 
 def _about(a: np.ndarray, angle: float) -> np.ndarray:
     """Rotation about one of the three axes."""
-    K = np.cross(np.eye(3), a).T
+    K = np.cross(np.eye(3), a)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
