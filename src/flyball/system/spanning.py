@@ -21,18 +21,13 @@ def saved(joint: Joint, planar: bool) -> int:
 
 
 def candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
-    """Joints that are worth being tree joints -> rows saved.
-
-    A chain of many massless links that saves few rows costs more than it saves. Joints whose reaction a friction needs
-    must be rows.
-    """
+    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows."""
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
     out = {}
     for joint in model.joints:
         worth = saved(joint, model.planar)
         a, b = ends(model, joint)
-        steps = len(joint.primitives(model.planar))
-        if worth > steps and a != b and joint.name not in needed and joint.name not in avoided:
+        if worth > 0 and a != b and joint.name not in needed and joint.name not in avoided:
             out[joint.name] = worth
     return out
 
