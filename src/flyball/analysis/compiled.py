@@ -9,9 +9,13 @@ import numpy as np
 
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
+from ..system.coordinates import BodyState, coordinates, turned_angle
+from ..system.forest import steps
+from ..system.kinematics import motions, poses
 from ..system.motion import NONE
+from ..system.records import load
 from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, STABILIZE, V0, Work
+from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..system.values import Values, values, work
 from .entry import POSITION, evaluate
 
@@ -39,6 +43,9 @@ class Compiled:
 
         Turns and places are those nearest to the last ones.
         """
+        s = self.structure
+        if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
+            raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.r_[q, v, self.z]
         out = evaluate(self.values.system, self.work, float(t), y, task)
         z = y[len(q) + len(v) :]
@@ -56,6 +63,34 @@ class Compiled:
         for name, k in self.structure.state_at.items():
             if name in hints and not name.endswith(".work"):
                 self.z[k] = hints[name]
+
+    def moving(self, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
+        """How every body moves at a state."""
+        S, W = self.values.system, self.work
+        poses(S, W, q)
+        motions(S, W, v)
+        out = {}
+        for name, b in self.structure.place.items():
+            if b >= 0:
+                p, R, w, u, _, _ = (np.array(part) for part in load(W.BK, b))
+                angle = float(turned_angle(self.values, W, b, q)) if self.structure.model.planar else 0.0
+                out[name] = BodyState(p, R.reshape(3, 3), u, w, angle)
+        return out
+
+    def take(self, other: Compiled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, v) of this mechanism in the state (q, v) of the same one in other coordinates; turns and places too."""
+        hints = other.hints | other.turned(q)
+        self.follow(hints)
+        return coordinates(self.values, other.moving(q, v), hints)
+
+    def turned(self, q: np.ndarray) -> dict[str, float]:
+        """Angles of joints that are coordinates, by name, as the states that count turns have them."""
+        s = self.structure
+        return {
+            f"{t.joint.name}.{p.coordinate}": t.joint.coordinates[p.coordinate].sign * q[s.tables["body_i"][row, Q0]]
+            for t, row, p in steps(s)
+            if p.kind == "R" and p.coordinate in t.joint.coordinates
+        }
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""

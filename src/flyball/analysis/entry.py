@@ -8,10 +8,11 @@ from .._jit import formula, kernel
 from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
+from ..system.follow import follow
 from ..system.motion import arrive, derivative, move, place, remember, report
-from ..system.tables import System, Work
+from ..system.tables import COORDINATES, System, Work
 
-POSITION, MOTION, INTEGRATE = 0, 1, 2
+POSITION, MOTION, INTEGRATE, FOLLOW = range(4)
 
 
 @formula
@@ -20,7 +21,7 @@ def perform(S, W, R, clock, out, task):
     y = clock.y[0]
     if task == POSITION:
         t = clock.real[0]
-        nq = S.kinds[-2]
+        nq = S.kinds[COORDINATES]
         z = y[nq + W.vel.shape[1] :]
         place(S, W, t, y[:nq], z)
         move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
@@ -28,6 +29,8 @@ def perform(S, W, R, clock, out, task):
         return 0
     if task == MOTION:
         return derivative(clock.real[0], y, clock.K[0], S, W)
+    if task == FOLLOW:
+        return follow(S, W, clock, out)
     return advance(derivative, arrive, report, S, W, R, clock, out)
 
 
@@ -37,7 +40,8 @@ def motion_kernel(S, W, R, clock, out, task):
 
     POSITION: kinematics and rows at the clock's state are left in W; the state's turns and places on curves are
     brought up to it. MOTION: also its derivative, in clock.K[0].
-    INTEGRATE: go on with the integration; returns the number of output rows written. The others return a status.
+    INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe; both return the number of
+    output rows written. The others return a status.
     """
     return perform(S, W, R, clock, out, task)
 

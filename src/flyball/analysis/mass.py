@@ -10,8 +10,8 @@ import numpy as np
 
 from ..model.inertia import principal, shifted
 from ..model.model import Model
+from ..results.records import Records
 from ..system.structure import structure
-from ..system.tree import PLANAR
 from ..system.values import Values, values
 from .assemble import assemble
 
@@ -143,12 +143,15 @@ def mass_properties(model: Model, *, drawn: bool = False, parameters: Mapping[st
 
 
 def report(model: Model, x: Values, q: np.ndarray) -> MassReport:
-    """The report for coordinates ``q``, those of free bodies."""
+    """The report for coordinates ``q``."""
+    still = np.zeros((1, x.structure.nv))
+    records = Records(x, q[None], still, still)
     bodies = {}
     placed = []
     for b in model.bodies:
         d = x.bodies[b.name]
-        c, R = _pose(x, q, b.name)
+        p, turn = records.body(x.structure.place[b.name])[:2]
+        c, R = np.ravel(p), np.reshape(turn, (3, 3))
         J = np.asarray(d.inertia).real
         bodies[b.name] = _properties(float(d.mass.real), d.com.real, c, J, d.volume, model.planar)
         placed.append((float(d.mass.real), c, R @ J @ R.T))
@@ -158,16 +161,6 @@ def report(model: Model, x: Values, q: np.ndarray) -> MassReport:
     volumes = [b.volume for b in bodies.values()]
     volume = None if None in volumes else sum(volumes)  # type: ignore[arg-type]
     return MassReport(model.name, model.planar, bodies, _properties(mass, com, com, inertia, volume, model.planar))
-
-
-def _pose(x: Values, q: np.ndarray, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Centre of mass and rotation of a body in the world."""
-    from ..model.geometry import quaternion_to_matrix, rotation_about
-
-    _, kind, q0 = x.structure.tables["body_i"][x.structure.place[name], :3]
-    if kind == PLANAR:
-        return np.array([q[q0], q[q0 + 1], 0.0]), rotation_about(2, q[q0 + 2])
-    return q[q0 : q0 + 3], quaternion_to_matrix(q[q0 + 3 : q0 + 7])
 
 
 def _properties(

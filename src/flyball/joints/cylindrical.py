@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import ANGLE, PARALLEL_AXES, SLIDE, STRAIGHT_LINE
 from ..model.element import Angle, Length, element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -34,6 +34,7 @@ class Cylindrical(Joint):
         "angle": Coordinate(ANGLE, offset="angle"),
         "displacement": Coordinate(SLIDE, offset="displacement"),
     }
+    chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("R", coordinate="angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "cylindrical"

@@ -23,4 +23,5 @@ class Fixed(Joint):
     """
 
     blocks: ClassVar = COMMON_POINT + SAME_AXES
+    chain: ClassVar = ()
     drawn: ClassVar[str] = "fixed"

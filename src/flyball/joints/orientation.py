@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import SAME_AXES, shift
 from ..model.element import element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -27,4 +27,5 @@ class Orientation(Joint):
 
     blocks: ClassVar = SAME_AXES
     coordinates: ClassVar = {a: Coordinate(shift(a)) for a in "xyz"}
+    chain: ClassVar = tuple(Primitive("P", a, a) for a in "xyz")
     drawn: ClassVar[str] = "orientation"

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import ANGLE, IN_PLANE, PARALLEL_AXES, shift
 from ..model.element import Angle, element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -36,6 +36,7 @@ class Planar(Joint):
         "x": Coordinate(shift("x")),
         "y": Coordinate(shift("y")),
     }
+    chain: ClassVar = (Primitive("P", "x", "x"), Primitive("P", "y", "y"), Primitive("R", "z", "angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "planar"

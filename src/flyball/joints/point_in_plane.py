@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import IN_PLANE, shift
 from ..model.element import element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -28,6 +28,7 @@ class PointInPlane(Joint):
 
     blocks: ClassVar = (IN_PLANE,)
     coordinates: ClassVar = {"x": Coordinate(shift("x")), "y": Coordinate(shift("y"))}
+    chain: ClassVar = (Primitive("P", "x", "x"), Primitive("P", "y", "y"), Primitive("S"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "point_in_plane"

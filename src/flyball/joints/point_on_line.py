@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import ANGLE, SLIDE, STRAIGHT_LINE
 from ..model.element import Angle, Length, element
-from ..model.joint import Z_TO_X, Coordinate, Joint
+from ..model.joint import Z_TO_X, Coordinate, Joint, Primitive
 
 
 @element
@@ -30,6 +30,7 @@ class PointOnLine(Joint):
 
     blocks: ClassVar = STRAIGHT_LINE
     coordinates: ClassVar = {"displacement": Coordinate(SLIDE, offset="displacement")}
+    chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("S", coordinate="angle"))
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     drawn: ClassVar[str] = "point_on_line"

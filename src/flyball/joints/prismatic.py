@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import SAME_AXES, SLIDE, STRAIGHT_LINE
 from ..model.element import Length, element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -30,6 +30,7 @@ class Prismatic(Joint):
 
     blocks: ClassVar = STRAIGHT_LINE + SAME_AXES
     coordinates: ClassVar = {"displacement": Coordinate(SLIDE, offset="displacement")}
+    chain: ClassVar = (Primitive("P", coordinate="displacement"),)
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     drawn: ClassVar[str] = "prismatic"

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import ANGLE, COMMON_POINT, PARALLEL_AXES
 from ..model.element import Angle, element
-from ..model.joint import Coordinate, Joint
+from ..model.joint import Coordinate, Joint, Primitive
 
 
 @element
@@ -30,5 +30,6 @@ class Revolute(Joint):
 
     blocks: ClassVar = COMMON_POINT + PARALLEL_AXES
     coordinates: ClassVar = {"angle": Coordinate(ANGLE, offset="angle")}
+    chain: ClassVar = (Primitive("R", coordinate="angle"),)
     needs_axis: ClassVar[bool] = True
     drawn: ClassVar[str] = "revolute"

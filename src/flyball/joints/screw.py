@@ -9,7 +9,7 @@ from typing import ClassVar
 from ..constraints.blocks import ANGLE, PARALLEL_AXES, SLIDE, STRAIGHT_LINE
 from ..errors import ModelError
 from ..model.element import Angle, Length, element
-from ..model.joint import Coordinate, Joint, WorldFrame
+from ..model.joint import Coordinate, Joint, Primitive, WorldFrame
 
 TURN = 6.283185307179586
 
@@ -42,6 +42,8 @@ class Screw(Joint):
         "angle": Coordinate(ANGLE, offset="angle"),
         "displacement": Coordinate(SLIDE, offset="displacement"),
     }
+    chain: ClassVar = (Primitive("P", coordinate="displacement"), Primitive("R", coordinate="angle"))
+    kept: ClassVar = blocks[-1:]
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "screw"

@@ -6,7 +6,7 @@ from typing import ClassVar
 
 from ..constraints.blocks import COMMON_POINT
 from ..model.element import element
-from ..model.joint import Joint
+from ..model.joint import Joint, Primitive
 
 
 @element
@@ -23,5 +23,6 @@ class Spherical(Joint):
     """
 
     blocks: ClassVar = COMMON_POINT
+    chain: ClassVar = (Primitive("S"),)
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "spherical"

@@ -11,7 +11,7 @@ from ..constraints.blocks import ANGLE, COMMON_POINT, CROSSED_AXES
 from ..errors import ModelError
 from ..model.element import Angle, Directions, element
 from ..model.geometry import vector
-from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
+from ..model.joint import Z_TO_X, Coordinate, Joint, Primitive, WorldFrame
 
 
 @element
@@ -41,6 +41,8 @@ class Universal(Joint):
         "angle_1": Coordinate(ANGLE, "FM", turn_M=Z_TO_X, offset="angle_1"),
         "angle_2": Coordinate(ANGLE, "MF", turn_F=Z_TO_X, sign=-1.0, offset="angle_2"),
     }
+    chain: ClassVar = (Primitive("R", "z", "angle_1"), Primitive("R", "x", "angle_2"))
+    rest: ClassVar = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "universal"
 

@@ -37,6 +37,19 @@ class Coordinate:
 
 
 @dataclass(frozen=True)
+class Primitive:
+    """One step of the chain that a joint is made of where it is a tree joint, from frame F to frame M."""
+
+    kind: str  # "R" turns about the axis, "P" slides along it, "S" turns about its point
+    axis: str = "z"  # of the frame it starts from; F as it has been moved
+    coordinate: str = ""  # the joint's coordinate that it is, if that has a name
+
+
+FLOATING = (Primitive("P", "x"), Primitive("P", "y"), Primitive("P", "z"), Primitive("S"))
+"""A chain that leaves everything free: for joints that have none of their own."""
+
+
+@dataclass(frozen=True)
 class Joint(Element):
     """Rows of constraint between a frame F on ``body_i`` and a frame M on ``body_j``.
 
@@ -52,6 +65,9 @@ class Joint(Element):
     category: ClassVar[str] = "joints"
     blocks: ClassVar[tuple[Row, ...]] = ()
     coordinates: ClassVar[dict[str, Coordinate]] = {}
+    chain: ClassVar[tuple[Primitive, ...] | None] = None  # what it leaves free, slides first; None: no chain of its own
+    kept: ClassVar[tuple[Row, ...]] = ()  # blocks that its chain leaves to be fulfilled
+    rest: ClassVar[tuple[tuple[float, ...], ...]] = ()  # M in F, axes as columns, where every coordinate is zero
     planar_normal: ClassVar[str] = "z"  # joint axis that points out of the plane; "" if it cannot be planar
     spatial: ClassVar[bool] = True
     in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
@@ -71,6 +87,19 @@ class Joint(Element):
         if not planar:
             return list(self.blocks)
         return [r for r in self.blocks if ("z" if r.world else self.planar_normal) not in r.axes]
+
+    def primitives(self, planar: bool) -> tuple[Primitive, ...]:
+        """Its chain as a tree joint: in the plane, what leaves it falls away."""
+        chain = FLOATING if self.chain is None else self.chain
+        if not planar:
+            return chain
+        normal = self.planar_normal
+        flat = (Primitive("R", normal, p.coordinate) if p.kind == "S" else p for p in chain)
+        return tuple(p for p in flat if (p.kind == "R") == (p.axis == normal))
+
+    def loose(self, planar: bool) -> list[Row]:
+        """The rows that remain where it is a tree joint."""
+        return [r for r in self.rows(planar) if self.chain is None or r in self.kept]
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """F and M (origin, rotation) in world coordinates of the drawn configuration, for a joint given by ``at``."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 GROUP = "flyball"
-FORMAT = 1
+FORMAT = 2  # 1: before joint coordinates
 ARRAYS = {
     "t": ("time",),
     "q": ("time", "nq"),
@@ -148,6 +148,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "health": json.dumps(result.health.as_dict()),
         "tree": json.dumps(list(s.tree)),
         "parameters": json.dumps(list(result.model.parameters)),
+        "wound": json.dumps(result.wound),
     }
     for name, text in texts.items():
         group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
@@ -227,7 +228,9 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
         health = _health(json.loads(stored["health"]))
     except KeyError as error:
         raise ModelError(f"{where} is no complete result of flyball: {error} is missing") from None
-    wanted = {"q": x.structure.nq, "v": x.structure.nv, "multipliers": len(x.structure.rows)}
+    s = x.structure
+    wanted = {"q": s.nq, "v": s.nv, "multipliers": len(s.rows) + len(s.prescribed)}
+    wanted["states"] = len(s.states)
     for name, n in wanted.items():
         if arrays[name].shape[1] != n:
             raise ModelError(
@@ -235,6 +238,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
             )
     result = Result(model, x, health=health, **arrays)
     result.final = (float(final[0]), final[1:])
+    result.wound = json.loads(stored.get("wound", "{}"))
     return result
 
 

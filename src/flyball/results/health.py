@@ -29,6 +29,7 @@ class Health:
     seconds: float  # wall time, assembly included [s]
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
+    coordinates: str = ""  # "absolute: why", or "joint: why"
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
 
     def _found(self, name: str) -> Any:
@@ -81,17 +82,21 @@ class Health:
         """Label and text of what a reader wants to see first."""
         out = [
             ("status", "done" if self.success else self.message),
+            *([("coordinates", self.coordinates)] if self.coordinates else []),
             ("freedoms", str(self.freedoms)),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
             ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
             ("time used", f"{self.seconds:.2f} s"),
         ]
+        more = []
         if self.redundant:
-            out.insert(2, ("redundant", ", ".join(self.redundant)))
+            more.append(("redundant", ", ".join(self.redundant)))
         if self.undetermined:
             text = "; ".join(f"{k}: {', '.join(v)}" for k, v in self.undetermined.items())
-            out.insert(3, ("reactions not determined", text))
+            more.append(("reactions not determined", text))
+        after = 1 + next(k for k, (label, _) in enumerate(out) if label == "freedoms")
+        out[after:after] = more
         crept = {k: c for k, c in self.creep.items() if c[1] > 0.0}
         if crept:
             text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..constraints.registry import FORMULAS
 from ..math.vec import dot, sub
-from ..system.rows import parameters
+from .terms import coefficient, term
 
 if TYPE_CHECKING:
     from .result import Result
@@ -28,19 +27,24 @@ class Measured:
             self._known[m] = self._found(m)
         return self._known[m]
 
-    def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
-        result, s, S = self._result, self._result.values.structure, self._result.values.system
-        r = result.records
-        value, rate = np.zeros(r.n), np.zeros(r.n)
+    @cached_property
+    def _terms(self) -> dict[int, list[int]]:
+        """Terms of every quantity."""
+        s = self._result.values.structure
+        out: dict[int, list[int]] = {m: [] for m in range(len(s.measured))}
         for k, t in enumerate(s.terms):
-            if t.row != len(s.rows) + m:
-                continue
-            F, M = r.frame(t.F), r.frame(t.M)
-            hint = result.states[:, t.hint] if t.hint >= 0 else 0.0
-            par = parameters(S.term_x, k)
-            g, f, tM, tF, _ = FORMULAS[t.formula.kind](par, F, M, hint, S.const)
-            value = value + par[7] * g
-            rate = rate + par[7] * (dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2]))
+            if t.measured:
+                out[t.row - len(s.rows)].append(k)
+        return out
+
+    def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
+        n = self._result.records.n
+        value, rate = np.zeros(n), np.zeros(n)
+        for k in self._terms[m]:
+            F, M, (g, f, tM, tF, _) = term(self._result, k)
+            c = coefficient(self._result, k)
+            value = value + c * g
+            rate = rate + c * (dot(f, sub(M[3], F[3])) + dot(tM, M[2]) + dot(tF, F[2]))
         return value, rate
 
     @cached_property

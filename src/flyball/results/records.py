@@ -2,26 +2,34 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from ..math.vec import add, cross, load3, load9, scale, sub
+from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.joint import Coordinate, Joint
+from ..system.coordinates import turned_angle
 from ..system.records import at_rest, carried, load
-from ..system.tables import PARENT, V0
+from ..system.tables import NV, PARENT, V0
 from ..system.tree import column, motion, pose
 from ..system.values import Values
 
 Record = tuple
+TURN = 2.0 * np.pi
 
 
 class Records:
-    """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number."""
+    """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number.
 
-    def __init__(self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray) -> None:
-        self.x = x
+    ``wound``: body -> whole turns [rad] that its coordinates count and its angle does not (`Result.wound`).
+    """
+
+    def __init__(
+        self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, wound: Mapping[str, float] | None = None
+    ) -> None:
+        self.x, self.q = x, q
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
@@ -31,27 +39,40 @@ class Records:
         for b in range(nb):
             pose(S, self.W, b, q.T)
             motion(S, self.W, b, v.T)
-        self._bodies = [self._moving(b, vdot.T) for b in range(nb)]
+        self._accelerate(vdot.T)
         self._frames: dict[int, Record] = {}
+        self._names = {b: name for name, b in x.structure.place.items() if b >= 0}
+        self._wound = wound or {}
 
-    def _moving(self, b: int, vdot: np.ndarray) -> Record:
-        """Record of a body with its true accelerations: the bias plus every twist column times its vdot."""
+    def _accelerate(self, vdot: np.ndarray) -> None:
+        """Make the bias accelerations in W.BK true ones.
+
+        What is missing passes from parent to child as if they were one body, and every twist column adds its vdot.
+        """
         S, W = self.x.system, self.W
-        p, R, w, v, alpha, a = load(W.BK, b)
-        k = b
-        while k >= 0:
-            arm = sub(p, load3(W.O, k, 0))
-            for i in range(S.body_i[k, 5]):
-                turn, shift = column(S, W, k, i)
-                s = vdot[S.body_i[k, V0] + i]
+        missing: list[tuple[tuple, tuple]] = []
+        for b in range(len(S.body_i)):
+            p, _, _, _, bias_alpha, bias_a = load(W.BK, b)
+            alpha = a = (0.0, 0.0, 0.0)
+            parent = int(S.body_i[b, PARENT])
+            if parent >= 0:
+                alpha, a = missing[parent]
+                a = add(a, cross(alpha, sub(p, load3(W.BK, parent, 0))))
+            arm = sub(p, load3(W.O, b, 0))
+            for i in range(S.body_i[b, NV]):
+                turn, shift = column(S, W, b, i)
+                s = vdot[S.body_i[b, V0] + i]
                 alpha = add(alpha, scale(s, turn))
                 a = add(a, scale(s, add(shift, cross(turn, arm))))
-            k = S.body_i[k, PARENT]
-        return p, R, w, v, alpha, a
+            missing.append((alpha, a))
+        for b, (alpha, a) in enumerate(missing):
+            _, _, _, _, bias_alpha, bias_a = load(W.BK, b)
+            put3(W.BK, b, 18, add(bias_alpha, alpha))
+            put3(W.BK, b, 21, add(bias_a, a))
 
     def body(self, b: int) -> Record:
         """Record of body b's centre of mass."""
-        return self._bodies[b]
+        return load(self.W.BK, b)
 
     def frame(self, k: int) -> Record:
         """Record of frame k."""
@@ -65,10 +86,49 @@ class Records:
     def carried(self, b: int, offset: tuple, turn: tuple) -> Record:
         """Record of a point and axes carried by body b (-1: ground)."""
         if b >= 0:
-            return carried(self._bodies[b], offset, turn)
+            return carried(self.body(b), offset, turn)
         zero = np.zeros(self.n)
         p, R, *rest = at_rest(offset, turn, zero)
         return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
+
+    def angle(self, b: int) -> np.ndarray:
+        """Turned angle [rad] of body b (-1: ground) of a planar mechanism, whole turns counted; (n,).
+
+        It is the drawn angle in the drawn configuration and goes on from there, whichever coordinates are below.
+        """
+        if b < 0:
+            return np.zeros(self.n)
+        return turned_angle(self.x, self.W, b, self.q.T) - self._wound.get(self._names[b], 0.0)
+
+    def drawn_angle(self, b: int) -> float:
+        """Angle [rad] of body b (-1: ground) of a planar mechanism as drawn, whole turns counted."""
+        return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
+
+
+def wound(x: Values, q: np.ndarray, angles: Mapping[str, float]) -> dict[str, float]:
+    """Whole turns that coordinates count and the angles of bodies do not.
+
+    A joint that is told to begin two turns on has them in its coordinate where that is one of the mechanism's; the
+    bodies are no further on for it.
+
+    Parameters
+    ----------
+    x : Values
+        Of a planar mechanism.
+    q : ndarray (nq,)
+        Its coordinates at the start.
+    angles : mapping
+        Body -> its turned angle there [rad].
+
+    Returns
+    -------
+    dict
+        Body -> how far its coordinates are ahead [rad]; those that are not are left out.
+    """
+    still = np.zeros((1, x.structure.nv))
+    records = Records(x, q[None], still, still)
+    ahead = {k: TURN * np.round((records.angle(x.structure.place[k])[0] - a) / TURN) for k, a in angles.items()}
+    return {name: float(more) for name, more in ahead.items() if more != 0.0}
 
 
 def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, Any], tuple[int, Any], Coordinate]:
@@ -83,6 +143,4 @@ def coordinate_frames(x: Values, joint: Joint, what: str) -> tuple[tuple[int, An
 
 def turned(record: Record, turn: Any) -> Record:
     """The record with its axes turned by a constant rotation."""
-    from ..math.vec import mm
-
     return (record[0], mm(record[1], tuple(np.asarray(turn).ravel())), *record[2:])

@@ -14,6 +14,7 @@ from ..system.values import Values
 from .energy import Energy
 from .health import Health
 from .measured import Measured
+from .reactions import Reactions
 from .records import Records
 from .views import View, view
 
@@ -34,11 +35,14 @@ class Result:
     q, v, vdot : ndarray
         Coordinates, velocities and accelerations of the compiled mechanism.
     multipliers : ndarray
-        One for each constraint row.
+        One for each constraint row; then the effort of each driver that prescribes one of the coordinates.
     states : ndarray
         Work of accounted elements and turned angles.
     health : Health
     energy : Energy
+    wound : dict
+        Planar body -> whole turns [rad] that coordinates count and its angle does not (`records.wound`): those that a
+        joint was told to begin with.
     """
 
     def __init__(
@@ -56,6 +60,7 @@ class Result:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v, self.states, self.vdot, self.multipliers = t, q, v, states, vdot, multipliers
         self.final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
+        self.wound: dict[str, float] = {}
         self.energy = Energy(self)
 
     @property
@@ -66,12 +71,17 @@ class Result:
     @cached_property
     def records(self) -> Records:
         """Kinematics of every body and frame at the output times."""
-        return Records(self.values, self.q, self.v, self.vdot)
+        return Records(self.values, self.q, self.v, self.vdot, self.wound)
 
     @cached_property
     def measured(self) -> Measured:
         """Quantities that forces act along and that laws name."""
         return Measured(self)
+
+    @cached_property
+    def reactions(self) -> Reactions:
+        """Wrenches that joints carry."""
+        return Reactions(self)
 
     def __getitem__(self, name: str) -> Any:
         """A part by its name, or one of its curves by ``"part.curve"``."""

@@ -14,26 +14,36 @@ from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
+from .laws import evaluate_jet
 from .loads import efforts, forces, gather, inertial
 from .records import load
-from .rows import parameters, row_times
+from .rows import BY_TIME, parameters, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
     BETA,
+    BODY_LAW,
+    BODY_WORK,
+    COORDINATES,
+    EFFORT,
     EVALUATIONS,
     F_APPLIED,
     G_VALUE,
     GAMMA,
+    GIVEN,
     GUILTY,
     LAM,
     LENGTH,
     NU,
+    OFFSET,
     PASS,
     PROJECTIONS,
+    Q0,
     R2,
     RESIDUAL,
     ROW_WORK,
+    SCHUR,
+    SOLVER,
     STABILIZE,
     STATUS,
     TERM_F,
@@ -41,6 +51,7 @@ from .tables import (
     TERM_M,
     TOL_G,
     TOL_V,
+    V0,
     V3,
     WORST_G,
     WORST_V,
@@ -50,12 +61,26 @@ from .tree import normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
+OLD, NEAR, HERE = range(3)
 PASSES = 16
 CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
 FAR = 1e3  # a state this far off is given up at once
+
+
+@formula
+def prepare(S, W, t, q, v):
+    """Unit quaternions; prescribed coordinates, velocities and accelerations (W.vel[GIVEN]) as their laws say."""
+    normalise(S, q)
+    for b in range(S.body_i.shape[0]):
+        law = S.body_i[b, BODY_LAW]
+        if law >= 0:
+            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+            q[S.body_i[b, Q0]] = f - S.body_x[b, OFFSET]
+            v[S.body_i[b, V0]] = f1
+            W.vel[GIVEN, S.body_i[b, V0]] = f2
 
 
 @formula
@@ -111,32 +136,31 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
     lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
-    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, whether the factor in W
-    is good for a solve here).
+    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
+    OLD, of poses NEARby or of those HERE).
     """
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
-    normalise(S, q)
     place(S, W, t, q, z)
     if r.shape[0] == 0:
         move(S, W, t, v, z)
-        return 0, 0.0, False
+        return 0, 0.0, OLD
     worst = violation(W, r)
     found = worst
     last = 1e300
-    factored = False
+    factored = OLD
     for _ in range(PASSES):
         if worst <= tol_g or (worst > 0.7 * last and worst <= CLOSED):
             break
         if not worst <= FAR:
-            return NOT_CLOSED, found, False
-        if not factored or worst > SLOW * last:
+            return NOT_CLOSED, found, OLD
+        if factored == OLD or worst > SLOW * last:
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, False
-            factored = True
+                return NOT_CLOSED, found, OLD
         else:
-            factored = reuse(S, W)
+            reuse(S, W)
+        factored = NEAR
         last = worst
         solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         retract(S, q, step)
@@ -144,15 +168,15 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
-        return NOT_CLOSED, found, False
+        return NOT_CLOSED, found, OLD
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (1.0 + size):
-        if factored:
-            factored = reuse(S, W)
-        if not factored or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
+        if factored == NEAR:
+            reuse(S, W)
+        if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, False
-            factored = True
+                return NOT_CLOSED, found, OLD
+            factored = HERE
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
@@ -163,7 +187,7 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
 @formula
 def accelerate(S, W, t, p, dy, factored):
     """Dy at the settled state p, whose kinematics and rows are in W; vdot and lam are left in W. Returns a status."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     v = p[nq : nq + nv]
     work = dy[nq + nv :]
@@ -173,8 +197,11 @@ def accelerate(S, W, t, p, dy, factored):
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
     x = W.vel[X_SOLVED]
-    if factored:
-        factored = reuse(S, W)
+    if factored == NEAR:
+        if S.kinds[SOLVER] == SCHUR:
+            reuse(S, W)
+        else:
+            factored = OLD  # M is another one here
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
@@ -183,13 +210,13 @@ def accelerate(S, W, t, p, dy, factored):
         gather(S, W, W.vel[F_APPLIED])
         efforts(S, W, t, work, W.vel[F_APPLIED])
         if (
-            not factored
+            factored == OLD
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
         ):
             if factor(S, W) != 0:
                 W.info[STATUS] = SINGULAR
                 return SINGULAR
-            factored = True
+            factored = HERE
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
         if S.load_i.shape[0] == 0:
             break
@@ -207,6 +234,12 @@ def accelerate(S, W, t, p, dy, factored):
     for k in range(S.row_i.shape[0]):
         if S.row_i[k, ROW_WORK] >= 0:
             work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:  # not for the integrator: the law says
+            d = S.body_i[b, V0]
+            work[S.body_i[b, BODY_WORK]] = W.vel[EFFORT, d] * v[d]
+            dy[S.body_i[b, Q0]] = 0.0
+            dy[nq + d] = 0.0
     progress(S, W, p[nq + nv :], work)
     W.info[STATUS] = finite(dy)
     return W.info[STATUS]
@@ -255,21 +288,21 @@ def finite(dy):
 @formula
 def derivative(t, y, dy, S, W):
     """dy/dt = f(P(y)) with P the projection; ``y`` is left as it is. Returns 0 or a status."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     p = W.y[0]
     for i in range(y.shape[0]):
         p[i] = y[i]
     q = p[:nq]
     v = p[nq : nq + W.vel.shape[1]]
     z = p[nq + W.vel.shape[1] :]
-    factored = False
+    prepare(S, W, t, q, v)
+    factored = OLD
     if W.option[STABILIZE] == STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
             W.info[STATUS] = status
             return status
     else:
-        normalise(S, q)
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     return accelerate(S, W, t, p, dy, factored)
@@ -278,22 +311,22 @@ def derivative(t, y, dy, S, W):
 @formula
 def arrive(t, y, dy, S, W):
     """Project the state y in place, to rounding, and evaluate there. Returns (0 or status, relative violation)."""
-    nq = S.kinds[-2]
+    nq = S.kinds[COORDINATES]
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]
     z = y[nq + W.vel.shape[1] :]
     found = 0.0
-    factored = False
+    factored = OLD
     fault = W.stack.shape[0] - STACK_RESERVE
     if W.stack[fault, 0].real > 0.0:  # overcome: the step that met it was taken again, shorter
         W.stack[fault, 0] = -W.stack[fault, 0]
+    prepare(S, W, t, q, v)
     if W.option[STABILIZE] >= STEPS:
         status, found, factored = settle(S, W, t, q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
         if status != 0:
             W.info[STATUS] = status
             return status, found
     else:
-        normalise(S, q)
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     remember(S, W, z)
@@ -303,10 +336,17 @@ def arrive(t, y, dy, S, W):
 @formula
 def report(t, y, out, S, W):
     """Write t, the state (projected first), vdot and lam to a row of the output."""
-    nq = S.kinds[-2]
+    status, _ = arrive(t, y, W.y[1], S, W)
+    write_row(t, y, out, S, W)
+    return status
+
+
+@formula
+def write_row(t, y, out, S, W):
+    """Write t, the state y that W was last evaluated at, vdot, lam and the efforts of prescribed coordinates."""
+    nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     ny = y.shape[0]
-    status, _ = arrive(t, y, W.y[1], S, W)
     if S.row_i.shape[0] > 0:
         W.option[WORST_G] = max(W.option[WORST_G], violation(W, W.row[R2]))
         W.option[WORST_V] = max(W.option[WORST_V], drift(S, W, y[nq : nq + nv], W.row[R2])[0])
@@ -315,6 +355,11 @@ def report(t, y, out, S, W):
         out[1 + i] = y[i]
     for d in range(nv):
         out[1 + ny + d] = W.vel[X_SOLVED, d]
+    to = 1 + ny + nv
     for k in range(S.row_i.shape[0]):
-        out[1 + ny + nv + k] = W.row[LAM, k]
-    return status
+        out[to + k] = W.row[LAM, k]
+    to += S.row_i.shape[0]
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:
+            out[to] = W.vel[EFFORT, S.body_i[b, V0]]
+            to += 1

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import ModelError
-from ..model.joint import Joint
 from ..numerics.ldl import analyse
 from .structure import Structure, ints
+from .tables import BODY_LAW, COUPLED, SCHUR, SOLVER
 
 
-def patterns(s: Structure, tree_joint: dict[int, Joint]) -> None:
+def patterns(s: Structure) -> None:
     """Entries of G, of the matrix that is factored, and who adds to them."""
     body_i = s.tables["body_i"]
     chains = _chains(body_i)
@@ -40,10 +40,13 @@ def patterns(s: Structure, tree_joint: dict[int, Joint]) -> None:
         "mix_i": ints(mix_i, 5),
         "load_i": ints(load_i, 2),
     }
-    if (body_i[:, 0] < 0).all() and not tree_joint:
+    solver = s.tables["kinds"][SOLVER]
+    if solver == SCHUR:
         _schur(s)
+    elif solver == COUPLED:
+        _coupled(s, chains)
     else:
-        _kkt(s, chains)
+        _nothing(s)
 
 
 def _touched(s: Structure, chains: dict[int, frozenset[int]]) -> list[set[int]]:
@@ -55,7 +58,7 @@ def _touched(s: Structure, chains: dict[int, frozenset[int]]) -> list[set[int]]:
     for k, r in enumerate(s.rows):
         for m in r.sensors:
             touched[k] |= touched[len(s.rows) + m]
-        if not touched[k]:
+        if not touched[k] and not s.tree_joints:  # where a forest is rigid between two bodies, the row is redundant
             raise ModelError(f"{r.element.title} restrains nothing that can move")
     return touched
 
@@ -104,8 +107,11 @@ def _schur(s: Structure) -> None:
     s.tables["mass_i"] = np.zeros((0, 3), np.int64)
 
 
-def _kkt(s: Structure, chains: dict[int, frozenset[int]]) -> None:
-    """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G."""
+def _coupled(s: Structure, chains: dict[int, frozenset[int]]) -> None:
+    """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G.
+
+    What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
+    """
     body_i = s.tables["body_i"]
     entries = []
     for b in range(len(body_i)):
@@ -116,7 +122,19 @@ def _kkt(s: Structure, chains: dict[int, frozenset[int]]) -> None:
     col_i = s.tables["col_i"][: row_p[-1]]
     rows = np.repeat(np.arange(len(s.rows)), np.diff(row_p)) + nv
     M = ints(entries, 2)
-    s.ldl, place = analyse(nv + len(s.rows), np.r_[M[:, 0], rows], np.r_[M[:, 1], col_i])
+    i, j = np.r_[M[:, 0], rows], np.r_[M[:, 1], col_i]
+    unknown = np.ones(nv + len(s.rows), bool)
+    unknown[body_i[body_i[:, BODY_LAW] >= 0, 3]] = False
+    counted = (unknown[i] & unknown[j]) | (i == j)
+    s.ldl, found = analyse(nv + len(s.rows), i[counted], j[counted])
+    place = np.full(len(i), len(s.ldl.Ai))
+    place[counted] = found[: counted.sum()]
     s.tables["mass_i"] = np.ascontiguousarray(np.column_stack([M, place[: len(M)]]))
     e = np.arange(len(col_i))
-    s.tables["pair_i"] = np.ascontiguousarray(np.column_stack([e, e, 0 * e + 1, place[len(M) : len(M) + len(e)]]))
+    s.tables["pair_i"] = np.ascontiguousarray(np.column_stack([e, e, 0 * e + 1, place[len(M) :]]))
+
+
+def _nothing(s: Structure) -> None:
+    """No rows on a forest of tree joints: sweeps over articulated bodies need no matrix."""
+    s.ldl, _ = analyse(0, np.zeros(0, int), np.zeros(0, int))
+    s.tables["pair_i"], s.tables["mass_i"] = np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)

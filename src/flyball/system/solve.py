@@ -1,9 +1,10 @@
 """The one solve: [M G^T; G 0] [x; -lam] = [f; gamma], redundant and singular rows included.
 
 Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
-quasi-definite matrix [M G^T; G -delta]. Either is regularised by a small part of each row's natural size D, and
-refined against the true equations until the residual of G x = gamma passes or stops falling (a proximal-point
-iteration: redundant rows cost nothing, and of all multipliers it finds those with least sum of D_k lam_k^2).
+quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are
+regularised by a small part of each row's natural size D, and refined against the true equations until the residual of
+G x = gamma passes or stops falling (a proximal-point iteration: redundant rows cost nothing, and of all multipliers it
+finds those with least sum of D_k lam_k^2).
 
 The regularisation is not small beyond need. Near a singular position a row combination with singular value s answers
 a rounding error e with e / s; refinement takes the regularisation out of everything that is well determined within a
@@ -18,9 +19,12 @@ from ..numerics.ldl import ldl_factor, ldl_solve
 from .mass import mass_entries
 from .rows import row_times
 from .tables import (
+    BODY_LAW,
     DIAGONAL,
+    EFFORT,
     EXCESS,
     FACTORISATIONS,
+    GIVEN,
     INVERSE,
     LENGTH,
     MASS,
@@ -30,7 +34,9 @@ from .tables import (
     PER_MASS,
     R1,
     REGULARISE,
+    SCHUR,
     SEMIDEFINITE,
+    SOLVER,
     SOLVES,
     V0,
     V1,
@@ -61,11 +67,9 @@ def inverse_mass(S, b, x, at, out, to):
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
     W.info[FACTORISATIONS] += 1
-    for e in range(W.A.shape[0]):
-        W.A[e] = 0.0
-    if S.mass_i.shape[0] == 0:
+    if S.kinds[SOLVER] == SCHUR:
         return factor_schur(S, W)
-    return factor_kkt(S, W)
+    return factor_coupled(S, W)
 
 
 @formula
@@ -97,17 +101,17 @@ def natural_size(S, W):
 
 @formula
 def reuse(S, W):
-    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement. Says whether."""
-    if S.mass_i.shape[0] > 0:
-        return False
-    turn_rows(S, W)
-    return True
+    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
+    if S.kinds[SOLVER] == SCHUR:
+        turn_rows(S, W)
 
 
 @formula
 def factor_schur(S, W):
     """S = G M^-1 G^T, block by block."""
     turn_rows(S, W)
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
     for e in range(S.pair_i.shape[0]):
         i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
         s = W.G[i] * W.H[j]
@@ -122,22 +126,24 @@ def factor_schur(S, W):
 
 
 @formula
-def factor_kkt(S, W):
+def factor_coupled(S, W):
     """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta."""
     nv = W.vel.shape[1]
+    per = W.vel[V1]
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
-        W.A[S.mass_i[e, 2]] += W.M[e]
-    for e in range(S.pair_i.shape[0]):
-        W.A[S.pair_i[e, 3]] += W.G[S.pair_i[e, 0]]
+        W.A[S.mass_i[e, 2]] = W.M[e]
+        if S.mass_i[e, 0] == S.mass_i[e, 1]:
+            per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
         for e in range(S.row_p[k], S.row_p[k + 1]):
-            d = S.ldl.Ap[S.ldl.perm[S.col_i[e]] + 1] - 1
-            s += W.G[e] * W.G[e] / W.A[d]
+            W.A[S.pair_i[e, 3]] = W.G[e]
+            if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
+                s += W.G[e] * W.G[e] * per[S.col_i[e]]
+        s = s if s.real > 0.0 else 1.0  # a row along which the forest cannot move
         W.row[DIAGONAL, k] = s
-    for k in range(S.row_i.shape[0]):
-        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * W.row[DIAGONAL, k]
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
 
 
@@ -145,75 +151,97 @@ def factor_kkt(S, W):
 def solve(S, W, f, gamma, x, lam, loaded, refinements):
     """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
 
-    Where M is semidefinite, M + E is factored in its place and the refinement takes E out again. Returns the
-    residual left, relative to the size of its terms.
+    Prescribed velocities have the accelerations in W.vel[GIVEN] if loaded, else they stay. Where M is semidefinite,
+    M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
+    of its terms.
     """
     W.info[SOLVES] += 1
-    dx = W.vel[V1]
-    rhs = W.vel[V2]
-    semidefinite = S.glob[SEMIDEFINITE] > 0.0
     for d in range(x.shape[0]):
-        x[d] = 0.0
-        rhs[d] = f[d] if loaded else 0.0
+        x[d] = W.vel[GIVEN, d] if loaded else 0.0
     for k in range(lam.shape[0]):
         lam[k] = 0.0
         W.row[R1, k] = gamma[k]
-    one_pass(S, W, rhs, dx, x, lam, loaded or S.mass_i.shape[0] > 0)
+    if S.kinds[SOLVER] == SCHUR:
+        return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
+    return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+
+
+@formula
+def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
+    """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
+    rhs = W.vel[V2]
+    semidefinite = S.glob[SEMIDEFINITE] > 0.0
+    for d in range(x.shape[0]):
+        rhs[d] = f[d] if loaded else 0.0
+    pass_schur(S, W, rhs, x, lam, loaded)
     worst = 0.0
     last = 1e300
     for _ in range(refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
-        if S.mass_i.shape[0] > 0:
-            worst = max(worst, remainder(S, W, f, x, lam, rhs, loaded))
-        elif semidefinite:
-            worst = max(worst, excess(S, dx, rhs, x))
+        if semidefinite:
+            worst = max(worst, excess(S, W.vel[V1], rhs, x))
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
-        one_pass(S, W, rhs, dx, x, lam, semidefinite or S.mass_i.shape[0] > 0)
+        pass_schur(S, W, rhs, x, lam, semidefinite)
     return worst
 
 
 @formula
-def one_pass(S, W, rhs, dx, x, lam, loaded):
+def pass_schur(S, W, rhs, x, lam, loaded):
     """Add to x and lam one solve for the residual in W.row[R1] and, if ``loaded``, for rhs, which is cleared.
 
-    The step is left in dx.
+    The step is left in W.vel[V1].
     """
+    dx = W.vel[V1]
     r = W.row[R1]
     z = W.D[2]
-    nv = x.shape[0]
-    if S.mass_i.shape[0] > 0:
-        for d in range(nv):
-            z[S.ldl.perm[d]] = rhs[d]
-        for k in range(r.shape[0]):
-            z[S.ldl.perm[nv + k]] = r[k]
-        ldl_solve(S.ldl, W.L, W.D[0], z)
-        for d in range(nv):
-            dx[d] = z[S.ldl.perm[d]]
-        for k in range(r.shape[0]):
-            lam[k] -= z[S.ldl.perm[nv + k]]
-    else:
-        if loaded:
-            for b in range(S.body_i.shape[0]):
-                inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
-            for k in range(r.shape[0]):
-                z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx)
-        else:
-            for d in range(nv):
-                dx[d] = 0.0
-            for k in range(r.shape[0]):
-                z[S.ldl.perm[k]] = r[k]
-        ldl_solve(S.ldl, W.L, W.D[0], z)
-        for k in range(r.shape[0]):
-            mu = z[S.ldl.perm[k]]
-            lam[k] += mu
-            for e in range(S.row_p[k], S.row_p[k + 1]):
-                dx[S.col_i[e]] += W.H[e] * mu
-    for d in range(nv):
+    for d in range(x.shape[0]):
+        dx[d] = 0.0
+    if loaded:
+        for b in range(S.body_i.shape[0]):
+            inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
+    for k in range(r.shape[0]):
+        z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx) if loaded else r[k]
+    ldl_solve(S.ldl, W.L, W.D[0], z)
+    for k in range(r.shape[0]):
+        mu = z[S.ldl.perm[k]]
+        lam[k] += mu
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            dx[S.col_i[e]] += W.H[e] * mu
+    for d in range(x.shape[0]):
         x[d] += dx[d]
         rhs[d] = 0.0
+
+
+@formula
+def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
+    """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
+    rhs = W.vel[V2]
+    z = W.D[2]
+    nv = x.shape[0]
+    worst = 1.0
+    last = 1e300
+    for d in range(nv):
+        rhs[d] = 0.0
+    if loaded:
+        remainder(S, W, f, gamma, x, lam, rhs, loaded)
+    for attempt in range(refinements):
+        for d in range(nv):
+            z[S.ldl.perm[d]] = rhs[d]
+        for k in range(lam.shape[0]):
+            z[S.ldl.perm[nv + k]] = W.row[R1, k]
+        ldl_solve(S.ldl, W.L, W.D[0], z)
+        for d in range(nv):
+            x[d] += z[S.ldl.perm[d]]
+        for k in range(lam.shape[0]):
+            lam[k] -= z[S.ldl.perm[nv + k]]
+        worst = remainder(S, W, f, gamma, x, lam, rhs, loaded)
+        if not worst > W.option[PASS] or (attempt > 0 and worst > STALLED * last):
+            break
+        last = worst
+    return worst
 
 
 @formula
@@ -235,8 +263,12 @@ def residual(S, W, gamma, x):
 
 
 @formula
-def remainder(S, W, f, x, lam, rhs, loaded):
-    """rhs = f - M x + G^T lam, for the coupled matrix; returns its largest entry relative to its terms."""
+def remainder(S, W, f, gamma, x, lam, rhs, loaded):
+    """Both lines of the coupled equations: gamma - G x into W.row[R1], f - M x + G^T lam into rhs.
+
+    Returns the largest entry of either relative to its terms. What is left in the lines of prescribed velocities is
+    what their drivers have to do: it goes to W.vel[EFFORT].
+    """
     size = 1e-300
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
@@ -248,15 +280,31 @@ def remainder(S, W, f, x, lam, rhs, loaded):
         size = max(size, magnitude(p))
         if i != j:
             rhs[j] -= W.M[e] * x[i]
+    wide = 1e-300
+    off = 0.0
     for k in range(lam.shape[0]):
+        s = gamma[k]
+        a = magnitude(s)
         for e in range(S.row_p[k], S.row_p[k + 1]):
+            d = S.col_i[e]
             p = W.G[e] * lam[k]
-            rhs[S.col_i[e]] += p
+            rhs[d] += p
             size = max(size, magnitude(p))
+            p = W.G[e] * x[d]
+            s -= p
+            a += magnitude(p)
+        W.row[R1, k] = s
+        off = max(off, magnitude(s))
+        wide = max(wide, a)
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:
+            d = S.body_i[b, V0]
+            W.vel[EFFORT, d] = -rhs[d]
+            rhs[d] = 0.0
     worst = 0.0
     for d in range(x.shape[0]):
         worst = max(worst, magnitude(rhs[d]))
-    return worst / size
+    return max(worst / size, off / wide)
 
 
 @formula

@@ -14,15 +14,14 @@ import numpy as np
 
 from ..constraints.blocks import Row
 from ..errors import ModelError
-from ..model.body import GROUND, Initial
+from ..model.body import Initial
 from ..model.element import Element
 from ..model.expressions import Expression
 from ..model.force import Force
-from ..model.joint import Joint
 from ..model.model import Model
 from ..numerics.ldl import Pattern
+from .forest import TreeJoint, body_table
 from .program import compile_law
-from .tree import FREE, NQ, NV, PLANAR, REVOLUTE
 
 
 @dataclass(frozen=True)
@@ -73,8 +72,9 @@ class Structure:
     far: bool
     tree: tuple[str, ...]
     positions: bool = False  # without the rows that restrain velocities only
-    order: list[int] = field(default_factory=list)  # model's bodies in the table's order
     place: dict[str, int] = field(default_factory=dict)  # body name -> row of the body table
+    tree_joints: dict[str, TreeJoint] = field(default_factory=dict)
+    prescribed: dict[str, int] = field(default_factory=dict)  # driver -> row of the body table it prescribes
     frames: list[FrameSpec] = field(default_factory=list)
     frame_at: dict[tuple[str, str, str], int] = field(default_factory=dict)  # (element, role, coordinate) -> frame
     terms: list[TermSpec] = field(default_factory=list)
@@ -167,48 +167,18 @@ def structure(
     for table in model.tables:
         s.table_at[table.name] = len(s.const)
         s.const += table.data()
-    tree_joint = _body_table(s)
+    body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
     force_table.measured_quantities(s)
     term_table.rows(s, holds)
     force_table.forces(s)
+    for e in s.loads:
+        if (joint := getattr(e, "joint", "")) in s.tree_joints:
+            raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
     term_table.sort(s)
-    patterns.patterns(s, tree_joint)
+    patterns.patterns(s)
     s.tables["code"] = np.array(s.code or [0], np.int64)
     return s
-
-
-def _body_table(s: Structure) -> dict[int, Joint]:
-    """Order bodies parents first; choose each one's tree joint."""
-    model = s.model
-    hung = {}
-    for name in s.tree:
-        joint: Any = model[name]
-        hung[model.carrier(joint.body_j, joint)] = (joint, model.carrier(joint.body_i, joint))
-    names = [b.name for b in model.bodies]
-    done: dict[str, int] = {GROUND: -1}
-    while len(done) <= len(names):
-        ready = [n for n in names if n not in done and (n not in hung or hung[n][1] in done)]
-        if not ready:
-            raise ModelError("the tree joints close a loop")
-        for n in ready:
-            done[n] = len(done) - 1
-    s.place = done
-    s.order = [names.index(n) for n in list(done)[1:]]
-    body_i = np.zeros((len(names), 8), np.int64)
-    q0 = v0 = 0
-    joints = {}
-    for name, b in done.items():
-        if b < 0:
-            continue
-        kind = REVOLUTE if name in hung else PLANAR if model.planar else FREE
-        parent = done[hung[name][1]] if name in hung else -1
-        body_i[b] = parent, kind, q0, v0, NQ[kind], NV[kind], -1, -1
-        q0, v0 = q0 + NQ[kind], v0 + NV[kind]
-        if name in hung:
-            joints[b] = hung[name][0]
-    s.tables["body_i"] = body_i
-    return joints
 
 
 def frame(s: Structure, e: Any, role: str, coordinate: str = "") -> int:

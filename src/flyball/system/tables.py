@@ -18,7 +18,7 @@ from ..numerics.ldl import Pattern
 PARENT, TREE, Q0, V0, NQ, NV, BODY_LAW, BODY_WORK = range(8)
 # columns of System.body_x
 MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
-PER_MASS, PER_COMPACT, BODY_WIDTH = 52, 53, 54
+PER_MASS, PER_COMPACT, OFFSET, BODY_WIDTH = 52, 53, 54, 55
 # columns of System.term_i
 TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END, TERM_HINT = range(6)
 # columns of System.row_i
@@ -30,7 +30,7 @@ FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG = 0
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
-F_APPLIED, X_SOLVED, V1, V2, V3 = range(5)
+F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT = range(7)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
@@ -41,6 +41,9 @@ STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 # entries of Work.info
 STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT = range(7)
 
+# entries of System.kinds from its end, and what may stand in the first: how the equations are solved
+SOLVER, COORDINATES, GROUND_FRAMES = -3, -2, -1
+SCHUR, COUPLED, ARTICULATED = range(3)
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
 
@@ -51,7 +54,7 @@ class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
     body_i: np.ndarray  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
-    body_x: np.ndarray  # (nb, 54): mass properties, their inverses and stand-ins; frames of tree joints
+    body_x: np.ndarray  # (nb, 55): mass properties, their inverses and stand-ins; frames of tree joints, their offset
     frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
     frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
     term_i: np.ndarray  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
@@ -65,11 +68,11 @@ class System(NamedTuple):
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
     load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
-    kinds: np.ndarray  # first row of each kind of term; number of q; frames on ground
+    kinds: np.ndarray  # first row of each kind of term; solver; number of q; frames on ground
     code: np.ndarray  # bytecode of the laws
     const: np.ndarray  # parameters, literals of the laws, splines
     glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism
-    mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; empty where M is constant and block diagonal
+    mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
     pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
     block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row
     ldl: Pattern  # the sparse factor
@@ -89,7 +92,7 @@ class Work(NamedTuple):
     H: np.ndarray  # (nG,): M^-1 G^T
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
-    vel: np.ndarray  # (5, nv)
+    vel: np.ndarray  # (7, nv)
     sensed: np.ndarray  # (6 + nl, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor

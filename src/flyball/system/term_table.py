@@ -13,8 +13,9 @@ from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
 from ..model.expressions import Expression
 from ..model.joint import Coordinate, Joint
+from .forest import step_of
 from .structure import RowSpec, Structure, TermSpec, frame, ints
-from .tables import TERM_KINDS
+from .tables import BODY_LAW, COUPLED, SCHUR, TERM_KINDS
 
 
 def rows(s: Structure, holds: Sequence[Initial]) -> None:
@@ -38,7 +39,8 @@ def rows(s: Structure, holds: Sequence[Initial]) -> None:
 def _joint_rows(s: Structure, joint: Joint) -> None:
     F, M = frame(s, joint, "F"), frame(s, joint, "M")
     first = len(s.rows)
-    for row in joint.rows(s.model.planar) if joint.name not in s.tree else ():
+    tree = joint.name in s.tree_joints
+    for row in joint.loose(s.model.planar) if tree else joint.rows(s.model.planar):
         if not (row.holonomic or not s.positions):
             continue
         used = row.far if s.far and row.far is not None else row
@@ -55,10 +57,24 @@ def _joint_rows(s: Structure, joint: Joint) -> None:
 def _driver_row(s: Structure, driver: Driver) -> None:
     law = s.model.law(driver.law, LawOf(s.model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
     at = s.law(law, (), derivatives=True)
+    sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
+    link = _prescribes(s, driver)
+    if link is not None and not sensors:
+        s.prescribed[driver.name] = link
+        s.tables["body_i"][link, BODY_LAW:] = at, s.state(f"{driver.name}.work")
+        return
     row = _told_row(s, driver, driver.coordinate, at)
-    row.sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
+    row.sensors = sensors
     if not s.far:
         row.work = s.state(f"{driver.name}.work")
+
+
+def _prescribes(s: Structure, driver: Driver) -> int | None:
+    """Row of the body table whose one coordinate a driver prescribes; none for coordinates that rows must drive."""
+    owner, what = s.model.coordinate(driver.coordinate, driver)
+    if not isinstance(owner, Joint) or sum(d.coordinate == driver.coordinate for d in s.model.drivers) > 1:
+        return None
+    return step_of(s, owner.name, what)
 
 
 def _told_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec:
@@ -107,12 +123,13 @@ def count(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
 
 def _turning(s: Structure) -> None:
     """In space the turns of every joint angle are counted; in the plane the bodies' own angles count them, unless
-    somebody says how many there are at the start.
+    somebody says how many there are at the start. Angles that are coordinates of the forest count their own.
     """
     told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
     for joint in s.model.joints:
         for what, c in joint.measured(s.model.planar).items():
-            if c.row.kind == angle.KIND and (not s.model.planar or f"{joint.name}.{what}" in told):
+            needed = not s.model.planar or f"{joint.name}.{what}" in told
+            if c.row.kind == angle.KIND and needed and step_of(s, joint.name, what) is None:
                 count(s, joint, what, *coordinate_frames(s, joint, what)[:2])
 
 
@@ -139,11 +156,14 @@ def sort(s: Structure) -> None:
     angles[:, :2] = new[angles[:, :2]]
     s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}
     s.tables["angle_i"] = angles
+    for k, name in enumerate(sorted(s.prescribed, key=s.prescribed.__getitem__)):
+        s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
     s.tables["frame_i"] = np.array([f.body for f in s.frames], np.int64)
     s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
-    s.tables["kinds"] = np.r_[terms, s.nq, ground].astype(np.int64)
+    solver = SCHUR if not s.tree_joints else COUPLED
+    s.tables["kinds"] = np.r_[terms, solver, s.nq, ground].astype(np.int64)
     _force_frames(s, new)
 
 

@@ -19,10 +19,11 @@ from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
 from ..model.element import resolve
 from ..model.force import BodyForce, TwoPointForce
-from ..model.geometry import matrix_to_quaternion, vector
+from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .call import STACK_RESERVE
+from .coordinates import BodyState, coordinates
 from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
@@ -33,6 +34,7 @@ from .tables import (
     INVERSE,
     INVERSE_JACOBIAN,
     MASS,
+    OFFSET,
     PER_COMPACT,
     PER_MASS,
     TREE_P,
@@ -40,11 +42,12 @@ from .tables import (
     System,
     Work,
 )
-from .tree import FREE, PLANAR, REVOLUTE
 
 REGULARISATION = 1e-9
 THIN = 1e-9  # principal inertias below this part of the body's size count as none
 STAND_IN = 1e-6  # what is put in their place while factoring
+TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
+BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
 
 
 @dataclass
@@ -84,8 +87,7 @@ def values(
     frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)])
     length = _length(s, frame_x, bodies)
     body_x, semidefinite = _body_x(s, bodies, frame_x, length)
-    if s.tree:
-        _tree_frames(s, pose, bodies, body_x)
+    _tree_frames(s, pose, numbers, body_x)
     const, curve_at = _constants(s, numbers, env)
     term_x = _term_x(s, pose, numbers, holds or {}, curve_at)
     glob = np.r_[model.gravity_vector(env), REGULARISATION, semidefinite, length]
@@ -95,8 +97,10 @@ def values(
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"],
         t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip
-    q, v = _drawn_state(s, bodies, pose)
-    return Values(s, system, q, v, numbers, bodies, length, pose)
+    x = Values(s, system, np.zeros(s.nq), np.zeros(s.nv), numbers, bodies, length, pose)
+    drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
+    x.q[:], x.v[:] = coordinates(x, drawn)
+    return x
 
 
 def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
@@ -205,9 +209,10 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace
 
 def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> tuple[np.ndarray, float]:
     """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
-    body_x = np.zeros((len(s.order), BODY_WIDTH))
+    nb = len(s.tables["body_i"])
+    body_x = np.zeros((nb, BODY_WIDTH))
     semidefinite = 0.0
-    of_body = [np.abs(frame_x[s.tables["frame_i"] == b, :3]).max(initial=0.0) for b in range(len(s.order))]
+    of_body = [np.abs(frame_x[s.tables["frame_i"] == b, :3]).max(initial=0.0) for b in range(nb)]
     for name, b in s.place.items():
         if b < 0:
             continue
@@ -233,15 +238,29 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> t
     return body_x, semidefinite
 
 
-def _tree_frames(s: Structure, pose: Poses, bodies: dict, body_x: np.ndarray) -> None:
-    """Frames of the tree joints: on the parent, and the child's centre of mass seen from the joint."""
-    for name in s.tree:
-        joint = s.model[name]
-        child = s.place[s.model.carrier(joint.body_j, joint)]
-        p, R = pose.local(FrameSpec(0, joint, "F"))
-        body_x[child, TREE_P : TREE_P + 3], body_x[child, TREE_R : TREE_R + 9] = p, R.ravel()
-        p, R = pose.local(FrameSpec(0, joint, "M"))
-        body_x[child, BODY_P : BODY_P + 3], body_x[child, BODY_R : BODY_R + 9] = -R.T @ p, R.T.ravel()
+def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -> None:
+    """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
+
+    A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
+    """
+    for t in s.tree_joints.values():
+        joint = t.joint
+        rest = np.array(joint.rest or np.eye(3))
+        (pF, RF), (pM, RM) = (pose.local(FrameSpec(0, joint, role)) for role in "FM")
+        start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
+        if t.reversed:
+            start, end = (pM, RM @ rest.T), (-RF.T @ pF, RF.T)
+        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [
+            np.eye(3)
+        ]
+        for k, (link, turn) in enumerate(zip(t.links, turns, strict=True)):
+            p, R = start if k == 0 else (np.zeros(3), np.eye(3))
+            body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
+            p, R = end if k == len(turns) - 1 else (np.zeros(3), np.eye(3))
+            body_x[link, BODY_P : BODY_P + 3], body_x[link, BODY_R : BODY_R + 9] = turn.T @ p, (turn.T @ R).ravel()
+        for link, step in zip(t.links, t.primitives, strict=False):
+            if step.coordinate in joint.coordinates:
+                body_x[link, OFFSET] = joint.offset(numbers[joint.name], step.coordinate)
 
 
 def _constants(s: Structure, numbers: dict, env: Mapping[str, float]) -> tuple[np.ndarray, dict[str, int]]:
@@ -309,30 +328,6 @@ def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:
     return x
 
 
-def _drawn_state(s: Structure, bodies: dict, pose: Poses) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and velocities of the drawn configuration."""
-    q, v = np.zeros(s.nq), np.zeros(s.nv)
-    for name, b in s.place.items():
-        if b < 0:
-            continue
-        d = bodies[name]
-        _, kind, q0, v0 = s.tables["body_i"][b, :4]
-        if kind == FREE:
-            q[q0 : q0 + 7] = np.r_[d.c, matrix_to_quaternion(d.R)]
-            v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
-        elif kind == PLANAR:
-            q[q0 : q0 + 3] = d.c[0], d.c[1], d.angle
-            v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
-        elif kind == REVOLUTE:
-            joint = next(s.model[j] for j in s.tree if s.model.carrier(s.model[j].body_j, s.model[j]) == name)
-            F, M = (pose.world(FrameSpec(0, joint, role)) for role in "FM")
-            x = F[1].T @ M[1][:, 0]
-            q[q0] = np.arctan2(x[1], x[0])
-            w = bodies[F[2]].w if F[2] != GROUND else np.zeros(3)
-            v[v0] = F[1][:, 2] @ (d.w - w)
-    return q, v
-
-
 def work(s: Structure, system: System, dtype: type = float) -> Work:
     """Scratch arrays for one run."""
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
@@ -343,8 +338,8 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
 
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
-        z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(5, nv),
-        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai)), z(len(system.ldl.Li)), z(3, n),
+        z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(7, nv),
+        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n),
         z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(7, np.int64),
     )  # fmt: skip
     from .kinematics import ground_frames

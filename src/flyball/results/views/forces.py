@@ -10,6 +10,7 @@ from ...model.force import CoordinateForce, JointForce, TwoPointForce
 from ...system.call import STACK_RESERVE
 from ...system.laws import evaluate
 from ...system.loads import power, wide
+from ...system.tables import FORCE_F, FORCE_M
 from ..records import coordinate_frames, turned
 from .base import View
 
@@ -32,6 +33,18 @@ class ForceView(View):
         self._frames = F, M, par
         return (a, b), force, torque
 
+    def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
+        """Of a force between frames: bodies of F and M, point, force and torque there on M's body over time."""
+        S = self._x.system
+        _, force, torque = self._between()
+        k = self._index()
+        i, j = (int(S.frame_i[int(S.force_i[k, side])]) for side in (FORCE_F, FORCE_M))
+        return (i, j), self._frames[1][0], force, torque
+
+    def pushes(self) -> tuple[int, np.ndarray]:
+        """Of a force along a measured quantity: number of that, and its effort along it over time."""
+        return int(self._x.system.force_i[self._index(), FORCE_F]), self._along()[2]
+
     def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """(value, rate, effort) over time, of a force along a measured quantity."""
         e, S = self.element, self._x.system
@@ -40,7 +53,7 @@ class ForceView(View):
         laws = (self._law(int(S.force_i[k, 2]), x, rate), 0.0 * x, 0.0 * x)
         load = 0.0 * x
         if hasattr(e, "load"):
-            force, torque = self._result[e.joint]._wrench()
+            force, torque = self._result.reactions.of(e.joint)
             load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, 1])), force, torque)
         return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
 

@@ -8,11 +8,12 @@ import numpy as np
 
 from ...constraints import angle
 from ...constraints.registry import FORMULAS
-from ...math.vec import add, dot, mtv, scale, sub
+from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
-from ...system.rows import parameters
+from ...system.forest import step_of
 from ...system.tables import Q0
-from ..records import coordinate_frames, turned
+from ..records import TURN, coordinate_frames, turned
+from ..terms import Wrench
 from .base import View, stacked
 from .points import PointView
 
@@ -34,22 +35,26 @@ class JointView(View):
         offset = self.element.offset(x.numbers[self.element.name], what)
         return c.sign * value + offset, c.sign * rate, c.sign * second
 
-    def _turns(self, what: str, i: int, j: int) -> np.ndarray:
+    def _turns(self, what: str, i: int, j: int) -> Any:
         """Something close to the measured angle that knows its whole turns."""
+        s, S = self._x.structure, self._x.system
+        row = step_of(s, self.element.name, what)
+        if row is not None:
+            return self.element.coordinates[what].sign * self._result.q[:, S.body_i[row, Q0]]
         name = f"{self.element.name}.{what}"
-        s = self._x.structure
         if name in s.state_at:
             return self._result.states[:, s.state_at[name]]
-        x = self._x
-        now = self._heading(j, self._result.q) - self._heading(i, self._result.q)
-        drawn = self._heading(j, x.q[None]) - self._heading(i, x.q[None])
-        return now - 2.0 * np.pi * np.round(drawn / (2.0 * np.pi))
+        r = self._result.records
+        (here, drawn_here), (there, drawn_there) = (
+            (self._heading(k) + r.angle(int(S.frame_i[k])), self._heading(k) + r.drawn_angle(int(S.frame_i[k])))
+            for k in (i, j)
+        )
+        return there - here - TURN * np.round((drawn_there - drawn_here) / TURN)
 
-    def _heading(self, frame: int, q: np.ndarray) -> Any:
-        """In the plane: the way that a frame's x axis points, by the turned angle of its body."""
-        S = self._x.system
-        b, R = int(S.frame_i[frame]), S.frame_x[frame, 3:]
-        return np.arctan2(R[3], R[0]) + (q[:, S.body_i[b, Q0] + 2] if b >= 0 else 0.0)
+    def _heading(self, frame: int) -> float:
+        """In the plane: the way that a frame's x axis points in its body."""
+        R = self._x.system.frame_x[frame, 3:]
+        return float(np.arctan2(R[3], R[0]))
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
@@ -66,20 +71,9 @@ class JointView(View):
         has = ", ".join([*own, "force", "torque"])
         raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
 
-    def _wrench(self) -> tuple[tuple, tuple]:
+    def _wrench(self) -> Wrench:
         """Force on body_j at M's origin and torque about it, world components."""
-        s, r, S = self._x.structure, self._result.records, self._x.system
-        zero = np.zeros(r.n)
-        force, torque = (zero,) * 3, (zero,) * 3
-        for k in s.terms_of.get(self.element.name, ()):
-            t = s.terms[k]
-            lam = self._result.multipliers[:, t.row]
-            par = parameters(S.term_x, k)
-            hint = self._result.states[:, t.hint] if t.hint >= 0 else 0.0
-            _, f, tM, _, _ = FORMULAS[t.formula.kind](par, r.frame(t.F), r.frame(t.M), hint, S.const)
-            force = add(force, scale(lam * par[7], f))
-            torque = add(torque, scale(lam * par[7], tM))
-        return force, torque
+        return self._result.reactions.of(self.element.name)
 
     def reaction(self, *, axes: str = "world", on: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Reaction force and torque of the joint.

@@ -8,7 +8,6 @@ import numpy as np
 
 from ...model.body import GROUND, Body, Frame
 from ...model.geometry import matrix_to_quaternion
-from ...system.tables import Q0
 from .base import View, stacked
 
 if TYPE_CHECKING:
@@ -61,10 +60,7 @@ class PointView(View):
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
             raise AttributeError(f"{self.element.title} moves in space and has no single angle; use rotation")
-        local = np.arctan2(self._turn[1, 0], self._turn[0, 0])
-        if self._body < 0:
-            return np.full(len(self._result.t), local)
-        return self._result.q[:, self._x.system.body_i[self._body, Q0] + 2] + local
+        return self._result.records.angle(self._body) + np.arctan2(self._turn[1, 0], self._turn[0, 0])
 
     @property
     def angular_velocity(self) -> np.ndarray:

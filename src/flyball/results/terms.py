@@ -1,0 +1,52 @@
+"""Terms of rows and of measured quantities over time: the formulas that the compiled loops use, on arrays."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..constraints.registry import FORMULAS
+from ..math.vec import neg, scale
+from ..model.joint import Joint
+from ..system.rows import COEFFICIENT, parameters
+from .records import Record, coordinate_frames, turned
+
+if TYPE_CHECKING:
+    from .result import Result
+
+Wrench = tuple[tuple, tuple]
+
+
+def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
+    """Records of frames F and M of term k, and what its formula says of them.
+
+    That is value, force on M at M's origin (the reverse acts at F's on F's body), torque on M's body, torque on F's
+    body, acceleration bias; without its coefficient.
+    """
+    x = result.values
+    t = x.structure.terms[k]
+    F, M = result.records.frame(t.F), result.records.frame(t.M)
+    hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
+    return F, M, FORMULAS[t.formula.kind](parameters(x.system.term_x, k), F, M, hint, x.system.const)
+
+
+def coefficient(result: Result, k: int) -> float:
+    """What term k counts in its row or measured quantity."""
+    return result.values.system.term_x[k, COEFFICIENT]
+
+
+def along(result: Result, joint: Joint, what: str) -> Wrench:
+    """Force and torque on ``body_j``, about M's origin, of a unit effort along a joint's coordinate."""
+    (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
+    F, M = turned(result.records.frame(i), turn_i), turned(result.records.frame(j), turn_j)
+    par = (*c.row.par[:6], 0.0, 0.0)
+    _, f, tM, tF, _ = FORMULAS[c.row.kind](par, F, M, 0.0, result.values.system.const)
+    force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
+    return scale(c.sign, force), scale(c.sign, torque)
+
+
+def nothing(n: int) -> Wrench:
+    """No wrench at all, at n times."""
+    zero = np.zeros(n)
+    return (zero,) * 3, (zero,) * 3

@@ -1,0 +1,196 @@
+"""Coordinates and velocities of the forest, read from where the bodies are and how they move.
+
+Serves the drawn state, the way from one coordinate layer to another, and goes for every chain of tree joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..model.body import GROUND
+from ..model.geometry import matrix_to_quaternion
+from .forest import TreeJoint
+from .kinematics import poses
+from .structure import FrameSpec
+from .tables import NV, PARENT, Q0, TREE, V0
+from .tree import FREE, PLANAR, column
+
+if TYPE_CHECKING:
+    from .values import Values
+
+AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """A body as it is: centre of mass, rotation, velocity, angular velocity, all in the world; in the plane its turned
+    angle.
+    """
+
+    p: np.ndarray
+    R: np.ndarray
+    v: np.ndarray
+    w: np.ndarray
+    angle: float = 0.0
+
+
+REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+def coordinates(
+    x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """(q, v) of the forest for bodies that move so; where these do not fit the tree joints, the nearest.
+
+    ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
+    """
+    s = x.structure
+    q, v = np.zeros(s.nq), np.zeros(s.nv)
+    names = {b: name for name, b in s.place.items() if b >= 0}
+    hung = {t.child: t for t in s.tree_joints.values()}
+    for b, name in names.items():
+        d = bodies[name]
+        kind, q0, v0 = s.tables["body_i"][b, [TREE, Q0, V0]]
+        if b in hung:
+            _read(x, hung[b], bodies, hints or {}, q)
+        elif kind == FREE:
+            q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
+            v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
+        elif kind == PLANAR:
+            q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
+            v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
+    if hung:
+        _rates(x, hung, bodies, q, v)
+    return q, v
+
+
+def turned_angle(x: Values, W: Any, b: int, q: np.ndarray) -> Any:
+    """Turned angle of body b of a planar mechanism, whole turns counted, at the poses in W, which belong to q.
+
+    A number for q (nq,), an array over time for (nq, n).
+    """
+    S = x.system
+    if S.body_i[b, TREE] == PLANAR:
+        return q[S.body_i[b, Q0] + 2]
+    name = next(k for k, row in x.structure.place.items() if row == b)
+    near, k = x.bodies[name].angle, b
+    while k >= 0:
+        for i in range(S.body_i[k, NV]):
+            at = S.body_i[k, Q0] + i
+            near = near + column(S, W, k, i)[0][2] * (q[at] - x.q[at])
+        k = S.body_i[k, PARENT]
+    angle = np.arctan2(W.BK[b, 6], W.BK[b, 3])
+    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+
+
+def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
+    """Bodies that carry frames F and M."""
+    model = x.structure.model
+    return model.carrier(t.joint.body_i, t.joint), model.carrier(t.joint.body_j, t.joint)
+
+
+def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mapping[str, float], q: np.ndarray) -> None:
+    """Coordinates of one tree joint from the pose of M in F: slides first, then what turns."""
+    body_i = x.structure.tables["body_i"]
+    (pF, RF), (pM, RM) = _frames(x, t, bodies)
+    rest = np.array(t.joint.rest or np.eye(3))
+    shift, turn = RF.T @ (pM - pF), RF.T @ RM @ rest.T
+    way = list(zip(t.links, t.primitives, strict=False))
+    for link, step in way[::-1] if t.reversed else way:
+        at = body_i[link, Q0]
+        a = AXES[step.axis]
+        if step.kind == "P":
+            q[at] = a @ shift
+        elif step.kind == "S":
+            q[at : at + 4] = matrix_to_quaternion(turn.T if t.reversed else turn)
+        else:
+            b = np.roll(a, 1)  # turned by the angle; a further turn is about an axis that this one has turned
+            c = np.cross(a, b)
+            crossing = [o for o in t.primitives if o.kind == "R" and o is not step]
+            if crossing and crossing[0].axis != step.axis:
+                b = AXES[crossing[0].axis]
+                c = np.cross(a, b)
+            turned = turn @ b
+            angle = np.arctan2(c @ turned, b @ turned)
+            turn = _about(a, -angle) @ turn
+            q[at] = _with_turns(x, t, step.coordinate, angle, bodies, hints)
+
+
+def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """World poses of a joint's frames F and M on those bodies."""
+    out = []
+    for role, name in zip("FM", _ends(x, t), strict=True):
+        p, R = x.poses.local(FrameSpec(0, t.joint, role))
+        d = bodies.get(name, REST)
+        out.append((d.p + d.R @ p, d.R @ R))
+    return out
+
+
+def _about(a: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation about one of the three axes."""
+    K = np.cross(np.eye(3), a)
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def _with_turns(
+    x: Values, t: TreeJoint, what: str, angle: float, bodies: Mapping[str, BodyState], hints: Mapping[str, float]
+) -> float:
+    """The angle with the whole turns that somebody told, or (in the plane) that the bodies' own angles say."""
+    name = f"{t.joint.name}.{what}"
+    if name in hints:
+        near = t.joint.coordinates[what].sign * hints[name]
+    elif x.structure.model.planar:
+        i, j = _ends(x, t)
+        sign = np.sign(_normal(x, t))
+        now = [bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
+        drawn = [x.bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
+        now_by, drawn_by = (sign * (a[1] - a[0]) for a in (now, drawn))
+        F, M = (x.poses.world(FrameSpec(0, t.joint, role))[1] for role in "FM")
+        at = _planar_angle(F.T @ M, t)
+        near = at + now_by - drawn_by
+    else:
+        return angle
+    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+
+
+def _normal(x: Values, t: TreeJoint) -> float:
+    """Component along the plane's normal of the axis that a joint in the plane turns about."""
+    R = x.poses.world(FrameSpec(0, t.joint, "F"))[1]
+    return float((R @ AXES[t.joint.planar_normal])[2])
+
+
+def _planar_angle(turn: np.ndarray, t: TreeJoint) -> float:
+    """Angle of a turn about a planar joint's normal."""
+    b = np.roll(AXES[t.joint.planar_normal], 1)
+    c = np.cross(AXES[t.joint.planar_normal], b)
+    return float(np.arctan2(c @ turn @ b, b @ turn @ b))
+
+
+def _rates(
+    x: Values, hung: Mapping[int, TreeJoint], bodies: Mapping[str, BodyState], q: np.ndarray, v: np.ndarray
+) -> None:
+    """Velocities of the tree joints: least squares of the body's motion relative to its parent's."""
+    s, S = x.structure, x.system
+    nb = len(S.body_i)
+    W = SimpleNamespace(
+        BK=np.zeros((nb, 24)), FK=np.zeros((len(S.frame_i), 24)), X=np.zeros((s.nv, 6)), O=np.zeros((nb, 3))
+    )
+    poses(S, W, q)
+    names = {b: name for name, b in s.place.items()}
+    for b, t in hung.items():
+        d, parent = bodies[names[b]], bodies.get(names[int(S.body_i[t.links[0], 0])], REST)
+        seen = parent.v + np.cross(parent.w, d.p - parent.p)
+        columns, at = [], []
+        for link in t.links:
+            for k in range(int(S.body_i[link, 5])):
+                turn, shift = (np.array(c) for c in column(S, W, link, k))
+                columns.append(np.r_[np.array(shift) + np.cross(turn, d.p - W.O[link]), x.length * turn])
+                at.append(int(S.body_i[link, V0]) + k)
+        if at:
+            rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
+            v[at] = np.linalg.lstsq(np.array(columns).T, rel, rcond=None)[0]

@@ -1,0 +1,141 @@
+"""The motion of a mechanism whose drivers leave no freedom: from one time to the next by prediction and Newton.
+
+Nothing is integrated, so nothing drifts. Positions are predicted by the cubic through the last two velocities and
+accelerations; where the prediction is far from the mechanism the way is halved, so that no step leads to another
+branch. Rows are written for all times that were stepped on, with the powers of what does work in place of the works.
+"""
+
+from __future__ import annotations
+
+from .._jit import formula
+from ..numerics.integrators.explicit import (
+    ACCEPTED,
+    DONE,
+    H_MAX,
+    LARGEST,
+    LIMIT,
+    NEXT,
+    QUOTA,
+    REJECTED,
+    RUNNING,
+    STARTED,
+    STATUS,
+    STUCK,
+    T_END,
+    TOO_MANY,
+    H,
+    T,
+)
+from .motion import arrive, write_row
+from .tables import COORDINATES, NV, V0
+from .tree import retract
+
+FAR_OFF = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
+
+
+@formula
+def follow(S, W, c, out):
+    """Go on until the end, or until the buffer ``out`` is full or the quota is used. Returns rows written.
+
+    ``c`` is the clock of the integrators; rows 0 and 1 of ``c.K`` hold derivatives now and at the step before.
+    """
+    used = 0
+    c.count[STATUS] = RUNNING
+    if c.count[STARTED] == 0:
+        status, _ = arrive(c.real[T], c.y[0], c.K[0], S, W)
+        if status != 0:
+            c.count[STATUS] = STUCK
+            return used
+        write(c, out[used], S, W)
+        used += 1
+        c.count[STARTED] = 1
+        c.real[H] = 0.0
+        while c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T]:
+            c.count[NEXT] += 1
+    steps = 0
+    share = 1.0
+    while c.real[T] < c.real[T_END]:
+        if used == out.shape[0] or steps >= c.count[QUOTA]:
+            return used
+        if c.count[ACCEPTED] + c.count[REJECTED] >= c.count[LIMIT]:
+            c.count[STATUS] = TOO_MANY
+            return used
+        goal = c.times[c.count[NEXT]] if c.count[NEXT] < c.times.shape[0] else c.real[T_END]
+        h = share * min(goal - c.real[T], c.real[H_MAX])
+        if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]):
+            c.count[STATUS] = STUCK
+            return used
+        t = goal if share == 1.0 and h == goal - c.real[T] else c.real[T] + h
+        predict(S, c, h)
+        status, found = arrive(t, c.y[1], c.K[2], S, W)
+        steps += 1
+        if status != 0 or not found <= FAR_OFF:
+            c.count[REJECTED] += 1
+            share *= 0.5
+            continue
+        accept(c, t, h)
+        write(c, out[used], S, W)
+        used += 1
+        if t >= goal:
+            c.count[NEXT] += 1
+        share = min(1.0, 2.0 * share)
+    c.count[STATUS] = DONE
+    return used
+
+
+@formula
+def predict(S, c, h):
+    """State after h into c.y[1]: velocities by the cubic that fits the last two, positions by its integral."""
+    nq = S.kinds[COORDINATES]
+    y, new, now, before = c.y[0], c.y[1], c.K[0], c.K[1]
+    last = c.real[H]
+    way = c.y[2]
+    for i in range(y.shape[0]):
+        new[i] = y[i]
+    nv = S.body_i[-1, V0] + S.body_i[-1, NV]
+    u = 1.0 + h / last if last > 0.0 else 1.0
+    a, b, d = u * u, u * u * u, u * u * u * u
+    for i in range(nv):
+        v, vdot = y[nq + i], now[nq + i]
+        if last > 0.0:
+            # Hermite's cubic in u = (t - t0) / last through (v, vdot) at u = 0 and u = 1, and its integral from u = 1
+            v0, vdot0 = c.K[3, nq + i], before[nq + i]
+            new[nq + i] = (
+                (2.0 * b - 3.0 * a + 1.0) * v0
+                + (b - 2.0 * a + u) * last * vdot0
+                + (3.0 * a - 2.0 * b) * v
+                + (b - a) * last * vdot
+            )
+            way[i] = last * (
+                (0.5 * d - b + u - 0.5) * v0
+                + (0.25 * d - 2.0 / 3.0 * b + 0.5 * a - 1.0 / 12.0) * last * vdot0
+                + (b - 0.5 * d - 0.5) * v
+                + (0.25 * d - b / 3.0 + 1.0 / 12.0) * last * vdot
+            )
+        else:
+            new[nq + i] = v + h * vdot
+            way[i] = h * v + 0.5 * h * h * vdot
+    retract(S, new[:nq], way)
+    for i in range(nq + nv, y.shape[0]):
+        new[i] = y[i] + h * now[i]
+
+
+@formula
+def write(c, out, S, W):
+    """A row of the output at the present state, with powers for works."""
+    write_row(c.real[T], c.y[0], out, S, W)
+    for k in range(c.accounts.shape[0]):
+        out[1 + c.accounts[k]] = c.K[0, c.accounts[k]]
+
+
+@formula
+def accept(c, t, h):
+    """Make the state in the making the present one."""
+    for i in range(c.y.shape[1]):
+        c.K[1, i] = c.K[0, i]
+        c.K[3, i] = c.y[0, i]
+        c.K[0, i] = c.K[2, i]
+        c.y[0, i] = c.y[1, i]
+    c.real[H] = h
+    c.real[T] = t
+    c.count[ACCEPTED] += 1

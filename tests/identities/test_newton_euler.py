@@ -1,0 +1,95 @@
+"""Newton and Euler's laws for every body, from outside the solve: all that acts on it adds up to what it needs.
+
+In absolute coordinates nothing passes through the tree joints, FREE and PLANAR. What does is the residual of the
+equations of motion, found by another way than theirs: wrenches on bodies in place of G^T lam and generalised forces.
+"""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.assemble import assemble
+from tests.contract.zoo import CASES
+from tests.examples.test_examples import FILES, mechanism
+from tests.identities.test_joint_layer import PARTS, coupled, with_joint
+from tests.mechanisms import G, bricard, four_bar
+from tests.results.at_states import assembled
+from tests.verification.test_reactions import actuated
+
+
+def residual(r):
+    """Largest component of the wrench through a tree joint, relative to the largest that acts; torques by length."""
+    S, length = r.values.system, r.values.length
+    through = r.reactions.through
+    if r.planar:
+        through = through[:, [0, 1, 5]]
+    turns = np.arange(through.shape[1]) >= (2 if r.planar else 3)
+    weight = np.where(turns, 1.0 / length, 1.0)[None, :, None]
+    needs = [
+        S.body_x[b, 0] * np.abs(np.subtract(np.array(r.records.body(b)[5]).T, S.glob[:3])).max()
+        for b in range(len(S.body_i))
+    ]
+    carried = [np.abs(np.array(r.reactions.of(j.name)[0])).max() for j in r.model.joints]
+    return np.abs(weight * through).max() / max(*needs, *carried, 1e-3)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_examples(name):
+    r = mechanism(name).simulate(0.05, outputs=5)
+    assert residual(r) < 1e-12
+
+
+@pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
+def test_every_joint(where, name):
+    assert residual(assembled(assemble(with_joint(where, name)))) < 1e-12
+
+
+@pytest.mark.parametrize("case", PARTS)
+def test_couplings_forces_and_drivers(case):
+    assert residual(assembled(assemble(coupled(*PARTS[case]())))) < 1e-12
+
+
+def rubbing():
+    """A crank-rocker with friction in two of its bearings, driven by a motor against a rope."""
+    m = four_bar()
+    m.add(fb.Initial("A.angle", rate=3.0))
+    m.add(fb.JointFriction("rub", "B", static=0.3, kinetic=0.2, radius=0.03))
+    m.add(fb.JointFriction("rub too", "D", static=0.2, radius=0.02, viscous=0.1))
+    m.add(fb.Motor("motor", "A", torque="2 - 0.1*rate"))
+    m.add(fb.Rope("rope", ("ground", "coupler", "ground"), at=((0, 1), (0.3, 0.3), (1, 1)), stiffness=200, length=0.5))
+    return m
+
+
+def followed():
+    """A slide whose driver follows two sensors, on a carriage that nobody holds."""
+    m = fb.Mechanism("followed", planar=True, gravity=(0, -G))
+    m.add(fb.Body("carriage", mass=2, inertia=0.1, velocity=(0.5, 0)))
+    m.add(fb.Body("bob", mass=1, inertia=0.02, position=(0.1, -0.5), angular_velocity=2.0))
+    m.add(fb.Body("load", mass=0.7, inertia=0.01, position=(0.4, 0.3)))
+    m.add(fb.Translational("rail", "ground", "carriage", at=(0, 0), axis=(1, 0.2)))
+    m.add(fb.Revolute("pin", "carriage", "bob", at=(0, 0)))
+    m.add(fb.Translational("lift", "carriage", "load", at=(0.4, 0.3), axis=(0.3, 1)))
+    m.add(fb.Sensor("s", "pin.angle"), fb.Sensor("d", "rail.displacement"))
+    m.add(fb.Driver("drive", "lift.displacement", "0.2*sin(3*s + 1) + 0.5*d*s + 0.1*t - 0.2*sin(1)"))
+    return m
+
+
+MORE = {"actuated": actuated, "Bricard": bricard, "friction": rubbing, "driver that follows": followed}
+
+
+@pytest.mark.parametrize("case", MORE)
+def test_more(case):
+    r = MORE[case]().simulate(0.3, outputs=7)
+    assert residual(r) < 1e-12
+
+
+def test_a_driver_that_follows_pushes_what_it_follows():
+    """Its law's slope times its effort is a force along each sensor: the work of both is that of the ideal row."""
+    r = followed().simulate(0.3, outputs=7)
+    lam, s, d = r["drive"].effort, r["pin"].angle, r["rail"].displacement
+    by_s, by_d = 0.6 * np.cos(3 * s + 1) + 0.5 * d, 0.5 * s
+    efforts = r.reactions._efforts()
+    named = {k.partition(":")[0]: m for k, m in r.values.structure.measured.items()}
+    assert np.abs(lam).min() > 0.1
+    assert efforts[named["pin.angle"]] == pytest.approx(-lam * by_s, rel=1e-12)
+    assert efforts[named["rail.displacement"]] == pytest.approx(-lam * by_d, rel=1e-12, abs=1e-12)
