@@ -53,7 +53,7 @@ def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
     s = a.compiled.structure
     if not s.tree or not s.model.planar:
         return {}
-    moving = base.compiled.moving(base.q, base.v)
+    moving = base.compiled.moving(base.t, base.q, base.v)
     return wound(a.compiled.values, y[: s.nq], {name: state.angle for name, state in moving.items()})
 
 
