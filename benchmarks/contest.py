@@ -19,7 +19,7 @@ from mechanisms import simulate
 
 TOLERANCES = tuple(10.0 ** (-e / 2) for e in range(4, 25))
 ATOL = 1e-2  # atol / rtol, as in flyball's defaults
-MOST_STEPS, FINEST = 4_000_000, 1e-13
+FINEST = 1e-13
 HALVINGS = 2
 TIMED = 10.0  # CPU seconds that the readings in turn may take, if that leaves three of each
 FAILURES = (RuntimeError, ValueError, np.linalg.LinAlgError)
@@ -34,7 +34,7 @@ COLUMNS = {
     "steps": "steps",
     "evaluations": "evaluations",
 }
-TIMES = {"cpu_ms": "CPU ms", "with_output_ms": "with output", "call_ms": "whole call"}
+TIMES = {"cpu_ms": "CPU ms", "ratio": "ratio", "with_output_ms": "with output", "call_ms": "whole call"}
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Contest:
     """What all have to reach.
 
     ``accuracy`` takes a motion, whatever that is, and returns numbers, of which ``key`` has to come to ``target``.
-    Motions have ``samples`` + 1 times. A peer's search ends with a run that takes longer than ``patience`` [CPU s].
-    Times are divided by ``per`` (the seconds of the motion, for milliseconds a second).
+    Motions have ``samples`` + 1 times. A peer's search ends unmet with a run that takes longer than ``patience`` [CPU s],
+    or where all its runs took five times that. Times are divided by ``per`` (the seconds of the motion, for milliseconds a second).
     """
 
     case: str
@@ -83,16 +83,17 @@ class Search:
     def __init__(self, contest: Contest, peer: Peer) -> None:
         self.contest, self.peer = contest, peer
         self.row: dict[str, Any] = {"met": False, contest.key: OPEN}
-        self.seconds = 0.0
+        self.seconds = self.spent = 0.0
 
     def meets(self, resolution: float) -> bool:
         """Try a resolution. A solver that gives up has an infinite error."""
         contest, peer = self.contest, self.peer
+        found: dict[str, float] = {}
         try:
-            motion, self.seconds = peer.solve(resolution, contest.samples)
-            found = contest.accuracy(motion)
+            self.seconds = timing.cpu(lambda: found.update(contest.accuracy(peer.solve(resolution, contest.samples)[0])))
         except FAILURES:
-            found = {}
+            found.clear()
+        self.spent += self.seconds
         error = found.get(contest.key, OPEN)
         met = bool(error <= contest.target)
         if met or not self.row["met"] and error <= self.row[contest.key]:
@@ -118,7 +119,7 @@ class Search:
         else:
             coarse, fine = fine, self.finer(fine)
             while not self.meets(fine):
-                if self.seconds > self.contest.patience or fine > MOST_STEPS or fine < FINEST:
+                if self.seconds > self.contest.patience or self.spent > 5 * self.contest.patience or fine < FINEST:
                     return self.row
                 coarse, fine = fine, self.finer(fine)
         for _ in range(HALVINGS):
@@ -201,6 +202,9 @@ def time_in_turn(contest: Contest, rows: Sequence[dict[str, Any]]) -> None:
             row |= {"cpu_ms": bare - nothing, "with_output_ms": call - nothing, "call_ms": call}
         else:
             row["cpu_ms"] = 1e3 * seconds[i, "cpu"] / contest.per
+    ours = min((row["cpu_ms"] for row in rows if row["engine"] == "flyball"), default=None)
+    for row in rows:
+        row["ratio"] = row["cpu_ms"] / ours if ours else None
 
 
 def ratios(rows: Sequence[Mapping[str, Any]]) -> str:

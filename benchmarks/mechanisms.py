@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import runpy
 from dataclasses import dataclass, fields
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from flyball.analysis.compiled import compiled as flyball_compiled
 from flyball.analysis.dynamics import Options
 
 GRAVITY = 9.81
@@ -42,6 +44,12 @@ def simulate(model: fb.Mechanism, t_end: float, *, coordinates: str = "auto", **
     elif coordinates == "joint":
         raise SystemExit("this flyball has no joint coordinates to simulate in")
     return model.simulate(t_end, **options)
+
+
+def compiled(model: fb.Mechanism, coordinates: str = "auto") -> Any:
+    """The compiled mechanism in the coordinates asked for, ready to be evaluated."""
+    options = {"coordinates": coordinates} if "coordinates" in signature(flyball_compiled).parameters else {}
+    return flyball_compiled(model.snapshot(), **options)
 
 
 def example(name: str, **options: Any) -> fb.Mechanism:

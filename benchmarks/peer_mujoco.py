@@ -31,12 +31,11 @@ def build(tree: Tree, h: float, setting: str):
     bodies = []
     for link in tree.links:
         above = spec.worldbody if link.parent == GROUND else bodies[link.parent]
-        origin = np.zeros(3) if link.parent == GROUND else tree.links[link.parent].centre
-        bodies.append(add_body(above, link, link.centre - origin))
+        bodies.append(add_body(above, link, origin(tree, link.parent)))
 
     def site(k: int, x: np.ndarray, name: str) -> str:
-        on, origin = (spec.worldbody, np.zeros(3)) if k == GROUND else (bodies[k], tree.links[k].centre)
-        on.add_site(name=name, pos=x - origin)
+        on = spec.worldbody if k == GROUND else bodies[k]
+        on.add_site(name=name, pos=x - origin(tree, k))
         return name
 
     stiff = {"solref": (SETTINGS[setting] * h, 1.0), "solimp": IMPEDANCE}
@@ -52,10 +51,16 @@ def build(tree: Tree, h: float, setting: str):
     return spec.compile()
 
 
-def add_body(above, link: Link, shift: np.ndarray):
-    """A link with its joints; the body's frame is its centre."""
-    body = above.add_body(name=link.name, pos=shift)
-    body.mass, body.ipos, body.explicitinertial = link.mass, (0, 0, 0), True
+def origin(tree: Tree, k: int) -> np.ndarray:
+    """Where a link's frame is drawn: at its first joint."""
+    return np.zeros(3) if k == GROUND else tree.links[k].axes[0].point
+
+
+def add_body(above, link: Link, below: np.ndarray):
+    """A link with its joints; ``below``: where the frame is drawn that it hangs on."""
+    at = link.axes[0].point
+    body = above.add_body(name=link.name, pos=at - below)
+    body.mass, body.ipos, body.explicitinertial = link.mass, link.centre - at, True
     J = np.asarray(link.inertia)
     if np.count_nonzero(J - np.diag(np.diag(J))):
         body.fullinertia = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
@@ -63,7 +68,7 @@ def add_body(above, link: Link, shift: np.ndarray):
         body.inertia = np.diag(J)
     for a in link.axes:
         kind = mujoco.mjtJoint.mjJNT_HINGE if a.kind == "hinge" else mujoco.mjtJoint.mjJNT_SLIDE
-        joint = body.add_joint(type=kind, pos=a.point - link.centre, axis=a.direction)
+        joint = body.add_joint(type=kind, pos=a.point - at, axis=a.direction)
         if a.stiffness:
             joint.stiffness, joint.springref = [a.stiffness, 0, 0], a.rest
     return body
@@ -73,8 +78,20 @@ def ready(tree: Tree, h: float, setting: str):
     """(model, data) at the start."""
     model = build(tree, h, setting)
     data = mujoco.MjData(model)
-    data.qvel[:] = tree.rates
+    data.qvel[:] = tree.rates[order_of_joints(model, tree)]
     return model, data
+
+
+def order_of_joints(model, tree: Tree) -> np.ndarray:
+    """MuJoCo counts joints branch by branch: for each of its joints, the number in the tree."""
+    first = np.cumsum([0] + [len(link.axes) for link in tree.links])
+    number = {model.body(link.name).id: first[k] for k, link in enumerate(tree.links)}
+    seen = {body: 0 for body in number}
+    out = []
+    for body in model.jnt_bodyid.tolist():
+        out.append(number[body] + seen[body])
+        seen[body] += 1
+    return np.array(out)
 
 
 def solve(tree: Tree, t_end: float, steps: float, setting: str, samples: int = 0):
@@ -101,24 +118,25 @@ def solve(tree: Tree, t_end: float, steps: float, setting: str, samples: int = 0
     seconds = time.process_time() - begin
     if any(w.number for w in data.warning):
         raise RuntimeError("MuJoCo warned of an unstable simulation")
-    return motion(model, q, v), seconds
+    return motion(model, tree, q, v), seconds
 
 
-def motion(model, q, v) -> Motion:
+def motion(model, tree: Tree, q, v) -> Motion:
     """Motion of the links, from coordinates and rates at some times."""
     data = mujoco.MjData(model)
-    twists = np.zeros((len(q), model.nbody - 1, 6))
-    p, R = np.zeros((len(q), model.nbody - 1, 3)), np.zeros((len(q), model.nbody - 1, 3, 3))
+    bodies = [model.body(link.name).id for link in tree.links]
+    twists = np.zeros((len(q), len(bodies), 6))
+    p, R = np.zeros((len(q), len(bodies), 3)), np.zeros((len(q), len(bodies), 3, 3))
     one = np.zeros(6)
     for n in range(len(q)):
         data.qpos[:], data.qvel[:] = q[n], v[n]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
-        p[n], R[n] = data.xpos[1:], data.xmat[1:].reshape(-1, 3, 3)
-        for k in range(1, model.nbody):
-            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, k, one, 0)
-            twists[n, k - 1] = one
+        p[n], R[n] = data.xipos[bodies], data.xmat[bodies].reshape(-1, 3, 3)
+        for k, body in enumerate(bodies):
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, one, 0)
+            twists[n, k] = one
     return Motion(p, R, twists[:, :, 3:], twists[:, :, :3])
 
 
@@ -128,7 +146,8 @@ def start_accelerations(tree: Tree) -> np.ndarray:
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     out, one = [], np.zeros(6)
-    for k in range(1, model.nbody):
-        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_XBODY, k, one, 0)
+    for link in tree.links:
+        body = model.body(link.name).id
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, body, one, 0)
         out.append(np.r_[one[3:] + tree.gravity, one[:3]])
     return np.array(out)

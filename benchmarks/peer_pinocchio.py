@@ -2,7 +2,8 @@
 
 Pinocchio has no time integrator. One setting is a classical Runge-Kutta method written in Python, which costs it 10 to
 20 us a step; the other is SciPy's DOP853 with error control. Without loops the accelerations are those of the
-articulated-body algorithm, else those of ``constraintDynamics`` with Baumgarte's correction.
+articulated-body algorithm, else those of ``constraintDynamics`` with Baumgarte's correction. (At the N-four-bar's
+singular positions DOP853 gets stuck or errs by tens of joules at any tolerance; fixed steps pass them.)
 """
 
 from __future__ import annotations
@@ -14,11 +15,15 @@ from mechanisms import GROUND
 from steppers import controlled, fixed_steps
 from trees import Axis, Motion, Tree
 
-RK4, DOP853 = "Python RK4", "SciPy DOP853"
-SETTINGS = (RK4, DOP853)
-DAMPING = 0.2  # Baumgarte's damping rate times the step of fixed steps
-RATE = 20.0  # his damping rate where steps vary [1/s]
+# label -> (fixed steps or not, Baumgarte's damping rate [1/s], or with fixed steps and below 1: times the step)
+SETTINGS = {
+    "Python RK4": (True, 0.2),
+    "Python RK4, 5/s": (True, 5.0),
+    "SciPy DOP853": (False, 5.0),
+    "SciPy DOP853, 20/s": (False, 20.0),
+}
 ROUNDS = pin.ProximalSettings(1e-12, 1e-8, 20)
+REDUNDANT = pin.ProximalSettings(1e-10, 1e-3, 50)  # a smaller regularisation blows up what rounding leaves of a gap
 
 
 def joint(a: Axis):
@@ -65,7 +70,8 @@ class Built:
         cuts = self.cuts(rate)
         work = pin.StdVec_RigidConstraintData([c.createData() for c in cuts])
         pin.initConstraintDynamics(model, data, cuts, work)
-        return lambda q, v: pin.constraintDynamics(model, data, q, v, effort(q), cuts, work, ROUNDS).copy()
+        rounds = REDUNDANT if self.tree.redundant else ROUNDS
+        return lambda q, v: pin.constraintDynamics(model, data, q, v, effort(q), cuts, work, rounds).copy()
 
     def cuts(self, rate: float):
         """Rigid constraints: one for each point that a cut holds together."""
@@ -120,11 +126,12 @@ class Built:
 def solve(tree: Tree, t_end: float, resolution: float, setting: str, samples: int = 0):
     """Integrate. Returns (motion, CPU seconds of the stepping); no motion where samples is 0."""
     built = Built(tree)
-    if setting == RK4:
-        acceleration = built.acceleration(DAMPING * resolution / t_end)
+    fixed, rate = SETTINGS[setting]
+    if fixed:
+        acceleration = built.acceleration(rate * resolution / t_end if rate < 1 else rate)
         q, v, seconds = fixed_steps(acceleration, *built.start(), t_end, int(resolution), samples)
     else:
-        q, v, seconds = controlled(built.acceleration(RATE), *built.start(), t_end, resolution, samples)
+        q, v, seconds = controlled(built.acceleration(rate), *built.start(), t_end, resolution, samples)
     return (built.motion(q, v) if samples else None), seconds
 
 
@@ -132,7 +139,7 @@ def start_accelerations(tree: Tree) -> np.ndarray:
     """Acceleration of each centre and angular acceleration, (links, 6), at the start."""
     built = Built(tree)
     q, v = built.start()
-    a = built.acceleration(RATE)(q, v)
+    a = built.acceleration(0.0)(q, v)
     pin.forwardKinematics(built.model, built.data, q, v, a)
     out = []
     for k, j in enumerate(built.last):
