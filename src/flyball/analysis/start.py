@@ -75,7 +75,7 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if not c.structure.tree:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
-    q, v = plain.take(c, q, v)
+    q, v = plain.take(c, t, q, v)
     for name, more in before.wound.items():
         q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
     return Assembly(plain, t, q, v)

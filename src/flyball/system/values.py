@@ -23,7 +23,7 @@ from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .call import STACK_RESERVE
-from .coordinates import BodyState, coordinates
+from .coordinates import BodyState, positions, velocities
 from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
@@ -99,7 +99,7 @@ def values(
     )  # fmt: skip
     x = Values(s, system, np.zeros(s.nq), np.zeros(s.nv), numbers, bodies, length, pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
-    x.q[:], x.v[:] = coordinates(x, drawn)
+    x.q[:], x.v[:] = positions(x, drawn), velocities(x, drawn)
     return x
 
 
