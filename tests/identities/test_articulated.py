@@ -242,7 +242,7 @@ def test_two_hinges_on_one_axis_share_no_inertia():
     S.body_x[1, MASS], S.body_x[1, INERTIA : INERTIA + 9] = 1.0, np.diag([0.3, 0.5, 0.7]).ravel()
     W.BK[1, :3] = 0.3, 0.1, -0.2
     assert articulate(S, W) == 1
-    S.body_x[0, INERTIA : INERTIA + 9] = 1e-9 * np.eye(3).ravel()
+    S.body_x[0, MASS], S.body_x[0, INERTIA : INERTIA + 9] = 1e-9, 1e-9 * np.eye(3).ravel()
     assert articulate(S, W) == 0, "a small inertia is one"
 
 
