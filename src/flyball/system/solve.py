@@ -16,10 +16,12 @@ from __future__ import annotations
 from .._jit import formula
 from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve
+from .articulated import articulate, articulated_solve
 from .mass import mass_entries
 from .rows import row_times
 from .tables import (
     BODY_LAW,
+    COUPLED,
     DIAGONAL,
     EFFORT,
     EXCESS,
@@ -70,7 +72,9 @@ def factor(S, W):
     W.info[FACTORISATIONS] += 1
     if S.kinds[SOLVER] == SCHUR:
         return factor_schur(S, W)
-    return factor_coupled(S, W)
+    if S.kinds[SOLVER] == COUPLED:
+        return factor_coupled(S, W)
+    return articulate(S, W)
 
 
 @formula
@@ -172,7 +176,10 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
         W.row[R1, k] = gamma[k]
     if S.kinds[SOLVER] == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
-    return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+    if S.kinds[SOLVER] == COUPLED:
+        return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+    articulated_solve(S, W, f, x, W.vel[EFFORT])
+    return 0.0
 
 
 @formula

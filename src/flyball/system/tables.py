@@ -83,10 +83,10 @@ class Work(NamedTuple):
 
     BK: np.ndarray  # (nb, 24): kinematics of the bodies
     FK: np.ndarray  # (nf, 24): kinematics of the frames
-    X: np.ndarray  # (nv, 6): world twist column of each velocity, at its body's reference point
+    X: np.ndarray  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
     O: np.ndarray  # (nb, 3): that reference point
     FB: np.ndarray  # (nb, 6): force on each body, torque about its centre of mass
-    IC: np.ndarray  # (nb, 10): composite inertias
+    IC: np.ndarray  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
     M: np.ndarray  # (nM,): mass matrix entries
     G: np.ndarray  # (nG,): constraint Jacobian, then gradients of the measured quantities
     H: np.ndarray  # (nG,): M^-1 G^T

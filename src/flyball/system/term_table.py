@@ -15,7 +15,7 @@ from ..model.expressions import Expression
 from ..model.joint import Coordinate, Joint
 from .forest import step_of
 from .structure import RowSpec, Structure, TermSpec, frame, ints
-from .tables import BODY_LAW, COUPLED, SCHUR, TERM_KINDS
+from .tables import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
 
 
 def rows(s: Structure, holds: Sequence[Initial]) -> None:
@@ -162,7 +162,7 @@ def sort(s: Structure) -> None:
     s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
-    solver = SCHUR if not s.tree_joints else COUPLED
+    solver = SCHUR if not s.tree_joints else COUPLED if s.rows else ARTICULATED
     s.tables["kinds"] = np.r_[terms, solver, s.nq, ground].astype(np.int64)
     _force_frames(s, new)
 
