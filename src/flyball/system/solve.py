@@ -47,6 +47,7 @@ from .tables import (
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
+BLUR = 1e-20  # squares of entries of G below this part of what is usual are rounding
 STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
 
 
@@ -131,9 +132,14 @@ def factor_schur(S, W):
 
 @formula
 def factor_coupled(S, W):
-    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta."""
+    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta.
+
+    A row along which the forest cannot move has nothing but rounding in G. It gets the size of one that it can move
+    along: entries of 1, or of the mechanism's length.
+    """
     nv = W.vel.shape[1]
     per = W.vel[V1]
+    short = min(1.0, S.glob[LENGTH]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
         W.A[S.mass_i[e, 2]] = W.M[e]
@@ -141,11 +147,14 @@ def factor_coupled(S, W):
             per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
+        usual = s
         for e in range(S.row_p[k], S.row_p[k + 1]):
             W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += W.G[e] * W.G[e] * per[S.col_i[e]]
-        s = s if s.real > 0.0 else 1.0  # a row along which the forest cannot move
+                usual += short * per[S.col_i[e]]
+        if not s.real > BLUR * usual.real:
+            s = usual if usual.real > 0.0 else usual + 1.0
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
