@@ -14,10 +14,10 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
 from contest import Contest, Flyball, Peer
-
-from mechanisms import Planar, energy, flyball_planar, fourbars, fourbars_exact, gap, planar_motion, point, simulate
 from trees import Tree, planar_tree
 from trees import planar_motion as tree_motion
+
+from mechanisms import Planar, energy, flyball_planar, fourbars, fourbars_exact, gap, planar_motion, point, simulate
 
 T_END, TARGET, SAMPLES = 10.0, 1e-3, 400
 METHODS = ("dop853", "rk45")
