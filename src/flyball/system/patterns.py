@@ -58,7 +58,7 @@ def _touched(s: Structure, chains: dict[int, frozenset[int]]) -> list[set[int]]:
     for k, r in enumerate(s.rows):
         for m in r.sensors:
             touched[k] |= touched[len(s.rows) + m]
-        if not any(s.tables["body_i"][b, 5] for b in touched[k]):
+        if not touched[k] and not s.tree_joints:  # where a forest is rigid between two bodies, the row is redundant
             raise ModelError(f"{r.element.title} restrains nothing that can move")
     return touched
 

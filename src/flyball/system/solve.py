@@ -141,6 +141,7 @@ def factor_coupled(S, W):
             W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += W.G[e] * W.G[e] * per[S.col_i[e]]
+        s = s if s.real > 0.0 else 1.0  # a row along which the forest cannot move
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
