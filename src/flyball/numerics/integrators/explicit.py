@@ -70,7 +70,8 @@ def first_step(derivative, S, W, R, c):
     y = c.y[0]
     d0 = scaled(c, y, y, n)
     d1 = scaled(c, c.K[0], y, n)
-    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    # a state that is zero but for rounding says nothing of how far to go
+    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else max(0.01 * d0 / d1, 1e-6 * c.real[H_MAX])
     h0 = min(h0, c.real[H_MAX])
     for i in range(y.shape[0]):
         c.y[1, i] = y[i] + h0 * c.K[0, i]
