@@ -5,6 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 RADIUS, OFF = 0.1, 0.03
 CIRCLE = [(OFF + RADIUS * np.cos(u), RADIUS * np.sin(u)) for u in np.linspace(0, 2 * np.pi, 160, endpoint=False)]

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 G = 9.81
 TILT = 0.3

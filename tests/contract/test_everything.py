@@ -13,6 +13,9 @@ from flyball.model.coupling import Coupling
 from flyball.model.io import dumps, loads
 from flyball.model.sensor import IMU, Sensor
 from flyball.system.motion import derivative
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 
 @lru_cache(maxsize=1)

@@ -5,6 +5,9 @@ import pytest
 
 import flyball as fb
 from flyball.errors import SimulationError
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 G = 9.81
 SLOPE = 0.5

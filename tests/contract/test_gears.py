@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 AXIS = np.array([1.0, 2.0, -2.0]) / 3.0
 TEETH = (17, 13)

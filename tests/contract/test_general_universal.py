@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 ONE, TWO = (0.1, 0.0, 0.2), (0.25, -0.1, 0.35)
 FIRST, SECOND = (0.2, 1.0, 0.1), (1.0, -0.3, 0.5)

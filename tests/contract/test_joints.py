@@ -26,6 +26,9 @@ from tests.contract.zoo import (
     joined,
     motion,
 )
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 every = pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
 

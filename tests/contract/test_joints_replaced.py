@@ -9,6 +9,9 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball import joints as room
 from tests.contract.zoo import CASES, TIMES, centre, declared, joined, motion, two_bodies, wrench
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 every = pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
 

@@ -8,6 +8,9 @@ from scipy.spatial.transform import Rotation
 
 import flyball as fb
 from tests.contract.zoo import GRAVITY, MASS, centre, two_bodies
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 G = 9.81
 

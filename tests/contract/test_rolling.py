@@ -5,6 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 G = 9.81
 

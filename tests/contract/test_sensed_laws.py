@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import rod
+
+pytestmark = both_layers
 
 G = 9.81
 

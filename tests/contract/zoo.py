@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 import flyball as fb
 from flyball import joints as room
 from flyball.model.geometry import triad
 from flyball.model.joint import Joint
+from tests.layers import cached
 
 GRAVITY = (0.7, -1.5, -9.3)
 P = (0.4, 0.1, 0.5)
@@ -155,13 +154,13 @@ MOMENTS = np.array([0.05, 0.21, 0.33])
 STENCIL = np.unique(np.r_[0.0, (MOMENTS[:, None] + STEP * np.arange(-3, 4)).ravel(), 0.4])
 
 
-@lru_cache(maxsize=64)
+@cached
 def motion(where: str, name: str) -> fb.Result:
     """Its motion at even times."""
     return joined(where, name).simulate(0.4, outputs=TIMES, rtol=1e-10, atol=1e-12)
 
 
-@lru_cache(maxsize=64)
+@cached
 def closely(where: str, name: str) -> fb.Result:
     """Its motion at a few moments, with neighbouring times for numerical differences."""
     return joined(where, name).simulate(0.4, outputs=STENCIL, rtol=1e-11, atol=1e-13)

@@ -11,7 +11,6 @@ from flyball.analysis.compiled import compiled
 from flyball.system.tables import G_VALUE, GAMMA, NU
 from flyball.system.tree import retract
 from tests.contract.zoo import CASES
-from tests.identities.test_coordinates import joint_coordinates
 from tests.identities.test_joint_layer import HINGES, PARTS, coupled, with_joint
 
 T, H = 0.4, 1e-5
@@ -21,8 +20,7 @@ def layers(model):
     """The assembled state, moved a little off the constraints, in absolute and in joint coordinates."""
     a = assemble(model)
     tree = compiled(model, tree=HINGES)
-    tree.follow(a.compiled.hints)
-    for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, joint_coordinates(a.compiled, a.q, a.v, tree))):
+    for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, tree.take(a.compiled, a.q, a.v))):
         rng = np.random.default_rng(5)
         q = q.copy()
         retract(c.values.system, q, 0.03 * rng.normal(size=len(v)))

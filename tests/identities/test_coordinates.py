@@ -10,13 +10,14 @@ import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.analysis.entry import MOTION
-from flyball.constraints import angle
 from flyball.results.records import Records
 from flyball.system.records import load
-from flyball.system.tables import F_APPLIED, GAMMA, LAM
-from flyball.system.tree import REVOLUTE
+from flyball.system.tables import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
+
+
+T = 0.3  # laws have all derivatives there
 
 
 def planar_chain():
@@ -78,30 +79,12 @@ CASES = {
     "four-bar, all but one": (moving_four_bar, ["A", "B", "D"]),
     "spatial four-bar": (spatial_four_bar, ["A", "D"]),
     "spatial four-bar, driven": (lambda: spatial_four_bar(driven=True), ["A", "D"]),
+    "four-bar, driven": (driven_four_bar, ["A", "D"]),
+    "four-bar, driven by a row": (driven_four_bar, ["B", "D"]),
     "Bricard": (bricard, ["R1", "R2", "R3", "R4", "R5"]),
     "governor": (lambda: example("governor.toml"), ["bearing", "left hinge", "right hinge"]),
     "robot": (actuated, ["waist"]),
 }
-
-
-def joint_coordinates(absolute, q, v, tree):
-    """Coordinates and velocities in the other layer of the state (q, v) of the first, read from its kinematics."""
-    absolute.at(0.0, q, v)
-    old, new = absolute.structure, tree.structure
-    Q, V = np.zeros(new.nq), np.zeros(new.nv)
-    hinges = {new.model.carrier(new.model[j].body_j, new.model[j]): j for j in new.tree}
-    for name, b in new.place.items():
-        if b < 0:
-            continue
-        _, kind, q0, v0, nq, nv = new.tables["body_i"][b, :6]
-        if kind == REVOLUTE:
-            F, M = (load(absolute.work.FK, old.frame_at[hinges[name], role, ""]) for role in "FM")
-            value, _, n, _, _ = angle.row((0.0,) * 8, F, M, 0.0, None)
-            Q[q0], V[v0] = value, np.dot(n, np.subtract(M[2], F[2]))
-        else:
-            _, _, p0, u0 = old.tables["body_i"][old.place[name], :4]
-            Q[q0 : q0 + nq], V[v0 : v0 + nv] = q[p0 : p0 + nq], v[u0 : u0 + nv]
-    return Q, V
 
 
 def spun(model, a):
@@ -122,17 +105,16 @@ def test_joint_coordinates_give_the_same_accelerations(case):
     """Poses, velocities and accelerations of all bodies, and the multipliers that are unique, to 1e-9."""
     make, hinges = CASES[case]
     model = make()
-    a = assemble(model)
+    a = assemble(model, t=T)
     q, v = spun(model, a)
     tree = compiled(model, tree=hinges)
-    Q, V = joint_coordinates(a.compiled, q, v, tree)
+    Q, V = tree.take(a.compiled, q, v)
     bodies = {}
     for c, x, u in ((a.compiled, q, v), (tree, Q, V)):
-        status, dy = c.at(0.0, x, u, MOTION)
+        status, _ = c.at(T, x, u, MOTION)
         assert status == 0
-        s = c.structure
-        r = Records(c.values, x[None], u[None], dy[None, s.nq : s.nq + s.nv])
-        for name, b in s.place.items():
+        r = Records(c.values, x[None], u[None], c.work.vel[X_SOLVED][None])
+        for name, b in c.structure.place.items():
             if b >= 0:
                 bodies.setdefault(name, []).append([np.ravel(part) for part in r.body(b)])
     assert tree.structure.nv < a.compiled.structure.nv
@@ -153,7 +135,9 @@ def test_joint_coordinates_give_the_same_accelerations(case):
 def test_mass_matrix_is_symmetric_and_positive(case):
     """The kinetic energy of random joint velocities, by the mass matrix of the tree, is that of the bodies."""
     make, hinges = CASES[case]
-    c = compiled(make(), tree=hinges)
+    model = make()
+    model.drivers.clear()  # they would prescribe some of the velocities
+    c = compiled(model, tree=hinges)
     random = np.random.default_rng(1)
     S, s = c.values.system, c.structure
     V = random.normal(size=s.nv)
@@ -172,17 +156,26 @@ def test_mass_matrix_is_symmetric_and_positive(case):
 
 @pytest.mark.parametrize("case", CASES)
 def test_joint_layer_solves_the_equations_of_motion(case):
-    """M x - G^T lam = f and G x = gamma, by a dense solve of the same M, G, f and gamma."""
+    """M x - G^T lam = f and G x = gamma, by a dense solve of the same M, G, f and gamma.
+
+    Where a driver prescribes an acceleration, its effort is what is left of the first.
+    """
     make, hinges = CASES[case]
     model = make()
-    a = assemble(model)
+    a = assemble(model, t=T)
     c = compiled(model, tree=hinges)
-    Q, V = joint_coordinates(a.compiled, *spun(model, a), c)
+    Q, V = c.take(a.compiled, *spun(model, a))
     S, s, W = c.values.system, c.structure, c.work
-    _, dy = c.at(0.0, Q, V, MOTION)
+    c.at(T, Q, V, MOTION)
     M = np.zeros((s.nv, s.nv))
     M[S.mass_i[:, 0], S.mass_i[:, 1]] = W.M
     M, G = M + np.tril(M, -1).T, c.jacobian()
-    K = np.block([[M, G.T], [G, np.zeros((len(G), len(G)))]])
-    exact = np.linalg.lstsq(K, np.r_[W.vel[F_APPLIED], W.row[GAMMA]], rcond=1e-12)[0][: s.nv]
-    assert dy[s.nq : s.nq + s.nv] == pytest.approx(exact, abs=2e-10 * np.abs(exact).max())
+    x, f = W.vel[X_SOLVED], W.vel[F_APPLIED]
+    driven = S.body_i[list(s.prescribed.values()), V0]
+    free = np.delete(np.arange(s.nv), driven)
+    K = np.block([[M[np.ix_(free, free)], G[:, free].T], [G[:, free], np.zeros((len(G), len(G)))]])
+    known = np.r_[f[free] - M[np.ix_(free, driven)] @ x[driven], W.row[GAMMA] - G[:, driven] @ x[driven]]
+    exact = np.linalg.lstsq(K, known, rcond=1e-12)[0][: len(free)]
+    assert x[free] == pytest.approx(exact, abs=2e-10 * np.abs(exact).max())
+    left = (M @ x - f - G.T @ W.row[LAM])[driven]
+    assert W.vel[EFFORT, driven] == pytest.approx(left, rel=1e-9)

@@ -14,7 +14,6 @@ from flyball.analysis.compiled import compiled
 from flyball.analysis.entry import MOTION
 from flyball.results.records import Records
 from tests.contract.zoo import CASES, declared, two_bodies
-from tests.identities.test_coordinates import joint_coordinates
 
 HINGES = ["H0", "H1"]
 
@@ -108,8 +107,7 @@ def both_layers(model):
     """Body -> its record in absolute and in joint coordinates, at the same state."""
     a = assemble(model)
     tree = compiled(model, tree=HINGES)
-    tree.follow(a.compiled.hints)
-    Q, V = joint_coordinates(a.compiled, a.q, a.v, tree)
+    Q, V = tree.take(a.compiled, a.q, a.v)
     bodies = {}
     for c, q, v in ((a.compiled, a.q, a.v), (tree, Q, V)):
         status, dy = c.at(0.2, q, v)

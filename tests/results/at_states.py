@@ -41,9 +41,9 @@ def assembled(a: Assembly) -> Result:
 def in_other_coordinates(r: Result, c: Compiled, from_: Compiled) -> Result:
     """The same states of the same mechanism in the coordinates of ``c``; ``from_`` has those of the result."""
     states = []
-    for q, v, z in zip(r.q, r.v, r.states, strict=True):
+    for t, q, v, z in zip(r.t.tolist(), r.q, r.v, r.states, strict=True):
         from_.z = z.copy()
-        states.append((*c.take(from_, q, v), c.z.copy()))
+        states.append((*c.take(from_, t, q, v), c.z.copy()))
     out = result_at(c, r.t.tolist(), states)
     out.health = r.health
     return out

@@ -6,19 +6,20 @@ of Chen, You and Tarnai, Threefold-symmetric Bricard linkages for deployable str
 closes the loop is checked here as well.
 """
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, 0, -1), (1, -1, -1), (0, -1, -1), (0, -1, 0)], float)
 AXES = np.array([(0, 0, 1), (0, -1, 0), (1, 0, 0), (0, 0, 1), (0, -1, 0), (1, 0, 0)], float)
 
 
-@functools.cache
+@cached
 def motion():
     return example("bricard.toml").simulate(10.0, rtol=1e-12, atol=1e-14, outputs=1001)
 

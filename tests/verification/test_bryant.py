@@ -12,6 +12,9 @@ from scipy.integrate import solve_ivp
 
 import flyball as fb
 from flyball import rotations
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 G = np.array([0.0, 0.0, -9.81])
 TIGHT = {"rtol": 1e-12, "atol": 1e-13}

@@ -5,14 +5,15 @@ phi'' = -(6/5) (g/l) sin phi, a pendulum (Jacobi). It is closed by four hinges, 
 tolerance is varied and the error held against the number of steps taken: of a method of order p it falls as n^-p.
 """
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from tests.layers import both_layers, cached
 from tests.mechanisms import G
+
+pytestmark = both_layers
 
 START = 1.2  # rad from the vertical; the singular position is at pi/2
 END = 1.7  # s; not a multiple of the quarter period, 0.5 s
@@ -60,7 +61,7 @@ def exact_reactions(t):
     return np.array(out)
 
 
-@functools.cache
+@cached
 def run(method, rtol):
     return parallelogram().simulate(END, rtol=rtol, atol=rtol, outputs=69, method=method)
 

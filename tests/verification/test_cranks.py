@@ -1,11 +1,12 @@
 """Crank mechanisms of the examples against their closed forms: slider-crank in space, quick return, straight line, cam."""
 
-import functools
-
 import numpy as np
 import pytest
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 TURN = 2 * np.pi
 
@@ -60,7 +61,7 @@ def shaper_energy(a):
     return mass, G * (6 * LEVER / 2 * np.cos(lever.real) + 1.5 * middle[1].real)
 
 
-@functools.cache
+@cached
 def quick_return():
     m = example("quick_return.toml")
     return m.simulate(1.0, rtol=1e-11, atol=1e-13, outputs=361)  # one degree a step

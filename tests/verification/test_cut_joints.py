@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, bricard, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated, loads
+
+pytestmark = both_layers
 
 
 def set_free(r, k):

@@ -7,7 +7,10 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 # the benchmark's published or closed-form values, A02: exact digits; those for N = 40 agree with the library's file to 4e-6
 A02 = {

@@ -6,6 +6,9 @@ from scipy.spatial.transform import Rotation
 from scipy.special import fresnel
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 MASS, SPIN, THRUST = 2.0, 5.0, 3.0
 TURN = Rotation.from_rotvec([0.4, -0.7, 0.3])

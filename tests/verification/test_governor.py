@@ -1,18 +1,19 @@
 """IFToMM benchmark A05, Watt's governor with stiff springs."""
 
-import functools
-
 import numpy as np
 import pytest
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import example
+
+pytestmark = both_layers
 
 # the benchmark's published or closed-form values: converged values of minimal coordinates; agree with the library's plot to its resolution
 S = {0.1: 0.5238364756, 0.5: 0.7432494248, 1.0: 0.5014209224, 2.0: 0.5059092943, 5.0: 0.5355631037, 10.0: 0.6196229171}
 ALPHA = {0.5: 0.2594913815, 10.0: 0.3900737018}
 
 
-@functools.cache
+@cached
 def governor(t_end, rtol):
     return example("governor.toml").simulate(t_end, rtol=rtol, atol=1e-2 * rtol, outputs=round(10 * t_end) + 1)
 

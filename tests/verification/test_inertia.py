@@ -11,6 +11,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
 
 MASS = 7.0
 MOMENTS = np.array([0.9, 1.4, 2.1])

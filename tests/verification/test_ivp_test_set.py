@@ -3,13 +3,14 @@
 Andrews' squeezing mechanism (II-13) and the car axis (II-10), both from the examples folder.
 """
 
-import functools
-
 import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers, cached
 from tests.mechanisms import EXAMPLES, example
+
+pytestmark = both_layers
 
 # -------------------------------------------------------------------------------- Andrews' squeezing mechanism, II-13
 
@@ -66,7 +67,7 @@ FIRST_ACCELERATIONS = (14222.4439199541138705911625887, -10666.83293996558540294
 FIRST_MULTIPLIERS = (98.5668703962410896057654982170, -6.12268834425566265503114393122, 0, 0, 0, 0)
 
 
-@functools.cache
+@cached
 def andrews(method="dop853"):
     return example("andrews.toml").simulate(0.03, rtol=1e-12, atol=1e-14, outputs=31, method=method)
 

@@ -1,19 +1,20 @@
 """Linkages against closed forms and independent solutions of their loop equations."""
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
 import flyball as fb
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, example, spatial_four_bar
+
+pytestmark = both_layers
 
 R, L = 0.2, 0.5  # crank and rod of the example slider-crank
 SPEED = 95.5 * 2 * np.pi / 60
 
 
-@functools.cache
+@cached
 def slider_crank():
     return example("slider_crank.toml").simulate(2.0, rtol=1e-10, atol=1e-12, outputs=401)
 

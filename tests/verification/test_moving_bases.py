@@ -6,7 +6,10 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G
+
+pytestmark = both_layers
 
 
 def turntable(law, planar=True, mass=2.0):

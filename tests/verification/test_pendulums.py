@@ -8,7 +8,10 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 # the benchmark's closed-form values, A01: exact (Jacobi); the IFToMM library's file agrees to its six digits
 A01 = {

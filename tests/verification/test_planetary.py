@@ -1,18 +1,19 @@
 """The planetary gear train: Willis' ratio, torques, and its acceleration in closed form."""
 
-import functools
-
 import numpy as np
 import pytest
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import example
+
+pytestmark = both_layers
 
 SUN, PLANET, RING, MODULE = 24, 18, 60, 0.005
 RATIO = 1 + RING / SUN  # sun to carrier, the ring at rest (Willis 1841)
 TORQUE, BRAKE = 2.0, 0.35
 
 
-@functools.cache
+@cached
 def train(planets=3):
     return example("planetary.py", planets=planets).simulate(4.0, rtol=1e-11, atol=1e-13, outputs=81)
 

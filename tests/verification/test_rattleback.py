@@ -1,12 +1,13 @@
 """The rattleback against its own equations in the body's axes, its two modes of rocking, and its reversal."""
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 A, B, C, DROP = 0.20, 0.03, 0.02, 0.01
 ALONG, ACROSS, HEIGHT = A * A / C, B * B / C, C - DROP  # radii of curvature, and of the centre of mass over its foot
@@ -37,7 +38,7 @@ def rates(_, y):
     return np.r_[np.linalg.solve(INERTIA - X @ X, -np.cross(w, INERTIA @ w) + np.cross(r, known)), n1]
 
 
-@functools.cache
+@cached
 def motion(spin, t_end=8.0):
     chosen = {"spin": spin}
     return example("rattleback.toml").simulate(t_end, rtol=1e-11, atol=1e-13, outputs=161, parameters=chosen)

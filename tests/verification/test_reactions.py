@@ -1,12 +1,13 @@
 """Joint reactions against statics and against Newton and Euler's laws for each body."""
 
-import functools
-
 import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
+
+pytestmark = both_layers
 
 
 def cantilever(swapped=False):
@@ -98,7 +99,7 @@ def loads(r):
             yield m.carrier(name, d), p, *((none, sign * effort) if what == "angle" else (sign * effort, none))
 
 
-@functools.cache
+@cached
 def motion(name):
     if name == "actuated":
         return actuated().simulate(1.0, outputs=41)

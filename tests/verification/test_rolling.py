@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 
 def test_disk_rolls_round_its_circle():

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from tests.layers import both_layers
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 K, FREE, M = 150.0, 1.0, 1.0
 

@@ -6,7 +6,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, door, four_bar, spatial_four_bar
+
+pytestmark = both_layers
 
 
 def scaled(base, length=1.0, mass=1.0, shift=None):

@@ -9,7 +9,6 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION
 from flyball.system.tables import G_VALUE, GAMMA, NU
 from flyball.system.tree import rates, retract
 from tests.mechanisms import bricard, example, four_bar, spatial_four_bar
@@ -59,7 +58,7 @@ CASES = {
     "four-bar, two coordinates": (four_bar, ("A", "B")),
     "governor": (lambda: example("governor.toml"), ("bearing", "left hinge", "right hinge")),
     "gyroscope": (gyroscope, ()),
-    "gyroscope, both coordinates": (gyroscope, ("bearing", "tilted")),
+    "gyroscope, one a coordinate": (gyroscope, ("bearing",)),
     "Hooke's joint": (lambda: hooke(0.6), ()),
     "Hooke's joint, shafts coordinates": (lambda: hooke(0.6), ("A", "B")),
     "shaken pendulum": (lambda: shaken_pendulum("point"), ()),
@@ -101,7 +100,7 @@ def test_derivatives_of_the_constraints(name, seed):
         c.at(t + step, *carried_on(S, q, v, vdot, step))
         values.append(W.row[G_VALUE].copy())
         speeds.append(c.jacobian() @ (v + step * vdot) - W.row[NU])
-    c.at(t, q, v, MOTION)
+    c.at(t, q, v)
     assert np.abs(W.row[G_VALUE]).max() > 1e-2, "off the constraints"
     first = c.jacobian() @ v - W.row[NU]
     second = c.jacobian() @ vdot - W.row[GAMMA]

@@ -5,7 +5,10 @@ import pytest
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import example, free_body
+
+pytestmark = both_layers
 
 # the benchmark's published or closed-form values, heavy top of Geradin and Cardona: converged values, MATLAB's published to 5 digits
 TOP = {

@@ -5,7 +5,10 @@ import pytest
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
+from tests.layers import both_layers
 from tests.mechanisms import example
+
+pytestmark = both_layers
 
 
 def hinges(radius, degrees):

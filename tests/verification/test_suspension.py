@@ -1,13 +1,14 @@
 """The double wishbone: its pose at any bump travel against the same geometry solved by itself with SciPy."""
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.optimize import fsolve
 from scipy.spatial.transform import Rotation
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import example
+
+pytestmark = both_layers
 
 LOWER_PIVOT, LOWER_AXIS, LOWER_BALL = np.array([[0, 0.35, 0.20], [1, 0, 0], [0, 0.72, 0.18]])
 UPPER_PIVOT, UPPER_AXIS, UPPER_BALL = np.array([[0, 0.42, 0.40], [1, 0, 0.1], [-0.01, 0.68, 0.42]])
@@ -41,7 +42,7 @@ def solved(height):
     return x
 
 
-@functools.cache
+@cached
 def bump():
     return example("double_wishbone.toml").simulate(2.0, rtol=1e-10, atol=1e-12, outputs=81)
 

@@ -1,13 +1,14 @@
 """The toggle press at rest, by the equilibrium of knee and ram and by virtual work; its energy on the way."""
 
-import functools
-
 import numpy as np
 import pytest
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, example
+
+pytestmark = both_layers
 
 ARM, GAP, STROKE, OPEN = 0.25, 0.05, 0.112, np.radians(30)
 FOOT = np.array([-0.55, -0.32])
@@ -45,7 +46,7 @@ def potential(slope):
 CLOSED = brentq(lambda s: cylinder(s) - cylinder(OPEN) - STROKE, 0.0, OPEN, xtol=1e-15)
 
 
-@functools.cache
+@cached
 def press(weightless=False):
     m = example("toggle_press.toml")
     if weightless:

@@ -9,9 +9,8 @@ import numpy as np
 
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
-from ..system.coordinates import BodyState, coordinates, turned_angles
+from ..system.coordinates import BodyState, positions, turned_angles, velocities
 from ..system.forest import steps
-from ..system.kinematics import motions, poses
 from ..system.motion import NONE
 from ..system.records import load
 from ..system.structure import Structure, structure
@@ -64,11 +63,10 @@ class Compiled:
             if name in hints and not name.endswith(".work"):
                 self.z[k] = hints[name]
 
-    def moving(self, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
+    def moving(self, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, BodyState]:
         """How every body moves at a state."""
-        S, W = self.values.system, self.work
-        poses(S, W, q)
-        motions(S, W, v)
+        W = self.work
+        self.at(t, q, v)
         angles = turned_angles(self.values, W, q) if self.structure.model.planar else {}
         out = {}
         for name, b in self.structure.place.items():
@@ -77,11 +75,14 @@ class Compiled:
                 out[name] = BodyState(p, R.reshape(3, 3), u, w, float(angles.get(name, 0.0)))
         return out
 
-    def take(self, other: Compiled, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(q, v) of this mechanism in the state (q, v) of the same one in other coordinates; turns and places too."""
+    def take(self, other: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(q, v) of this mechanism in the state (t, q, v) of it in other coordinates; turns and places too."""
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        return coordinates(self.values, other.moving(q, v), hints)
+        bodies = other.moving(t, q, v)
+        own = positions(self.values, bodies, hints)
+        self.at(t, own, np.zeros(self.structure.nv))
+        return own, velocities(self.values, bodies, self.work)
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""

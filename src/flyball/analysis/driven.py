@@ -2,7 +2,7 @@
 
 The compiled loop (``system/follow.py``) gives positions, velocities, accelerations and powers at every time that it
 stops at. The powers are integrated by the polynomial through eight neighbouring times; where six say something else,
-times are added.
+times are added, first where they differ most.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from .start import Start
 
 NODES, FEWER = 8, 6
 ROUNDS = 40
+CALLS = 1_000_000
 SHORT = 1e-12  # part of the span: a power that is still uneven over less has jumped
 
 
@@ -29,20 +30,20 @@ def leaves_no_freedom(start: Start) -> bool:
     return mobility(s.model, start.base).freedoms == 0
 
 
-def integrate_powers(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
+def integrate_powers(start: Start, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
     """Put works where the rows of ``follow`` have powers, in place; keep those at output times.
 
     Parameters
     ----------
-    a : Assembly
+    start : Start
+        With the works that the motion begins with.
     clock : Clock
         As the loop has left it; its state at the end gets its works too.
     rows : ndarray (n, width)
     """
     at = 1 + clock.accounts
-    begin = clock.y[0, clock.accounts] if len(rows) == 0 else None
-    if begin is None and len(at):
-        works = _works(a, clock, rows)
+    if len(rows) and len(at):
+        works = start.y[clock.accounts] + _works(start.assembly, clock, rows)
         rows[:, at] = works
         clock.y[0, clock.accounts] = works[-1]
     wanted = np.isin(rows[:, 0], clock.times)
@@ -50,29 +51,31 @@ def integrate_powers(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarr
 
 
 def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
-    """Works at the times of the rows."""
+    """Works at the times of the rows, from none at the first."""
     at = 1 + clock.accounts
-    t, P = rows[:, 0], rows[:, at]
-    nodes, powers = t, P
-    states = {float(row[0]): row for row in rows}
-    span = max(t[-1] - t[0], 1e-300)
+    known = rows
+    shortest = SHORT * (rows[-1, 0] - rows[0, 0])
     for _ in range(ROUNDS):
-        pieces, error = _pieces(nodes, powers)
-        h = np.diff(nodes)
+        pieces, error = _pieces(known[:, 0], known[:, at])
         allowed = ex.LOOSER * clock.real[ex.RTOL] * (clock.real[ex.LEDGER] + np.abs(pieces).sum())
-        uneven = (error > allowed * np.sqrt(h / span)) & (h > SHORT * span)
-        if not uneven.any():
+        uneven = _largest(np.where(np.diff(known[:, 0]) > shortest, error, 0.0), allowed)
+        more = _halfway(a, clock, known, uneven) if len(uneven) else known[:0]
+        if not len(more):
             break
-        more = [_between(a, clock, states, nodes[k], nodes[k + 1]) for k in np.flatnonzero(uneven)]
-        more = [row for row in more if row is not None]
-        if not more:
-            break
-        states |= {float(row[0]): row for row in more}
-        nodes = np.array(sorted(states))
-        powers = np.array([states[x][at] for x in nodes.tolist()])
-    pieces, _ = _pieces(nodes, powers)
+        known = np.vstack([known, more])
+        known = known[np.unique(known[:, 0], return_index=True)[1]]
+    pieces, _ = _pieces(known[:, 0], known[:, at])
     works = np.vstack([np.zeros(len(at)), np.cumsum(pieces, axis=0)])
-    return works[np.searchsorted(nodes, t)]
+    return works[np.searchsorted(known[:, 0], rows[:, 0])]
+
+
+def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
+    """The fewest whose errors, taken away, leave no more than half of what is allowed; none if all is well."""
+    if error.sum() <= allowed:
+        return np.zeros(0, np.int64)
+    order = np.argsort(-error)
+    left = error.sum() - np.cumsum(error[order])
+    return np.sort(order[: 1 + np.argmax(left <= 0.5 * allowed)])
 
 
 def _pieces(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -97,22 +100,19 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     return np.einsum("im,imk->ik", weights, P[window])
 
 
-def _between(a: Assembly, clock: ex.Clock, states: dict, t0: float, t1: float) -> np.ndarray | None:
-    """A row half way between two neighbours; nothing where the motion does not lead there."""
+def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+    """Rows half way through those pieces, and where else the loop stops on its way there; as far as it gets."""
     S, W = a.compiled.values.system, a.compiled.work
-    row = states[float(t0)]
-    own = ex.Clock(
-        clock.real.copy(),
-        clock.count.copy(),
-        np.array([0.5 * (t0 + t1)]),
-        clock.y.copy(),
-        clock.K.copy(),
-        clock.accounts,
-    )
-    own.y[0] = row[1 : 1 + clock.y.shape[1]]
-    own.real[[ex.T, ex.T_END]] = t0, own.times[0]
-    own.count[[ex.STARTED, ex.NEXT]] = 0
-    own.count[ex.QUOTA] = 1000
-    out = np.zeros((50, len(row)))
-    used = motion_kernel(S, W, tableau("rk45"), own, out, FOLLOW)
-    return out[used - 1].copy() if own.count[ex.STATUS] == ex.DONE else None
+    first = known[pieces[0]]
+    times = 0.5 * (known[pieces, 0] + known[pieces + 1, 0])
+    own = ex.Clock(clock.real.copy(), clock.count.copy(), times, clock.y.copy(), clock.K.copy(), clock.accounts)
+    own.y[0] = first[1 : 1 + clock.y.shape[1]]
+    own.real[[ex.T, ex.T_END]] = first[0], times[-1]
+    own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
+    own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
+    out = np.zeros((len(times) + 50, len(first)))
+    rows = []
+    while own.count[ex.STATUS] == ex.RUNNING:
+        used = motion_kernel(S, W, tableau("rk45"), own, out, FOLLOW)
+        rows.append(out[:used].copy())
+    return np.concatenate(rows)[1:]

@@ -75,7 +75,7 @@ def simulate(
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
     rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
     if follow:
-        rows = integrate_powers(begun.assembly, clock, rows)
+        rows = integrate_powers(begun, clock, rows)
     try:
         result = outcome(model, begun, clock, rows, chosen, interrupted)
     except SimulationError as error:

@@ -50,7 +50,7 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
         why = f"{_counts(c)} cost less than {_counts(a.compiled)} in absolute coordinates"
     else:
         why = "as asked for"
-    q, v = c.take(a.compiled, a.q, a.v)
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
     return Assembly(c, a.t, q, v, a.moved, a.iterations, a.sped), f"joint: {why}{_cuts(c)}"
 
 
@@ -95,7 +95,7 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     s, S = c.structure, c.values.system
     if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED:
         return None
-    q, v = c.take(a.compiled, a.q, a.v)
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)
     M = np.zeros((s.nv, s.nv))
     M[S.mass_i[:, 0], S.mass_i[:, 1]] = c.work.M

@@ -53,7 +53,7 @@ def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
     s = a.compiled.structure
     if not s.tree or not s.model.planar:
         return {}
-    moving = base.compiled.moving(base.q, base.v)
+    moving = base.compiled.moving(base.t, base.q, base.v)
     return wound(a.compiled.values, y[: s.nq], {name: state.angle for name, state in moving.items()})
 
 
@@ -75,7 +75,7 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if not c.structure.tree:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
-    q, v = plain.take(c, q, v)
+    q, v = plain.take(c, t, q, v)
     for name, more in before.wound.items():
         q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
     return Assembly(plain, t, q, v)

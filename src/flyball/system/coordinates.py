@@ -7,23 +7,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
 from .forest import TreeJoint
-from .kinematics import poses
 from .structure import FrameSpec
 from .tables import NV, PARENT, Q0, TREE, V0
-from .tree import FREE, PLANAR, column
+from .tree import PLANAR, column
 
 if TYPE_CHECKING:
     from .values import Values
 
 AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
+
+NEXT = {"x": "y", "y": "z", "z": "x"}
 
 
 @dataclass(frozen=True)
@@ -42,31 +43,47 @@ class BodyState:
 REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
-def coordinates(
-    x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """(q, v) of the forest for bodies that move so; where these do not fit the tree joints, the nearest.
+def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None) -> np.ndarray:
+    """Coordinates (nq,) of the forest for bodies that are there; where these do not fit the tree joints, the nearest.
 
     ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
     """
     s = x.structure
-    q, v = np.zeros(s.nq), np.zeros(s.nv)
-    names = {b: name for name, b in s.place.items() if b >= 0}
+    q = np.zeros(s.nq)
     hung = {t.child: t for t in s.tree_joints.values()}
-    for b, name in names.items():
-        d = bodies[name]
-        kind, q0, v0 = s.tables["body_i"][b, [TREE, Q0, V0]]
+    for name, b in s.place.items():
         if b in hung:
             _read(x, hung[b], bodies, hints or {}, q)
-        elif kind == FREE:
-            q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
-            v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
-        elif kind == PLANAR:
-            q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
-            v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
-    if hung:
-        _rates(x, hung, bodies, q, v)
-    return q, v
+        elif b >= 0:
+            d, q0 = bodies[name], s.tables["body_i"][b, Q0]
+            if s.model.planar:
+                q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
+            else:
+                q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
+    return q
+
+
+def velocities(x: Values, bodies: Mapping[str, BodyState], W: Any = None) -> np.ndarray:
+    """Velocities (nv,) of the forest for bodies that move so.
+
+    Those of tree joints are the least squares of each body's motion relative to its parent's, at the poses in W; zero
+    where W is not given.
+    """
+    s, body_i = x.structure, x.structure.tables["body_i"]
+    v = np.zeros(s.nv)
+    hung = {t.child: t for t in s.tree_joints.values()}
+    names = {b: name for name, b in s.place.items()}
+    for name, b in s.place.items():
+        if b in hung:
+            if W is not None:
+                _rates(x, W, hung[b], bodies[name], bodies.get(names[int(body_i[hung[b].links[0], PARENT])], REST), v)
+        elif b >= 0:
+            d, v0 = bodies[name], body_i[b, V0]
+            if s.model.planar:
+                v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
+            else:
+                v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
+    return v
 
 
 def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
@@ -113,12 +130,11 @@ def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mappi
         elif step.kind == "S":
             q[at : at + 4] = matrix_to_quaternion(turn.T if t.reversed else turn)
         else:
-            b = np.roll(a, 1)  # turned by the angle; a further turn is about an axis that this one has turned
-            c = np.cross(a, b)
+            b = AXES[NEXT[step.axis]]  # turned by the angle; a further turn is about an axis that this one has turned
             crossing = [o for o in t.primitives if o.kind == "R" and o is not step]
             if crossing and crossing[0].axis != step.axis:
                 b = AXES[crossing[0].axis]
-                c = np.cross(a, b)
+            c = _cross(a, b)
             turned = turn @ b
             angle = np.arctan2(c @ turned, b @ turned)
             turn = _about(a, -angle) @ turn
@@ -137,7 +153,7 @@ def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tu
 
 def _about(a: np.ndarray, angle: float) -> np.ndarray:
     """Rotation about one of the three axes."""
-    K = np.cross(np.eye(3), a)
+    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
@@ -170,31 +186,26 @@ def _normal(x: Values, t: TreeJoint) -> float:
 
 def _planar_angle(turn: np.ndarray, t: TreeJoint) -> float:
     """Angle of a turn about a planar joint's normal."""
-    b = np.roll(AXES[t.joint.planar_normal], 1)
-    c = np.cross(AXES[t.joint.planar_normal], b)
+    b = AXES[NEXT[t.joint.planar_normal]]
+    c = _cross(AXES[t.joint.planar_normal], b)
     return float(np.arctan2(c @ turn @ b, b @ turn @ b))
 
 
-def _rates(
-    x: Values, hung: Mapping[int, TreeJoint], bodies: Mapping[str, BodyState], q: np.ndarray, v: np.ndarray
-) -> None:
-    """Velocities of the tree joints: least squares of the body's motion relative to its parent's."""
-    s, S = x.structure, x.system
-    nb = len(S.body_i)
-    W = SimpleNamespace(
-        BK=np.zeros((nb, 24)), FK=np.zeros((len(S.frame_i), 24)), X=np.zeros((s.nv, 6)), O=np.zeros((nb, 3))
-    )
-    poses(S, W, q)
-    names = {b: name for name, b in s.place.items()}
-    for b, t in hung.items():
-        d, parent = bodies[names[b]], bodies.get(names[int(S.body_i[t.links[0], 0])], REST)
-        seen = parent.v + np.cross(parent.w, d.p - parent.p)
-        columns, at = [], []
-        for link in t.links:
-            for k in range(int(S.body_i[link, 5])):
-                turn, shift = (np.array(c) for c in column(S, W, link, k))
-                columns.append(np.r_[np.array(shift) + np.cross(turn, d.p - W.O[link]), x.length * turn])
-                at.append(int(S.body_i[link, V0]) + k)
-        if at:
-            rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
-            v[at] = np.linalg.lstsq(np.array(columns).T, rel, rcond=None)[0]
+def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: np.ndarray) -> None:
+    """Velocities of one tree joint from the motions of the bodies on both sides."""
+    S = x.system
+    seen = parent.v + _cross(parent.w, d.p - parent.p)
+    columns, at = [], []
+    for link in t.links:
+        for k in range(int(S.body_i[link, NV])):
+            turn, shift = column(S, W, link, k)
+            columns.append(np.r_[np.array(shift) + _cross(turn, d.p - W.O[link]), x.length * np.array(turn)])
+            at.append(int(S.body_i[link, V0]) + k)
+    if at:
+        rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
+        v[at] = np.linalg.lstsq(np.array(columns).T, rel, rcond=None)[0]
+
+
+def _cross(a: Any, b: Any) -> np.ndarray:
+    """Cross product; NumPy's own takes ten times as long."""
+    return np.array(cross(a, b))

@@ -30,6 +30,7 @@ from .motion import arrive, write_row
 from .tables import COORDINATES, NV, V0
 from .tree import retract
 
+ALL_BUT = 1.0 - 1e-6
 FAR_OFF = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
 
 
@@ -61,11 +62,15 @@ def follow(S, W, c, out):
             c.count[STATUS] = TOO_MANY
             return used
         goal = c.times[c.count[NEXT]] if c.count[NEXT] < c.times.shape[0] else c.real[T_END]
-        h = share * min(goal - c.real[T], c.real[H_MAX])
+        left = goal - c.real[T]
+        h = share * min(left, c.real[H_MAX])
+        lands = h > ALL_BUT * left  # no sliver is left over for the next step
+        if lands:
+            h = left
         if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]):
             c.count[STATUS] = STUCK
             return used
-        t = goal if share == 1.0 and h == goal - c.real[T] else c.real[T] + h
+        t = goal if lands else c.real[T] + h
         predict(S, c, h)
         status, found = arrive(t, c.y[1], c.K[2], S, W)
         steps += 1

@@ -16,10 +16,12 @@ from __future__ import annotations
 from .._jit import formula
 from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve
+from .articulated import articulate, articulated_solve
 from .mass import mass_entries
 from .rows import row_times
 from .tables import (
     BODY_LAW,
+    COUPLED,
     DIAGONAL,
     EFFORT,
     EXCESS,
@@ -45,6 +47,7 @@ from .tables import (
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
+BLUR = 1e-20  # squares of entries of G below this part of what is usual are rounding
 STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
 
 
@@ -69,7 +72,9 @@ def factor(S, W):
     W.info[FACTORISATIONS] += 1
     if S.kinds[SOLVER] == SCHUR:
         return factor_schur(S, W)
-    return factor_coupled(S, W)
+    if S.kinds[SOLVER] == COUPLED:
+        return factor_coupled(S, W)
+    return articulate(S, W)
 
 
 @formula
@@ -127,9 +132,14 @@ def factor_schur(S, W):
 
 @formula
 def factor_coupled(S, W):
-    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta."""
+    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta.
+
+    A row along which the forest cannot move has nothing but rounding in G. It gets the size of one that it can move
+    along: entries of 1, or of the mechanism's length.
+    """
     nv = W.vel.shape[1]
     per = W.vel[V1]
+    short = min(1.0, S.glob[LENGTH]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
         W.A[S.mass_i[e, 2]] = W.M[e]
@@ -137,11 +147,14 @@ def factor_coupled(S, W):
             per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
+        usual = s
         for e in range(S.row_p[k], S.row_p[k + 1]):
             W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += W.G[e] * W.G[e] * per[S.col_i[e]]
-        s = s if s.real > 0.0 else 1.0  # a row along which the forest cannot move
+                usual += short * per[S.col_i[e]]
+        if not s.real > BLUR * usual.real:
+            s = usual if usual.real > 0.0 else usual + 1.0
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
@@ -163,7 +176,10 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
         W.row[R1, k] = gamma[k]
     if S.kinds[SOLVER] == SCHUR:
         return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
-    return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+    if S.kinds[SOLVER] == COUPLED:
+        return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+    articulated_solve(S, W, f, x, W.vel[EFFORT])
+    return 0.0
 
 
 @formula

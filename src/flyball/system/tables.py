@@ -42,7 +42,7 @@ STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT = range(7)
 
 # entries of System.kinds from its end, and what may stand in the first: how the equations are solved
-SOLVER, COORDINATES, GROUND_FRAMES = -3, -2, -1
+SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
 SCHUR, COUPLED, ARTICULATED = range(3)
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
@@ -68,7 +68,7 @@ class System(NamedTuple):
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
     load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
-    kinds: np.ndarray  # first row of each kind of term; solver; number of q; frames on ground
+    kinds: np.ndarray  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
     code: np.ndarray  # bytecode of the laws
     const: np.ndarray  # parameters, literals of the laws, splines
     glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism
@@ -83,10 +83,10 @@ class Work(NamedTuple):
 
     BK: np.ndarray  # (nb, 24): kinematics of the bodies
     FK: np.ndarray  # (nf, 24): kinematics of the frames
-    X: np.ndarray  # (nv, 6): world twist column of each velocity, at its body's reference point
+    X: np.ndarray  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
     O: np.ndarray  # (nb, 3): that reference point
     FB: np.ndarray  # (nb, 6): force on each body, torque about its centre of mass
-    IC: np.ndarray  # (nb, 10): composite inertias
+    IC: np.ndarray  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
     M: np.ndarray  # (nM,): mass matrix entries
     G: np.ndarray  # (nG,): constraint Jacobian, then gradients of the measured quantities
     H: np.ndarray  # (nG,): M^-1 G^T

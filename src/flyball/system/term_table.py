@@ -15,7 +15,7 @@ from ..model.expressions import Expression
 from ..model.joint import Coordinate, Joint
 from .forest import step_of
 from .structure import RowSpec, Structure, TermSpec, frame, ints
-from .tables import BODY_LAW, COUPLED, SCHUR, TERM_KINDS
+from .tables import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
 
 
 def rows(s: Structure, holds: Sequence[Initial]) -> None:
@@ -139,8 +139,9 @@ def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: floa
 
 
 def sort(s: Structure) -> None:
-    """Terms by kind, frames on ground first; offsets of every kind."""
-    order = sorted(range(len(s.frames)), key=lambda k: s.frames[k].body >= 0)
+    """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
+    used = _used(s)
+    order = sorted(range(len(s.frames)), key=lambda k: 0 if s.frames[k].body < 0 else 1 if k in used else 2)
     new = np.empty(len(order), np.int64)
     new[order] = np.arange(len(order))
     s.frames = [s.frames[k] for k in order]
@@ -162,9 +163,18 @@ def sort(s: Structure) -> None:
     s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
-    solver = SCHUR if not s.tree_joints else COUPLED
-    s.tables["kinds"] = np.r_[terms, solver, s.nq, ground].astype(np.int64)
+    solver = SCHUR if not s.tree_joints else COUPLED if s.rows else ARTICULATED
+    moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
+    s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
     _force_frames(s, new)
+
+
+def _used(s: Structure) -> set[int]:
+    """Frames that the compiled loops ask for; those of tree joints often only results do."""
+    used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
+    for k, e in enumerate(s.forces):
+        used |= {int(s.tables["force_i"][k, column]) for column in ((1,) if hasattr(e, "effort") else (0, 1))}
+    return used
 
 
 def _force_frames(s: Structure, new: np.ndarray) -> None:

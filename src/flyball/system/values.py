@@ -23,7 +23,7 @@ from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .call import STACK_RESERVE
-from .coordinates import BodyState, coordinates
+from .coordinates import BodyState, positions, velocities
 from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
@@ -99,7 +99,7 @@ def values(
     )  # fmt: skip
     x = Values(s, system, np.zeros(s.nq), np.zeros(s.nv), numbers, bodies, length, pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
-    x.q[:], x.v[:] = coordinates(x, drawn)
+    x.q[:], x.v[:] = positions(x, drawn), velocities(x, drawn)
     return x
 
 
@@ -337,7 +337,7 @@ def work(s: Structure, system: System, dtype: type = float) -> Work:
         return np.zeros(shape, dtype)
 
     W = Work(
-        z(nb, 24), z(nf, 24), z(nv, 6), z(nb, 3), z(nb, 6), z(nb, 10), z(len(system.mass_i)), z(len(system.col_i)),
+        z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(7, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n),
         z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(8), np.zeros(7, np.int64),

@@ -22,6 +22,7 @@ T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER = range(10)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT = range(8)
 SAFETY = 0.85
+FIRST = 1e-7  # part of the largest step: the least that is tried first
 LOOSER = 10.0  # accounts are held to this many times the relative tolerance
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
 
@@ -65,14 +66,16 @@ def scaled(c, a, y, n):
 
 @formula
 def first_step(derivative, S, W, R, c):
-    """A first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4)."""
+    """A first step width from the sizes of y, y' and y'' (Hairer, Norsett and Wanner, section II.4).
+
+    A state that begins at rest near zero is small without changing fast: hence the least.
+    """
     n = c.count[CONTROLLED]
     y = c.y[0]
     d0 = scaled(c, y, y, n)
     d1 = scaled(c, c.K[0], y, n)
-    # a state that is zero but for rounding says nothing of how far to go
-    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else max(0.01 * d0 / d1, 1e-6 * c.real[H_MAX])
-    h0 = min(h0, c.real[H_MAX])
+    h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+    h0 = min(max(h0, FIRST * c.real[H_MAX]), c.real[H_MAX])
     for i in range(y.shape[0]):
         c.y[1, i] = y[i] + h0 * c.K[0, i]
     if derivative(c.real[T] + h0, c.y[1], c.K[1], S, W) != 0:

@@ -1,0 +1,64 @@
+"""Absolute and joint coordinates: what must hold in both is tested in both.
+
+``both_layers`` runs a test, or as ``pytestmark`` all of a file, once in each; ``simulate`` then takes that layer where a
+test does not say which. Mechanisms without a joint that can be a tree joint are run once.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable, Mapping
+
+import pytest
+
+import flyball as fb
+from flyball.analysis import dynamics
+from flyball.analysis.assemble import Assembly
+from flyball.analysis.options import Options, options_from
+from flyball.analysis.start import Start, begin
+
+LAYERS = ("absolute", "joint")
+AUTO = "auto"
+both_layers = pytest.mark.usefixtures("layer")
+_chosen = [AUTO]
+
+
+def in_force() -> str:
+    """The coordinates that ``simulate`` takes now where it is not told."""
+    return _chosen[-1]
+
+
+def take(layer: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulate in that layer until the test ends."""
+
+    def options(given: Mapping[str, object]) -> Options:
+        return options_from({"coordinates": layer} | dict(given))
+
+    def begun(model, t, parameters, before, coordinates) -> Start:
+        start = begin(model, t, parameters, before, coordinates)
+        if coordinates == "joint" and not start.assembly.compiled.structure.tree:
+            pytest.skip("no joint of it can be a tree joint")
+        return start
+
+    monkeypatch.setattr(dynamics, "options_from", options)
+    monkeypatch.setattr(dynamics, "begin", begun)
+    monkeypatch.setattr(f"{__name__}._chosen", [layer])
+
+
+def cached(make: Callable) -> Callable:
+    """As ``functools.cache``, for each layer its own."""
+
+    @functools.cache
+    def of_layer(layer, args, named):
+        return make(*args, **dict(named))
+
+    @functools.wraps(make)
+    def found(*args, **named):
+        return of_layer(in_force(), args, tuple(named.items()))
+
+    return found
+
+
+def started(model: fb.Mechanism) -> Assembly:
+    """A mechanism where it starts, in the coordinates in force."""
+    return dynamics.begin(model, 0.0, None, None, in_force()).assembly
