@@ -10,7 +10,9 @@ import pytest
 import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.math.vec import dot
-from flyball.system.tables import NV
+from flyball.system.spanning import spanning
+from flyball.system.structure import structure
+from flyball.system.tables import FRAMES, GROUND_FRAMES, NV
 from flyball.system.tree import column
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
@@ -113,3 +115,12 @@ def test_a_driver_that_follows_pushes_what_it_follows():
     assert np.abs(lam).min() > 0.1
     assert efforts[named["pin.angle"]] == pytest.approx(-lam * by_s, rel=1e-12)
     assert efforts[named["rail.displacement"]] == pytest.approx(-lam * by_d, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("case", MORE)
+def test_frames_that_are_kept_up_to_date_exist(case):
+    """Those of bodies that the loops run over are no more than there are; forces without frames ask for none."""
+    m = MORE[case]().snapshot()
+    for tree in ((), spanning(m)):
+        t = structure(m, tree=tree).tables
+        assert t["kinds"][GROUND_FRAMES] <= t["kinds"][FRAMES] <= len(t["frame_i"])
