@@ -17,6 +17,7 @@ from ..system.loads import wide
 from ..system.opcodes import BY_TIME
 from ..system.records import load
 from ..system.tables import (
+    BODY_LAW,
     FORCE_F,
     FORCE_LAW,
     FORCE_LOAD,
@@ -30,8 +31,10 @@ from ..system.tables import (
     ROW_LAW,
     ROW_WRAP,
     STATUS,
+    TREE,
     VALUE,
 )
+from ..system.tree import REVOLUTE
 from .assemble import Assembly
 from .entry import MOTION
 
@@ -80,17 +83,22 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     t, span = float(clock.real[ex.T]), float(clock.real[ex.LARGEST])
     stack = np.zeros_like(W.stack)
-    for k, row in enumerate(s.rows):
-        if not isinstance(row.element, Driver):
-            continue
-        law = int(S.row_i[k, ROW_LAW])
+    laws = [
+        (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
+        for k, row in enumerate(s.rows)
+        if isinstance(row.element, Driver)
+    ]
+    laws += [
+        (s.model[name], int(S.body_i[b, BODY_LAW]), S.body_i[b, TREE] == REVOLUTE) for name, b in s.prescribed.items()
+    ]
+    for driver, law, wrapped in laws:
         with np.errstate(all="ignore"):
             before, *after = (
                 evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
             )
-        problem = _no_number(after) or _jump(before, after[0], NEAR * span, bool(S.row_i[k, ROW_WRAP]))
+        problem = _no_number(after) or _jump(before, after[0], NEAR * span, wrapped)
         if problem:
-            return f"{row.element.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
+            return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
     return ""
 
 
@@ -240,8 +248,13 @@ def _pacemaker(clock: ex.Clock) -> int:
 
 
 def _component(a: Assembly, i: int) -> str:
-    """Name of the body that a component of the state belongs to."""
+    """Name of the body or tree joint that a component of the state belongs to."""
     s = a.compiled.structure
+    for joint in s.tree_joints.values():
+        for b in joint.links:
+            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
+            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
+                return f"joint {joint.joint.name!r}"
     for name, b in s.place.items():
         if b >= 0:
             q0, v0, nq, nv = s.tables["body_i"][b, 2:6]

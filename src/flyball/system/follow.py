@@ -8,9 +8,11 @@ branch. Rows are written for all times that were stepped on, with the powers of 
 from __future__ import annotations
 
 from .._jit import formula
+from ..math.scalar import atan2, cos, sin
 from ..numerics.integrators.explicit import (
     ACCEPTED,
     DONE,
+    GROW,
     H_MAX,
     LARGEST,
     LIMIT,
@@ -26,11 +28,21 @@ from ..numerics.integrators.explicit import (
     H,
     T,
 )
+from .laws import evaluate_jet
 from .motion import arrive, write_row
-from .tables import COORDINATES, NV, V0
-from .tree import retract
+from .rows import BY_TIME
+from .solve import magnitude
+from .tables import BODY_LAW, COORDINATES, NV, ROW_LAW, ROW_WRAP, TREE, V0
+from .tree import REVOLUTE, retract
 
+SHARE = GROW  # entry of the clock's: part of the way to the next output time that a step is
 ALL_BUT = 1.0 - 1e-6
+EVEN = 1e-6  # part of its change by which the change of a law may differ from that of its derivatives
+NEAR, SHARP, ROUNDED = (
+    1e-10,
+    10.0,
+    1e-13,
+)  # a law that leaps over this part of the time span does more than this times its slope
 FAR_OFF = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
 
 
@@ -51,10 +63,10 @@ def follow(S, W, c, out):
         used += 1
         c.count[STARTED] = 1
         c.real[H] = 0.0
+        c.real[SHARE] = 1.0
         while c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T]:
             c.count[NEXT] += 1
     steps = 0
-    share = 1.0
     while c.real[T] < c.real[T_END]:
         if used == out.shape[0] or steps >= c.count[QUOTA]:
             return used
@@ -63,7 +75,7 @@ def follow(S, W, c, out):
             return used
         goal = c.times[c.count[NEXT]] if c.count[NEXT] < c.times.shape[0] else c.real[T_END]
         left = goal - c.real[T]
-        h = share * min(left, c.real[H_MAX])
+        h = c.real[SHARE] * min(left, c.real[H_MAX])
         lands = h > ALL_BUT * left  # no sliver is left over for the next step
         if lands:
             h = left
@@ -74,18 +86,51 @@ def follow(S, W, c, out):
         predict(S, c, h)
         status, found = arrive(t, c.y[1], c.K[2], S, W)
         steps += 1
-        if status != 0 or not found <= FAR_OFF:
+        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real[T], h, NEAR * c.real[LARGEST]):
             c.count[REJECTED] += 1
-            share *= 0.5
+            c.real[SHARE] *= 0.5
             continue
         accept(c, t, h)
         write(c, out[used], S, W)
         used += 1
         if t >= goal:
             c.count[NEXT] += 1
-        share = min(1.0, 2.0 * share)
+        c.real[SHARE] = min(1.0, 2.0 * c.real[SHARE])
     c.count[STATUS] = DONE
     return used
+
+
+@formula
+def broken(S, W, t, h, shortest):
+    """Whether a driver's law does more over a step than its derivatives say: it may jump there, or have a kink."""
+    for b in range(S.body_i.shape[0]):
+        law = S.body_i[b, BODY_LAW]
+        if law >= 0 and leaps(S, W, law, t, h, shortest, S.body_i[b, TREE] == REVOLUTE):
+            return True
+    for k in range(S.row_i.shape[0]):
+        law = S.row_i[k, ROW_LAW]
+        if law >= 0 and leaps(S, W, law, t, h, shortest, S.row_i[k, ROW_WRAP] == 1):
+            return True
+    return False
+
+
+@formula
+def leaps(S, W, law, t, h, shortest, turns):
+    """Whether value and rate of a law change over a step by what their derivatives add up to (Hermite's and Simpson's
+    rule): to EVEN; over a step that cannot be much shorter, by no more than they can have.
+    """
+    f0, v0, a0 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+    _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
+    f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)
+    way = f1 - f0 - h / 30.0 * (7.0 * v0 + 16.0 * vm + 7.0 * v1) - h * h / 60.0 * (a0 - a1)
+    if turns:
+        way = atan2(sin(way), cos(way))
+    rate = v1 - v0 - h / 6.0 * (a0 + 4.0 * am + a1)
+    v = max(magnitude(v0), magnitude(vm), magnitude(v1))
+    a = max(magnitude(a0), magnitude(am), magnitude(a1))
+    part = EVEN if h > shortest else SHARP
+    least = ROUNDED * (magnitude(f0) + magnitude(f1))
+    return not (magnitude(way) <= part * h * (v + h * a) + least and magnitude(rate) <= EVEN * v + part * h * a)
 
 
 @formula

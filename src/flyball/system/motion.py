@@ -9,6 +9,7 @@ from __future__ import annotations
 from .._jit import formula
 from ..constraints import curve
 from ..constraints.angle import row as angle
+from ..math.scalar import atan2, cos, sin
 from ..math.vec import dot, sub
 from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
@@ -51,13 +52,14 @@ from .tables import (
     TERM_M,
     TOL_G,
     TOL_V,
+    TREE,
     V0,
     V3,
     WORST_G,
     WORST_V,
     X_SOLVED,
 )
-from .tree import normalise, rates, retract
+from .tree import REVOLUTE, normalise, rates, retract
 
 NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
@@ -81,6 +83,27 @@ def prepare(S, W, t, q, v):
             q[S.body_i[b, Q0]] = f - S.body_x[b, OFFSET]
             v[S.body_i[b, V0]] = f1
             W.vel[GIVEN, S.body_i[b, V0]] = f2
+
+
+@formula
+def astray(S, W, t, q, v):
+    """How far prescribed coordinates and velocities are from their laws, relative to the mechanism's size and speed.
+
+    They come from the derivatives of the laws: where these are not the whole truth, a law jumps.
+    """
+    worst = 0.0
+    for b in range(S.body_i.shape[0]):
+        law = S.body_i[b, BODY_LAW]
+        if law >= 0:
+            f, f1, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+            way = f - S.body_x[b, OFFSET] - q[S.body_i[b, Q0]]
+            size = S.glob[LENGTH]
+            if S.body_i[b, TREE] == REVOLUTE:  # its whole turns are the law's own
+                way = atan2(sin(way), cos(way))
+                size = 0.0 * size + 1.0
+            rate = magnitude(f1 - v[S.body_i[b, V0]]) / (size + magnitude(f1))
+            worst = max(worst, magnitude(way) / size, rate)
+    return worst
 
 
 @formula
@@ -235,11 +258,9 @@ def accelerate(S, W, t, p, dy, factored):
         if S.row_i[k, ROW_WORK] >= 0:
             work[S.row_i[k, ROW_WORK]] = W.row[LAM, k] * W.row[NU, k]
     for b in range(S.body_i.shape[0]):
-        if S.body_i[b, BODY_LAW] >= 0:  # not for the integrator: the law says
+        if S.body_i[b, BODY_LAW] >= 0:
             d = S.body_i[b, V0]
             work[S.body_i[b, BODY_WORK]] = W.vel[EFFORT, d] * v[d]
-            dy[S.body_i[b, Q0]] = 0.0
-            dy[nq + d] = 0.0
     progress(S, W, p[nq + nv :], work)
     W.info[STATUS] = finite(dy)
     return W.info[STATUS]
@@ -315,6 +336,7 @@ def arrive(t, y, dy, S, W):
     q = y[:nq]
     v = y[nq : nq + W.vel.shape[1]]
     z = y[nq + W.vel.shape[1] :]
+    astray_by = astray(S, W, t, q, v)
     found = 0.0
     factored = OLD
     fault = W.stack.shape[0] - STACK_RESERVE
@@ -330,7 +352,7 @@ def arrive(t, y, dy, S, W):
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     remember(S, W, z)
-    return accelerate(S, W, t, y, dy, factored), found
+    return accelerate(S, W, t, y, dy, factored), max(found, astray_by)
 
 
 @formula
