@@ -15,7 +15,7 @@ from flyball._jit import start_numba
 from flyball._link import optimise_once
 from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, remember, settle
 from flyball.system.solve import REFINEMENTS, factor, solve
-from flyball.system.tables import F_APPLIED, GAMMA, LAM, LENGTH, PASS, STABILIZE, TOL_G, TOL_V, V3, X_SOLVED
+from flyball.system.tables import COORDINATES, F_APPLIED, GAMMA, LAM, LENGTH, PASS, STABILIZE, TOL_G, TOL_V, V3, X_SOLVED
 from flyball.system.tree import retract
 
 RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)
@@ -28,7 +28,7 @@ def follow(S, W, times, y, dy, task):
     velocities, and accelerations from the constraints alone. REACTIONS: the same with forces, accelerations and
     reactions, as a simulation reports them.
     """
-    nq, nv = S.kinds[-2], W.vel.shape[1]
+    nq, nv = S.kinds[COORDINATES], W.vel.shape[1]
     q, v, z = y[:nq], y[nq : nq + nv], y[nq + nv :]
     a, step = W.vel[X_SOLVED], W.vel[V3]
     for k in range(times.shape[0]):
