@@ -1,7 +1,8 @@
 """Andrews' squeezing mechanism for 0.03 s to 1e-5 rad in every angle at the end: flyball and Exudyn in one run.
 
 Schiehlen, Multibody Systems Handbook (1990); problem II-13 of the Test Set for IVP Solvers. The end is that of an
-80-bit extrapolation of the test set's equations; the test set's own digits differ by 2e-9. Usage: ``python andrews.py``.
+80-bit extrapolation of the test set's equations; the test set's own digits differ by 2e-9.
+Usage: ``python andrews.py``.
 """
 
 from __future__ import annotations
@@ -19,10 +20,14 @@ from mechanisms import GROUND, Planar, example
 
 T_END, TARGET, SAMPLES = 0.03, 1e-5, 100
 # beta, theta, gamma, phi, delta, omega, epsilon
-START = (-0.0617138900142764496358948458001, 0.0, 0.455279819163070380255912382449, 0.222668390165885884674473185609,
-         0.487364979543842550225598953530, -0.222668390165885884674473185609, 1.23054744454982119249735015568)  # fmt: skip
-END = (15.81077119515369977, -15.75637105841183032, 0.04082224011964573388, -0.5347301163420797179,
-       0.5244099658799540657, 0.534730116342079718, 1.048080741041937871)  # fmt: skip
+START = (
+    *(-0.0617138900142764496358948458001, 0.0, 0.455279819163070380255912382449, 0.222668390165885884674473185609),
+    *(0.487364979543842550225598953530, -0.222668390165885884674473185609, 1.23054744454982119249735015568),
+)
+END = (
+    *(15.81077119515369977, -15.75637105841183032, 0.04082224011964573388, -0.5347301163420797179),
+    *(0.5244099658799540657, 0.534730116342079718, 1.048080741041937871),
+)
 JOINTS = ("crank", "K1-K2", "B", "K5-K4", "A5", "K7-K6", "A7")  # of flyball's example, for these angles
 MASS = (0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498)
 INERTIA = (2.194e-6, 4.410e-7, 5.255e-6, 5.667e-7, 1.169e-5, 5.667e-7, 1.912e-5)

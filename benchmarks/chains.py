@@ -15,10 +15,10 @@ import contest
 import numpy as np
 from compiled_loops import RIGHT_HAND_SIDE, clock
 from contest import Contest, Flyball, Peer
-
-from mechanisms import CHAIN_ANGLE, GRAVITY, chain, compiled, energy, flyball_planar, planar_motion, simulate
 from trees import Motion, planar_tree
 from trees import planar_motion as tree_motion
+
+from mechanisms import CHAIN_ANGLE, GRAVITY, chain, compiled, energy, flyball_planar, planar_motion, simulate
 
 T_END, TARGET, SAMPLES = 10.0, 1e-6, 500
 SWING = 0.5 * GRAVITY * (1.0 - np.cos(CHAIN_ANGLE))  # energy of the swing [J]

@@ -8,6 +8,7 @@ tolerance on a grid of half decades, with its own error control and stabilizatio
 from __future__ import annotations
 
 import argparse
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -42,8 +43,9 @@ class Contest:
     """What all have to reach.
 
     ``accuracy`` takes a motion, whatever that is, and returns numbers, of which ``key`` has to come to ``target``.
-    Motions have ``samples`` + 1 times. A peer's search ends unmet with a run that takes longer than ``patience`` [CPU s],
-    or where all its runs took five times that. Times are divided by ``per`` (the seconds of the motion, for milliseconds a second).
+    Motions have ``samples`` + 1 times. A peer's search ends unmet with a run that takes longer than ``patience``
+    [CPU s], or where all its runs took five times that. Times are divided by ``per`` (the seconds of the motion, for
+    milliseconds a second).
     """
 
     case: str
@@ -88,15 +90,16 @@ class Search:
     def meets(self, resolution: float) -> bool:
         """Try a resolution. A solver that gives up has an infinite error."""
         contest, peer = self.contest, self.peer
-        found: dict[str, float] = {}
+        begin = time.process_time()
         try:
-            self.seconds = timing.cpu(lambda: found.update(contest.accuracy(peer.solve(resolution, contest.samples)[0])))
+            found = contest.accuracy(peer.solve(resolution, contest.samples)[0])
         except FAILURES:
-            found.clear()
+            found = {}
+        self.seconds = time.process_time() - begin
         self.spent += self.seconds
         error = found.get(contest.key, OPEN)
         met = bool(error <= contest.target)
-        if met or not self.row["met"] and error <= self.row[contest.key]:
+        if met or (not self.row["met"] and error <= self.row[contest.key]):
             self.row |= found | {"resolution": resolution, "met": met}
         return met
 

@@ -1,8 +1,8 @@
 """Watt's governor with stiff springs (IFToMM A05), 10 s to 1e-6 m at the end: flyball and its peers in one run.
 
-The end is the sleeve's height s(10 s) from equations in three coordinates, integrated by themselves to 5e-11 m; published
-markers up to 3 s agree with them to 1e-6 m. The springs are so stiff and so damped that explicit methods are bound by
-stability. Usage: ``python governor.py``.
+The end is the sleeve's height s(10 s) from equations in three coordinates, integrated by themselves to 5e-11 m;
+published markers up to 3 s agree with them to 1e-6 m. The springs are so stiff and so damped that explicit methods are
+bound by stability. Usage: ``python governor.py``.
 """
 
 from __future__ import annotations
@@ -15,9 +15,9 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
 from contest import Contest, Flyball, Peer
+from trees import Axis, Link, Spring, Tree
 
 from mechanisms import GRAVITY, GROUND, example
-from trees import Axis, Link, Spring, Tree
 
 T_END, TARGET, SAMPLES = 10.0, 1e-6, 100
 END = 0.6196229171  # height of the sleeve [m]

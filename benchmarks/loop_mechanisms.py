@@ -10,9 +10,9 @@ The others are flyball's examples, the Stewart platform with springs in place of
 from __future__ import annotations
 
 import numpy as np
+from trees import Array, Axis, Cut, Link, Tree, closed
 
 from mechanisms import GRAVITY, GROUND
-from trees import Array, Axis, Cut, Link, Tree, closed
 
 DOWN = np.array([0.0, 0.0, -GRAVITY])
 X, Y, Z = np.eye(3)

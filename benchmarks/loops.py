@@ -16,10 +16,10 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
 from contest import Contest, Flyball, Peer
-
 from loop_mechanisms import bricard, spatial_four_bar, stewart
-from mechanisms import simulate
 from trees import Motion, Tree, energy, flyball_motion, flyball_tree, gap
+
+from mechanisms import simulate
 
 T_END, TARGET, SAMPLES = 10.0, 1e-3, 400
 MAKERS: dict[str, Callable[[], Tree]] = {
@@ -69,7 +69,8 @@ def check_start(tree: Tree, model: Any, coordinates: str) -> None:
         in_energy = abs(energy(tree, motion)[0] - ours_energy) / size
         in_motion = float(np.abs(module.start_accelerations(tree) - ours).max() / np.abs(ours).max())
         limit = SOFT if name == "mujoco" else SAME
-        print(f"  {tree.name}, {name}: differs at the start by {in_energy:.1e} in energy, {in_motion:.1e} in acceleration")
+        found = f"{in_energy:.1e} in energy, {in_motion:.1e} in acceleration"
+        print(f"  {tree.name}, {name}: differs at the start by {found}")
         if not (in_energy <= SAME and in_motion <= limit):
             raise SystemExit(f"{tree.name} is another mechanism in {name}")
 

@@ -23,6 +23,7 @@ from scipy.special import ellipj, ellipk
 import flyball as fb
 from flyball.analysis.compiled import compiled as flyball_compiled
 from flyball.analysis.dynamics import Options
+from flyball.analysis.dynamics import simulate as flyball_simulate
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
@@ -39,7 +40,7 @@ def simulate(model: fb.Mechanism, t_end: float, *, coordinates: str = "auto", **
     SystemExit
         If this flyball has absolute coordinates only and others are asked for.
     """
-    if "coordinates" in {f.name for f in fields(Options)}:
+    if "coordinates" in {f.name for f in fields(Options)} | set(signature(flyball_simulate).parameters):
         options["coordinates"] = coordinates
     elif coordinates == "joint":
         raise SystemExit("this flyball has no joint coordinates to simulate in")

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-
 from exudyn_run import DENSE, IMPLICIT, exu, integrate, item, stored
+
 from mechanisms import GROUND, Planar
 
 SETTINGS = IMPLICIT

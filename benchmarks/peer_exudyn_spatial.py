@@ -6,10 +6,10 @@ All joints are constraints, those of the tree as well as those that cut it.
 from __future__ import annotations
 
 import numpy as np
-
 from exudyn_run import DENSE, IMPLICIT, exu, integrate, item, stored
-from mechanisms import GROUND
 from trees import Link, Motion, Tree, start_twists
+
+from mechanisms import GROUND
 
 SETTINGS = IMPLICIT
 MOTION = ("Position", "RotationMatrix", "Velocity", "AngularVelocity")

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-
 from exudyn_run import exu, integrate, item, stored
-from mechanisms import GROUND
 from trees import Motion, Tree
+
+from mechanisms import GROUND
 
 SETTINGS = ("RK44", "RK67", "DOPRI5")  # the last with error control
 

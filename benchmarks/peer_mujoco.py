@@ -11,9 +11,9 @@ import time
 
 import mujoco
 import numpy as np
+from trees import Link, Motion, Tree
 
 from mechanisms import GROUND
-from trees import Link, Motion, Tree
 
 SETTINGS = {"RK4, stiff": 2.0, "RK4, softer (4 steps)": 4.0}  # time constant of the constraints in steps
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
@@ -40,8 +40,8 @@ def build(tree: Tree, h: float, setting: str):
 
     stiff = {"solref": (SETTINGS[setting] * h, 1.0), "solimp": IMPEDANCE}
     kind = {"type": mujoco.mjtEq.mjEQ_CONNECT, "objtype": mujoco.mjtObj.mjOBJ_SITE}
-    for n, (c, x) in enumerate((c, x) for c in tree.cuts for x in c.points):
-        names = {"name1": site(c.i, x, f"i{n}"), "name2": site(c.j, x, f"j{n}")}
+    for n, (i, j, x) in enumerate((c.i, c.j, x) for c in tree.cuts for x in c.points):
+        names = {"name1": site(i, x, f"i{n}"), "name2": site(j, x, f"j{n}")}
         spec.add_equality(**names, **kind, **stiff)
     for n, s in enumerate(tree.springs):
         forces = {"stiffness": [s.stiffness, 0, 0], "damping": [s.damping, 0, 0], "springlength": [s.length] * 2}
@@ -78,20 +78,8 @@ def ready(tree: Tree, h: float, setting: str):
     """(model, data) at the start."""
     model = build(tree, h, setting)
     data = mujoco.MjData(model)
-    data.qvel[:] = tree.rates[order_of_joints(model, tree)]
+    data.qvel[:] = tree.rates
     return model, data
-
-
-def order_of_joints(model, tree: Tree) -> np.ndarray:
-    """MuJoCo counts joints branch by branch: for each of its joints, the number in the tree."""
-    first = np.cumsum([0] + [len(link.axes) for link in tree.links])
-    number = {model.body(link.name).id: first[k] for k, link in enumerate(tree.links)}
-    seen = {body: 0 for body in number}
-    out = []
-    for body in model.jnt_bodyid.tolist():
-        out.append(number[body] + seen[body])
-        seen[body] += 1
-    return np.array(out)
 
 
 def solve(tree: Tree, t_end: float, steps: float, setting: str, samples: int = 0):
@@ -118,24 +106,24 @@ def solve(tree: Tree, t_end: float, steps: float, setting: str, samples: int = 0
     seconds = time.process_time() - begin
     if any(w.number for w in data.warning):
         raise RuntimeError("MuJoCo warned of an unstable simulation")
-    return motion(model, tree, q, v), seconds
+    return motion(model, q, v), seconds
 
 
-def motion(model, tree: Tree, q, v) -> Motion:
+def motion(model, q, v) -> Motion:
     """Motion of the links, from coordinates and rates at some times."""
     data = mujoco.MjData(model)
-    bodies = [model.body(link.name).id for link in tree.links]
-    twists = np.zeros((len(q), len(bodies), 6))
-    p, R = np.zeros((len(q), len(bodies), 3)), np.zeros((len(q), len(bodies), 3, 3))
+    links = model.nbody - 1
+    twists = np.zeros((len(q), links, 6))
+    p, R = np.zeros((len(q), links, 3)), np.zeros((len(q), links, 3, 3))
     one = np.zeros(6)
     for n in range(len(q)):
         data.qpos[:], data.qvel[:] = q[n], v[n]
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_comVel(model, data)
-        p[n], R[n] = data.xipos[bodies], data.xmat[bodies].reshape(-1, 3, 3)
-        for k, body in enumerate(bodies):
-            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, body, one, 0)
+        p[n], R[n] = data.xipos[1:], data.xmat[1:].reshape(-1, 3, 3)
+        for k in range(links):
+            mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, k + 1, one, 0)
             twists[n, k] = one
     return Motion(p, R, twists[:, :, 3:], twists[:, :, :3])
 
@@ -146,8 +134,7 @@ def start_accelerations(tree: Tree) -> np.ndarray:
     mujoco.mj_forward(model, data)
     mujoco.mj_rnePostConstraint(model, data)
     out, one = [], np.zeros(6)
-    for link in tree.links:
-        body = model.body(link.name).id
-        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, body, one, 0)
+    for k in range(1, model.nbody):
+        mujoco.mj_objectAcceleration(model, data, mujoco.mjtObj.mjOBJ_BODY, k, one, 0)
         out.append(np.r_[one[3:] + tree.gravity, one[:3]])
     return np.array(out)

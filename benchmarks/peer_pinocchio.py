@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-
-from mechanisms import GROUND
 from steppers import controlled, fixed_steps
 from trees import Axis, Motion, Tree
+
+from mechanisms import GROUND
 
 # label -> (fixed steps or not, Baumgarte's damping rate [1/s], or with fixed steps and below 1: times the step)
 SETTINGS = {

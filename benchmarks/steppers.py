@@ -8,11 +8,12 @@ from collections.abc import Callable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-Acceleration = Callable[[np.ndarray, np.ndarray], np.ndarray]
-Run = tuple[np.ndarray, np.ndarray, float]
+Array = np.ndarray
+Acceleration = Callable[[Array, Array], Array]
+Run = tuple[Array, Array, float]
 
 
-def runge_kutta(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, h: float) -> tuple[np.ndarray, np.ndarray]:
+def runge_kutta(acceleration: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
     """One step of the classical method of order 4."""
     a1 = acceleration(q, v)
     v2 = v + h / 2 * a1
@@ -24,7 +25,7 @@ def runge_kutta(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, h: flo
     return q + h / 6 * (v + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
 
-def fixed_steps(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, t_end: float, steps: int, samples: int) -> Run:
+def fixed_steps(acceleration: Acceleration, q: Array, v: Array, t_end: float, steps: int, samples: int) -> Run:
     """So many steps of the classical method. Returns (coordinates, rates, CPU seconds); arrays of the samples only.
 
     Raises
@@ -49,11 +50,11 @@ def fixed_steps(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, t_end:
     return np.array(kept_q), np.array(kept_v), seconds
 
 
-def controlled(acceleration: Acceleration, q: np.ndarray, v: np.ndarray, t_end: float, rtol: float, samples: int) -> Run:
+def controlled(acceleration: Acceleration, q: Array, v: Array, t_end: float, rtol: float, samples: int) -> Run:
     """SciPy's DOP853 with error control, atol a hundredth of rtol. Returns as ``fixed_steps`` does."""
     n = len(q)
 
-    def rate(_: float, y: np.ndarray) -> np.ndarray:
+    def rate(_: float, y: Array) -> Array:
         return np.concatenate([y[n:], acceleration(y[:n], y[n:])])
 
     times = np.linspace(0, t_end, samples + 1) if samples else [t_end]

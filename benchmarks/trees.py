@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import flyball as fb
-from mechanisms import GRAVITY, GROUND, Planar, point
+from mechanisms import GROUND, Planar, point
 
 Array = np.ndarray
 
@@ -72,7 +72,10 @@ class Spring:
 
 @dataclass(frozen=True)
 class Tree:
-    """A mechanism. ``rates``: of all joints of the tree at the start, in the order of links and axes."""
+    """A mechanism. ``rates``: of all joints of the tree at the start, in the order of links and axes.
+
+    Links are in depth-first order, branch by branch: MuJoCo counts so, and Pinocchio is silently wrong otherwise.
+    """
 
     name: str
     gravity: Array
@@ -81,6 +84,15 @@ class Tree:
     rates: Array
     springs: tuple[Spring, ...] = ()
     redundant: bool = False  # whether some row of its joints repeats others
+
+    def __post_init__(self) -> None:
+        branch: list[int] = []
+        for k, link in enumerate(self.links):
+            while branch and branch[-1] != link.parent:
+                branch.pop()
+            if not branch and link.parent != GROUND:
+                raise ValueError(f"{self.name}: link {link.name!r} is out of depth-first order")
+            branch.append(k)
 
     @property
     def axes(self) -> list[Axis]:
@@ -173,21 +185,30 @@ def gap(tree: Tree, m: Motion) -> float:
 
 def planar_tree(p: Planar) -> Tree:
     """A planar mechanism of hinges as a tree: a hinge that reaches a new body hangs it, any other closes a loop."""
+    at = [np.r_[point(p.start[None], i, a)[0], 0.0] for i, a, _, _ in p.hinges]
+    hangs: dict[int, list[int]] = {}  # hinges that hang bodies on each body
+    cut, reached = [], {GROUND}
+    for h, (i, _, j, _) in enumerate(p.hinges):
+        if j in reached:
+            cut.append(h)
+        else:
+            reached.add(j)
+            hangs.setdefault(i, []).append(h)
     place = {GROUND: GROUND}
     links: list[Link] = []
-    cuts, rates = [], []
-    z = np.array([0.0, 0.0, 1.0])
-    for i, a, j, _ in p.hinges:
-        at = np.r_[point(p.start[None], i, a)[0], 0.0]
-        if j in place:
-            cuts.append(Cut(place[i], place[j], at))
-            continue
+    rates = []
+    waiting = hangs[GROUND][::-1]
+    while waiting:
+        h = waiting.pop()
+        i, _, j, _ = p.hinges[h]
         place[j] = len(links)
-        inertia = float(p.inertia[j]) * np.eye(3)
-        centre = np.r_[p.start[j, :2], 0.0]
-        links.append(Link(f"rod{j}", float(p.mass[j]), inertia, centre, place[i], (Axis("hinge", at, z),)))
+        inertia, centre = float(p.inertia[j]) * np.eye(3), np.r_[p.start[j, :2], 0.0]
+        hinge = (Axis("hinge", at[h], np.array([0.0, 0.0, 1.0])),)
+        links.append(Link(f"rod{j}", float(p.mass[j]), inertia, centre, place[i], hinge))
         rates.append(p.rate[j, 2] - (0.0 if i == GROUND else p.rate[i, 2]))
-    return Tree(p.name, np.array([0.0, -GRAVITY, 0.0]), tuple(links), tuple(cuts), np.array(rates))
+        waiting += hangs.get(j, [])[::-1]
+    cuts = tuple(Cut(place[p.hinges[h][0]], place[p.hinges[h][2]], at[h]) for h in cut)
+    return Tree(p.name, np.array([0.0, -p.gravity, 0.0]), tuple(links), cuts, np.array(rates))
 
 
 def planar_motion(p: Planar, tree: Tree, m: Motion) -> tuple[Array, Array]:

@@ -174,7 +174,7 @@ def _used(s: Structure) -> set[int]:
     used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
     for k, e in enumerate(s.forces):
         used |= {int(s.tables["force_i"][k, column]) for column in ((1,) if hasattr(e, "effort") else (0, 1))}
-    return used - {-1}  # forces along a measured quantity that have no frame of their own
+    return used - {-1}
 
 
 def _force_frames(s: Structure, new: np.ndarray) -> None:
