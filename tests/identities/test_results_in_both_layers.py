@@ -149,7 +149,7 @@ def test_examples(name):
     """In motion; one of their trees, whichever it is."""
     m = mechanism(name)
     a = assemble(m)
-    r = m.simulate(0.05, outputs=4)
+    r = m.simulate(0.05, outputs=4, coordinates="absolute")
     if r.health.redundant:  # what it leaves open is known at the start only
         r = assembled(a)
     tree = spanning_tree(m)
