@@ -7,13 +7,12 @@ import pytest
 
 import flyball as fb
 from flyball import forces
-from flyball.analysis.assemble import assemble
 from flyball.analysis.entry import MOTION
 from flyball.model.coupling import Coupling
 from flyball.model.io import dumps, loads
 from flyball.model.sensor import IMU, Sensor
 from flyball.system.motion import derivative
-from tests.layers import both_layers
+from tests.layers import both_layers, started
 
 pytestmark = both_layers
 
@@ -98,7 +97,7 @@ def test_everything_is_there():
 
 def test_compiled_code_is_the_plain_python():
     """Plain Python first: it notices scratch that is too small, where compiled code would write beside it."""
-    a = assemble(everything())
+    a = started(everything())
     c = a.compiled
     c.at(0.3, a.q, a.v)
     y = np.r_[a.q, a.v, c.z]

@@ -20,7 +20,7 @@ def layers(model):
     """The assembled state, moved a little off the constraints, in absolute and in joint coordinates."""
     a = assemble(model)
     tree = compiled(model, tree=HINGES)
-    for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, tree.take(a.compiled, a.q, a.v))):
+    for c, (q, v) in ((a.compiled, (a.q, a.v)), (tree, tree.take(a.compiled, 0.0, a.q, a.v))):
         rng = np.random.default_rng(5)
         q = q.copy()
         retract(c.values.system, q, 0.03 * rng.normal(size=len(v)))

@@ -16,7 +16,6 @@ from flyball.system.tables import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
 
-
 T = 0.3  # laws have all derivatives there
 
 
@@ -108,7 +107,7 @@ def test_joint_coordinates_give_the_same_accelerations(case):
     a = assemble(model, t=T)
     q, v = spun(model, a)
     tree = compiled(model, tree=hinges)
-    Q, V = tree.take(a.compiled, q, v)
+    Q, V = tree.take(a.compiled, T, q, v)
     bodies = {}
     for c, x, u in ((a.compiled, q, v), (tree, Q, V)):
         status, _ = c.at(T, x, u, MOTION)
@@ -164,7 +163,7 @@ def test_joint_layer_solves_the_equations_of_motion(case):
     model = make()
     a = assemble(model, t=T)
     c = compiled(model, tree=hinges)
-    Q, V = c.take(a.compiled, *spun(model, a))
+    Q, V = c.take(a.compiled, T, *spun(model, a))
     S, s, W = c.values.system, c.structure, c.work
     c.at(T, Q, V, MOTION)
     M = np.zeros((s.nv, s.nv))

@@ -107,7 +107,7 @@ def both_layers(model):
     """Body -> its record in absolute and in joint coordinates, at the same state."""
     a = assemble(model)
     tree = compiled(model, tree=HINGES)
-    Q, V = tree.take(a.compiled, a.q, a.v)
+    Q, V = tree.take(a.compiled, 0.0, a.q, a.v)
     bodies = {}
     for c, q, v in ((a.compiled, a.q, a.v), (tree, Q, V)):
         status, dy = c.at(0.2, q, v)

@@ -19,6 +19,7 @@ from .start import Start
 NODES, FEWER = 8, 6
 ROUNDS = 40
 CALLS = 1_000_000
+CROWDED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
 SHORT = 1e-12  # part of the span: a power that is still uneven over less has jumped
 
 
@@ -87,7 +88,11 @@ def _pieces(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
-    """Integrals over every interval of the polynomials through the m nearest nodes."""
+    """Integrals over every interval of the polynomials through the m nearest nodes.
+
+    Where nodes crowd, the polynomial hangs on the last digits of their differences: there the smallest weights that
+    integrate powers of time do.
+    """
     n = len(t) - 1
     first = np.clip(np.arange(n) - m // 2 + 1, 0, len(t) - m)
     window = first[:, None] + np.arange(m)
@@ -96,7 +101,12 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     ends = np.stack([t[:-1] - middle, t[1:] - middle], axis=1) / half[:, None]
     powers = np.arange(m)
     moments = (ends[:, 1:] ** (powers + 1) - ends[:, :1] ** (powers + 1)) / (powers + 1)
-    weights = np.linalg.solve(x[:, None, :] ** powers[:, None], moments[..., None])[..., 0] * half[:, None]
+    V = x[:, None, :] ** powers[:, None]
+    weights = np.empty((n, m))
+    crowded = np.diff(x, axis=1).min(axis=1) < CROWDED
+    weights[~crowded] = np.linalg.solve(V[~crowded], moments[~crowded, :, None])[..., 0]
+    weights[crowded] = np.einsum("imk,ik->im", np.linalg.pinv(V[crowded], rcond=CROWDED), moments[crowded])
+    weights *= half[:, None]
     return np.einsum("im,imk->ik", weights, P[window])
 
 

@@ -22,7 +22,7 @@ def acceleration_violation(result: Result) -> float:
     reactions alone would make of a row: |G| M^-1 |G^T lam|.
     """
     n = len(result.t)
-    if not n or not result.multipliers.shape[1]:
+    if not n or not len(result.values.structure.rows):
         return 0.0
     c = compiled(result.model, parameters=_parameters(result), tree=result.values.structure.tree)
     R = c.inverse_mass_root(np.ones(c.structure.nv)) if not c.structure.tree else None
