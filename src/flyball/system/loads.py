@@ -25,11 +25,10 @@ from .tables import (
     NV,
     PARENT,
     RATE,
-    TREE,
     V0,
     VALUE,
 )
-from .tree import PLANAR, project
+from .tree import project
 
 
 @formula
@@ -37,15 +36,10 @@ def inertial(S, W):
     """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
     gravity = (S.glob[0], S.glob[1], S.glob[2])
     for b in range(S.body_i.shape[0]):
-        m = S.body_x[b, MASS]
-        put3(W.FB, b, 0, scale(m, sub(gravity, load3(W.BK, b, 21))))
-        if m == 0.0 or S.body_i[b, TREE] == PLANAR:
-            o = 0.0 * m
-            put3(W.FB, b, 3, (o, o, o))
-        else:
-            R = load9(W.BK, b, 3)
-            t = euler(load9(S.body_x, b, INERTIA), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
-            put3(W.FB, b, 3, neg(mv(R, t)))
+        put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, load3(W.BK, b, 21))))
+        R = load9(W.BK, b, 3)
+        t = euler(load9(S.body_x, b, INERTIA), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
+        put3(W.FB, b, 3, neg(mv(R, t)))
 
 
 @formula
