@@ -15,7 +15,19 @@ from flyball._jit import start_numba
 from flyball._link import optimise_once
 from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, remember, settle
 from flyball.system.solve import REFINEMENTS, factor, solve
-from flyball.system.tables import COORDINATES, F_APPLIED, GAMMA, LAM, LENGTH, PASS, STABILIZE, TOL_G, TOL_V, V3, X_SOLVED
+from flyball.system.tables import (
+    COORDINATES,
+    F_APPLIED,
+    GAMMA,
+    LAM,
+    LENGTH,
+    PASS,
+    STABILIZE,
+    TOL_G,
+    TOL_V,
+    V3,
+    X_SOLVED,
+)
 from flyball.system.tree import retract
 
 RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)

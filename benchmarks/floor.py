@@ -13,7 +13,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
@@ -128,8 +127,10 @@ def scope() -> dict[str, Any]:
 
 def operations(S: Any, W: Any, y: np.ndarray, nq: int, nv: int) -> dict[str, int]:
     """Floating-point operations of every part."""
-    real = lambda T: T._replace(**{k: objects(a) for k, a in T._asdict().items() if getattr(a, "dtype", None) == float})  # noqa: E731
-    S, W = real(S), real(W)
+    S, W = (
+        T._replace(**{k: objects(a) for k, a in T._asdict().items() if getattr(a, "dtype", None) == np.float64})
+        for T in (S, W)
+    )
     y = objects(y)
     names = scope() | {"S": S, "W": W, "y": y, "q": y[:nq], "v": y[nq : nq + nv], "z": y[nq + nv :]}
     names["dy"] = objects(np.zeros(len(y)))
@@ -164,6 +165,7 @@ def compiled_loop(part: str) -> Callable:
     """A part again and again, compiled as the kernels are."""
     if part not in _loops:
         import numba
+
         from flyball._jit import start_numba
         from flyball._link import optimise_once
 
@@ -247,7 +249,7 @@ def main() -> None:
     for name, layer, start, ns, bytes_ in found:
         c = start.assembly.compiled
         flops = operations(c.values.system, c.work, start.y, c.structure.nq, c.structure.nv)
-        cells = "".join(f"{flops[p]:7d} {ns[p]:6.0f} ns" [:16].rjust(16) for p in PARTS)
+        cells = "".join(f"{flops[p]:8d} {ns[p]:7.0f}" for p in PARTS)
         print(f"{name:14s}{layer:10s}{cells}{bytes_ / 1e3:8.1f}{flops['all'] / per_ns:6.0f} ns")
 
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.assemble import assemble
 from flyball.math.vec import dot
 from flyball.system.spanning import spanning
 from flyball.system.structure import structure
