@@ -13,7 +13,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 from scipy.optimize import lsq_linear
 

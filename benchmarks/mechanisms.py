@@ -10,17 +10,54 @@ Free body: Euler's equations in Jacobi's elliptic functions (Landau and Lifshitz
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import runpy
+from dataclasses import dataclass, fields
+from inspect import signature
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from flyball.analysis.compiled import compiled as flyball_compiled
+from flyball.analysis.dynamics import Options
+from flyball.analysis.dynamics import simulate as flyball_simulate
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
 GROUND = -1
+CHAIN_ANGLE = np.pi / 6  # of the serial pendulum from hanging, at the start [rad]
+EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
+
+
+def simulate(model: fb.Mechanism, t_end: float, *, coordinates: str = "auto", **options: Any) -> fb.Result:
+    """flyball's ``simulate`` in the coordinates asked for.
+
+    Raises
+    ------
+    SystemExit
+        If this flyball has absolute coordinates only and others are asked for.
+    """
+    if "coordinates" in {f.name for f in fields(Options)} | set(signature(flyball_simulate).parameters):
+        options["coordinates"] = coordinates
+    elif coordinates == "joint":
+        raise SystemExit("this flyball has no joint coordinates to simulate in")
+    return model.simulate(t_end, **options)
+
+
+def compiled(model: fb.Mechanism, coordinates: str = "auto") -> Any:
+    """The compiled mechanism in the coordinates asked for, ready to be evaluated."""
+    options = {"coordinates": coordinates} if "coordinates" in signature(flyball_compiled).parameters else {}
+    return flyball_compiled(model.snapshot(), **options)
+
+
+def example(name: str, **options: Any) -> fb.Mechanism:
+    """A mechanism of the examples folder."""
+    if name.endswith(".py"):
+        return runpy.run_path(str(EXAMPLES / name))["mechanism"](**options)
+    return fb.load(EXAMPLES / name)
 
 
 @dataclass(frozen=True)
@@ -28,6 +65,7 @@ class Planar:
     """A planar mechanism of rods as numbers, counted from the centres of mass.
 
     ``start`` (bodies, 3): x, y, angle; ``rate`` their rates; ``hinges``: (body, its point, body, its point).
+    ``springs``: the same, stiffness and free length.
     """
 
     name: str
@@ -36,6 +74,9 @@ class Planar:
     start: np.ndarray
     rate: np.ndarray
     hinges: tuple[tuple[int, tuple[float, float], int, tuple[float, float]], ...]
+    gravity: float = GRAVITY
+    torques: tuple[tuple[int, float], ...] = ()  # body, constant torque on it
+    springs: tuple[tuple[int, tuple[float, float], int, tuple[float, float], float, float], ...] = ()
 
 
 def fourbars(n: int) -> Planar:
@@ -49,6 +90,18 @@ def fourbars(n: int) -> Planar:
     rods = 2 * n + 1
     rate = np.array([(0.5, 0.0, -1.0)] * (n + 1) + [(1.0, 0.0, 0.0)] * n)
     return Planar(f"fourbars-{n}", np.ones(rods), np.full(rods, ROD), np.array(upright + level), rate, tuple(hinges))
+
+
+def chain(n: int) -> Planar:
+    """Serial pendulum of ``n`` slender rods, 1 m and 1 kg in all, straight at 30 deg from hanging, at rest."""
+    angle = CHAIN_ANGLE - np.pi / 2
+    along = np.array([np.cos(angle), np.sin(angle)])
+    middles = (np.arange(n)[:, None] + 0.5) / n * along
+    start = np.column_stack([middles, np.full(n, angle)])
+    ends = (-0.5 / n, 0.0), (0.5 / n, 0.0)
+    hinges = [(GROUND, (0.0, 0.0), 0, ends[0]), *((i - 1, ends[1], i, ends[0]) for i in range(1, n))]
+    mass, inertia = np.full(n, 1.0 / n), np.full(n, 1.0 / n**3 / 12.0)
+    return Planar(f"chain-{n}", mass, inertia, start, np.zeros((n, 3)), tuple(hinges))
 
 
 def fourbars_exact(n: int, t: np.ndarray) -> np.ndarray:
@@ -94,34 +147,11 @@ def gap(p: Planar, q: np.ndarray) -> float:
     return max(float(np.abs(point(q, i, a) - point(q, j, b)).max()) for i, a, j, b in p.hinges)
 
 
-def from_tree(n: int, angle: np.ndarray, rate: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Coordinates and rates of the rods of A02 from joint angles, (times, 2 n + 1).
-
-    The angles are of the upright rods from the vertical, then of the level ones relative to the upright rod on their
-    left: the tree that MuJoCo and Pinocchio are given.
-    """
-    up, wu = angle[:, : n + 1], rate[:, : n + 1]
-    level, wl = up[:, :n] + angle[:, n + 1 :], wu[:, :n] + rate[:, n + 1 :]
-    base = np.arange(n + 1.0)
-    tx, ty = base - np.sin(up), np.cos(up)
-    q = np.stack(
-        [
-            np.hstack([base - 0.5 * np.sin(up), tx[:, :n] + 0.5 * np.cos(level)]),
-            np.hstack([0.5 * np.cos(up), ty[:, :n] + 0.5 * np.sin(level)]),
-            np.hstack([up + np.pi / 2, level]),
-        ],
-        axis=2,
-    )
-    vx, vy = -np.cos(up) * wu, -np.sin(up) * wu
-    v = np.stack(
-        [
-            np.hstack([0.5 * vx, vx[:, :n] - 0.5 * np.sin(level) * wl]),
-            np.hstack([0.5 * vy, vy[:, :n] + 0.5 * np.cos(level) * wl]),
-            np.hstack([wu, wl]),
-        ],
-        axis=2,
-    )
-    return q, v
+def planar_motion(p: Planar, run: fb.Result) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates and rates of the rods in flyball's result, (times, bodies, 3)."""
+    views = [run[f"rod{i}"] for i in range(len(p.mass))]
+    q = np.stack([np.column_stack([b.position, b.angle]) for b in views], axis=1)
+    return q, np.stack([np.column_stack([b.velocity, b.angular_velocity]) for b in views], axis=1)
 
 
 def pendulum() -> fb.Mechanism:

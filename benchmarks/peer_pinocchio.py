@@ -1,81 +1,151 @@
-"""The N-four-bar in Pinocchio: a tree of hinges closed by rigid constraints, ``constraintDynamics`` inside an RK4.
+"""A tree in Pinocchio: hinges and slides, loops closed by rigid constraints.
 
-Pinocchio has no time integrator; the one here is written in Python, which costs it 10 to 20 us a step.
+Pinocchio has no time integrator. One setting is a classical Runge-Kutta method written in Python, which costs it 10 to
+20 us a step; the other is SciPy's DOP853 with error control. Without loops the accelerations are those of the
+articulated-body algorithm, else those of ``constraintDynamics`` with Baumgarte's correction. (At the N-four-bar's
+singular positions DOP853 gets stuck or errs by tens of joules at any tolerance; fixed steps pass them.)
 """
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pinocchio as pin
+from steppers import controlled, fixed_steps
+from trees import Axis, Motion, Tree
 
-from mechanisms import GRAVITY, ROD, from_tree
+from mechanisms import GROUND
 
-SETTINGS = {"constraintDynamics, Python RK4": 0.2}  # label -> Baumgarte damping rate times step
-THIN = 1e-6
-
-
-def build(n: int, damping: float):
-    """(model, constraints): upright rods on ground, each but the last carrying a level one, and the cut joints."""
-    model = pin.Model()
-    model.gravity.linear = np.array([0.0, -GRAVITY, 0.0])
-    upright = pin.Inertia(1.0, np.array([0.0, 0.5, 0.0]), np.diag([ROD, THIN, ROD]))
-    flat = pin.Inertia(1.0, np.array([0.5, 0.0, 0.0]), np.diag([THIN, ROD, ROD]))
-    x, y = (pin.SE3(np.eye(3), np.eye(3)[k]) for k in range(2))
-    up, level = [], []
-    for i in range(n + 1):
-        foot = pin.SE3(np.eye(3), np.array([float(i), 0.0, 0.0]))
-        up.append(model.addJoint(0, pin.JointModelRZ(), foot, f"up{i}"))
-        model.appendBodyToJoint(up[-1], upright, pin.SE3.Identity())
-        if i < n:
-            level.append(model.addJoint(up[-1], pin.JointModelRZ(), y, f"level{i}"))
-            model.appendBodyToJoint(level[-1], flat, pin.SE3.Identity())
-    cuts = pin.StdVec_RigidConstraintModel()
-    for i in range(n):
-        cut = pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, level[i], x, up[i + 1], y)
-        cut.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(damping**2 / 4, damping))
-        cuts.append(cut)
-    return model, cuts, [model.joints[j].idx_v for j in up], [model.joints[j].idx_v for j in level]
+# label -> (fixed steps or not, Baumgarte's damping rate [1/s], or with fixed steps and below 1: times the step)
+SETTINGS = {
+    "Python RK4": (True, 0.2),
+    "Python RK4, 5/s": (True, 5.0),
+    "SciPy DOP853": (False, 5.0),
+    "SciPy DOP853, 20/s": (False, 20.0),
+}
+ROUNDS = pin.ProximalSettings(1e-12, 1e-8, 20)
+REDUNDANT = pin.ProximalSettings(1e-10, 1e-3, 50)  # a smaller regularisation blows up what rounding leaves of a gap
 
 
-def solve(n: int, t_end: float, steps: int, setting: str, samples: int = 0):
-    """Integrate. Returns (coordinates, rates, CPU seconds of the stepping); no arrays where samples is 0."""
-    h = t_end / steps
-    model, cuts, up, level = build(n, SETTINGS[setting] / h)
-    data = model.createData()
-    work = pin.StdVec_RigidConstraintData([c.createData() for c in cuts])
-    pin.initConstraintDynamics(model, data, cuts, work)
-    proximal = pin.ProximalSettings(1e-12, 1e-8, 20)
-    q, v, tau = np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv)
-    v[up], v[level] = -1.0, 1.0
-
-    def acceleration(q, v):
-        return pin.constraintDynamics(model, data, q, v, tau, cuts, work, proximal).copy()
-
-    kept = set(np.linspace(0, steps, samples + 1).round().astype(int).tolist()) if samples else set()
-    angle, rate = [], []
-    begin = time.process_time()
-    for k in range(steps + 1):
-        if k in kept:
-            angle.append(q)
-            rate.append(v)
-        if k < steps:
-            q, v = runge_kutta(acceleration, q, v, h)
-    seconds = time.process_time() - begin
-    if not samples:
-        return None, None, seconds
-    order = np.array(up + level)
-    return *from_tree(n, np.array(angle)[:, order], np.array(rate)[:, order]), seconds
+def joint(a: Axis):
+    """Joint model of an axis; those along a coordinate axis have their own, faster ones."""
+    names = ("X", "Y", "Z")
+    if np.count_nonzero(a.direction) == 1 and a.direction.sum() == 1.0:
+        return getattr(pin, f"JointModel{'R' if a.kind == 'hinge' else 'P'}{names[int(a.direction.argmax())]}")()
+    return (pin.JointModelRevoluteUnaligned if a.kind == "hinge" else pin.JointModelPrismaticUnaligned)(a.direction)
 
 
-def runge_kutta(acceleration, q, v, h):
-    """One step of the classical method of order 4."""
-    a1 = acceleration(q, v)
-    v2 = v + h / 2 * a1
-    a2 = acceleration(q + h / 2 * v, v2)
-    v3 = v + h / 2 * a2
-    a3 = acceleration(q + h / 2 * v2, v3)
-    v4 = v + h * a3
-    a4 = acceleration(q + h * v3, v4)
-    return q + h / 6 * (v + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
+class Built:
+    """The model; the frame of every joint is drawn at its point, along the world's axes."""
+
+    def __init__(self, tree: Tree) -> None:
+        self.tree = tree
+        self.model = pin.Model()
+        self.model.gravity.linear = tree.gravity
+        self.last: list[int] = []  # joint that carries each link
+        self.at = [np.zeros(3)]  # of each joint, where it is drawn
+        for link in tree.links:
+            parent = 0 if link.parent == GROUND else self.last[link.parent]
+            for a in link.axes:
+                shift = pin.SE3(np.eye(3), a.point - self.at[parent])
+                parent = self.model.addJoint(parent, joint(a), shift, f"joint{len(self.at)}")
+                self.at.append(np.asarray(a.point))
+            inertia = pin.Inertia(link.mass, link.centre - self.at[parent], np.asarray(link.inertia))
+            self.model.appendBodyToJoint(parent, inertia, pin.SE3.Identity())
+            self.last.append(parent)
+        self.order = np.array([self.model.joints[k].idx_v for k in range(1, len(self.at))])
+        self.data = self.model.createData()
+
+    def start(self) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates and rates."""
+        v = np.zeros(self.model.nv)
+        v[self.order] = self.tree.rates
+        return np.zeros(self.model.nq), v
+
+    def acceleration(self, rate: float):
+        """Function of (q, v); ``rate``: Baumgarte's damping rate [1/s]."""
+        model, data = self.model, self.data
+        effort = self.effort()
+        if not self.tree.cuts:
+            return lambda q, v: pin.aba(model, data, q, v, effort(q)).copy()
+        cuts = self.cuts(rate)
+        work = pin.StdVec_RigidConstraintData([c.createData() for c in cuts])
+        pin.initConstraintDynamics(model, data, cuts, work)
+        rounds = REDUNDANT if self.tree.redundant else ROUNDS
+        return lambda q, v: pin.constraintDynamics(model, data, q, v, effort(q), cuts, work, rounds).copy()
+
+    def cuts(self, rate: float):
+        """Rigid constraints: one for each point that a cut holds together."""
+        out = pin.StdVec_RigidConstraintModel()
+        for c in self.tree.cuts:
+            i, j = (0 if k == GROUND else self.last[k] for k in (c.i, c.j))
+            for x in c.points:
+                places = (pin.SE3(np.eye(3), x - self.at[k]) for k in (i, j))
+                first, second = places
+                one = pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, self.model, i, first, j, second)
+                one.setBaumgarteCorrectorParameters(pin.BaumgarteCorrectorParameters(rate**2 / 4, rate))
+                out.append(one)
+        return out
+
+    def effort(self):
+        """Function of q: efforts of the springs along joints.
+
+        Raises
+        ------
+        ValueError
+            If there are springs elsewhere.
+        """
+        if self.tree.springs:
+            raise ValueError("springs between points are not built for this engine")
+        axes = self.tree.axes
+        stiffness, rest = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        stiffness[self.order] = [a.stiffness for a in axes]
+        rest[self.order] = [a.rest for a in axes]
+        zero = np.zeros(self.model.nv)
+        if not stiffness.any():
+            return lambda q: zero
+        return lambda q: stiffness * (rest - q)
+
+    def motion(self, q: np.ndarray, v: np.ndarray) -> Motion:
+        """Of the links, at coordinates and rates of shape (times, joints)."""
+        out = [[], [], [], []]
+        for one_q, one_v in zip(q, v, strict=True):
+            pin.forwardKinematics(self.model, self.data, one_q, one_v)
+            rows = [self.pose(k) for k in range(len(self.last))]
+            for part, values in zip(out, zip(*rows, strict=True), strict=True):
+                part.append(values)
+        return Motion(*(np.array(part) for part in out))
+
+    def pose(self, k: int):
+        """Position of the centre, rotation, velocity of the centre and angular velocity of link k."""
+        place, twist = self.data.oMi[self.last[k]], self.data.v[self.last[k]]
+        R = place.rotation.copy()
+        arm = self.tree.links[k].centre - self.at[self.last[k]]
+        return place.act(arm), R, R @ (twist.linear + np.cross(twist.angular, arm)), R @ twist.angular
+
+
+def solve(tree: Tree, t_end: float, resolution: float, setting: str, samples: int = 0):
+    """Integrate. Returns (motion, CPU seconds of the stepping); no motion where samples is 0."""
+    built = Built(tree)
+    fixed, rate = SETTINGS[setting]
+    if fixed:
+        acceleration = built.acceleration(rate * resolution / t_end if rate < 1 else rate)
+        q, v, seconds = fixed_steps(acceleration, *built.start(), t_end, int(resolution), samples)
+    else:
+        q, v, seconds = controlled(built.acceleration(rate), *built.start(), t_end, resolution, samples)
+    return (built.motion(q, v) if samples else None), seconds
+
+
+def start_accelerations(tree: Tree) -> np.ndarray:
+    """Acceleration of each centre and angular acceleration, (links, 6), at the start."""
+    built = Built(tree)
+    q, v = built.start()
+    a = built.acceleration(0.0)(q, v)
+    pin.forwardKinematics(built.model, built.data, q, v, a)
+    out = []
+    for k, j in enumerate(built.last):
+        R, twist, rate = built.data.oMi[j].rotation, built.data.v[j], built.data.a[j]
+        arm = tree.links[k].centre - built.at[j]
+        w, alpha = twist.angular, rate.angular
+        linear = rate.linear + np.cross(w, twist.linear) + np.cross(alpha, arm) + np.cross(w, np.cross(w, arm))
+        out.append(np.r_[R @ linear, R @ alpha])
+    return np.array(out)

@@ -105,6 +105,7 @@ def run(
     rtol: Annotated[float | None, typer.Option(help="Relative tolerance.")] = None,
     atol: Annotated[float | None, typer.Option(help="Absolute tolerance.")] = None,
     method: Annotated[str | None, typer.Option(help="Integration method.")] = None,
+    coordinates: Annotated[str, typer.Option(help="absolute, joint, or auto: those that cost less.")] = "auto",
     change: Annotated[list[str] | None, typer.Option("--set", help='Set a parameter: --set speed="120 rpm".')] = None,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="Write no pictures.")] = False,
     no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
@@ -120,7 +121,8 @@ def run(
         _set(mechanism, change or [])
         end = _seconds(t_end)
         folder = out if out is not None else Path(f"{model.stem}-result")
-        options = {k: v for k, v in {"rtol": rtol, "atol": atol, "method": method}.items() if v is not None}
+        chosen = {"rtol": rtol, "atol": atol, "method": method, "coordinates": coordinates}
+        options = {k: v for k, v in chosen.items() if v is not None}
         talk = not (as_json or quiet)
         error = None
         try:

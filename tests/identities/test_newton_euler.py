@@ -9,7 +9,10 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.system.tables import NV
+from flyball.math.vec import dot
+from flyball.system.spanning import spanning
+from flyball.system.structure import structure
+from flyball.system.tables import FRAMES, GROUND_FRAMES, NV
 from flyball.system.tree import column
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
@@ -49,7 +52,7 @@ def residual(r):
 
 @pytest.mark.parametrize("name", FILES)
 def test_examples(name):
-    r = mechanism(name).simulate(0.05, outputs=5)
+    r = mechanism(name).simulate(0.05, outputs=5, coordinates="absolute")
     assert residual(r) < 1e-12
 
 
@@ -93,13 +96,30 @@ MORE = {"actuated": actuated, "Bricard": bricard, "friction": rubbing, "driver t
 
 @pytest.mark.parametrize("case", MORE)
 def test_more(case):
-    r = MORE[case]().simulate(0.3, outputs=7)
+    r = MORE[case]().simulate(0.3, outputs=7, coordinates="absolute")
     assert residual(r) < 1e-12
+
+
+@pytest.mark.parametrize("case", [*FILES, *MORE])
+def test_tree_joints_carry_nothing_along_their_coordinates(case):
+    """Whatever passes through a tree joint does no work along its free coordinates, but for a driver's effort."""
+    m = mechanism(case) if case in FILES else MORE[case]()
+    r = m.simulate(0.05, outputs=5, coordinates="joint")
+    S, s = r.values.system, r.values.structure
+    driver = {b: name for name, b in s.prescribed.items()}
+    largest = max([1e-3, *(np.abs(np.array(r.reactions.of(j.name)[0])).max() for j in m.joints)])
+    for b in range(len(S.body_i)):
+        force, torque, p = r.reactions.through[b, :3], r.reactions.through[b, 3:], r.records.body(b)[0]
+        at_joint = torque + np.cross(np.subtract(p, r.records.W.O[b]), force, axis=0)
+        for k in range(S.body_i[b, NV]):
+            turn, shift = column(S, r.records.W, b, k)
+            effort = r[driver[b]].effort if b in driver else 0.0
+            assert dot(turn, at_joint) + dot(shift, force) == pytest.approx(effort + 0.0 * r.t, abs=1e-10 * largest)
 
 
 def test_a_driver_that_follows_pushes_what_it_follows():
     """Its law's slope times its effort is a force along each sensor: the work of both is that of the ideal row."""
-    r = followed().simulate(0.3, outputs=7)
+    r = followed().simulate(0.3, outputs=7, coordinates="absolute")
     lam, s, d = r["drive"].effort, r["pin"].angle, r["rail"].displacement
     by_s, by_d = 0.6 * np.cos(3 * s + 1) + 0.5 * d, 0.5 * s
     efforts = r.reactions._efforts()
@@ -107,3 +127,12 @@ def test_a_driver_that_follows_pushes_what_it_follows():
     assert np.abs(lam).min() > 0.1
     assert efforts[named["pin.angle"]] == pytest.approx(-lam * by_s, rel=1e-12)
     assert efforts[named["rail.displacement"]] == pytest.approx(-lam * by_d, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("case", MORE)
+def test_frames_that_are_kept_up_to_date_exist(case):
+    """Those of bodies that the loops run over are no more than there are; forces without frames ask for none."""
+    m = MORE[case]().snapshot()
+    for tree in ((), spanning(m)):
+        t = structure(m, tree=tree).tables
+        assert t["kinds"][GROUND_FRAMES] <= t["kinds"][FRAMES] <= len(t["frame_i"])

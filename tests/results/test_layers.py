@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis.mass import report
 from tests.identities.test_results_in_both_layers import agree
-from tests.mechanisms import G, four_bar
+from tests.mechanisms import G, example, four_bar
 from tests.results.test_result_files import same
 
 TURN = 2 * np.pi
@@ -137,3 +138,21 @@ def test_health_says_which_coordinates():
     assert r.health.as_dict()["coordinates"] == r.health.coordinates
     r.health.coordinates = ""
     assert "coordinates" not in dict(r.health.lines())
+
+
+def test_masses_and_energies_do_not_ask_for_coordinates():
+    """Centres of mass and the inertia of all together where a motion ends, from either layer's coordinates."""
+    r, o = (spinning().simulate(0.1, outputs=2, coordinates=c, rtol=1e-11, atol=1e-12) for c in ("absolute", "joint"))
+    one, two = (report(x.model, x.values, x.q[-1]) for x in (r, o))
+    for name in ("fork", "rotor"):
+        assert two[name].position == pytest.approx(one[name].position, abs=1e-8)
+    assert two.total.inertia == pytest.approx(one.total.inertia, abs=1e-8)
+    assert two.total.position == pytest.approx(one.total.position, abs=1e-8)
+    assert one["rotor"].position[1] != pytest.approx(0.0, abs=1e-3)
+
+
+def test_a_start_that_is_zero_but_for_rounding():
+    """Joint coordinates are zero as drawn: tight tolerances must not take rounding for a size to go by."""
+    r = example("pendulum_chain.py").simulate(0.01, outputs=2, coordinates="joint", rtol=1e-11, atol=1e-13)
+    assert r.health.success
+    assert 0.0 < np.abs(r.q[0]).max() < 1e-14

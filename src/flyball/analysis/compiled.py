@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
-from ..system.coordinates import BodyState, positions, turned_angle, velocities
+from ..system.coordinates import BodyState, positions, turned_angles, velocities
 from ..system.forest import steps
 from ..system.motion import NONE
 from ..system.records import load
@@ -67,12 +67,12 @@ class Compiled:
         """How every body moves at a state."""
         W = self.work
         self.at(t, q, v)
+        angles = turned_angles(self.values, W, q) if self.structure.model.planar else {}
         out = {}
         for name, b in self.structure.place.items():
             if b >= 0:
                 p, R, w, u, _, _ = (np.array(part) for part in load(W.BK, b))
-                angle = float(turned_angle(self.values, W, b, q)) if self.structure.model.planar else 0.0
-                out[name] = BodyState(p, R.reshape(3, 3), u, w, angle)
+                out[name] = BodyState(p, R.reshape(3, 3), u, w, float(angles.get(name, 0.0)))
         return out
 
     def take(self, other: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

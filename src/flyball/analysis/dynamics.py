@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ..errors import SimulationError
 from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
@@ -71,18 +70,13 @@ def simulate(
     t_end = number(t_end, {}, "s", "t_end")
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
+    begun.since = started
     clock = _clock(begun, t_start, float(t_end), times, chosen)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
     rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
     if follow:
         rows = integrate_powers(begun, clock, rows)
-    try:
-        result = outcome(model, begun, clock, rows, chosen, interrupted)
-    except SimulationError as error:
-        error.result.health.seconds = time.perf_counter() - started
-        raise
-    result.health.seconds = time.perf_counter() - started
-    return result
+    return outcome(model, begun, clock, rows, chosen, interrupted)
 
 
 def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from functools import partial
 
 import numpy as np
@@ -70,7 +71,7 @@ def _health(start: Start, clock: ex.Clock, o: Options) -> Health:
         rejected=int(clock.count[ex.REJECTED]),
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
-        seconds=0.0,
+        seconds=time.perf_counter() - start.since,
         options={k: getattr(o, k) for k in o.__dataclass_fields__},
         remarks=remarks(start.assembly),
         coordinates=start.coordinates,

@@ -27,6 +27,7 @@ class Start:
     y: np.ndarray
     coordinates: str  # which they are, and why
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
+    since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 
 def begin(

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..math.vec import add, cross, load3, neg, scale, sub
+from ..math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..model.force import CoordinateForce
 from ..system.call import STACK_RESERVE
 from ..system.laws import evaluate_jet
-from ..system.loads import act, inertial
-from ..system.tables import PARENT
+from ..system.loads import act, euler
+from ..system.tables import INERTIA, MASS, PARENT
 from .terms import Wrench, along, coefficient, nothing, term
 
 if TYPE_CHECKING:
@@ -92,10 +92,8 @@ class Reactions:
 
     def _acting(self) -> SimpleNamespace:
         """Kinematics, and what acts on every body with the tree joints left out: gravity, inertia, forces, rows."""
-        result = self._result
-        s, S, BK = result.values.structure, result.values.system, result.records.W.BK
-        W = SimpleNamespace(BK=BK, FB=np.zeros((len(BK), 6, result.records.n)))
-        inertial(S, W)
+        result, s = self._result, self._result.values.structure
+        W = self._inertial()
         for f in s.forces:
             if not isinstance(f, CoordinateForce):
                 self._between(W, f.name)
@@ -105,6 +103,17 @@ class Reactions:
             effort = efforts[t.row - len(s.rows)] if t.measured else result.multipliers[:, t.row]
             if c != 0.0 and effort.any():
                 self._term(W, k, c * effort)
+        return W
+
+    def _inertial(self) -> SimpleNamespace:
+        """Kinematics, and gravity less what each body needs to move as it does."""
+        S, records = self._result.values.system, self._result.records
+        W = SimpleNamespace(BK=records.W.BK, FB=np.zeros((len(S.body_i), 6, records.n)))
+        gravity = tuple(S.glob[:3])
+        for b in range(len(S.body_i)):
+            _, R, w, _, alpha, a = records.body(b)
+            put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, a)))
+            put3(W.FB, b, 3, neg(mv(R, euler(load9(S.body_x, b, INERTIA), mtv(R, w), mtv(R, alpha)))))
         return W
 
     def _between(self, W: SimpleNamespace, name: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 from types import SimpleNamespace
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.joint import Coordinate, Joint
-from ..system.coordinates import turned_angle
+from ..system.coordinates import turned_angles
 from ..system.records import at_rest, carried, load
 from ..system.tables import NV, PARENT, V0
 from ..system.tree import column, motion, pose
@@ -98,7 +99,12 @@ class Records:
         """
         if b < 0:
             return np.zeros(self.n)
-        return turned_angle(self.x, self.W, b, self.q.T) - self._wound.get(self._names[b], 0.0)
+        return self._angles[self._names[b]] - self._wound.get(self._names[b], 0.0)
+
+    @cached_property
+    def _angles(self) -> dict[str, np.ndarray]:
+        """What the coordinates make of every body's angle."""
+        return turned_angles(self.x, self.W, self.q.T)
 
     def drawn_angle(self, b: int) -> float:
         """Angle [rad] of body b (-1: ground) of a planar mechanism as drawn, whole turns counted."""

@@ -86,23 +86,27 @@ def velocities(x: Values, bodies: Mapping[str, BodyState], W: Any = None) -> np.
     return v
 
 
-def turned_angle(x: Values, W: Any, b: int, q: np.ndarray) -> Any:
-    """Turned angle of body b of a planar mechanism, whole turns counted, at the poses in W, which belong to q.
+def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
+    """Turned angle of every body of a planar mechanism, whole turns counted, at the poses in W, which belong to q.
 
-    A number for q (nq,), an array over time for (nq, n).
+    Numbers for q (nq,), arrays over time for (nq, n). Bodies begin at the angles that they are drawn with.
     """
     S = x.system
-    if S.body_i[b, TREE] == PLANAR:
-        return q[S.body_i[b, Q0] + 2]
-    name = next(k for k, row in x.structure.place.items() if row == b)
-    near, k = x.bodies[name].angle, b
-    while k >= 0:
-        for i in range(S.body_i[k, NV]):
-            at = S.body_i[k, Q0] + i
-            near = near + column(S, W, k, i)[0][2] * (q[at] - x.q[at])
-        k = S.body_i[k, PARENT]
-    angle = np.arctan2(W.BK[b, 6], W.BK[b, 3])
-    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+    since: list[Any] = []  # what the coordinates along each chain have turned it since it was drawn
+    for b in range(len(S.body_i)):
+        total = since[S.body_i[b, PARENT]] if S.body_i[b, PARENT] >= 0 else 0.0
+        for i in range(S.body_i[b, NV]):
+            at = S.body_i[b, Q0] + i
+            total = total + column(S, W, b, i)[0][2] * (q[at] - x.q[at])
+        since.append(total)
+    out = {}
+    for name, b in x.structure.place.items():
+        if b >= 0 and S.body_i[b, TREE] == PLANAR:
+            out[name] = q[S.body_i[b, Q0] + 2]
+        elif b >= 0:
+            near, angle = x.bodies[name].angle + since[b], np.arctan2(W.BK[b, 6], W.BK[b, 3])
+            out[name] = angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+    return out
 
 
 def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:

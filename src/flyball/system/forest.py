@@ -71,9 +71,9 @@ def hung(model: Model, tree: Sequence[str]) -> list[Hung]:
     out: list[Hung] = []
     seen = {GROUND}
     _reach(near, GROUND, seen, out)
-    for b in model.bodies:
-        if b.name not in seen:
-            root = _middle(near, b.name)
+    for body in model.bodies:
+        if body.name not in seen:
+            root = _middle(near, body.name)
             out.append(Hung(root))
             seen.add(root)
             _reach(near, root, seen, out)

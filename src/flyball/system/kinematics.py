@@ -5,7 +5,7 @@ from __future__ import annotations
 from .._jit import formula
 from ..math.vec import load3, load9
 from .records import at_rest, carried, load, store_motion, store_pose
-from .tables import GROUND_FRAMES
+from .tables import FRAMES, GROUND_FRAMES
 from .tree import motion, pose
 
 
@@ -14,7 +14,7 @@ def poses(S, W, q):
     """Positions and rotations of all bodies, parents first, and of the frames on them."""
     for b in range(S.body_i.shape[0]):
         pose(S, W, b, q)
-    for k in range(S.kinds[GROUND_FRAMES], S.frame_i.shape[0]):
+    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
         p, R, _, _, _, _ = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_pose(W.FK, k, p, R)
 
@@ -24,7 +24,7 @@ def motions(S, W, v):
     """Velocities and bias accelerations at these poses."""
     for b in range(S.body_i.shape[0]):
         motion(S, W, b, v)
-    for k in range(S.kinds[GROUND_FRAMES], S.frame_i.shape[0]):
+    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
         _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_motion(W.FK, k, w, u, alpha, a)
 

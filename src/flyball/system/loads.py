@@ -36,12 +36,22 @@ def inertial(S, W):
     """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
     gravity = (S.glob[0], S.glob[1], S.glob[2])
     for b in range(S.body_i.shape[0]):
-        p, R, w, v, alpha, a = load(W.BK, b)
-        I = load9(S.body_x, b, INERTIA)
-        w_B = mtv(R, w)
-        t = add(mv(I, mtv(R, alpha)), cross(w_B, mv(I, w_B)))
-        put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, a)))
+        put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, load3(W.BK, b, 21))))
+        R = load9(W.BK, b, 3)
+        t = euler(load9(S.body_x, b, INERTIA), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
         put3(W.FB, b, 3, neg(mv(R, t)))
+
+
+@formula
+def euler(I, w, alpha):
+    """I alpha + w x I w in body axes; by Euler's equations where these are principal axes."""
+    if I[1] != 0.0 or I[2] != 0.0 or I[5] != 0.0:
+        return add(mv(I, alpha), cross(w, mv(I, w)))
+    return (
+        I[0] * alpha[0] + (I[8] - I[4]) * w[1] * w[2],
+        I[4] * alpha[1] + (I[0] - I[8]) * w[2] * w[0],
+        I[8] * alpha[2] + (I[4] - I[0]) * w[0] * w[1],
+    )
 
 
 @formula

@@ -79,6 +79,8 @@ def turned(R, I):
 def rigid(S, W, b):
     """Mass, first moment and inertia of body b about W.O[b]."""
     m = S.body_x[b, MASS]
+    if m == 0.0:
+        return m, (m, m, m), (m, m, m, m, m, m)
     J = turned(load9(W.BK, b, 3), load9(S.body_x, b, INERTIA))
     r = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
     return m, scale(m, r), shifted(J, scale(0.5 * m, r), r)

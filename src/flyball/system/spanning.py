@@ -42,7 +42,8 @@ def spanning(model: Model, avoided: Collection[str] = ()) -> tuple[str, ...]:
         Joints that must stay rows.
     """
     worth = candidates(model, avoided)
-    near: dict[str, list[tuple[str, str]]] = {GROUND: []} | {b.name: [] for b in model.bodies}
+    near: dict[str, list[tuple[str, str]]] = {GROUND: []}
+    near |= {b.name: [] for b in model.bodies}
     for name in worth:
         a, b = ends(model, model[name])
         near[a].append((name, b))

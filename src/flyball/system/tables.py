@@ -42,7 +42,7 @@ STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
 STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT = range(7)
 
 # entries of System.kinds from its end, and what may stand in the first: how the equations are solved
-SOLVER, COORDINATES, GROUND_FRAMES = -3, -2, -1
+SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
 SCHUR, COUPLED, ARTICULATED = range(3)
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
@@ -68,7 +68,9 @@ class System(NamedTuple):
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
     load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
-    kinds: np.ndarray  # first row of each kind of term; solver; number of q; frames on ground
+    kinds: (
+        np.ndarray
+    )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
     code: np.ndarray  # bytecode of the laws
     const: np.ndarray  # parameters, literals of the laws, splines
     glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism

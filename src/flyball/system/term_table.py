@@ -139,8 +139,9 @@ def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: floa
 
 
 def sort(s: Structure) -> None:
-    """Terms by kind, frames on ground first; offsets of every kind."""
-    order = sorted(range(len(s.frames)), key=lambda k: s.frames[k].body >= 0)
+    """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
+    used = _used(s)
+    order = sorted(range(len(s.frames)), key=lambda k: 0 if s.frames[k].body < 0 else 1 if k in used else 2)
     new = np.empty(len(order), np.int64)
     new[order] = np.arange(len(order))
     s.frames = [s.frames[k] for k in order]
@@ -163,8 +164,17 @@ def sort(s: Structure) -> None:
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
     solver = SCHUR if not s.tree_joints else COUPLED if s.rows else ARTICULATED
-    s.tables["kinds"] = np.r_[terms, solver, s.nq, ground].astype(np.int64)
+    moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
+    s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
     _force_frames(s, new)
+
+
+def _used(s: Structure) -> set[int]:
+    """Frames that the compiled loops ask for; those of tree joints often only results do."""
+    used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
+    for k, e in enumerate(s.forces):
+        used |= {int(s.tables["force_i"][k, column]) for column in ((1,) if hasattr(e, "effort") else (0, 1))}
+    return used - {-1}  # forces along a measured quantity that have no frame of their own
 
 
 def _force_frames(s: Structure, new: np.ndarray) -> None:

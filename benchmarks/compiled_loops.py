@@ -1,0 +1,104 @@
+"""flyball's own compiled pieces in loops of their own: right-hand sides again and again, kinematics at given times.
+
+The loops are compiled when first called and not cached, which takes about half a minute.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import timing  # isort: skip  (before numpy: it fixes the thread counts)
+import numpy as np
+
+from flyball._jit import start_numba
+from flyball._link import optimise_once
+from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, remember, settle
+from flyball.system.solve import REFINEMENTS, factor, solve
+from flyball.system.tables import (
+    COORDINATES,
+    F_APPLIED,
+    GAMMA,
+    LAM,
+    LENGTH,
+    PASS,
+    STABILIZE,
+    TOL_G,
+    TOL_V,
+    V3,
+    X_SOLVED,
+)
+from flyball.system.tree import retract
+
+RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)
+
+
+def follow(S, W, times, y, dy, task):
+    """Visit the times; ``y`` goes along from each to the next. Returns 0 or a status.
+
+    KINEMATICS: positions by Newton's method from those before, carried on with velocities and accelerations; then
+    velocities, and accelerations from the constraints alone. REACTIONS: the same with forces, accelerations and
+    reactions, as a simulation reports them.
+    """
+    nq, nv = S.kinds[COORDINATES], W.vel.shape[1]
+    q, v, z = y[:nq], y[nq : nq + nv], y[nq + nv :]
+    a, step = W.vel[X_SOLVED], W.vel[V3]
+    for k in range(times.shape[0]):
+        if task == RIGHT_HAND_SIDE:
+            status = derivative(times[k], y, dy, S, W)
+        else:
+            if k > 0:
+                h = times[k] - times[k - 1]
+                for d in range(nv):
+                    step[d] = h * (v[d] + 0.5 * h * a[d])
+                    v[d] += h * a[d]
+                retract(S, q, step)
+            if task == REACTIONS:
+                status = arrive(times[k], y, dy, S, W)[0]
+            else:
+                status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
+                remember(S, W, z)
+                if not factored:
+                    factor(S, W)
+                solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], a, W.row[LAM], False, REFINEMENTS)
+        if status != 0:
+            return status
+    return 0
+
+
+@lru_cache(maxsize=1)
+def compiled_follow() -> Any:
+    """The loop, compiled as flyball's kernels are."""
+    start_numba()
+    from numba import njit
+
+    made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(follow)
+
+    def call(*arguments: Any) -> int:
+        if made.signatures:
+            return made(*arguments)
+        with optimise_once(follow.__qualname__):
+            return made(*arguments)
+
+    return call
+
+
+def clock(c: Any, y: np.ndarray, times: np.ndarray, task: int) -> float:
+    """CPU seconds of the loop over the times, from the state y of a compiled mechanism.
+
+    Raises
+    ------
+    RuntimeError
+        If the loop could not go on.
+    """
+    S, W = c.values.system, c.work
+    W.option[STABILIZE], W.option[PASS] = STAGES, 1e-13
+    W.option[TOL_G], W.option[TOL_V] = 1e-10, 1e-9  # those of a simulation at rtol 1e-8
+    y, dy = y.copy(), np.zeros(len(y))
+    run = compiled_follow()
+    run(S, W, times[:1], y.copy(), dy, task)  # compiles, and brings the arrays into the cache
+    status = []
+    seconds = timing.cpu(lambda: status.append(run(S, W, times, y, dy, task)))
+    if status[0] != 0:
+        raise RuntimeError(f"the loop ended with the status {status[0]}")
+    return seconds
