@@ -56,7 +56,7 @@ def test_compiled_is_plain_python(name):
     plain, _ = ready(name, motion.STAGES)
     clock = explicit.Clock(
         np.r_[1e-3, np.zeros(9)],
-        np.zeros(8, np.int64),
+        np.zeros(9, np.int64),
         np.zeros(0),
         np.vstack([y, 0 * y, 0 * y]),
         np.zeros((1, len(y))),
