@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from tests.layers import both_layers
 from tests.mechanisms import G, four_bar, hanging_bodies
 from tests.verification.test_reactions import actuated
+
+pytestmark = both_layers
 
 
 def test_energy_balance_with_everything_that_works():

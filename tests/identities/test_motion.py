@@ -1,6 +1,5 @@
 """The integration itself: compiled as plain, its order, restart, chunks, repeats, singular positions, whole turns."""
 
-import functools
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +14,11 @@ from flyball.numerics.integrators import explicit
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.system import motion
 from flyball.system.tables import PASS, STABILIZE, TOL_G, TOL_V
+from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
+
+pytestmark = both_layers
 
 # ---------------------------------------------------------------------------------------- compiled = plain Python
 
@@ -56,7 +58,7 @@ def test_compiled_is_plain_python(name):
     plain, _ = ready(name, motion.STAGES)
     clock = explicit.Clock(
         np.r_[1e-3, np.zeros(9)],
-        np.zeros(8, np.int64),
+        np.zeros(9, np.int64),
         np.zeros(0),
         np.vstack([y, 0 * y, 0 * y]),
         np.zeros((1, len(y))),
@@ -82,7 +84,7 @@ def swinging():
     return m
 
 
-@functools.cache
+@cached
 def exact():
     return swinging().simulate(0.48, rtol=1e-13, atol=1e-14, outputs=17)
 
@@ -91,11 +93,11 @@ def fixed_steps(monkeypatch, h, method):
     """The motion with steps of one width."""
     original = dynamics._clock
 
-    def clock(a, *args):
-        made = original(a, *args)
+    def clock(start, *args):
+        made = original(start, *args)
         made.real[explicit.RTOL] = made.real[explicit.ATOL] = 1e6
         made.real[explicit.H] = made.real[explicit.H_MAX] = h
-        a.compiled.work.option[[TOL_G, TOL_V]] = 1e-13, 1e-12
+        start.assembly.compiled.work.option[[TOL_G, TOL_V]] = 1e-13, 1e-12
         return made
 
     monkeypatch.setattr(dynamics, "_clock", clock)
@@ -189,6 +191,7 @@ def test_chunks_change_nothing(monkeypatch, make):
 
 def test_interrupt_keeps_what_was_computed(monkeypatch):
     """Ctrl-C ends the run with a result that says so and equals the uninterrupted one as far as it goes."""
+    whole = actuated().simulate(2.0, outputs=201)
     one_step_a_call(monkeypatch)
 
     def stop(part):
@@ -199,8 +202,6 @@ def test_interrupt_keeps_what_was_computed(monkeypatch):
     assert not r.health.success
     assert "interrupted by the user at t = " in r.health.message
     assert 0.9 < r.t[-1] < 2.0
-    monkeypatch.undo()
-    whole = actuated().simulate(2.0, outputs=201)
     assert np.array_equal(r.q, whole.q[: len(r.t)])
 
 

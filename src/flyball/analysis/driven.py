@@ -20,6 +20,7 @@ NODES, FEWER = 8, 6
 ROUNDS = 40
 CALLS = 1_000_000
 CROWDED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
+BLURRED = 1e-10  # singular values of the equations of weights below this part of the largest are rounding
 SHORT = 1e-12  # part of the span: a power that is still uneven over less has jumped
 
 
@@ -105,7 +106,7 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     weights = np.empty((n, m))
     crowded = np.diff(x, axis=1).min(axis=1) < CROWDED
     weights[~crowded] = np.linalg.solve(V[~crowded], moments[~crowded, :, None])[..., 0]
-    weights[crowded] = np.einsum("imk,ik->im", np.linalg.pinv(V[crowded], rcond=CROWDED), moments[crowded])
+    weights[crowded] = np.einsum("imk,ik->im", np.linalg.pinv(V[crowded], rcond=BLURRED), moments[crowded])
     weights *= half[:, None]
     return np.einsum("im,imk->ik", weights, P[window])
 

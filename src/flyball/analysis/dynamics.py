@@ -83,7 +83,7 @@ def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) 
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
     s, W = a.compiled.structure, a.compiled.work
-    real, count = np.zeros(10), np.zeros(8, np.int64)
+    real, count = np.zeros(10), np.zeros(9, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
@@ -91,7 +91,7 @@ def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) 
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED] = s.nq + s.nv
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq
     Y = np.zeros((3, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]

@@ -55,7 +55,7 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
     real[0] = t
     Y = np.zeros((3, len(y)))
     Y[0] = y
-    clock = Clock(real, np.zeros(8, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), np.zeros(0, np.int64))
+    clock = Clock(real, np.zeros(9, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), np.zeros(0, np.int64))
     status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
     y[:] = Y[0]
     return status, clock.K[0]

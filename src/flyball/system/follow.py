@@ -32,17 +32,14 @@ from .laws import evaluate_jet
 from .motion import arrive, write_row
 from .rows import BY_TIME
 from .solve import magnitude
-from .tables import BODY_LAW, COORDINATES, NV, ROW_LAW, ROW_WRAP, TREE, V0
+from .tables import BODY_LAW, COORDINATES, LENGTH, NV, ROW_LAW, ROW_WRAP, TREE, V0
 from .tree import REVOLUTE, retract
 
 SHARE = GROW  # entry of the clock's: part of the way to the next output time that a step is
 ALL_BUT = 1.0 - 1e-6
 EVEN = 1e-6  # part of its change by which the change of a law may differ from that of its derivatives
-NEAR, SHARP, ROUNDED = (
-    1e-10,
-    10.0,
-    1e-13,
-)  # a law that leaps over this part of the time span does more than this times its slope
+NEAR, SHARP = 1e-10, 10.0  # a law that leaps changes over this part of the time span by more than this times its slope
+TINY, SLOW = 1e-12, 1e-9  # changes of laws that are nothing: of the mechanism's size, of that in the time span
 FAR_OFF = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
 
 
@@ -86,7 +83,7 @@ def follow(S, W, c, out):
         predict(S, c, h)
         status, found = arrive(t, c.y[1], c.K[2], S, W)
         steps += 1
-        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real[T], h, NEAR * c.real[LARGEST]):
+        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real[T], h, c.real[LARGEST]):
             c.count[REJECTED] += 1
             c.real[SHARE] *= 0.5
             continue
@@ -101,36 +98,39 @@ def follow(S, W, c, out):
 
 
 @formula
-def broken(S, W, t, h, shortest):
+def broken(S, W, t, h, span):
     """Whether a driver's law does more over a step than its derivatives say: it may jump there, or have a kink."""
     for b in range(S.body_i.shape[0]):
         law = S.body_i[b, BODY_LAW]
-        if law >= 0 and leaps(S, W, law, t, h, shortest, S.body_i[b, TREE] == REVOLUTE):
+        if law >= 0 and leaps(S, W, law, t, h, span, S.body_i[b, TREE] == REVOLUTE):
             return True
     for k in range(S.row_i.shape[0]):
         law = S.row_i[k, ROW_LAW]
-        if law >= 0 and leaps(S, W, law, t, h, shortest, S.row_i[k, ROW_WRAP] == 1):
+        if law >= 0 and leaps(S, W, law, t, h, span, S.row_i[k, ROW_WRAP] == 1):
             return True
     return False
 
 
 @formula
-def leaps(S, W, law, t, h, shortest, turns):
-    """Whether value and rate of a law change over a step by what their derivatives add up to (Hermite's and Simpson's
-    rule): to EVEN; over a step that cannot be much shorter, by no more than they can have.
+def leaps(S, W, law, t, h, span, turns):
+    """Whether value and rate of a law change over a step by something else than what their derivatives add up to.
+
+    By Hermite's and Simpson's rule, to EVEN; over a step that cannot be much shorter, by more than they can add up to.
     """
     f0, v0, a0 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
     _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
     f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)
     way = f1 - f0 - h / 30.0 * (7.0 * v0 + 16.0 * vm + 7.0 * v1) - h * h / 60.0 * (a0 - a1)
+    size = S.glob[LENGTH]
     if turns:
         way = atan2(sin(way), cos(way))
+        size = 0.0 * size + 1.0
     rate = v1 - v0 - h / 6.0 * (a0 + 4.0 * am + a1)
     v = max(magnitude(v0), magnitude(vm), magnitude(v1))
     a = max(magnitude(a0), magnitude(am), magnitude(a1))
-    part = EVEN if h > shortest else SHARP
-    least = ROUNDED * (magnitude(f0) + magnitude(f1))
-    return not (magnitude(way) <= part * h * (v + h * a) + least and magnitude(rate) <= EVEN * v + part * h * a)
+    part = EVEN if h > NEAR * span else SHARP
+    as_told = magnitude(way) <= part * h * (v + h * a) + TINY * (magnitude(f0) + magnitude(f1) + size)
+    return not (as_told and magnitude(rate) <= EVEN * v + part * h * a + SLOW * size / span)
 
 
 @formula

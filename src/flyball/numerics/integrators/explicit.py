@@ -20,8 +20,9 @@ from ...math.scalar import sqrt
 # entries of Clock.real
 T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER = range(10)
 # entries of Clock.count
-ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT = range(8)
+ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS = range(9)
 SAFETY = 0.85
+BEYOND = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
 FIRST = 1e-7  # part of the largest step: the least that is tried first
 LOOSER = 10.0  # accounts are held to this many times the relative tolerance
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
@@ -31,7 +32,7 @@ class Clock(NamedTuple):
     """Everything an interrupted integration needs to go on."""
 
     real: np.ndarray  # (10,)
-    count: np.ndarray  # type: ignore[assignment]  # (8,)
+    count: np.ndarray  # type: ignore[assignment]  # (9,)
     times: np.ndarray  # output times, ascending
     y: np.ndarray  # (3, ny): state, state in the making, interpolated state
     K: np.ndarray  # (stages, ny): derivatives of the stages
@@ -54,12 +55,23 @@ def combine(y, K, weights, stages, h, out):
 
 
 @formula
+def allowed(c, i, size):
+    """Tolerance of component i of that size.
+
+    Of the first c.count[POSITIONS] what is beyond the size of what moves counts little: that a wheel has turned a
+    hundred times, or that the world's origin is far away, is no reason to be less accurate.
+    """
+    if i < c.count[POSITIONS]:
+        size = max(min(size, max(1.0, c.real[SCALE])), BEYOND * size)
+    return c.real[ATOL] + c.real[RTOL] * size
+
+
+@formula
 def scaled(c, a, y, n):
     """Root mean square of a in units of the tolerance, over the first n components."""
     s = 0.0
     for i in range(n):
-        size = y[i] if y[i] > 0.0 else -y[i]
-        e = a[i] / (c.real[ATOL] + c.real[RTOL] * size)
+        e = a[i] / allowed(c, i, y[i] if y[i] > 0.0 else -y[i])
         s += e * e
     return sqrt(s / max(n, 1))
 
@@ -114,8 +126,7 @@ def attempt(derivative, arrive, S, W, R, c, h):
         for j in range(stages + 1):
             a += R.E[0, j] * c.K[j, i]
             b += R.E[1, j] * c.K[j, i]
-        size = max(abs(y[i]), abs(new[i]))
-        s = c.real[ATOL] + c.real[RTOL] * size
+        s = allowed(c, i, max(abs(y[i]), abs(new[i])))
         e5 += (a / s) ** 2
         e3 += (b / s) ** 2
     moved = max(moved, accounting_error(R, c, h))
