@@ -47,7 +47,6 @@ from .tables import (
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
-BLUR = 1e-20  # squares of entries of G below this part of what is usual are rounding
 STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
 
 
@@ -134,12 +133,12 @@ def factor_schur(S, W):
 def factor_coupled(S, W):
     """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta.
 
-    A row along which the forest cannot move has nothing but rounding in G. It gets the size of one that it can move
-    along: entries of 1, or of the mechanism's length.
+    To the entries of G a lever is added, 1 or the mechanism's length: the size of a row along which the forest cannot
+    move just now, or never, must not vanish with them.
     """
     nv = W.vel.shape[1]
     per = W.vel[V1]
-    short = min(1.0, S.glob[LENGTH]) ** 2
+    lever = min(1.0, S.glob[LENGTH]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
         W.A[S.mass_i[e, 2]] = W.M[e]
@@ -147,14 +146,11 @@ def factor_coupled(S, W):
             per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
-        usual = s
         for e in range(S.row_p[k], S.row_p[k + 1]):
             W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
-                s += W.G[e] * W.G[e] * per[S.col_i[e]]
-                usual += short * per[S.col_i[e]]
-        if not s.real > BLUR * usual.real:
-            s = usual if usual.real > 0.0 else usual + 1.0
+                s += (W.G[e] * W.G[e] + lever) * per[S.col_i[e]]
+        s = s if s.real > 0.0 else s + 1.0
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
