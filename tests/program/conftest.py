@@ -105,7 +105,7 @@ def runs(tmp_path_factory):
     first = copy.run(FALL + PRINT)
     second = copy.run(FALL + PRINT)
     # a callee in another file than the kernel's: gravity pulls the other way
-    copy.edit("system/loads.py", "sub(gravity, a)", "sub(neg(gravity), a)")
+    copy.edit("system/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
     copy.add("joints/sheet.py", JOINT)
     copy.append("joints/__init__.py", "from .sheet import Sheet as Sheet\n")
     copy.add("forces/drag.py", FORCE)

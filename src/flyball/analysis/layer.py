@@ -70,7 +70,7 @@ def _cuts(c: Compiled) -> str:
     cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
     if not cut:
         return ""
-    return f"; not in the tree: {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
+    return f"; rows remain for {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
 
 
 def _forest(a: Assembly, parameters: Mapping[str, float] | None) -> tuple[Compiled | None, str]:

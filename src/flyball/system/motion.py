@@ -181,11 +181,16 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         if factored == OLD or worst > SLOW * last:
             if factor(S, W) != 0:
                 return NOT_CLOSED, found, OLD
+            factored = HERE
         else:
             reuse(S, W)
-        factored = NEAR
         last = worst
-        solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+        left = solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+        if factored == NEAR and left > SLOW:  # too far from where it was made to serve
+            if factor(S, W) != 0:
+                return NOT_CLOSED, found, OLD
+            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
+        factored = NEAR
         retract(S, q, step)
         place(S, W, t, q, z)
         worst = violation(W, r)

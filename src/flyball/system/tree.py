@@ -29,7 +29,7 @@ from ..math.vec import (
     sub,
 )
 from .records import load, store_motion, store_pose
-from .tables import BODY_P, BODY_R, PARENT, Q0, TREE, TREE_P, TREE_R, V0
+from .tables import BODY_P, BODY_R, BODY_TURNS, PARENT, Q0, TREE, TREE_P, TREE_R, TREE_TURNS, V0
 
 FREE, PLANAR, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(6)
 NQ = (7, 3, 1, 1, 4, 0)
@@ -66,7 +66,7 @@ def hinge(S, W, b, kind, q, q0):
     if parent >= 0:
         A = load9(W.BK, parent, 3)
         p = add(load3(W.BK, parent, 0), mv(A, p))
-        R = mm(A, R)
+        R = mm(A, R) if S.body_x[b, TREE_TURNS] != 0.0 else A
     v0 = S.body_i[b, V0]
     axis = col(R, 2)
     if kind == REVOLUTE:
@@ -80,7 +80,10 @@ def hinge(S, W, b, kind, q, q0):
         for i in range(3):
             put3(W.X, v0 + i, 0, (R[i], R[3 + i], R[6 + i]))
     put3(W.O, b, 0, p)
-    store_pose(W.BK, b, add(p, mv(R, load3(S.body_x, b, BODY_P))), mm(R, load9(S.body_x, b, BODY_R)))
+    p = add(p, mv(R, load3(S.body_x, b, BODY_P)))
+    if S.body_x[b, BODY_TURNS] != 0.0:
+        R = mm(R, load9(S.body_x, b, BODY_R))
+    store_pose(W.BK, b, p, R)
 
 
 @formula

@@ -28,6 +28,7 @@ from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
     BODY_R,
+    BODY_TURNS,
     BODY_WIDTH,
     EXCESS,
     INERTIA,
@@ -37,11 +38,14 @@ from .tables import (
     OFFSET,
     PER_COMPACT,
     PER_MASS,
+    TREE,
     TREE_P,
     TREE_R,
+    TREE_TURNS,
     System,
     Work,
 )
+from .tree import REVOLUTE
 
 REGULARISATION = 1e-9
 THIN = 1e-9  # principal inertias below this part of the body's size count as none
@@ -258,9 +262,27 @@ def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -
             body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
             p, R = end if k == len(turns) - 1 else (np.zeros(3), np.eye(3))
             body_x[link, BODY_P : BODY_P + 3], body_x[link, BODY_R : BODY_R + 9] = turn.T @ p, (turn.T @ R).ravel()
+        for link in t.links:
+            _leave_out(body_x[link], s.tables["body_i"][link, TREE])
         for link, step in zip(t.links, t.primitives, strict=False):
             if step.coordinate in joint.coordinates:
                 body_x[link, OFFSET] = joint.offset(numbers[joint.name], step.coordinate)
+
+
+def _leave_out(x: np.ndarray, kind: int) -> None:
+    """Note in a body's row which of its joint's constant rotations are none: they need not be multiplied.
+
+    One about the axis of a hinge may as well come after the hinge's own, and becomes one with what stands there.
+    """
+    tree, body = slice(TREE_R, TREE_R + 9), slice(BODY_R, BODY_R + 9)
+    T = x[tree].reshape(3, 3).copy()
+    if kind == REVOLUTE and T[2, 2] == 1.0 and not T[2, :2].any() and not T[:2, 2].any():
+        x[BODY_P : BODY_P + 3] = T @ x[BODY_P : BODY_P + 3]
+        x[body], x[tree] = (T @ x[body].reshape(3, 3)).ravel(), np.eye(3).ravel()
+    for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
+        if np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
+            x[rotation] = np.eye(3).ravel()
+        x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
 def _constants(s: Structure, numbers: dict, env: Mapping[str, float]) -> tuple[np.ndarray, dict[str, int]]:
