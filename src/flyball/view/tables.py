@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.element import written
+from ..model.joint import Joint
 from .facts import between
 
 if TYPE_CHECKING:
@@ -104,8 +105,7 @@ def joints(result: Result) -> Table:
             origin, R = result.records.frame(k)[:2]
             at = triple([np.ravel(c)[0] for c in origin], p)
             axis = triple([np.ravel(R[i])[0] for i in (2, 5, 8)], False)
-        held = s.slices.get(e.name)
-        count = str(held.stop - held.start) if held is not None else ""
+        count = str(len(e.rows(p))) if isinstance(e, Joint) else "1"
         free = ", ".join(getattr(result[e.name], "undetermined", ()))
         most = [fixed(v if v > tiny else 0.0) for v, tiny in zip(sizes.get(e.name, ()), least, strict=False)]
         rows.append((e.name, type(e).__name__, between(e), at, axis, count, *(most or ["", ""]), free))
