@@ -18,7 +18,7 @@ from contest import Contest, Flyball, Peer
 from trees import Motion, planar_tree
 from trees import planar_motion as tree_motion
 
-from mechanisms import CHAIN_ANGLE, GRAVITY, chain, compiled, energy, flyball_planar, planar_motion, simulate
+from mechanisms import CHAIN_ANGLE, GRAVITY, chain, energy, flyball_planar, planar_motion, simulate, started
 
 T_END, TARGET, SAMPLES = 10.0, 1e-6, 500
 SWING = 0.5 * GRAVITY * (1.0 - np.cos(CHAIN_ANGLE))  # energy of the swing [J]
@@ -70,7 +70,7 @@ def right_hand_sides(coordinates: str) -> list[dict[str, Any]]:
     rows, clocks = [], {}
     for n in RHS_LENGTHS:
         model = flyball_planar(chain(n))
-        c = compiled(model, coordinates)
+        c, _ = started(model, coordinates)
         y = simulate(model, BENT, outputs=2, rtol=1e-4, atol=1e-6, coordinates=coordinates).final[1]
         times = np.full(max(RHS_CALLS // n, 10), BENT)
         clocks[n] = partial(clock, c, y, times, RIGHT_HAND_SIDE)

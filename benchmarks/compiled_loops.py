@@ -13,7 +13,7 @@ import numpy as np
 
 from flyball._jit import start_numba
 from flyball._link import optimise_once
-from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, remember, settle
+from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
 from flyball.system.solve import REFINEMENTS, factor, solve
 from flyball.system.tables import (
     COORDINATES,
@@ -56,6 +56,7 @@ def follow(S, W, times, y, dy, task):
             if task == REACTIONS:
                 status = arrive(times[k], y, dy, S, W)[0]
             else:
+                prepare(S, W, times[k], q, v)
                 status, _, factored = settle(S, W, times[k], q, v, z, TIGHT_G * S.glob[LENGTH], TIGHT_V)
                 remember(S, W, z)
                 if not factored:

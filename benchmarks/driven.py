@@ -15,7 +15,7 @@ import numpy as np
 from compiled_loops import KINEMATICS, REACTIONS, clock
 
 import flyball as fb
-from mechanisms import GRAVITY, compiled, example, simulate
+from mechanisms import GRAVITY, example, simulate, started
 
 T_END, OUTPUTS, REPEATS = 10.0, 501, 7
 COLUMNS = {
@@ -63,8 +63,7 @@ def compare(name: str, coordinates: str) -> dict[str, Any]:
     model = MAKERS[name]()
     options = {"outputs": OUTPUTS, "coordinates": coordinates}
     run = simulate(model, T_END, **options)
-    c = compiled(model, coordinates)
-    y = simulate(model, 1e-9, outputs=2, coordinates=coordinates).final[1]
+    c, y = started(model, coordinates)
     clocks = {
         "call": lambda: timing.cpu(lambda: simulate(model, T_END, **options)),
         "nothing": lambda: timing.cpu(lambda: simulate(model, 1e-6, outputs=2, coordinates=coordinates)),

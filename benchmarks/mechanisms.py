@@ -11,8 +11,7 @@ Free body: Euler's equations in Jacobi's elliptic functions (Landau and Lifshitz
 from __future__ import annotations
 
 import runpy
-from dataclasses import dataclass, fields
-from inspect import signature
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
-from flyball.analysis.compiled import compiled as flyball_compiled
-from flyball.analysis.dynamics import Options
-from flyball.analysis.dynamics import simulate as flyball_simulate
+from flyball.analysis.start import begin
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
@@ -33,24 +30,14 @@ EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
 
 def simulate(model: fb.Mechanism, t_end: float, *, coordinates: str = "auto", **options: Any) -> fb.Result:
-    """flyball's ``simulate`` in the coordinates asked for.
-
-    Raises
-    ------
-    SystemExit
-        If this flyball has absolute coordinates only and others are asked for.
-    """
-    if "coordinates" in {f.name for f in fields(Options)} | set(signature(flyball_simulate).parameters):
-        options["coordinates"] = coordinates
-    elif coordinates == "joint":
-        raise SystemExit("this flyball has no joint coordinates to simulate in")
-    return model.simulate(t_end, **options)
+    """flyball's ``simulate`` in the coordinates asked for."""
+    return model.simulate(t_end, coordinates=coordinates, **options)
 
 
-def compiled(model: fb.Mechanism, coordinates: str = "auto") -> Any:
-    """The compiled mechanism in the coordinates asked for, ready to be evaluated."""
-    options = {"coordinates": coordinates} if "coordinates" in signature(flyball_compiled).parameters else {}
-    return flyball_compiled(model.snapshot(), **options)
+def started(model: fb.Mechanism, coordinates: str = "auto") -> tuple[Any, Any]:
+    """(compiled mechanism, state at the start) in the coordinates asked for."""
+    start = begin(model.snapshot(), 0.0, None, None, coordinates)
+    return start.assembly.compiled, start.y
 
 
 def example(name: str, **options: Any) -> fb.Mechanism:

@@ -32,24 +32,37 @@ def leaves_no_freedom(start: Start) -> bool:
     return mobility(s.model, start.base).freedoms == 0
 
 
-def integrate_powers(start: Start, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
-    """Put works where the rows of ``follow`` have powers, in place; keep those at output times.
+def at_outputs(clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
+    """The rows (n, width) of ``follow`` at output times; powers stand where works belong."""
+    return np.ascontiguousarray(rows[np.isin(rows[:, 0], clock.times)])
+
+
+def owed_works(start: Start, clock: ex.Clock, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The works that a followed motion has done, found when they are first asked for.
 
     Parameters
     ----------
     start : Start
         With the works that the motion begins with.
     clock : Clock
-        As the loop has left it; its state at the end gets its works too.
+        As the loop has left it.
     rows : ndarray (n, width)
+        All that the loop has written, powers in place of works.
+
+    Returns
+    -------
+    states : ndarray (n outputs, nz)
+    final : ndarray
+        The state vector at the end.
     """
     at = 1 + clock.accounts
+    s = start.assembly.compiled.structure
+    states, final = at_outputs(clock, rows)[:, 1 + s.nq + s.nv :][:, : len(s.states)].copy(), clock.y[0].copy()
     if len(rows) and len(at):
         works = start.y[clock.accounts] + _works(start.assembly, clock, rows)
-        rows[:, at] = works
-        clock.y[0, clock.accounts] = works[-1]
-    wanted = np.isin(rows[:, 0], clock.times)
-    return np.ascontiguousarray(rows[wanted])
+        states[:, clock.accounts - s.nq - s.nv] = works[np.isin(rows[:, 0], clock.times)]
+        final[clock.accounts] = works[-1]
+    return states, final
 
 
 def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assemble import Assembly
-from .driven import integrate_powers, leaves_no_freedom
+from .driven import at_outputs, leaves_no_freedom, owed_works
 from .entry import FOLLOW, INTEGRATE, motion_kernel
 from .options import STABILIZATION, Options, options_from, output_times
 from .outcome import outcome
@@ -74,9 +75,10 @@ def simulate(
     clock = _clock(begun, t_start, float(t_end), times, chosen)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
     rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
+    owed = partial(owed_works, begun, clock, rows) if follow else None
     if follow:
-        rows = integrate_powers(begun, clock, rows)
-    return outcome(model, begun, clock, rows, chosen, interrupted)
+        rows = at_outputs(clock, rows)
+    return outcome(model, begun, clock, rows, chosen, interrupted, owed)
 
 
 def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:

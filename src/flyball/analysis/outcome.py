@@ -12,7 +12,7 @@ from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..results import doubts
 from ..results.health import Health
-from ..results.result import Result
+from ..results.result import Owed, Result
 from ..system.tables import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from .mobility import mobility
 from .options import Options
@@ -22,9 +22,15 @@ from .start import Start
 
 
 def outcome(
-    model: Model, start: Start, clock: ex.Clock, rows: np.ndarray, o: Options, interrupted: bool = False
+    model: Model,
+    start: Start,
+    clock: ex.Clock,
+    rows: np.ndarray,
+    o: Options,
+    interrupted: bool = False,
+    owed: Owed | None = None,
 ) -> Result:
-    """Result and health; a failed run raises with its partial result.
+    """Result and health; a failed run raises with its partial result. ``owed`` finds works when they are asked for.
 
     Raises
     ------
@@ -46,6 +52,7 @@ def outcome(
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
+    result.owed = owed
     result.wound = start.wound
     health.late = {
         "mobility": partial(mobility, model, start.base),

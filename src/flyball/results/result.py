@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +18,8 @@ from .measured import Measured
 from .reactions import Reactions
 from .records import Records
 from .views import View, view
+
+Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
     import pandas
@@ -36,8 +39,6 @@ class Result:
         Coordinates, velocities and accelerations of the compiled mechanism.
     multipliers : ndarray
         One for each constraint row; then the effort of each driver that prescribes one of the coordinates.
-    states : ndarray
-        Work of accounted elements and turned angles.
     health : Health
     energy : Energy
     wound : dict
@@ -58,10 +59,35 @@ class Result:
         health: Health,
     ) -> None:
         self.model, self.values, self.health = model, values, health
-        self.t, self.q, self.v, self.states, self.vdot, self.multipliers = t, q, v, states, vdot, multipliers
-        self.final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
+        self.t, self.q, self.v, self.vdot, self.multipliers = t, q, v, vdot, multipliers
+        self.owed: Owed | None = None  # finds works that are not there yet
+        self._states = states
+        self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
         self.energy = Energy(self)
+
+    @property
+    def states(self) -> np.ndarray:
+        """Works of accounted elements, turned angles, places on curves, (n, nz)."""
+        self._settle()
+        return self._states
+
+    @property
+    def final(self) -> tuple[float, np.ndarray]:
+        """Time and state vector to go on from."""
+        self._settle()
+        return self._final
+
+    @final.setter
+    def final(self, value: tuple[float, np.ndarray]) -> None:
+        self._final = value
+
+    def _settle(self) -> None:
+        """Find the works of a motion that was followed, not integrated."""
+        if self.owed is not None:
+            find, self.owed = self.owed, None
+            self._states, y = find()
+            self._final = (self._final[0], y)
 
     @property
     def planar(self) -> bool:
