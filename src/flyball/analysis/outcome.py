@@ -44,7 +44,7 @@ def outcome(
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
     elif status != ex.DONE:
-        message, cause = reason(a, clock)
+        message, cause = reason(a, start.base, clock)
     health = _health(start, clock, o)
     health.message, health.success = message, status == ex.DONE and not interrupted
     s = a.compiled.structure

@@ -45,13 +45,15 @@ PARTS = ("value", "rate", "second derivative")
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
-def reason(a: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
+def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
     """What stopped the integration, and the exception that a user's function raised, if one did.
 
     Parameters
     ----------
     a : Assembly
         Its scratch is as the compiled loop has left it.
+    base : Assembly
+        The mechanism in absolute coordinates, where every joint and driver has rows.
     clock : Clock
         State of the integration.
     """
@@ -63,7 +65,7 @@ def reason(a: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
     found = fault(a.compiled.work.stack, a.compiled.structure.functions)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a, clock) or _locked(a, clock) or _stuck(a, clock)
+    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a, clock) or _locked(a, base, clock) or _stuck(a, clock)
     return f"{name!r}: {text}. {kept}", None
 
 
@@ -178,16 +180,17 @@ def _broken_force(a: Assembly, t: float) -> str:
     return ""
 
 
-def _locked(a: Assembly, clock: ex.Clock) -> str:
+def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     """The elements for whose rows there are no accelerations where the motion stopped, if so."""
-    c = a.compiled
-    nq, nv = c.structure.nq, c.structure.nv
-    y = clock.y[0]
+    t, y, own, c = float(clock.real[ex.T]), clock.y[0], a.compiled, base.compiled
     if not len(c.structure.rows) or not np.isfinite(y).all():
         return ""
-    c.z = y[nq + nv :].copy()
-    _, dy = c.at(clock.real[ex.T], y[:nq].copy(), y[nq : nq + nv].copy(), MOTION)
-    x = dy[nq : nq + nv]
+    nq, nv = own.structure.nq, own.structure.nv
+    q, v, own.z = y[:nq].copy(), y[nq : nq + nv].copy(), y[nq + nv :].copy()
+    if c is not own:
+        q, v = c.take(own, t, q, v)
+    _, dy = c.at(t, q, v, MOTION)
+    x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
     if not np.isfinite(x).all():
         return ""
     G, gamma = c.sparse_jacobian(), c.work.row[GAMMA]
