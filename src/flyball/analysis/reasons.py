@@ -65,7 +65,13 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
     found = fault(a.compiled.work.stack, a.compiled.structure.functions)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
-    text = of_drivers(a, clock) or _not_finite(a, clock) or _jammed(a, clock) or _locked(a, base, clock) or _stuck(a, clock)
+    text = (
+        of_drivers(a, clock)
+        or _not_finite(a, clock)
+        or _jammed(a, clock)
+        or _locked(a, base, clock)
+        or _stuck(a, clock)
+    )
     return f"{name!r}: {text}. {kept}", None
 
 
