@@ -80,6 +80,7 @@ class Result:
 
     @final.setter
     def final(self, value: tuple[float, np.ndarray]) -> None:
+        """Say where the motion ended."""
         self._final = value
 
     def _settle(self) -> None:
