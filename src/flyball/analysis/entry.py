@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .._held import held
 from .._jit import formula, kernel
 from ..numerics.integrators.explicit import Clock, advance
 from ..numerics.integrators.tableaux import tableau
@@ -43,7 +44,7 @@ def motion_kernel(S, W, R, clock, out, task):
     INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe; both return the number of
     output rows written. The others return a status.
     """
-    return perform(S, W, R, clock, out, task)
+    return perform(held(S), held(W), held(R), held(clock), out, task)
 
 
 def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:
