@@ -6,7 +6,7 @@ and cached on disk. Numba is imported when the first kernel is called, never bef
 mechanism does not pay for a compiler.
 
 Numba's own cache looks at the file of the kernel only, and silently serves old code after an edit of a callee
-elsewhere. Here every cache file carries a hash of all sources of the package.
+elsewhere. Here every cache file carries a hash of all sources that compiled code is made of.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from typing import Any, TypeVar
 F = TypeVar("F", bound=Callable[..., Any])
 
 PACKAGE = pathlib.Path(__file__).parent
+COMPILED = ("_*.py", "analysis/entry.py", "constraints", "forces", "math", "numerics", "system")
+"""Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
 KERNELS: list[Kernel] = []
 _pending: list[Callable[[], None]] = []
 _started = False
@@ -100,11 +102,20 @@ def start_numba() -> None:
         _pending.clear()
 
 
+def stamped() -> list[pathlib.Path]:
+    """The source files of `COMPILED`."""
+    files: set[pathlib.Path] = set()
+    for pattern in COMPILED:
+        for path in PACKAGE.glob(pattern):
+            files |= set(path.rglob("*.py")) if path.is_dir() else {path}
+    return sorted(files)
+
+
 @lru_cache(maxsize=1)
 def source_stamp() -> str:
-    """Hash of every source file of the package: what a cached kernel must agree with."""
+    """Hash of every source file that compiled code is made of: what a cached kernel must agree with."""
     digest = hashlib.sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in stamped():
         digest.update(str(path.relative_to(PACKAGE)).encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -65,3 +65,36 @@ class SimulationError(AnalysisError):
         super().__init__(message)
         self.result = result
         self.t = t
+
+
+class MobilityError(AnalysisError):
+    """A mechanism has more or fewer freedoms than an analysis can do with.
+
+    ``free`` names bodies or joints that can still move, ``redundant`` elements that prescribe the same thing twice.
+    """
+
+    def __init__(self, message: str, free: tuple[str, ...] = (), redundant: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.free = free
+        self.redundant = redundant
+
+
+class SingularityError(AnalysisError):
+    """An analysis was asked for at, or has run into, a singular position.
+
+    ``where`` is the value of what was varied there (time [s] or a driver's coordinate), ``elements`` names those whose
+    constraints lose their independence.
+    """
+
+    def __init__(self, message: str, where: float = float("nan"), elements: tuple[str, ...] = ()) -> None:
+        super().__init__(message)
+        self.where = where
+        self.elements = elements
+
+
+class NotConverged(AnalysisError):  # noqa: N818  (the field's term)
+    """An iteration found no solution. ``residuals`` holds, for each body or element concerned, what is left."""
+
+    def __init__(self, message: str, residuals: dict | None = None) -> None:
+        super().__init__(message)
+        self.residuals = residuals or {}

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball._jit import stamped
 from flyball.model.element import Element
 from tests.program.copied import PACKAGE
 
@@ -33,12 +34,13 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "contact": {*LIBRARY, "constraints", "model"},
     "system": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "contact"},
     "results": {*LIBRARY, "constraints", "model", "joints", "forces", "system"},
-    "analysis": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "system", "results"},
+    "analysis": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "system", "results", "_held"},
     "symbolic": {*LIBRARY, "numerics", "constraints", "model", "joints", "forces", "system", "results"},
     "view": {*LIBRARY, "constraints", "model", "joints", "forces", "system", "results"},
     "errors": set(),
     "_jit": set(),
     "_link": set(),
+    "_held": {"_jit"},
     "mechanism": {"model"},
     "files": {"mechanism"},
     "cli": set(),
@@ -100,6 +102,26 @@ def test_formulas_and_solvers_stand_on_numpy_alone(own):
                     names = [node.module] if isinstance(node, ast.ImportFrom) else [a.name for a in node.names]
                     for name in names:
                         assert name.split(".")[0] in {*sys.stdlib_module_names, "numpy"}, f"{path.name} imports {name}"
+
+
+def test_compiled_code_is_made_of_stamped_files():
+    """What formulas and kernels name comes from files whose edits the cache notices."""
+    known = set(stamped())
+    for path in FILES:
+        tree = TREES[path]
+        marked = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
+        marked = [n for n in marked if {ast.unparse(d) for d in n.decorator_list} & {"formula", "kernel"}]
+        if not marked:
+            continue
+        assert path in known, f"{path} holds compiled code: add it to _jit.COMPILED"
+        used = {n.id for f in marked for n in ast.walk(f) if isinstance(n, ast.Name)}
+        for node in tree.body:
+            if isinstance(node, ast.ImportFrom) and node.level and used & {a.asname or a.name for a in node.names}:
+                base = path.parents[node.level - 1].joinpath(*(node.module or "").split("."))
+                named = [base / a.name for a in node.names if (a.asname or a.name) in used]
+                for place in (base, *(n for n in named if not base.with_suffix(".py").is_file())):
+                    file = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+                    assert not file.is_file() or file in known, f"{path}: {sorted(used)} of {file}"
 
 
 def test_only_dispatch_lists_kinds():

@@ -1,0 +1,55 @@
+"""Progress on a terminal: a bar, and word of the first compilation."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import typer
+
+
+def announce_compiling(talk: bool) -> None:
+    """On a terminal, say that the first use takes long, if it is the first use."""
+    if talk and sys.stderr.isatty() and _will_compile():
+        typer.echo("compiling for this machine, once: about half a minute", err=True)
+
+
+def _will_compile() -> bool:
+    """Whether no compiled code of this version is in the cache."""
+    from ..analysis.entry import motion_kernel
+
+    try:
+        return not motion_kernel.dispatcher._cache._cache_file._load_index()  # type: ignore[attr-defined]
+    except Exception:  # internals of Numba: where they differ, say nothing
+        return False
+
+
+@contextmanager
+def progress_bar(talk: bool) -> Iterator[Callable[[float], None] | None]:
+    """A progress bar on a terminal, once the run has taken a second; else nothing."""
+    if not (talk and sys.stderr.isatty()):
+        yield None
+        return
+    announce_compiling(talk)
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("simulating"), BarColumn(), TextColumn("{task.percentage:>3.0f} %"), TimeRemainingColumn())
+    bar = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = bar.add_task("", total=1.0)
+    begin: list[float] = []
+
+    def progress(fraction: float) -> None:
+        if not begin:
+            begin.append(time.monotonic())
+        if not bar.live.is_started and time.monotonic() - begin[0] > 1.0:
+            bar.start()
+        bar.update(task, completed=fraction)
+
+    try:
+        yield progress
+    finally:
+        if bar.live.is_started:
+            bar.stop()

@@ -1,0 +1,128 @@
+"""``flyball run``: simulate, and write the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, cast
+
+import typer
+
+from ..errors import SimulationError
+from .common import (
+    FAILED,
+    INTERRUPTED,
+    Changes,
+    Json,
+    Model,
+    app,
+    fail,
+    make_folder,
+    print_json,
+    reported,
+    seconds,
+    table,
+)
+from .loading import load_mechanism, set_parameters
+from .progress import progress_bar
+
+if TYPE_CHECKING:
+    from ..results.result import Result
+
+CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
+
+
+@app.command()
+def run(
+    model: Model,
+    t_end: Annotated[str, typer.Option(help='End of the motion, e.g. 10 or "500 ms".')] = "10",
+    out: Annotated[Path | None, typer.Option(help="Folder for the results; by default named after the model.")] = None,
+    outputs: Annotated[int, typer.Option(help="Number of output times.")] = 501,
+    rtol: Annotated[float | None, typer.Option(help="Relative tolerance.")] = None,
+    atol: Annotated[float | None, typer.Option(help="Absolute tolerance.")] = None,
+    method: Annotated[str | None, typer.Option(help="Integration method.")] = None,
+    coordinates: Annotated[str, typer.Option(help="absolute, joint, or auto: those that cost less.")] = "auto",
+    change: Changes = None,
+    no_plots: Annotated[bool, typer.Option("--no-plots", help="Write no pictures.")] = False,
+    no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
+    report: Annotated[
+        bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
+    ] = None,
+    as_json: Json = False,
+    quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
+) -> None:
+    """Simulate a mechanism and write its motion: report.html, animation.html, plots, result.csv and result.nc."""
+    with reported(as_json):
+        mechanism = load_mechanism(model)
+        set_parameters(mechanism, change or [])
+        end = seconds(t_end)
+        folder = out if out is not None else Path(f"{model.stem}-result")
+        chosen = {"rtol": rtol, "atol": atol, "method": method, "coordinates": coordinates}
+        options = {k: v for k, v in chosen.items() if v is not None}
+        talk = not (as_json or quiet)
+        error = None
+        try:
+            with progress_bar(talk) as progress:
+                result = mechanism.simulate(end, outputs=outputs, progress=progress, **options)
+        except SimulationError as stopped:
+            if stopped.result is None:
+                raise
+            result, error = cast("Result", stopped.result), stopped
+        pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
+        files, notes = _write(result, folder, not no_plots, [name for name, wanted in pages.items() if wanted])
+        _conclude(result, error, files, notes, as_json, talk)
+
+
+def _conclude(
+    result: Result, error: SimulationError | None, files: list[Path], notes: list[str], as_json: bool, talk: bool
+) -> None:
+    """Say what was done, and end with the right code."""
+    summary = {
+        "name": result.model.name,
+        "success": result.health.success,
+        "message": result.health.message,
+        "t": float(result.t[-1]) if len(result.t) else None,
+        "health": result.health.as_dict(),
+        "files": [str(f) for f in files],
+        "notes": notes,
+    }
+    if talk:
+        lines = result.health.lines()
+        if error is not None:
+            lines[0] = ("status", f"stopped at t = {error.t:.6g} s")
+        page = [("open this", str(f)) for f in files if f.name == "report.html"]
+        table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes), *page])
+    if error is not None:
+        fail(str(error), type(error).__name__, FAILED, as_json, summary)
+    if as_json:
+        print_json(summary)
+    if not result.health.success:
+        raise typer.Exit(INTERRUPTED)
+
+
+def _write(result: Result, folder: Path, plots: bool, pages: Sequence[str]) -> tuple[list[Path], list[str]]:
+    """Write all files of a result; returns them, and remarks on what was left out."""
+    files, notes = [], []
+    make_folder(folder)
+
+    def keep(name: str, write: Callable[[Path], None]) -> None:
+        write(folder / name)
+        files.append(folder / name)
+
+    keep("result.nc", result.save)
+    curves = 8 * len(result.model.bodies) + 5 * len(result.model.joints)
+    if curves * len(result.t) <= CSV_NUMBERS:
+        keep("result.csv", result.to_csv)
+    else:
+        notes.append(f"result.csv is left out: some {curves} curves at {len(result.t)} times; read result.nc instead")
+    if not len(result.t):
+        notes.append("no output time was reached: there is nothing to draw")
+        return files, notes
+    if plots:
+        from ..view.plots import standard_plots
+
+        make_folder(folder / "plots")
+        files += standard_plots(result, folder / "plots")
+    for name in pages:
+        keep(name, result.to_report if name == "report.html" else result.to_html)
+    return files, notes
