@@ -29,6 +29,9 @@ _HOME = {
     "AnalysisError": "errors",
     "AssemblyError": "errors",
     "SimulationError": "errors",
+    "MobilityError": "errors",
+    "SingularityError": "errors",
+    "NotConverged": "errors",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)

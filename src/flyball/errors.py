@@ -92,7 +92,7 @@ class SingularityError(AnalysisError):
         self.elements = elements
 
 
-class NotConverged(AnalysisError):  # noqa: N818  (the field's term)
+class NotConverged(AnalysisError):
     """An iteration found no solution. ``residuals`` holds, for each body or element concerned, what is left."""
 
     def __init__(self, message: str, residuals: dict | None = None) -> None:
