@@ -30,6 +30,7 @@ from .tables import (
     RATE,
     RETURNED,
     V0,
+    V2,
     VALUE,
 )
 from .tree import column, retract
@@ -46,13 +47,14 @@ def residuals(S, W, t, state, vdot, lam, steps, out):
     t : number [s]
     state : (nq + nv + nz,)
     vdot, lam : (nv,), (nr,)
-    steps : (n, 2 nv + 1)
-        Steps of positions (along the velocities), of velocities, and of time.
+    steps : (n, 3 nv + 1)
+        Steps of positions (along the velocities), of velocities, of accelerations, and of time.
     out : (n, nv + 3 nr + 3 nm)
         Filled with r, g, G v - nu, G vdot - gamma; then value, rate and acceleration of every measured quantity.
     """
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
+    a = W.vel[V2]
     for n in range(steps.shape[0]):
         p = W.y[0]
         for i in range(state.shape[0]):
@@ -60,7 +62,8 @@ def residuals(S, W, t, state, vdot, lam, steps, out):
         retract(S, p[:nq], steps[n, :nv])
         for d in range(nv):
             p[nq + d] += steps[n, nv + d]
-        residual(S, W, t + steps[n, 2 * nv], p, vdot, lam, out[n])
+            a[d] = vdot[d] + steps[n, 2 * nv + d]
+        residual(S, W, t + steps[n, 3 * nv], p, a, lam, out[n])
 
 
 @formula
