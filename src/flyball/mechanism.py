@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .results.equilibrium import Equilibrium
     from .results.linear import LinearModel
     from .results.result import Result
 
@@ -33,6 +34,15 @@ class Mechanism(Model):
         from .analysis.assemble import assemble
 
         return assemble(self, **options)
+
+    def equilibrium(self, **options: Any) -> Equilibrium:
+        """A static equilibrium near the mechanism as described, and whether it is stable.
+
+        See `flyball.analysis.equilibrium.equilibrium` for the options.
+        """
+        from .analysis.equilibrium import equilibrium
+
+        return equilibrium(self, **options)
 
     def linearize(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **options: Any) -> LinearModel:
         """Linear equations about an equilibrium or a steady motion, with named inputs and outputs.

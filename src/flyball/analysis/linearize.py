@@ -114,7 +114,8 @@ def _effects(e: Equations, f: Free, inputs: list[Input]) -> Inputs:
     prescribed = list(e.state.c.structure.prescribed)
     by = [e.by_law(i.parameter) if i.parameter != i.name else e.by_parameter(i.name) for i in inputs]
     W = np.array(by).reshape(len(inputs), e.width).T
-    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed]).reshape(-1, len(inputs))
+    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed])
+    given = given.reshape(len(prescribed), len(inputs))
     g = np.vstack([W[e.at["g"]], given])[f.on_positions]
     return Inputs(W[e.at["r"]], g, np.vstack([W[e.at["n"]], 0.0 * given]))
 
