@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from .analysis.mass import MassReport
     from .results.equilibrium import Equilibrium
     from .results.linear import LinearModel
+    from .results.modes import Modes
     from .results.result import Result
 
 
@@ -52,6 +53,12 @@ class Mechanism(Model):
         from .analysis.linearize import linearize
 
         return linearize(self, inputs, outputs, **options)
+
+    def modes(self, **options: Any) -> Modes:
+        """Natural motions about an equilibrium or a steady motion; see `flyball.analysis.modes.modes`."""
+        from .analysis.modes import modes
+
+        return modes(self, **options)
 
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""

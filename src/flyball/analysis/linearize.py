@@ -82,15 +82,25 @@ def linearize(
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
         x = _in_copy(model, x)
+    e, f, frame = _about(x, frozen)
+    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+
+
+def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:
+    """The reduced linear equations at a state; errors as those of `linearize`."""
+    e, f, frame = _about(x, frozen)
+    return f, frame, _reduced(e, f, frame, None)
+
+
+def _about(x: State, frozen: bool) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
-    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
-    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
 
 
-def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs) -> Reduced:
+def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
     try:
         return reduced(e, f, frame, inputs)
     except np.linalg.LinAlgError:
