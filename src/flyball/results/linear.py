@@ -107,11 +107,21 @@ class LinearModel:
         return zeros, poles, float(gain.real)
 
     def response(self, omega: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
-        """Frequency response G(i omega) of an input and an output at angular frequencies [rad/s]; complex, (n,)."""
+        """Frequency response G(i omega) of an input and an output at angular frequencies [rad/s]; complex, (n,).
+
+        At an undamped pole it is infinite.
+        """
         i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
         one = np.eye(len(self.A))
         b, c, d = self.B[:, i], self.C[k], self.D[k, i]
-        return np.array([c @ np.linalg.solve(1j * w * one - self.A, b) + d for w in np.atleast_1d(omega)])
+
+        def at(w: float) -> complex:
+            try:
+                return c @ np.linalg.solve(1j * w * one - self.A, b) + d
+            except np.linalg.LinAlgError:
+                return complex(np.inf)
+
+        return np.array([at(w) for w in np.atleast_1d(omega)])
 
     def root_locus(self, gains: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
         """Eigenvalues of the closed loop u = -k y for every gain k, (gains, n)."""
