@@ -6,19 +6,39 @@ The formulas of the results run on complex arrays as on real ones, every directi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
 from ..results.health import Health
 from ..results.result import Result
+from ..system.tables import G_VALUE, NU, V0
 from ..system.tree import retract
 from ..system.values import Values
+from .assemble import Assembly
+from .compiled import compiled
 from .derivatives import STEP, State
+from .mobility import Mobility, mobility
 
 
 def snapshot(x: State, values: Values | None = None) -> Result:
-    """The state as a result with one time."""
-    return _result(x, values or x.c.values, *(np.zeros((1, n)) for n in _sizes(x)))
+    """The state as a result with one time; one can go on from it."""
+    result = _result(x, values or x.c.values, *(np.zeros((1, n)) for n in _sizes(x)))
+    x.c.at(x.t, x.q, x.v)
+    row = x.c.work.row
+    health = result.health
+    health.violation = float(np.abs(row[G_VALUE]).max(initial=0.0))
+    health.velocity_violation = float(np.abs(x.c.sparse_jacobian() @ x.v - row[NU]).max(initial=0.0))
+    health.late = {"mobility": partial(_mobility, x)}
+    result.final = (x.t, x.y)
+    return result
+
+
+def _mobility(x: State) -> Mobility:
+    model = x.c.structure.model
+    base = compiled(model, parameters=x.c.parameters)
+    q, v = base.take(x.c, x.t, x.q, x.v)
+    return mobility(model, Assembly(base, x.t, q, v))
 
 
 def slopes(x: State, names: Sequence[str], d: Sequence[np.ndarray], values: Values | None = None) -> np.ndarray:
@@ -59,8 +79,6 @@ def _result(x: State, values: Values, dq: np.ndarray, dv: np.ndarray, da: np.nda
     n = len(dq)
     q = np.repeat(x.q[:, None], n, axis=1).astype(dq.dtype)
     retract(values.system, q, dq.T)
-    from ..system.tables import V0
-
     body_i = values.structure.tables["body_i"]
     efforts = [x.effort[body_i[b, V0]] for b in values.structure.prescribed.values()]
     z = np.repeat(x.z[None], n, axis=0)

@@ -32,6 +32,11 @@ class Health:
     coordinates: str = ""  # "absolute: why", or "joint: why"
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
 
+    @property
+    def _simulated(self) -> bool:
+        """Whether these are figures of a motion, rather than of one state."""
+        return "energy_drift" in self.late
+
     def _found(self, name: str) -> Any:
         value = self.late[name]
         if callable(value):
@@ -55,8 +60,8 @@ class Health:
 
     @property
     def energy_drift(self) -> float:
-        """Largest deviation from the energy balance [J]."""
-        return self._found("energy_drift")
+        """Largest deviation from the energy balance [J]; 0 where nothing was simulated."""
+        return self._found("energy_drift") if self._simulated else 0.0
 
     @property
     def acceleration_violation(self) -> float:
@@ -81,7 +86,7 @@ class Health:
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
-            ("status", "done" if self.success else self.message),
+            ("status", "done" if self.success and self._simulated else self.message),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             ("freedoms", str(self.freedoms)),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
@@ -89,6 +94,7 @@ class Health:
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
             ("time used", f"{self.seconds:.2f} s"),
         ]
+        out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []
         if self.redundant:
             more.append(("redundant", ", ".join(self.redundant)))

@@ -1,4 +1,4 @@
-"""A mode as a motion: the mechanism swung along its shape, and closed again at every time."""
+"""A mode as a motion: the mechanism swung along its shape."""
 
 from __future__ import annotations
 
@@ -33,5 +33,5 @@ def motion(m: Modes, k: int, amplitude: float, outputs: int) -> Result:
     retract(x.values.system, q, step)
     states = np.repeat(x.states, outputs, axis=0)
     lam = np.repeat(x.multipliers, outputs, axis=0)
-    health = Health(True, f"mode {k}, not a simulation", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+    health = Health(True, f"mode {k}, not a simulation", 0.0, 0.0, 0, 0, 0, 0, 0.0, late=dict(x.health.late))
     return Result(x.model, x.values, t, np.ascontiguousarray(q.T), speed.T, states, acceleration.T, lam, health)
