@@ -11,6 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .result import Result
 
+ROUNDING = 1e-9  # damping ratios below this are written as 0
 STILL = 1e-7  # part of the largest eigenvalue below which one is zero
 
 
@@ -85,7 +86,9 @@ class Modes:
         out = [("mode", f"{'frequency [Hz]':>15} {'omega [rad/s]':>15} {'damping ratio':>14}  kind         moves")]
         for k in range(len(self)):
             most = ", ".join(list(self.shape(k, 0.3))[:4])
-            figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {self.damping_ratio[k]:14.4g}"
+            ratio = self.damping_ratio[k]
+            ratio = ratio if abs(ratio) > ROUNDING else 0.0
+            figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {ratio:14.4g}"
             out.append((str(k), f"{figures}  {self.kinds[k]:<12} {most}"))
         if self.turning.any():
             turning = ", ".join(f"{x:.4g}" for x in self.turning)

@@ -63,8 +63,10 @@ def animation(result: Result, *, paths: Iterable[Path] = (), show: Collection[st
     return page(record(result, paths=paths, show=show))
 
 
-def record(result: Result, *, paths: Iterable[Path] = (), show: Collection[str] = USUAL) -> Recording:
-    """Make the recording that pictures and pages read; see `animation`.
+def record(
+    result: Result, *, paths: Iterable[Path] = (), show: Collection[str] = USUAL, curves: bool = True
+) -> Recording:
+    """Make the recording that pictures and pages read, with or without curves and arrows; see `animation`.
 
     Bodies are placed by their reference frames, so that shapes lie on them as the user gave them. Bodies without
     shapes get some that follow from their joints and inertia.
@@ -75,7 +77,7 @@ def record(result: Result, *, paths: Iterable[Path] = (), show: Collection[str] 
     places = Places(result)
     looks = Looks(result, places)
     drawn = list(_drawn(result, places, looks, every))
-    channels = _channels(result, every)
+    channels = _channels(result, every) if curves else ()
     bodies = tuple(
         RecordedBody(b.name, looks.shapes(b.name), *_poses(result, b.name, every), b.color) for b in result.model.bodies
     )
@@ -92,7 +94,7 @@ def record(result: Result, *, paths: Iterable[Path] = (), show: Collection[str] 
         size=looks.size,
         notes=dict(result.health.lines()),
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
-        arrows=arrows(result, places, every),
+        arrows=arrows(result, places, every) if curves else (),
         frames=tuple(_frames(result, places)),
         paths=tuple(_path(result, p) for p in paths),
         show=_chosen(show),

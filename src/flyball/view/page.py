@@ -44,6 +44,8 @@ MODULES = (
     "keys",
     "clock",
     "bar",
+    "swing",
+    "modes",
     "overlay",
     "main",
 )

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Iterable
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,7 @@ def payload(recording: Recording) -> bytes:
         "arrows": [_riding(a, "group", "what") | {"vector": block.add(a.vector)} for a in recording.arrows],
         "frames": [_riding(f, "of") for f in recording.frames],
         "paths": [_riding(p) for p in recording.paths],
+        "modes": [asdict(mode) for mode in recording.modes],
         "channels": _curves(recording.channels, block),
         "figures": [
             {"name": f.name, "title": f.title, "note": f.note}

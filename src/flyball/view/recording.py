@@ -172,6 +172,24 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class RecordedMode:
+    """A mode: one period of it, from ``begin`` to ``end`` of the recorded times, and what it is.
+
+    ``frequency`` [Hz] is 0 where it does not oscillate, ``omega`` [rad/s] is the size of the eigenvalue. ``shape``
+    holds for each moving coordinate its name, unit, size and phase [deg]. The first of all recorded times is at rest.
+    """
+
+    name: str
+    begin: float
+    end: float
+    frequency: float
+    omega: float
+    damping_ratio: float
+    kind: str
+    shape: tuple[tuple[str, str, float, float], ...] = ()
+
+
+@dataclass(frozen=True)
 class Recording:
     """One motion, ready to be shown."""
 
@@ -193,6 +211,7 @@ class Recording:
     facts: dict[str, tuple[str, ...]] = field(default_factory=dict)  # part -> lines about it, for its card
     figures: tuple[Figure, ...] = ()  # of a report
     down: Three = (0.0, 0.0, 0.0)  # direction of gravity, or zero
+    modes: tuple[RecordedMode, ...] = ()  # to choose from, in place of one motion
 
 
 SHOW = {

@@ -39,6 +39,9 @@ def check(recording: Recording) -> None:
         _check_shape(f"arrow {arrow.name!r}: vector", arrow.vector, (t.size, 3))
     for channel in _channels(recording):
         _check_shape(f"channel {channel.name!r}: values", channel.values, (t.size,))
+    for mode in recording.modes:
+        if not t[0] <= mode.begin < mode.end <= t[-1]:
+            raise ValueError(f"mode {mode.name!r}: from {mode.begin} to {mode.end} is no stretch of the recorded times")
     for name in recording.show:
         _check_kind(f"recording {recording.name!r}: show", name, tuple(SHOW))
     _check_riders(recording)

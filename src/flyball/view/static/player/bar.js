@@ -8,10 +8,15 @@ export function controlBar(bar, clock, keys) {
   const part = (name) => bar.querySelector(`[name=${name}]`);
   const [play, scrub, speed, loop] = ["play", "scrub", "speed", "loop"].map(part);
   const read = bar.querySelector("output");
-  const digits = timeDigits(clock.end - clock.begin);
-  Object.assign(scrub, { min: clock.begin, max: clock.end, step: "any" });
+  const total = bar.querySelector(".total");
   for (const control of [play, scrub, speed, loop]) control.disabled = clock.still;
-  bar.querySelector(".total").textContent = ` / ${clock.end.toFixed(digits)} s`;
+  const span = () => {
+    const digits = timeDigits((clock.end - clock.begin) * clock.scale);
+    Object.assign(scrub, { min: clock.begin, max: clock.end, step: "any" });
+    total.textContent = clock.scale ? ` / ${((clock.end - clock.origin) * clock.scale).toFixed(digits)} s` : "";
+    return digits;
+  };
+  span();
 
   play.addEventListener("click", () => clock.play(!clock.playing));
   part("start").addEventListener("click", () => clock.seek(clock.begin));
@@ -33,7 +38,8 @@ export function controlBar(bar, clock, keys) {
   barKeys(keys, clock, { speed, loop });
 
   return () => {
-    const text = clock.time.toFixed(digits);
+    const digits = span();
+    const text = clock.scale ? ((clock.time - clock.origin) * clock.scale).toFixed(digits) : "–";
     read.textContent = text;
     scrub.value = clock.time;
     scrub.style.setProperty("--done", `${(100 * (clock.time - clock.begin)) / (clock.end - clock.begin || 1)}%`);
@@ -45,7 +51,7 @@ export function controlBar(bar, clock, keys) {
 
 /** The keys that do the same. */
 function barKeys(keys, clock, parts) {
-  const step = STEP * (clock.end - clock.begin);
+  const step = () => STEP * (clock.end - clock.begin);
   const paused = (action) => () => {
     clock.play(false);
     action();
@@ -54,12 +60,12 @@ function barKeys(keys, clock, parts) {
   keys.add(
     "ArrowLeft",
     "",
-    paused(() => clock.seek(clock.time - step)),
+    paused(() => clock.seek(clock.time - step())),
   );
   keys.add(
     "ArrowRight",
     "a little back or on",
-    paused(() => clock.seek(clock.time + step)),
+    paused(() => clock.seek(clock.time + step())),
     "← →",
   );
   keys.add(

@@ -4,6 +4,14 @@ export class Clock {
   /** A clock over a span of model time; `onChange` is called after every change of time or state. */
   constructor(begin, end, onChange) {
     Object.assign(this, { begin, end, onChange, time: begin, playing: false, looping: true, speed: 1, before: null });
+    Object.assign(this, { origin: 0, scale: 1 }); // of the times that are shown
+  }
+
+  /** Go round within a part of the time; times count from its begin, multiplied by a scale (none are shown for 0). */
+  within(begin, end, scale) {
+    const part = (this.time - this.begin) / (this.end - this.begin);
+    Object.assign(this, { begin, end, scale, origin: begin });
+    this.seek(begin + part * (end - begin));
   }
 
   get still() {

@@ -4,6 +4,7 @@ import { Clock } from "./clock.js";
 import { readRecording } from "./data.js";
 import { drawFigures, reportButtons } from "./report.js";
 import { motionPoints } from "./framing.js";
+import { Modes, periodSpeeds } from "./modes.js";
 import { Keys } from "./keys.js";
 import { Mechanism } from "./mechanism.js";
 import { Names } from "./names.js";
@@ -36,14 +37,24 @@ function measures(recording) {
   return extent > 0 ? { extent, unit: Math.min(Math.max(size, extent / 7), extent / 2) } : { extent: size, unit: size };
 }
 
-/** What the page's address asks for, as #t=5&theme=dark&view=top&play=1&show=reactions,names&select=rod. */
+/** What the page's address asks for, as #t=5&theme=dark&view=top&play=1&show=reactions,names&select=rod&mode=2. */
 function wishes() {
   const hash = new URLSearchParams(location.hash.slice(1));
   const time = hash.has("t") ? Number(hash.get("t")) : null;
   const theme = Object.hasOwn(THEMES, hash.get("theme")) ? hash.get("theme") : null;
   const show = hash.has("show") ? hash.get("show").split(",") : null;
-  const [view, play, select, arrows] = ["view", "play", "select", "arrows"].map((name) => hash.get(name));
-  return { time: Number.isFinite(time) ? time : null, theme, show, view, play, select, arrows: Number(arrows) || 1 };
+  const named = ["view", "play", "select", "arrows", "mode"].map((name) => hash.get(name));
+  const [view, play, select, arrows, mode] = named;
+  return {
+    time: Number.isFinite(time) ? time : null,
+    theme,
+    show,
+    view,
+    play,
+    select,
+    arrows: Number(arrows) || 1,
+    mode,
+  };
 }
 
 /** Switch between the themes; the first one is the address's or the system's. */
@@ -78,7 +89,10 @@ function begin(clock, { time, play }) {
 function describe(recording) {
   const span = recording.t.at(-1) - recording.t[0];
   const bodies = recording.bodies.length === 1 ? "1 body" : `${recording.bodies.length} bodies`;
-  find(".subtitle").textContent = span > 0 ? `${bodies}, ${Number(span.toPrecision(3))} s` : bodies;
+  const { modes } = recording;
+  if (modes.length)
+    find(".subtitle").textContent = `${bodies}, ${modes.length === 1 ? "1 mode" : `${modes.length} modes`}`;
+  else find(".subtitle").textContent = span > 0 ? `${bodies}, ${Number(span.toPrecision(3))} s` : bodies;
   if (!recording.channels.length && !Object.keys(recording.notes).length) document.body.classList.add("alone");
   if (!recording.channels.length) document.body.classList.add("plotless");
 }
@@ -245,6 +259,14 @@ function choosing(picture, recording, plots, now) {
   return { card, chosen };
 }
 
+/** The list of modes where a recording has some; the bar then speaks of periods. */
+function modeList(recording, clock, keys, onSwing) {
+  const { modes } = recording;
+  if (!modes.length) return null;
+  periodSpeeds(find(".bar select"), modes[0].end - modes[0].begin);
+  return new Modes(find(".modes"), recording, clock, keys, onSwing);
+}
+
 /** Start the player on the bytes of a recording. */
 export function start(buffer) {
   const recording = readRecording(buffer);
@@ -266,6 +288,7 @@ export function start(buffer) {
     recording.shown,
     (channels, together) => plots.show(channels, together),
   );
+  const modes = modeList(recording, clock, keys, () => update());
   const { card, chosen } = choosing(picture, recording, plots, () => mechanism.arrows.frame);
   const shown = new Shown(find(".menu"), find(".forces"), picture, () => (stage.dirty = true));
   for (const name of wanted.show ?? recording.show) shown.set(name, true);
@@ -290,16 +313,19 @@ export function start(buffer) {
   reportButtons(stage);
   if (VIEWS.includes(wanted.view) && !stage.planar) stage.look(wanted.view);
   document.addEventListener("click", (event) => event.detail && event.target.closest("button")?.blur());
+  modes?.open(wanted.mode);
   update();
   begin(clock, wanted);
   if (wanted.select) chosen.select(mechanism.parts(wanted.select)[0] ?? null);
-  window.flyball = hooks(clock, picture, recording, shown, chosen);
+  window.flyball = hooks(clock, picture, recording, shown, chosen, modes);
   keepDrawing(clock, picture);
 }
 
 /** What a script on the page may ask for; tests do. */
-function hooks(clock, { mechanism, stage }, recording, shown, chosen) {
+function hooks(clock, { mechanism, stage }, recording, shown, chosen, modes) {
   return {
+    mode: () => modes?.name ?? null,
+    begin: () => clock.begin,
     seek(time) {
       clock.play(false);
       clock.seek(time);

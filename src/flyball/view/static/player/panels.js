@@ -166,7 +166,7 @@ const unbroken = (text) => text.replace(/(\d)e-(\d)/g, "$1e\u2011$2"); // a numb
 export function summary(details, notes) {
   const entries = Object.entries(notes);
   details.hidden = !entries.length;
-  details.open = details.parentElement.clientHeight >= ENOUGH || document.body.classList.contains("plotless");
+  details.open = details.parentElement.clientHeight >= ENOUGH || document.body.matches(".plotless:not(.has-modes)");
   details
     .querySelector("dl")
     .append(
