@@ -34,7 +34,7 @@ from flyball.system.tree import REVOLUTE
 from flyball.system.values import Values, values
 
 STEP = 1e-30
-STEPS = (1e-3, 1e-4, 1e-5)  # of the differences, one after the other where they do not agree
+STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # of the differences, one after the other where they do not agree
 Tables = dict[str, np.ndarray]
 Derivative = Callable[[], Tables]
 

@@ -287,9 +287,7 @@ def _leave_out(x: np.ndarray, kind: int) -> None:
         x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
-def _constants(
-    s: Structure, numbers: dict, env: Mapping[str, Any], dtype: type
-) -> tuple[np.ndarray, dict[str, int]]:
+def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: type) -> tuple[np.ndarray, dict[str, int]]:
     """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
