@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from .model.model import Model
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .results.linear import LinearModel
     from .results.result import Result
 
 
@@ -31,6 +33,15 @@ class Mechanism(Model):
         from .analysis.assemble import assemble
 
         return assemble(self, **options)
+
+    def linearize(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **options: Any) -> LinearModel:
+        """Linear equations about an equilibrium or a steady motion, with named inputs and outputs.
+
+        See `flyball.analysis.linearize.linearize` for the options.
+        """
+        from .analysis.linearize import linearize
+
+        return linearize(self, inputs, outputs, **options)
 
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""

@@ -9,10 +9,10 @@ import flyball as fb
 from flyball import forces, joints
 from flyball.errors import ExpressionError, ModelError
 from flyball.model.coupling import Coupling
+from flyball.model.expressions import Expression, number
 from flyball.model.geometry import triad
 from flyball.model.grammar import FUNCTIONS
 from flyball.model.shapes import ALL as SHAPES
-from flyball.model.expressions import Expression, number
 from flyball.system.coordinates import _least_squares
 from flyball.system.inverse import inverse_inertia
 from flyball.system.spanning import spanning
@@ -313,7 +313,7 @@ def test_functions_of_expressions(name):
 @pytest.mark.parametrize("text", ["log(x - 1)", "sqrt(x - 1)", "asin(1 + x)", "(x - 1)**0.5", "1/(x - 0.5)"])
 def test_what_has_no_real_value_is_refused(text):
     """Complex numbers have a root of -0.5, the parameter has not."""
-    with pytest.raises((ModelError, ExpressionError), match="mass of Body 'b'.*finite number is wanted"):
+    with pytest.raises((ModelError, ExpressionError), match=r"mass of Body 'b'.*finite number is wanted"):
         number(text, {"x": 0.5 + 1j * STEP}, "kg", "mass of Body 'b'")
 
 
@@ -321,12 +321,12 @@ def test_a_joint_of_the_plane_is_not_tilted():
     m = fb.Mechanism("plane", planar=True, parameters={"tilt": 0.0})
     m.add(fb.Body("b", mass=1.0, inertia=0.1))
     m.add(fb.Revolute("J", "ground", "b", at=(0, 0), axis=("tilt", 0, 1)))
-    with pytest.raises(ModelError, match="Revolute 'J'.*axis is the normal"):
+    with pytest.raises(ModelError, match=r"Revolute 'J'.*axis is the normal"):
         values(structure(m), {"tilt": 1j * STEP})
 
 
 def test_an_inertia_must_stay_symmetric():
     m = fb.Mechanism("space", parameters={"tilt": 0.0})
     m.add(fb.Body("b", mass=1.0, inertia=((1, "tilt", 0), (0, 1, 0), (0, 0, 1))))
-    with pytest.raises(ModelError, match="Body 'b'.*not symmetric"):
+    with pytest.raises(ModelError, match=r"Body 'b'.*not symmetric"):
         values(structure(m), {"tilt": 1j * STEP})

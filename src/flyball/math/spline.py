@@ -91,13 +91,13 @@ def complex_cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
         A[n - 1, 1], A[n - 1, 0], A[n - 1, n - 2] = h[-1], 2.0 * (h[-1] + h[0]), h[0]
         b[n - 1] = 3.0 * (h[0] * d[-1] + h[-1] * d[0])
     else:
-        for k, m, i, j, e, f in ((0, 1, 0, 1, d[0], d[1]), (n - 1, n - 2, -1, -2, d[-1], d[-2])):
+        for end, beside, i, j in ((0, 1, 0, 1), (n - 1, n - 2, -1, -2)):
             width = h[i] + h[j]
-            A[k, k], A[k, m] = h[j], width
-            b[k] = ((h[i] + 2.0 * width) * h[j] * e + h[i] ** 2 * f) / width
-    m = np.linalg.solve(A, b)
-    c2, c3 = (3.0 * d - 2.0 * m[:-1] - m[1:]) / h, (m[:-1] + m[1:] - 2.0 * d) / h**2
-    return np.column_stack([y[:-1], m[:-1], c2, c3])
+            A[end, end], A[end, beside] = h[j], width
+            b[end] = ((h[i] + 2.0 * width) * h[j] * d[i] + h[i] ** 2 * d[j]) / width
+    slopes = np.linalg.solve(A, b)
+    left, right = slopes[:-1], slopes[1:]
+    return np.column_stack([y[:-1], left, (3.0 * d - 2.0 * left - right) / h, (left + right - 2.0 * d) / h**2])
 
 
 def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, outside: str) -> np.ndarray:

@@ -17,6 +17,7 @@ import numpy as np
 
 from ..constraints import angle, curve
 from ..constraints.registry import FORMULAS
+from ..math.scalar import absolute, maximum
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
 from ..model.element import resolve
@@ -24,7 +25,6 @@ from ..model.force import BodyForce, TwoPointForce
 from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
-from ..math.scalar import absolute, maximum
 from .call import STACK_RESERVE
 from .coordinates import BodyState, positions, velocities
 from .inverse import inverse_inertia
@@ -87,7 +87,7 @@ def values(
     env = model.environment(parameters)
     numbers = {e.name: resolve(e, env) for e in model.elements()}
     given = (*env.values(), *(holds or {}).values())
-    dtype: type = complex if any(isinstance(x, complex) for x in given) else float
+    dtype: Any = complex if any(isinstance(x, complex) for x in given) else float
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
@@ -287,7 +287,7 @@ def _leave_out(x: np.ndarray, kind: int) -> None:
         x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
-def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: type) -> tuple[np.ndarray, dict[str, int]]:
+def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
     """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
@@ -301,7 +301,7 @@ def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: type)
 
 
 def _term_x(
-    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: type
+    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
 ) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
     x = np.zeros((len(s.terms), 8), dtype)
@@ -343,7 +343,7 @@ def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: type) -> np.ndarray:
+def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: Any) -> np.ndarray:
     x = np.zeros((len(s.forces), 16), dtype)
     for k, e in enumerate(s.forces):
         separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
