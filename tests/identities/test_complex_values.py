@@ -7,6 +7,8 @@ import pytest
 
 import flyball as fb
 from flyball import forces, joints
+from flyball.analysis.compiled import compiled
+from flyball.analysis.derivatives import Equations, State
 from flyball.errors import ExpressionError, ModelError
 from flyball.model.coupling import Coupling
 from flyball.model.expressions import Expression, number
@@ -254,6 +256,39 @@ def test_least_squares_carry_the_derivative():
     h = 1e-3
     difference = (8.0 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12.0 * h)
     assert at(1j * STEP).imag / STEP == pytest.approx(difference, rel=1e-8)
+
+
+def equations(m, tree, parameters=None):
+    """The equations in the drawn state, at some accelerations and multipliers."""
+    c = compiled(m, parameters=parameters, tree=tree)
+    g = np.random.default_rng(2)
+    nv, nr = c.structure.nv, len(c.structure.rows)
+    v, vdot, lam = (g.standard_normal(n) for n in (nv, nv, nr))
+    q = compiled(m, tree=tree).values.q
+    return Equations(State(c, 0.3, q, v, c.z.copy(), vdot, lam, np.zeros(nv)))
+
+
+@pytest.mark.parametrize(("where", "name"), zoo.CASES)
+def test_equations_of_complex_tables(where, name):
+    """The compiled formulas read them: residuals have the derivatives by every field's parameter."""
+    if name == "Cam":  # beside a point of its profile, where the third derivative jumps
+        m = zoo.two_bodies(where)
+        at = zoo.P + zoo.NORMAL @ (0.32, 0.05, 0.05) if where == "space" else (zoo.P[0] + 0.32, zoo.P[1] + 0.05)
+        m.add(fb.Cam("J", "a", "b", **zoo.declared(where, name) | {"at": tuple(at)}))
+    else:
+        m = zoo.joined(where, name)
+    m, names = with_parameters(m)
+    tree = spanning(m)
+    for layer in ((), tree) if tree else ((),):
+        x = equations(m, layer)
+        for field, parameter in names.items():
+            if field.partition(".")[2] in RIGHT_ANGLES.get(name, ()):
+                continue
+            h = 1e-4
+            near = {k: equations(m, layer, {parameter: k * h}).residual for k in (-2, -1, 1, 2)}
+            difference = (8.0 * (near[1] - near[-1]) - (near[2] - near[-2])) / (12.0 * h)
+            size = 1e-8 * np.abs(difference).max() + 1e-14 * np.abs(x.residual).max() / h
+            assert x.by_parameter(parameter) == pytest.approx(difference, rel=1e-7, abs=size), field
 
 
 def test_real_parameters_give_floats():
