@@ -82,15 +82,25 @@ def linearize(
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
         x = _in_copy(model, x)
+    e, f, frame = _about(x, frozen)
+    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+
+
+def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:
+    """The reduced linear equations at a state; errors as those of `linearize`."""
+    e, f, frame = _about(x, frozen)
+    return f, frame, _reduced(e, f, frame, None)
+
+
+def _about(x: State, frozen: bool) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
-    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
-    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
 
 
-def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs) -> Reduced:
+def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
     try:
         return reduced(e, f, frame, inputs)
     except np.linalg.LinAlgError:
@@ -114,7 +124,8 @@ def _effects(e: Equations, f: Free, inputs: list[Input]) -> Inputs:
     prescribed = list(e.state.c.structure.prescribed)
     by = [e.by_law(i.parameter) if i.parameter != i.name else e.by_parameter(i.name) for i in inputs]
     W = np.array(by).reshape(len(inputs), e.width).T
-    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed]).reshape(-1, len(inputs))
+    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed])
+    given = given.reshape(len(prescribed), len(inputs))
     g = np.vstack([W[e.at["g"]], given])[f.on_positions]
     return Inputs(W[e.at["r"]], g, np.vstack([W[e.at["n"]], 0.0 * given]))
 
