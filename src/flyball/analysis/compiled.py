@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Compiled:
     values: Values
     work: Work
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
-    parameters: dict[str, complex] = field(default_factory=dict)  # values in place of the model's own
+    parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
 
     @property
     def structure(self) -> Structure:
