@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .results.result import Result
+    from .results.singularities import Singularities
 
 
 class Mechanism(Model):
@@ -43,6 +44,12 @@ class Mechanism(Model):
         from .analysis.mass import mass_properties
 
         return mass_properties(self, **options)
+
+    def singularities(self, driver: str, range: Any, **options: Any) -> Singularities:
+        """Singular positions over a range of a driver; see `flyball.analysis.singularities.singularities`."""
+        from .analysis.singularities import singularities
+
+        return singularities(self, driver, range, **options)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the description to a TOML file; `flyball.load` reads it back exactly."""
