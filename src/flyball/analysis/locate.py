@@ -31,6 +31,8 @@ def branch_point(c: Closure, x: Place, dropped: int = 1) -> Place | None:
         r = c.rank(x)
         kept = c.columns - 1 - dropped
         U, V = r.U[:, kept:], r.V[:, kept:]
+        if not U.shape[1]:  # fewer rows than that would leave: freedoms, no singular position
+            return None
         F = c.residual(x)
         aside = -r.V[:, :kept] @ ((r.U[:, :kept].T @ F) / r.values[:kept])
         k = V.shape[1]

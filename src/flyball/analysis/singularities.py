@@ -95,8 +95,9 @@ def singularities(
     _in_range(f, nodes, x, ends, places)
     least, most = min(ends), max(ends)
     allowed = [(s, y) for s, y in places if least - room - 1e-9 <= y.a <= most + room + 1e-9]
-    out = _result(f, ends, nodes, (ways[1].end, ways[0].end))
-    out.points.extend(point(f, tracer, y, s, _near(f, out, y, s)) for s, y in _once(f, allowed))
+    once = _once(f, allowed)
+    out = _result(f, ends, [(n.s, n.x) for n in nodes], once, (ways[1].end, ways[0].end))
+    out.points.extend(point(f, tracer, y, s, _near(f, out, y, s)) for s, y in once)
     return out
 
 
@@ -206,7 +207,7 @@ def _in_range(
 ) -> None:
     """Refuse a range that the curve never comes to."""
     least, most = min(ends), max(ends)
-    values = [n.x.a for n in nodes] or [x.a]
+    values = [n.x.a for n in nodes] + [p.a for _, p in places] + [x.a]
     if min(values) <= most + EDGE and max(values) >= least - EDGE:
         return
     wall = max(values) if x.a < least else min(values)
@@ -274,21 +275,24 @@ def _mobile(f: Freed, x: Place) -> None:
 
 def _near(f: Freed, out: Singularities, x: Place, s: float) -> np.ndarray:
     """Coordinates next to which those of a singular position are, for the whole turns of angles."""
-    if not len(out.s):
-        return f.values(x)
     k = int(np.argmin(np.abs(out.s - s)))
     return np.array([v[k] for v in out.values.values()])
 
 
 def _result(
-    f: Freed, ends: tuple[float, float], nodes: list[Node], why: tuple[str, str]
+    f: Freed,
+    ends: tuple[float, float],
+    nodes: list[tuple[float, Place]],
+    found: list[tuple[float, Place]],
+    why: tuple[str, str],
 ) -> Singularities:
-    values = np.zeros((len(nodes), f.coordinates))
-    distance = np.zeros(len(nodes))
+    along = sorted([*nodes, *found], key=lambda p: p[0])
+    values = np.zeros((len(along), f.coordinates))
+    distance = np.zeros(len(along))
     near = None
-    for k, n in enumerate(nodes):
-        values[k] = near = f.values(n.x, near)
-        distance[k] = np.linalg.svd(f.closure.jacobian(n.x)[:, :-1], compute_uv=False)[-1]
+    for k, (_, x) in enumerate(along):
+        values[k] = near = f.values(x, near)
+        distance[k] = np.linalg.svd(f.closure.jacobian(x)[:, :-1], compute_uv=False)[f.closure.columns - 2]
     return Singularities(
         model=f.model.name,
         driver=f.driver.name,
@@ -296,8 +300,8 @@ def _result(
         unit=f.unit,
         range=ends,
         points=[],
-        s=np.array([n.s for n in nodes]),
-        a=np.array([n.x.a for n in nodes]),
+        s=np.array([s for s, _ in along]),
+        a=np.array([x.a for _, x in along]),
         values=dict(zip(f.labels, values.T, strict=False)),
         distance=distance,
         ends=why,

@@ -17,11 +17,12 @@ import numpy as np
 
 from ..errors import NotConverged
 from .closure import Closure, Place, Rank
-from .locate import branch_point, interior_least, limit
+from .locate import branch_point, interior_least
 
 TURN = 0.12  # the most that a step may turn the tangent [rad]
 LEAST = 1e-7  # the shortest step [1]
 SAME = 1e-5  # points nearer than this are one [1]
+SMALL = 0.1  # part of the largest singular value below which others may vanish together with the least
 STILL = 1e-8  # a driver's part of the tangent below this is none
 ON_IT = 1e-6  # singular values below this are avoided by changing the step
 
@@ -152,13 +153,12 @@ class Tracer:
     def _lost(self, m: Node, n: Node, u: float, way: Way) -> None:
         middle = self.ahead(m, u * (n.s - m.s)) or m
         for near in (middle, m, n):
-            x = branch_point(self.c, near.x)
-            if x is not None and self._between(m, n, x):
-                r = self.c.rank(x)
-                more = r.below(limit(r)) - 1
-                x = (branch_point(self.c, x, more) or x) if more > 1 else x
-                self._note(m.s + float(np.linalg.norm(self.c.way(m.x, x))), x, way)
-                return
+            values = self.c.rank(near.x).values[: self.c.columns - 1]
+            for dropped in range(max(1, int((values < SMALL * values[0]).sum())), 0, -1):
+                x = branch_point(self.c, near.x, dropped)
+                if x is not None and self._between(m, n, x):
+                    self._note(m.s + float(np.linalg.norm(self.c.way(m.x, x))), x, way)
+                    return
 
     def _between(self, m: Node, n: Node, x: Place) -> bool:
         ds = n.s - m.s
