@@ -17,11 +17,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from .closure import Closure, Place, Rank
+from .halves import touching
 from .tangents import directions
 
 FLAT = 1e-7  # a Taylor coefficient of the driver below this, of unit steps, is none
 ORDER = 6  # up to which the driver's coefficients are looked at
-WALK = 0.5  # how far a self-motion is followed to make sure of it [1]
 
 
 @dataclass(frozen=True)
@@ -51,6 +51,7 @@ class Crossing:
     left: np.ndarray  # (rows, l)
     curves: list[Curve]
     decided: bool  # whether the second order told all of them
+    endless: bool  # whether there are infinitely many directions
 
 
 def crossing(c: Closure, x: Place, limit: float) -> Crossing:
@@ -60,9 +61,14 @@ def crossing(c: Closure, x: Place, limit: float) -> Crossing:
     N, U = r.V[:, kept:], r.U[:, kept:]
     forms = quadratic(c, x, N, U)
     size = max(1.0, float(np.abs(c.second(x, N.sum(axis=1))).max()))
-    tangents, decided = directions(forms, size)
-    curves = [taylor(c, x, r, kept, N @ t) for t in tangents] if decided else _further(c, x, r, kept, forms)
-    return Crossing(N, U, sorted(curves, key=_passing_first), decided)
+    found = directions(forms, size)
+    curves = [taylor(c, x, r, kept, N @ t) for t in found.single]
+    if found.several and not found.endless:
+        known = [k.x[0] for k in curves]
+        for x_k, half in touching(c, x, N):
+            if half or all(abs(x_k[0] @ n) < 1.0 - 1e-5 for n in known):
+                curves.append(Curve(x_k, half))
+    return Crossing(N, U, sorted(curves, key=_passing_first), found.decided, found.endless)
 
 
 def _passing_first(curve: Curve) -> tuple:
@@ -118,8 +124,3 @@ def _facing(n: np.ndarray) -> np.ndarray:
     n = n if lead > 0.0 else -n
     n[np.abs(n) < 1e-15] = 0.0
     return n
-
-
-def _further(c: Closure, x: Place, r: Rank, kept: int, forms: np.ndarray) -> list[Curve]:
-    """Branches where the second order leaves them open."""
-    return []

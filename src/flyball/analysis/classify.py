@@ -40,7 +40,7 @@ def point(f: Freed, tracer: Tracer, x: Place, s: float, near: np.ndarray) -> Sin
     return Singularity(
         a=float(x.a),
         kind=kind,
-        isolated=not cross.curves and cross.decided,
+        isolated=not cross.curves and not cross.endless,
         self_motion=resting,
         lost=generic - rank,
         branch_point=r.below(limit(r)) > 1,
@@ -50,6 +50,7 @@ def point(f: Freed, tracer: Tracer, x: Place, s: float, near: np.ndarray) -> Sin
         branches=[_branch(f, x, curve, order) for curve, order in zip(cross.curves, orders, strict=True)],
         motions=motions,
         decided=cross.decided,
+        endless=cross.endless,
         at=s,
         outline=f.outline(x),
     )

@@ -78,7 +78,9 @@ class Singularity:
     motions : list of Motion
         All finite motions for a' = 1 (a'' = 0), and for a' = 0 with a'' = 1 and -1.
     decided : bool
-        False if derivatives up to the order that was looked at leave the branches open; then there may be more.
+        False if derivatives of second order leave the branches open; those there are were found at small distances.
+    endless : bool
+        Whether there are infinitely many directions to leave it: more freedoms meet here.
     """
 
     a: float
@@ -93,15 +95,16 @@ class Singularity:
     branches: list[Branch]
     motions: list[Motion]
     decided: bool = True
+    endless: bool = False
     at: float = 0.0  # arc length from the start [1]
     outline: list[tuple[str, str, np.ndarray]] = field(default_factory=list, repr=False, compare=False)
 
     def count(self, rate: float = 0.0, acceleration: float = 0.0) -> float:
         """Number of finite motions if the driver moves with a' = ``rate`` (not 0), or from rest with a''.
 
-        Infinite where derivatives do not tell branches apart (`decided` is False and there are none).
+        Infinite where there are infinitely many directions to leave the position.
         """
-        if not self.decided and not self.branches and not self.isolated:
+        if self.endless:
             return math.inf
         if rate:
             return sum(m.rate != 0.0 for m in self.motions)
@@ -124,12 +127,14 @@ class Singularity:
         for m in self.motions:
             if m.rate == 0.0 and any(abs(v) > 0.0 for v in m.velocities.values()):
                 yield "", f"branch {m.branch}, a' = 0, a'' = {m.acceleration:g}: velocities {vector(m.velocities)}"
-        if not self.decided:
-            yield "", "derivatives of second order leave the branches open; those found here come from positions nearby"
+        if self.endless:
+            yield "", "infinitely many directions lead away: more freedoms meet here"
+        elif not self.decided:
+            yield "", "derivatives of second order leave branches open: those above were found at small distances"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        own = ("a", "kind", "isolated", "self_motion", "lost", "branch_point", "coordinates", "decided")
+        own = ("a", "kind", "isolated", "self_motion", "lost", "branch_point", "coordinates", "decided", "endless")
         return {k: getattr(self, k) for k in own} | {
             "null_vectors": self.null_vectors,
             "left_null_vectors": self.left_null_vectors,

@@ -66,10 +66,10 @@ def singular_plot(result: Singularities, path: str | os.PathLike | None = None, 
 
 
 def sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:
-    """Every body as the lines between its joints, joints as circles; ground hatched."""
+    """Every body as the lines between its joints, joints as circles, ground as triangles, guides dotted."""
     names = list(dict.fromkeys(body for body, _, _ in p.outline))
     colors = {b: PALETTE[k % len(PALETTE)] for k, b in enumerate(n for n in names if n != GROUND)}
-    seen = {}
+    seen: dict[str, dict[str, np.ndarray]] = {}
     for body, joint, point in p.outline:
         seen.setdefault(body, {})[joint] = point[:2] if planar else ISOMETRIC @ point
     for k, (body, points) in enumerate(seen.items()):
@@ -82,6 +82,10 @@ def sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:
             P = P if len(P) < 3 else np.vstack([P, P[:1]])
             width = 6.0 if k % 2 else 3.0  # bars on top of one another stay visible
             ax.plot(P[:, 0], P[:, 1], color=colors[body], linewidth=width, alpha=0.6, solid_capstyle="round", zorder=2)
+    for joint in dict.fromkeys(j for _, j, _ in p.outline):  # what slides hangs on its guide
+        ends = np.array([points[joint] for points in seen.values() if joint in points])
+        if np.ptp(ends, axis=0).max() > 1e-6:
+            ax.plot(ends[:, 0], ends[:, 1], ":", color="#555555", linewidth=1.2, zorder=1)
     every = np.array([q for points in seen.values() for q in points.values()])
     ax.plot(every[:, 0], every[:, 1], "o", color="white", markeredgecolor="#333333", markersize=4.5, zorder=3)
     ax.set_aspect("equal", adjustable="datalim")
