@@ -1,7 +1,7 @@
 """All singular positions of the slider-crank, driven at the crank or at the slider, as a table and as pictures.
 
-Cases after H. Hahn, Rigid Body Dynamics of Mechanisms 1 (2002), section 3.1.3: crank i and rod j have the lengths li, lj
-and the angles psi_i, psi_j from the line of the slider. Everything in the table is found by ``m.singularities``.
+Cases after H. Hahn, Rigid Body Dynamics of Mechanisms 1 (2002), section 3.1.3: crank i and rod j have the lengths li,
+lj and the angles psi_i, psi_j from the line of the slider. Everything in the table is found by ``m.singularities``.
 
 Run it with ``python examples/slider_crank_singularities.py``; with ``pictures.png`` behind it, it draws them too.
 """
@@ -51,7 +51,7 @@ def mechanism(
     x = float(B[0] + lj * np.cos(psi_j))
     m = fb.Mechanism("slider-crank", planar=True, gravity=(0, 0))
     m.add(fb.Body("crank", mass=1, inertia=li**2 / 12, position=B / 2, angle=psi_i))
-    m.add(fb.Body("rod", mass=1, inertia=lj**2 / 12, position=(B + [x, 0]) / 2, angle=psi_j))
+    m.add(fb.Body("rod", mass=1, inertia=lj**2 / 12, position=(B + np.array([x, 0])) / 2, angle=psi_j))
     m.add(fb.Body("slider", mass=1, inertia=1e-3, position=(x, 0)))
     m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=B))
     m.add(fb.Revolute("C", "rod", "slider", at=(x, 0)))

@@ -21,6 +21,7 @@ from .halves import touching
 from .tangents import directions
 
 FLAT = 1e-7  # a Taylor coefficient of the driver below this, of unit steps, is none
+DRIVES = ("a'", "a'' > 0", "a'' < 0")
 ORDER = 6  # up to which the driver's coefficients are looked at
 
 
@@ -29,12 +30,17 @@ class Curve:
     """One branch: Taylor coefficients x1 = n, x2, ... of unit steps (derivatives, not divided by factorials)."""
 
     x: tuple[np.ndarray, ...]
-    half: bool = False  # it begins here and goes one way only
+    ends: tuple[np.ndarray, ...] = ()  # of a cusp, which goes one way only: a step onto each half
 
     @property
     def driver(self) -> np.ndarray:
         """The driver's derivatives along it."""
         return np.array([c[-1] for c in self.x])
+
+    @property
+    def half(self) -> bool:
+        """Whether it goes one way only."""
+        return bool(self.ends)
 
     @property
     def order(self) -> int:
@@ -51,7 +57,7 @@ class Crossing:
     left: np.ndarray  # (rows, l)
     curves: list[Curve]
     decided: bool  # whether the second order told all of them
-    endless: bool  # whether there are infinitely many directions
+    endless: tuple[str, ...]  # drives (see `DRIVES`) that infinitely many directions answer
 
 
 def crossing(c: Closure, x: Place, limit: float) -> Crossing:
@@ -63,12 +69,25 @@ def crossing(c: Closure, x: Place, limit: float) -> Crossing:
     size = max(1.0, float(np.abs(c.second(x, N.sum(axis=1))).max()))
     found = directions(forms, size)
     curves = [taylor(c, x, r, kept, N @ t) for t in found.single]
-    if found.several and not found.endless:
+    endless = found.endless
+    open_ones = [N @ n for n in found.several]
+    if found.several and not endless:
         known = [k.x[0] for k in curves]
-        for x_k, half in touching(c, x, N):
-            if half or all(abs(x_k[0] @ n) < 1.0 - 1e-5 for n in known):
-                curves.append(Curve(x_k, half))
-    return Crossing(N, U, sorted(curves, key=_passing_first), found.decided, found.endless)
+        nearby = touching(c, x, N)
+        endless = nearby is None
+        for coefficients, ends in nearby or []:
+            if ends or all(abs(coefficients[0] @ n) < 1.0 - 1e-5 for n in known):
+                curves.append(Curve(coefficients, ends))
+    drives = _answers(c, x, r, kept, open_ones) if endless else ()
+    return Crossing(N, U, sorted(curves, key=_passing_first), found.decided, drives)
+
+
+def _answers(c: Closure, x: Place, r: Rank, kept: int, directions: list[np.ndarray]) -> tuple[str, ...]:
+    """Which drives directions without end answer: all if the driver moves along some, else the signs of a''."""
+    if np.abs(r.V[-1, kept:]).max() > FLAT:
+        return DRIVES
+    bends = [-(r.V[-1, :kept] / r.values[:kept]) @ (r.U[:, :kept].T @ c.second(x, n)) for n in directions]
+    return tuple(d for d, sign in zip(DRIVES[1:], (1.0, -1.0), strict=True) if any(sign * b > FLAT for b in bends))
 
 
 def _passing_first(curve: Curve) -> tuple:
@@ -82,9 +101,7 @@ def quadratic(c: Closure, x: Place, N: np.ndarray, U: np.ndarray) -> np.ndarray:
     B = np.zeros((len(U), k, k))
     for i in range(k):
         for j in range(i + 1):
-            B[:, i, j] = B[:, j, i] = (
-                c.second(x, N[:, i]) if i == j else c.mixed(x, N[:, i], N[:, j])
-            )
+            B[:, i, j] = B[:, j, i] = c.second(x, N[:, i]) if i == j else c.mixed(x, N[:, i], N[:, j])
     return np.einsum("ru,rij->uij", U, B)
 
 

@@ -14,7 +14,7 @@ from ..results.singularities import (
     Motion,
     Singularity,
 )
-from .branches import Curve, crossing
+from .branches import DRIVES, Curve, crossing
 from .closure import Place
 from .freed import Freed
 from .locate import limit
@@ -30,9 +30,14 @@ def point(f: Freed, tracer: Tracer, x: Place, s: float, near: np.ndarray) -> Sin
     r = c.rank(x)
     cross = crossing(c, x, limit(r))
     orders = [_order(tracer, x, curve) for curve in cross.curves]
-    motions = [m for k, (curve, order) in enumerate(zip(cross.curves, orders, strict=True)) for m in _motions(f, x, k, curve, order)]
-    passing = sum(order == 1 for order in orders)
+    motions = [
+        m
+        for k, (curve, order) in enumerate(zip(cross.curves, orders, strict=True))
+        for m in _motions(f, x, k, curve, order)
+    ]
+    passing = sum(order == 1 and not k.half for k, order in zip(cross.curves, orders, strict=True))
     resting = 0 in orders
+    passing = 2 if DRIVES[0] in cross.endless else passing
     kind = BIFURCATION if passing > 1 else PASSAGE if passing else SELF_MOTION if resting else LOCK_UP
     U, held, V = np.linalg.svd(c.jacobian(x)[:, :-1], full_matrices=True)
     rank = int((held > limit(r)).sum())
@@ -80,6 +85,8 @@ def _motions(f: Freed, x: Place, k: int, curve: Curve, order: int) -> list[Motio
         v, w = f.rates(x, d), f.rates(x, d, e)
         return Motion(k, rate, acceleration, _dict(f, v), _dict(f, w))
 
+    if curve.half:  # from rest along one half and back along the other
+        return [motion(0.0, float(np.sign(a[0])), 0.0, 1.0 / abs(a[0]))] * 2 if order == 1 else []
     if order == 1:
         out = [motion(1.0, 0.0, 1.0 / a[0], -a[1] / a[0] ** 3 if len(a) > 1 else 0.0)]
         return out + [motion(0.0, sign, 0.0, sign / a[0]) for sign in (1.0, -1.0)]
@@ -96,11 +103,12 @@ def _dict(f: Freed, rates: np.ndarray) -> dict[str, float]:
 
 def _branch(f: Freed, x: Place, curve: Curve, order: int) -> Branch:
     a = curve.driver * f.closure.unit
-    side = int(np.sign(a[order - 1])) if order and order % 2 == 0 and order <= len(a) else 0
+    one_sided = order and (order % 2 == 0 or curve.half) and order <= len(a)
+    side = int(np.sign(a[order - 1])) if one_sided else 0
     what = "self-motion" if order == 0 else "passes" if order == 1 else "turns back" if side else "passes, unbounded"
     rates = f.rates(x, curve.x[0])
     tangent = _dict(f, rates / a[0] if order == 1 else rates / np.abs(rates).max())
-    return Branch("begins" if curve.half else what, order, side, tangent, (x, curve))
+    return Branch("cusp" if curve.half else what, order, side, tangent, (x, curve))
 
 
 def _named(f: Freed, x: Place, d: np.ndarray) -> dict[str, float]:

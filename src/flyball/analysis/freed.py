@@ -116,8 +116,11 @@ def freed(model: Model, driver: str, t: float, parameters: Mapping[str, float] |
     units = [model.unit(name, mine) for name in labels]
     count = len(labels)
     if not model.planar:
-        bodies = [b for b, k in c.structure.place.items() if k >= 0]
-        labels = [*labels, *(f"{b}.omega_{axis}" for b in sorted(bodies, key=c.structure.place.get) for axis in "xyz")]
+        bodies = sorted((b for b, k in c.structure.place.items() if k >= 0), key=lambda b: c.structure.place[b])
+        labels = [
+            *labels,
+            *(f"{b}.omega_{axis}" for b in bodies for axis in "xyz"),
+        ]
         units = [*units, *["rad"] * (3 * len(bodies))]
     out = Freed(model, mine, closure, Place(a.q, 0.0, c.z.copy()), labels, units, rows, count)
     value = float(out.values(out.start)[labels.index(mine.coordinate)])

@@ -7,6 +7,7 @@ that touch, or cross twice); one that has no other half ends here in a cusp.
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -18,26 +19,46 @@ SHARES = (1.0, 0.75, 0.5, 0.25)
 ROUND = 160  # starts on a circle; as many in more dimensions
 ITERATIONS = 14
 SAME = 2e-3  # directions nearer than this are one, at the largest radius [1]
+ALIGNED, CUSP = 0.02, 0.5  # how far the tangents of the halves of a branch, of a cusp, may seem apart [1]
+ENDLESS = 24  # halves beyond which there is no end of them
 FLAT = 1e-4  # derivatives of the driver below this are none, here
 
 Half = tuple[np.ndarray, np.ndarray, np.ndarray]  # tangent, half the curvature, steps (len(SHARES), columns)
 
+Touch = tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]
 
-def touching(c: Closure, x: Place, N: np.ndarray) -> list[tuple[tuple[np.ndarray, ...], bool]]:
-    """Branches through x, whose kernel is N: Taylor coefficients of each, and whether it is but a half."""
-    halves = [h for h in map(lambda d: _shrunk(c, x, N, d), _around(c, x, N)) if h is not None]
-    out = []
-    left = list(halves)
+
+def touching(c: Closure, x: Place, N: np.ndarray) -> list[Touch] | None:
+    """Branches through x, whose kernel is N: Taylor coefficients of each; of a cusp also steps onto its halves.
+
+    None if there are directions without end.
+    """
+    around = _around(c, x, N)
+    if len(around) > ENDLESS:
+        return None
+    left = [h for h in (_shrunk(c, x, N, d) for d in around) if h is not None]
+    out: list[Touch] = []
     while left:
         n, m, d = left.pop(0)
-        partners = [(float(np.linalg.norm(m - h[1])), k) for k, h in enumerate(left) if np.linalg.norm(n + h[0]) < 0.02]
-        if partners:
-            _, k = min(partners)
-            other = left.pop(k)
-            out.append((_fitted(n, d, other[2]), False))
+        across = [
+            (float(np.linalg.norm(m - h[1])), k) for k, h in enumerate(left) if np.linalg.norm(n + h[0]) < ALIGNED
+        ]
+        beside = [(float(np.linalg.norm(n - h[0])), k) for k, h in enumerate(left) if np.linalg.norm(n - h[0]) < CUSP]
+        if across:
+            out.append((_fitted(n, d, left.pop(min(across)[1])[2]), ()))
+        elif beside:
+            other = left.pop(min(beside)[1])[2]
+            out.append((_tip(d, other), (d[0], other[0])))
         else:
-            out.append(((_quiet(n), _quiet(2.0 * m)), True))
+            out.append(((_quiet(n), _quiet(2.0 * m)), (d[0],)))
     return out
+
+
+def _tip(one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Tangent and curvature of the middle of a cusp's halves, which are apart by odd powers of the root of distance."""
+    h = RADIUS * np.array(SHARES)
+    fit = np.linalg.solve(np.vander(h, increasing=True), 0.5 * (one + other) / h[:, None])
+    return _quiet(fit[0] / np.linalg.norm(fit[0])), _quiet(2.0 * fit[1])
 
 
 def _around(c: Closure, x: Place, N: np.ndarray) -> list[np.ndarray]:
@@ -54,6 +75,8 @@ def _around(c: Closure, x: Place, N: np.ndarray) -> list[np.ndarray]:
         d = _at_radius(c, x, N, RADIUS * N @ y, RADIUS)
         if d is not None and not any(np.linalg.norm(d - e) < SAME * RADIUS for e in found):
             found.append(d)
+        if len(found) > ENDLESS:
+            break
     return found
 
 
@@ -78,7 +101,7 @@ def _at_radius(c: Closure, x: Place, N: np.ndarray, d: np.ndarray, h: float) -> 
 def _shrunk(c: Closure, x: Place, N: np.ndarray, d: np.ndarray) -> Half | None:
     """Follow a position to smaller radii: its tangent and curvature at x."""
     steps = [d]
-    for before, share in zip(SHARES, SHARES[1:], strict=False):
+    for before, share in itertools.pairwise(SHARES):
         guess = steps[-1] * share / before
         if len(steps) > 1:  # straight on, from two directions
             a, b = steps[-2] / (RADIUS * SHARES[len(steps) - 2]), steps[-1] / (RADIUS * before)

@@ -41,12 +41,10 @@ def branch_point(c: Closure, x: Place, dropped: int = 1) -> Place | None:
         slopes = np.zeros((k, k, U.shape[1]))  # [j, l]: U^T F''[V_j, V_l]
         for j in range(k):
             for l in range(j + 1):
-                slopes[j, l] = slopes[l, j] = U.T @ (
-                    c.second(x, V[:, j]) if j == l else c.mixed(x, V[:, j], V[:, l])
-                )
+                slopes[j, l] = slopes[l, j] = U.T @ (c.second(x, V[:, j]) if j == l else c.mixed(x, V[:, j], V[:, l]))
         given = np.array([U.T @ c.mixed(x, V[:, j], aside) for j in range(k)]) if np.any(aside) else 0.0
         A = slopes.transpose(0, 2, 1).reshape(-1, k)
-        y = -np.linalg.lstsq(A, (loss + given).ravel(), rcond=1e-8)[0]
+        y = -np.linalg.lstsq(A, (loss + given).ravel(), rcond=1e-11)[0]
         d = aside + V @ y
         size = float(np.linalg.norm(d))
         if not np.isfinite(size):

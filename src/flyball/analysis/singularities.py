@@ -10,16 +10,16 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..errors import ModelError, MobilityError, SingularityError
+from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.singularities import Branch, Singularities
-from .branches import Crossing, Curve, crossing
+from .branches import Curve, crossing
 from .classify import point
 from .closure import Place
 from .freed import Freed, freed
 from .locate import branch_point, limit
-from .trace import STILL, Node, Tracer, Way
+from .trace import SAME, STILL, Node, Tracer, Way
 
 NEAR = 1e-4  # a start this near to a singular position is drawn there [1]
 EDGE = 1e-9  # of the range: how far beyond its ends a singular position may lie
@@ -38,10 +38,9 @@ def singularities(
 ) -> Singularities:
     """Follow a driven motion and find every position where the driven Jacobian loses rank.
 
-    The mechanism is assembled as described. From there the curve of its positions is followed by arc length, both
-    ways, with the driver's law replaced by a value a of its coordinate, until a leaves the range or the curve closes.
-    Where the driver cannot go on the curve turns back, and is followed on the other side. Other drivers stay at what
-    they ask for at time t.
+    From the assembled position the curve of positions is followed by arc length, both ways, with the driver's law
+    replaced by a value a of its coordinate, until a leaves the range or the curve closes. Where the driver locks up
+    the curve turns back, and is followed on the other side. Other drivers stay at what they ask for at time t.
 
     Parameters
     ----------
@@ -55,8 +54,8 @@ def singularities(
     parameters : mapping, optional
         Values in SI units in place of the model's own.
     branch : Branch or int, optional
-        Start from the singular position that this branch was found at, along it; or, where the mechanism is drawn in
-        a singular position, which of its branches to follow (the first if not told).
+        Start from the singular position that this branch was found at, along it; where the mechanism is drawn in a
+        singular position, the number of its branch to follow (the first if not told).
     step : float
         The longest step along the curve [1]: radians, and lengths as parts of the mechanism's.
     steps : int
@@ -80,8 +79,13 @@ def singularities(
         If the curve cannot be followed.
     """
     f = freed(model, driver, t, parameters)
-    ends = _range(f, range)
-    tracer = Tracer(f.closure, step)
+    return _followed(f, Tracer(f.closure, step), _range(f, range), branch, steps)
+
+
+def _followed(
+    f: Freed, tracer: Tracer, ends: tuple[float, float], branch: Branch | int | None, steps: int
+) -> Singularities:
+    """The curve both ways from its start, and what is singular on it."""
     x, curve, first = _start(f, tracer, branch)
     low, high = min(*ends, x.a), max(*ends, x.a)
     room = EDGE * (high - low)
@@ -93,8 +97,8 @@ def singularities(
     places = [(-s, y) for s, y in reversed(ways[1].found)] + ([(0.0, x)] if first else []) + ways[0].found
     nodes = _nodes(tracer, ways, low, high)
     _in_range(f, nodes, x, ends, places)
-    least, most = min(ends), max(ends)
-    allowed = [(s, y) for s, y in places if least - room - 1e-9 <= y.a <= most + room + 1e-9]
+    room += 1e-9
+    allowed = [(s, y) for s, y in places if min(ends) - room <= y.a <= max(ends) + room]
     once = _once(f, allowed)
     out = _result(f, ends, [(n.s, n.x) for n in nodes], once, (ways[1].end, ways[0].end))
     out.points.extend(point(f, tracer, y, s, _near(f, out, y, s)) for s, y in once)
@@ -130,7 +134,9 @@ def _start(f: Freed, tracer: Tracer, branch: Branch | int | None) -> tuple[Place
         return x, None, False
     cross = crossing(c, x, limit(r))
     if isinstance(branch, int) and not 0 <= branch < len(cross.curves):
-        raise ModelError(f"{f.model.name!r} starts where there are {len(cross.curves)} branches, none of number {branch}")
+        raise ModelError(
+            f"{f.model.name!r} starts where there are {len(cross.curves)} branches, none of number {branch}"
+        )
     return x, cross.curves[branch or 0] if cross.curves else None, True
 
 
@@ -162,8 +168,8 @@ def _ways(tracer: Tracer, x: Place, curve: Curve | None, ends: tuple[float, floa
         return [Way(end="nothing leads away from here"), Way(end="nothing leads away from here")]
     if curve is not None:
         n, bend = curve.x[0], curve.x[1] if len(curve.x) > 1 else 0.0 * curve.x[0]
-        sides = (1.0,) if curve.half else (toward, -toward)
-        starts = [tracer.off(x, side * n, bend) for side in sides]
+        starts = [tracer.onto(x, d) for d in curve.ends]
+        starts = starts or [tracer.off(x, side * n, bend) for side in (toward, -toward)]
         homes: list[Node | None] = [None] * len(starts)
     else:
         start = tracer.node(0.0, x, r, r.V[:, -1] * toward * np.sign(r.V[-1, -1]))
@@ -177,29 +183,28 @@ def _ways(tracer: Tracer, x: Place, curve: Curve | None, ends: tuple[float, floa
 
 def _nodes(tracer: Tracer, ways: list[Way], low: float, high: float) -> list[Node]:
     """All nodes in order; the last of each way is drawn back to the end of the range."""
+    forward, back = (_cut(tracer, way, low, high) for way in ways)
+    backward = [Node(-n.s, n.x, -n.t, n.bend, n.value, -n.slope) for n in reversed(back)]
+    if backward and forward and backward[-1].s == forward[0].s == 0.0:
+        backward.pop()
+    return [*backward, *forward]
+
+
+def _cut(tracer: Tracer, way: Way, low: float, high: float) -> list[Node]:
     from scipy.optimize import brentq
 
-    out: list[list[Node]] = []
-    for way in ways:
-        nodes = list(way.nodes)
-        if way.end == "end of the range" and len(nodes) > 1:
-            last, before = nodes[-1], nodes[-2]
-            goal = high if last.x.a > high else low
-            try:
-                h = brentq(
-                    lambda h: getattr(tracer.ahead(before, h), "x", last.x).a - goal,
-                    0.0,
-                    last.s - before.s,
-                    xtol=1e-13,
-                )
-                nodes[-1] = tracer.ahead(before, h) or last
-            except ValueError:
-                nodes.pop()
-        out.append(nodes)
-    backward = [Node(-n.s, n.x, -n.t, n.bend, n.value, -n.slope) for n in reversed(out[1])]
-    if backward and out[0] and backward[-1].s == out[0][0].s == 0.0:
-        backward.pop()
-    return [*backward, *out[0]]
+    if way.end != "end of the range" or len(way.nodes) < 2:
+        return way.nodes
+    *inside, before, last = way.nodes
+    goal = high if last.x.a > high else low
+
+    def beyond(h: float) -> float:
+        return (tracer.ahead(before, h) or last).x.a - goal if h > 0.0 else before.x.a - goal
+
+    if beyond(0.0) * (last.x.a - goal) >= 0.0:  # the last but one is the end
+        return [*inside, before]
+    h = brentq(beyond, 0.0, last.s - before.s, xtol=1e-13)
+    return [*inside, before, tracer.ahead(before, h) or last]
 
 
 def _in_range(
@@ -216,7 +221,9 @@ def _in_range(
     u = r.U[:, int((r.values > limit(r)).sum()) - (0 if r.below(limit(r)) > 1 else 1) :]
     s = f.closure.c.structure
     weight = np.abs(u).max(axis=1, initial=0.0)[:-1]
-    names = tuple(dict.fromkeys(s.rows[k].element.name for k in np.flatnonzero(weight > 1e-3 * weight.max(initial=0.0))))
+    names = tuple(
+        dict.fromkeys(s.rows[k].element.name for k in np.flatnonzero(weight > 1e-3 * weight.max(initial=0.0)))
+    )
     raise SingularityError(
         f"{f.model.name!r}: driver {f.driver.name!r} cannot come to {least:g} .. {most:g} {f.unit} from where the "
         f"mechanism is drawn ({f.driver.coordinate} = {x.a:.6g}): it locks up at {wall:.6g} {f.unit}",
@@ -228,7 +235,7 @@ def _in_range(
 def _once(f: Freed, places: list[tuple[float, Place]]) -> list[tuple[float, Place]]:
     out: list[tuple[float, Place]] = []
     for s, y in places:
-        if all(np.linalg.norm(f.closure.way(y, z)) > 1e-5 or abs(y.a - z.a) > 1e-3 for _, z in out):
+        if all(np.linalg.norm(f.closure.way(y, z)) > SAME or abs(y.a - z.a) > 1e-3 for _, z in out):
             out.append((s, y))
     return out
 
@@ -237,7 +244,8 @@ def _overdriven(f: Freed) -> MobilityError:
     others = [d.name for d in f.model.drivers if d.name != f.driver.name]
     beside = f"; the other drivers ({', '.join(others)}) hold it" if others else ""
     return MobilityError(
-        f"{f.model.name!r}: driver {f.driver.name!r} cannot move {f.driver.coordinate}, since no freedom is left{beside}",
+        f"{f.model.name!r}: driver {f.driver.name!r} cannot move {f.driver.coordinate}, since no freedom "
+        f"is left{beside}",
         redundant=tuple(others),
     )
 
@@ -286,13 +294,15 @@ def _result(
     found: list[tuple[float, Place]],
     why: tuple[str, str],
 ) -> Singularities:
-    along = sorted([*nodes, *found], key=lambda p: p[0])
+    c = f.closure
+    own = [p for p in nodes if all(np.linalg.norm(c.way(p[1], x)) > SAME for s, x in found if abs(s - p[0]) < 0.01)]
+    along = sorted([*own, *found], key=lambda p: p[0])
     values = np.zeros((len(along), f.coordinates))
     distance = np.zeros(len(along))
     near = None
     for k, (_, x) in enumerate(along):
         values[k] = near = f.values(x, near)
-        distance[k] = np.linalg.svd(f.closure.jacobian(x)[:, :-1], compute_uv=False)[f.closure.columns - 2]
+        distance[k] = np.linalg.svd(c.jacobian(x)[:, :-1], compute_uv=False)[c.columns - 2]
     return Singularities(
         model=f.model.name,
         driver=f.driver.name,

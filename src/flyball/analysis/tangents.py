@@ -21,7 +21,7 @@ class Directions(NamedTuple):
 
     single: list[np.ndarray]  # simple zeros: a curve leaves along each of them
     several: list[np.ndarray]  # multiple zeros, up to some: the next order has a say
-    endless: bool = False  # whether the multiple ones are a continuum, or everything
+    endless: bool = False  # whether the multiple ones are a continuum
 
     @property
     def decided(self) -> bool:
@@ -36,7 +36,7 @@ def directions(forms: np.ndarray, size: float) -> Directions:
         return Directions([np.ones(1)], [])
     limit = NOTHING * max(size, 1e-300)
     if not len(forms) or np.abs(forms).max() < limit:
-        return Directions([], [], True)
+        return Directions([], list(np.eye(k)))
     return _binary(forms, limit) if k == 2 else _several(forms, limit)
 
 

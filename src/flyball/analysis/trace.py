@@ -26,6 +26,8 @@ SMALL = 0.1  # part of the largest singular value below which others may vanish 
 STILL = 1e-8  # a driver's part of the tangent below this is none
 ON_IT = 1e-6  # singular values below this are avoided by changing the step
 
+LEAVES = "the curve cannot be followed away from a singular position along the branch chosen"
+
 
 @dataclass(frozen=True)
 class Node:
@@ -77,7 +79,9 @@ class Tracer:
         if found is None or found[2] > 0.3 * abs(h) + 1e-9:
             return None
         new = self.node(node.s + h, found[0], found[1], node.t)
-        turned = float(np.arccos(np.clip(new.t @ (node.t + h * node.bend) / np.linalg.norm(node.t + h * node.bend), -1, 1)))
+        turned = float(
+            np.arccos(np.clip(new.t @ (node.t + h * node.bend) / np.linalg.norm(node.t + h * node.bend), -1, 1))
+        )
         return None if turned > 0.5 * TURN + 0.5 * abs(h) * TURN else new
 
     def off(self, x: Place, n: np.ndarray, bend: np.ndarray) -> Node:
@@ -86,7 +90,14 @@ class Tracer:
             found = self.c.close(self.c.at(self.c.moved(x, h * n + 0.5 * h * h * bend)))
             if found is not None and found[2] < 0.2 * h and found[1].values[self.c.columns - 2] > 1e-5 * h:
                 return self.node(h, found[0], found[1], n + h * bend)
-        raise NotConverged("the curve cannot be followed away from a singular position along the branch chosen")
+        raise NotConverged(LEAVES)
+
+    def onto(self, x: Place, d: np.ndarray) -> Node:
+        """A regular node a step d away from a point."""
+        found = self.c.close(self.c.at(self.c.moved(x, d)))
+        if found is None:
+            raise NotConverged(LEAVES)
+        return self.node(float(np.linalg.norm(d)), found[0], found[1], d)
 
     def follow(self, first: Node, within: Callable[[float], bool], steps: int, home: Node | None) -> Way:
         """Go on from a node until the driver's coordinate leaves what it may be, or the curve closes."""
@@ -162,7 +173,7 @@ class Tracer:
 
     def _between(self, m: Node, n: Node, x: Place) -> bool:
         ds = n.s - m.s
-        return max(np.linalg.norm(self.c.way(k.x, x)) for k in (m, n)) < 1.2 * ds + 1e-9
+        return bool(max(np.linalg.norm(self.c.way(k.x, x)) for k in (m, n)) < 1.2 * ds + 1e-9)
 
     def _turned(self, m: Node, n: Node, way: Way) -> None:
         """The root of the driver's part of the tangent, by secants that keep it between."""

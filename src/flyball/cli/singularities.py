@@ -24,7 +24,9 @@ def singularities(
         str | None,
         typer.Option(help="Then go on along a branch: POINT.BRANCH of the table, points from 1, branches from 0."),
     ] = None,
-    plot: Annotated[Path | None, typer.Option(help="Write pictures of the positions to a PNG, SVG or PDF file.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(help="Write pictures of the positions to a PNG, SVG or PDF file.")
+    ] = None,
     brief: Annotated[bool, typer.Option("--table", help="One line a position.")] = False,
     change: Changes = None,
     as_json: Json = False,

@@ -33,7 +33,8 @@ class Branch:
     ----------
     what : str
         ``"passes"``: the driver moves along it. ``"turns back"``: the driver has an extremum. ``"passes, unbounded"``:
-        the driver passes, at velocities without bound. ``"self-motion"``: the driver stays. ``"begins"``: a cusp.
+        the driver passes, at velocities without bound. ``"self-motion"``: the driver stays. ``"cusp"``: it goes
+        one way only, on two halves with one tangent.
     order : int
         Order of the driver's first derivative along it that is not zero; 0 if there is none.
     side : int
@@ -79,8 +80,8 @@ class Singularity:
         All finite motions for a' = 1 (a'' = 0), and for a' = 0 with a'' = 1 and -1.
     decided : bool
         False if derivatives of second order leave the branches open; those there are were found at small distances.
-    endless : bool
-        Whether there are infinitely many directions to leave it: more freedoms meet here.
+    endless : tuple of str
+        Drives (``"a'"``, ``"a'' > 0"``, ``"a'' < 0"``) that infinitely many directions answer: more freedoms meet here.
     """
 
     a: float
@@ -95,16 +96,16 @@ class Singularity:
     branches: list[Branch]
     motions: list[Motion]
     decided: bool = True
-    endless: bool = False
+    endless: tuple[str, ...] = ()
     at: float = 0.0  # arc length from the start [1]
     outline: list[tuple[str, str, np.ndarray]] = field(default_factory=list, repr=False, compare=False)
 
     def count(self, rate: float = 0.0, acceleration: float = 0.0) -> float:
         """Number of finite motions if the driver moves with a' = ``rate`` (not 0), or from rest with a''.
 
-        Infinite where there are infinitely many directions to leave the position.
+        Infinite where infinitely many directions lead away.
         """
-        if self.endless:
+        if ("a'" if rate else "a'' > 0" if acceleration > 0.0 else "a'' < 0") in self.endless:
             return math.inf
         if rate:
             return sum(m.rate != 0.0 for m in self.motions)

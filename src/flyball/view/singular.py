@@ -18,7 +18,12 @@ if TYPE_CHECKING:
 
     from ..results.singularities import Singularities, Singularity
 
-MARKS = {PASSAGE: ("o", PALETTE[2]), LOCK_UP: ("s", PALETTE[1]), BIFURCATION: ("D", PALETTE[0]), SELF_MOTION: ("^", PALETTE[3])}
+MARKS = {
+    PASSAGE: ("o", PALETTE[2]),
+    LOCK_UP: ("s", PALETTE[1]),
+    BIFURCATION: ("D", PALETTE[0]),
+    SELF_MOTION: ("^", PALETTE[3]),
+}
 MOST = 12  # pictures
 ACROSS = 4
 ISOMETRIC = np.array([[-0.7071, 0.7071, 0.0], [-0.4082, -0.4082, 0.8165]])
@@ -106,7 +111,12 @@ def _chosen(result: Singularities) -> str:
     }
     values = result.values.get(result.coordinate)
     for k, v in result.values.items():
-        if k in spread and values is not None and len(v) and np.ptp(np.abs(v - v[0]) - np.abs(values - values[0])) < 1e-9:
+        if (
+            k in spread
+            and values is not None
+            and len(v)
+            and np.ptp(np.abs(v - v[0]) - np.abs(values - values[0])) < 1e-9
+        ):
             spread[k] = 0.0  # the same over again
     return max(spread, key=lambda k: round(spread[k], 9)) if spread else result.coordinate
 
