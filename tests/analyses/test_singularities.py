@@ -168,11 +168,10 @@ def test_windows_of_rhombi():
 def test_stewart_platform_against_its_legs_lines():
     """Where one leg locks up the six legs' lines are dependent: their Pluecker coordinates have no determinant."""
     m = example("stewart.py")
-    r = m.singularities("cylinder 1", (-0.3, 0.34), step=0.15)
-    long = m.singularities("cylinder 1", (-0.3, 0.7), step=0.15)
-    assert len(r) < len(long)
+    r = m.singularities("cylinder 1", (-0.8, 1.5))
+    assert len(r) == 5
     points = {}
-    for p in long:
+    for p in r:
         for body, joint, at in p.outline:
             if body == "platform" or (body == "ground" and joint.startswith("foot")):
                 points[joint] = at
@@ -181,7 +180,6 @@ def test_stewart_platform_against_its_legs_lines():
         lines = np.hstack([d, np.cross([points[f"foot {k}"] for k in range(1, 7)], d)])
         assert np.linalg.svd(lines, compute_uv=False)[-1] < 1e-9
         assert p.kind == "lock-up"
-    assert len(long) >= 3
 
 
 def test_other_drivers_stay():
@@ -204,12 +202,12 @@ def test_what_is_refused():
         m.singularities("motor", (0,))
     with pytest.raises(fb.ModelError, match="is no range"):
         m.singularities("motor", (1, 1))
-    with pytest.raises(fb.ModelError, match="range of Driver 'motor'.*expected"):
+    with pytest.raises(fb.ModelError, match=r"range of Driver 'motor'.*expected"):
         m.singularities("motor", ("0 mm", "5 mm"))
     with pytest.raises(fb.ModelError, match="does not start in a singular position"):
         m.singularities("motor", (0, 1), branch=1)
     limit = math.acos((1.44 + 1 - 2.25) / 2.4)
-    with pytest.raises(fb.SingularityError, match="it locks up at 1.49") as e:
+    with pytest.raises(fb.SingularityError, match=r"it locks up at 1\.49") as e:
         m.singularities("motor", (2.0, 4.0))
     assert e.value.where == pytest.approx(limit, abs=1e-9)
     assert {"B", "C", "D"} <= set(e.value.elements)

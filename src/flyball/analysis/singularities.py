@@ -79,7 +79,7 @@ def singularities(
         If the curve cannot be followed.
     """
     f = freed(model, driver, t, parameters)
-    return _followed(f, Tracer(f.closure, step), _range(f, range), branch, steps)
+    return _followed(f, Tracer(f.closure, step), _range(f, range, parameters), branch, steps)
 
 
 def _followed(
@@ -105,10 +105,10 @@ def _followed(
     return out
 
 
-def _range(f: Freed, given: Sequence[float | str]) -> tuple[float, float]:
+def _range(f: Freed, given: Sequence[float | str], parameters: Mapping[str, float] | None) -> tuple[float, float]:
     if isinstance(given, str) or len(given) != 2:
         raise ModelError(f"range of {f.driver.title}: give two values (a0, a1), not {given!r}")
-    env = f.model.environment()
+    env = f.model.environment(parameters)
     low, high = (float(number(x, env, f.unit, f"range of {f.driver.title}")) for x in given)
     if low == high:
         raise ModelError(f"range of {f.driver.title}: from {low:g} to {high:g} is no range")
