@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from .results.equilibrium import Equilibrium
     from .results.linear import LinearModel
     from .results.modes import Modes
+    from .results.optimum import Optimum
     from .results.result import Result
+    from .results.sensitivity import Sensitivity
     from .results.singularities import Singularities
 
 
@@ -60,6 +62,21 @@ class Mechanism(Model):
         from .analysis.modes import modes
 
         return modes(self, **options)
+
+    def sensitivity(self, of: Sequence[str] = (), to: Sequence[str] = (), **options: Any) -> Sensitivity:
+        """Derivatives of kinematics, reactions, equilibria, eigenvalues or motions by parameters.
+
+        See `flyball.analysis.sensitivity.sensitivity` for the options.
+        """
+        from .analysis.sensitivity import sensitivity
+
+        return sensitivity(self, of, to, **options)
+
+    def optimize(self, of: Sequence[str], to: Any, **options: Any) -> Optimum:
+        """Parameters for which quantities come nearest to a target; see `flyball.analysis.optimize.optimize`."""
+        from .analysis.optimize import optimize
+
+        return optimize(self, of, to, **options)
 
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""
