@@ -20,8 +20,10 @@ from .assemble import Assembly, assemble
 from .curves import snapshot
 from .derivatives import Equations, State
 from .free import Free, free
+from .linearize import without_inputs
 from .preload import preloaded
 from .rest import Rest
+from .turning import turning as turn
 
 NEWTON, DESCENT = 40, 400  # steps
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
@@ -40,8 +42,9 @@ def equilibrium(
     start: Equilibrium | None = None,
     stable: bool = False,
     preload: Sequence[str] = (),
+    turning: Sequence[str] = (),
 ) -> Equilibrium:
-    """A static equilibrium near the mechanism as described.
+    """A static equilibrium near the mechanism as described, or a steady motion.
 
     Drivers hold their coordinates where they are at ``t``. Velocities, dampers and inertia play no part.
 
@@ -59,6 +62,10 @@ def equilibrium(
     preload : sequence of str
         Forces, by the names that `linearize` takes for inputs: instead of moving the mechanism, find what has to be
         added to them for it to be in equilibrium where it is drawn.
+    turning : sequence of str
+        Joints' coordinates that turn (or move) evenly while all others stand still, for instance the spindle of a
+        governor: a steady motion near the described positions and speeds is found. Speeds stay as described where
+        nothing else decides them.
 
     Returns
     -------
@@ -76,6 +83,8 @@ def equilibrium(
     if start is not None:
         q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
         a = Assembly(a.compiled, a.t, q, np.zeros(a.compiled.structure.nv))
+    if turning:
+        return _steady(a, turning)
     if preload:
         x, found = preloaded(a, preload)
         return _finished(x, "preload", found)
@@ -89,6 +98,31 @@ def equilibrium(
         if arrived is None:
             raise _failure(downhill or x)
     return _finished(arrived, way, {})
+
+
+def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
+    """A steady motion; its stability by its eigenvalues, of which those of the turning itself are zero."""
+    c = a.compiled
+    found = turn(a, names, c.parameters)
+    x = found.state
+    f, _, r = without_inputs(x)
+    w = np.linalg.eigvals(r.A)
+    grows = w.real.max(initial=0.0) / max(np.abs(w).max(initial=0.0), 1e-300)
+    q, v = c.take(x.c, x.t, x.q, x.v)
+    return Equilibrium(
+        t=x.t,
+        stability=UNSTABLE if grows > NEUTRAL**0.5 else STABLE,
+        freedoms=tuple(f.labels),
+        stiffness=r.K if r.K is not None else np.zeros((0, 0)),
+        weakest={},
+        least=float("nan"),
+        unbalanced=float(np.abs(Equations(x).block("r")).max(initial=0.0)),
+        method="Newton's method",
+        parameters=dict(c.parameters),
+        result=snapshot(x),
+        assembly=Assembly(c, x.t, q, v),
+        speeds=found.speeds,
+    )
 
 
 def _newton(x: Rest) -> Rest | None:
