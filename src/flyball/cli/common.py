@@ -28,6 +28,8 @@ app = typer.Typer(
 
 Model = Annotated[Path, typer.Argument(help="A model file: .toml, or .py that defines m, mechanism or mechanism().")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
+Time = Annotated[str, typer.Option("--t", help='Time at which laws of drivers and forces are taken, e.g. "0.5 s".')]
+Resting = Annotated[bool, typer.Option("--equilibrium", help="About the equilibrium next to the mechanism as drawn.")]
 Changes = Annotated[list[str] | None, typer.Option("--set", help='Set a parameter: --set speed="120 rpm".')]
 
 
@@ -85,8 +87,8 @@ def make_folder(folder: Path) -> None:
         raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
 
 
-def seconds(text: str) -> float:
+def seconds(text: str, option: str = "--t-end") -> float:
     """A time from the command line."""
     from ..model.expressions import number
 
-    return float(number(text, {}, "s", "--t-end"))
+    return float(number(text, {}, "s", option))

@@ -9,19 +9,25 @@ from contextlib import contextmanager
 
 import typer
 
+KERNELS = {  # of analysis/entry.py: what to say before they are compiled
+    "motion_kernel": "compiling for this machine, once: about half a minute",
+    "residual_kernel": "compiling the derivatives of the equations for this machine, once: about a quarter of a minute",
+}
 
-def announce_compiling(talk: bool) -> None:
-    """On a terminal, say that the first use takes long, if it is the first use."""
-    if talk and sys.stderr.isatty() and _will_compile():
-        typer.echo("compiling for this machine, once: about half a minute", err=True)
+
+def announce_compiling(talk: bool, *kernels: str) -> None:
+    """On a terminal, say that the first use takes long, if it is the first use of kernels: the motion's by default."""
+    for name in kernels or ("motion_kernel",):
+        if talk and sys.stderr.isatty() and _will_compile(name):
+            typer.echo(KERNELS[name], err=True)
 
 
-def _will_compile() -> bool:
-    """Whether no compiled code of this version is in the cache."""
-    from ..analysis.entry import motion_kernel
+def _will_compile(name: str) -> bool:
+    """Whether no compiled code of this version of a kernel is in the cache."""
+    from ..analysis import entry
 
     try:
-        return not motion_kernel.dispatcher._cache._cache_file._load_index()  # type: ignore[attr-defined]
+        return not getattr(entry, name).dispatcher._cache._cache_file._load_index()
     except Exception:  # internals of Numba: where they differ, say nothing
         return False
 

@@ -73,7 +73,7 @@ class Equilibrium:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
             out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
         out += [("speed", f"{k}: {v:.9g}") for k, v in self.speeds.items()]
-        out += [("preload", f"{k}: {v:.6g}") for k, v in self.preload.items()]
+        out += [("preload", f"{k}: {v + 0.0:.6g}") for k, v in self.preload.items()]
         return [*out, ("unbalanced", f"{self.unbalanced:.1g} of what acts")]
 
     def _positions(self) -> list[str]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 
-@dataclass
+@dataclass(repr=False)
 class LinearModel:
     """Linear equations of a mechanism about a state.
 
@@ -156,6 +156,23 @@ class LinearModel:
         title = f"u = -k y, u: {names[0]}, y: {names[1]}"
         return root_locus(self.root_locus(gains, input, output), gains, "k", title, path)
 
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: names, eigenvalues; of a single input and output poles, zeros and gain."""
+        out = []
+        for what in ("state", "input", "output"):
+            units = getattr(self, f"{what}_units")
+            for k, (name, unit) in enumerate(zip(getattr(self, f"{what}s"), units, strict=True)):
+                now = f", {self.output_values[k]:.6g} at the state itself" if what == "output" else ""
+                out.append((what, f"{name} [{unit}]{now}"))
+        if self.turning.any():
+            out.append(("seen from", f"a frame that turns with ({', '.join(f'{x:.4g}' for x in self.turning)}) rad/s"))
+        out += [("eigenvalues", f"{_written(w)} 1/s") for w in self.eigenvalues if w.imag >= 0.0]
+        if len(self.inputs) == len(self.outputs) == 1:
+            zeros, _, gain = self.transfer()
+            out += [("zeros", f"{_written(w)} 1/s") for w in zeros if w.imag >= 0.0]
+            out.append(("gain", f"{gain:.6g}: G(s) = gain prod(s - zeros) / prod(s - eigenvalues)"))
+        return out
+
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names."""
         matrices = {k: getattr(self, k) for k in ("A", "B", "C", "D", "mass", "damping", "stiffness")}
@@ -165,6 +182,9 @@ class LinearModel:
             out[what] = [{"name": n, "unit": u} for n, u in zip(getattr(self, what), units, strict=True)]
         out |= {k: None if X is None else X.tolist() for k, X in matrices.items()}
         return out | {"eigenvalues": [[float(w.real), float(w.imag)] for w in self.eigenvalues]}
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())
 
     def _place(self, what: str, names: tuple[str, ...], name: str | None) -> int:
         return names.index(self._named(what, names, name))
@@ -181,6 +201,13 @@ class LinearModel:
 
 def _plain(name: str) -> str:
     return "".join(c if c.isalnum() else "_" for c in name)
+
+
+def _written(w: complex) -> str:
+    """A number, or a complex pair."""
+    size = abs(w)
+    real = 0.0 if abs(w.real) < 1e-12 * size else w.real
+    return f"{real:.6g}" if abs(w.imag) < 1e-12 * size or not size else f"{real:.6g} +- {w.imag:.6g} i"
 
 
 def follow(roots: np.ndarray) -> np.ndarray:
