@@ -88,7 +88,11 @@ def equilibrium(
     if preload:
         x, found = preloaded(a, preload)
         return _finished(x, "preload", found)
-    x = Rest.at(a.compiled, a.t, a.q)
+    return _searched(Rest.at(a.compiled, a.t, a.q), stable)
+
+
+def _searched(x: Rest, stable: bool) -> Equilibrium:
+    """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
     way = "Newton's method"
     arrived = _newton(x)
     if arrived is None or (stable and _stability(arrived)[0] == UNSTABLE):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -209,23 +210,25 @@ def _crossings(ax: Axes, roots: np.ndarray, gains: np.ndarray, name: str) -> Non
     least = TOUCHING * np.abs(roots).max(initial=0.0)
     seen: list[complex] = []
     for branch in roots.T:
-        for k in np.flatnonzero(branch[:-1].real * branch[1:].real < 0.0):
-            a, b = branch[k], branch[k + 1]
+        off = np.flatnonzero(np.abs(branch.real) > least)
+        for k, n in pairwise(off):
+            a, b = branch[k], branch[n]
+            if a.real * b.real > 0.0:
+                continue
             f = a.real / (a.real - b.real)
             meet = (abs(a.imag) <= least) != (abs(b.imag) <= least)
             at = complex(0.0, 0.0 if meet else (a + f * (b - a)).imag)
-            known = any(abs(at - s) < 0.02 * abs(ax.get_ylim()[1]) for s in seen)
-            if at.imag < -least or max(abs(a.real), abs(b.real)) < least or known or len(seen) >= MOST:
+            if at.imag < -least or any(abs(at - x) < 0.02 * abs(ax.get_ylim()[1]) for x in seen) or len(seen) >= MOST:
                 continue
             seen.append(at)
-            value = f"≈ {gains[k] + f * (gains[k + 1] - gains[k]):.4g}"
-            value = f"from {gains[k]:.4g} to {gains[k + 1]:.4g}" if meet else value
-            ax.plot([0.0], [at.imag], "o", markersize=10, markerfacecolor="none", markeredgecolor=BAD, zorder=4)
-            place: dict[str, Any] = {
-                "textcoords": "offset points",
-                "bbox": {"color": "white", "alpha": 0.8, "pad": 0.5},
-            }
-            ax.annotate(f"{name} {value}", (0.0, at.imag), (9, 9), color=BAD, fontsize=9, **place)
+            value = f"≈ {gains[k] + f * (gains[n] - gains[k]):.4g}"
+            _ringed(ax, at, f"{name} from {gains[k]:.4g} to {gains[n]:.4g}" if meet else f"{name} {value}")
+
+
+def _ringed(ax: Axes, at: complex, text: str) -> None:
+    ax.plot([at.real], [at.imag], "o", markersize=10, markerfacecolor="none", markeredgecolor=BAD, zorder=4)
+    box = {"color": "white", "alpha": 0.8, "pad": 0.5}
+    ax.annotate(text, (at.real, at.imag), (9, 9), textcoords="offset points", bbox=box, color=BAD, fontsize=9)
 
 
 def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
