@@ -93,8 +93,12 @@ class SingularityError(AnalysisError):
 
 
 class NotConverged(AnalysisError):
-    """An iteration found no solution. ``residuals`` holds, for each body or element concerned, what is left."""
+    """An iteration found no solution. ``residuals`` holds, for each body or element concerned, what is left.
 
-    def __init__(self, message: str, residuals: dict | None = None) -> None:
+    ``series`` holds what a series reached before.
+    """
+
+    def __init__(self, message: str, residuals: dict | None = None, series: object = None) -> None:
         super().__init__(message)
         self.residuals = residuals or {}
+        self.series = series

@@ -14,10 +14,12 @@ if TYPE_CHECKING:
     from .analysis.mass import MassReport
     from .results.equilibrium import Equilibrium
     from .results.linear import LinearModel
+    from .results.locus import RootLocus
     from .results.modes import Modes
     from .results.optimum import Optimum
     from .results.result import Result
     from .results.sensitivity import Sensitivity
+    from .results.series import EquilibriumSeries
     from .results.singularities import Singularities
 
 
@@ -62,6 +64,21 @@ class Mechanism(Model):
         from .analysis.modes import modes
 
         return modes(self, **options)
+
+    def equilibria(self, parameter: str, values: Sequence[float], **options: Any) -> EquilibriumSeries:
+        """Equilibria over values of a parameter, each following from the one before.
+
+        See `flyball.analysis.series.equilibria` for the options.
+        """
+        from .analysis.series import equilibria
+
+        return equilibria(self, parameter, values, **options)
+
+    def root_locus(self, parameter: str, values: Sequence[float], **options: Any) -> RootLocus:
+        """Eigenvalues over values of a parameter; see `flyball.analysis.locus.root_locus` for the options."""
+        from .analysis.locus import root_locus
+
+        return root_locus(self, parameter, values, **options)
 
     def sensitivity(self, of: Sequence[str] = (), to: Sequence[str] = (), **options: Any) -> Sensitivity:
         """Derivatives of kinematics, reactions, equilibria, eigenvalues or motions by parameters.

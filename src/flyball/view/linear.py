@@ -122,6 +122,7 @@ def root_locus(
     parameter_name: str,
     title: str,
     path: str | os.PathLike | None = None,
+    known: Sequence[Any] | None = None,
 ) -> Any:
     """Eigenvalues over a gain or parameter as branches, from a cross to a dot; the stable half plane is shaded.
 
@@ -136,6 +137,8 @@ def root_locus(
     title : str
     path : path, optional
         Write a PNG, SVG or PDF file instead of returning the figure.
+    known : sequence of (value, eigenvalue), optional
+        The crossings, where they need not be interpolated.
     """
     roots, values = np.asarray(roots), np.asarray(gains, float)
     with _drawing():
@@ -147,7 +150,10 @@ def root_locus(
             ax.plot(branch.real[:1], branch.imag[:1], "x", color=color, markersize=7, markeredgewidth=1.8)
             ax.plot(branch.real[-1:], branch.imag[-1:], "o", color=color, markersize=5.5)
         _bounded(ax, roots)
-        _crossings(ax, roots, values, parameter_name)
+        if known is None:
+            _crossings(ax, roots, values, parameter_name)
+        for value, at in known or ():
+            _ringed(ax, at, f"{parameter_name} = {value:.5g}")
         for mark, own in (("x", values[:1]), ("o", values[-1:])):
             for g in own:
                 ax.plot([], [], mark, color="#555555", label=f"{parameter_name} = {g:.4g}")

@@ -1,0 +1,202 @@
+"""Quasi-static series: equilibria over values of a parameter, along one branch for as long as it lasts.
+
+Steps from value to value are taken by Newton's method where it contracts from its first step on (Deuflhard 2004,
+"Newton Methods for Nonlinear Problems", 2.1); elsewhere the step is halved. Where steps have become tiny the branch has
+ended, at a limit point say, and the forces push the mechanism to another equilibrium.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import AnalysisError, ModelError, NotConverged
+from ..model.expressions import number
+from ..model.model import Model, listing, suggest
+from ..results.equilibrium import UNSTABLE, Equilibrium
+from ..results.series import EquilibriumSeries, Jump
+from .compiled import compiled
+from .equilibrium import LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, _settled, _stability
+from .equilibrium import equilibrium as single
+from .rest import Rest
+
+HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
+CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
+NEAR = 0.02  # in the same: a branch that goes on within this has not ended but is steep there
+PUSH = 1e-2  # in radians or parts of the length
+TINY = 1e-7  # steps, in radians or parts of the length, that rounding may keep from becoming shorter
+
+
+def equilibria(
+    model: Model,
+    parameter: str,
+    values: Sequence[float] | np.ndarray,
+    *,
+    t: float | str = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    start: Equilibrium | None = None,
+    stable: bool = False,
+) -> EquilibriumSeries:
+    """Equilibria over values of a parameter, each following from the one before.
+
+    Where the branch ends, the series goes on from where the forces then lead; such jumps are told.
+
+    Parameters
+    ----------
+    model : Model
+    parameter : str
+        A parameter of the model, or ``"t"``: drivers and forces then change as their laws say.
+    values : sequence of float
+        In SI units, in the order in which they are gone through.
+    t, parameters, start
+        As for `flyball.analysis.equilibrium.equilibrium`; ``start`` is for the first value.
+    stable : bool
+        Leave a branch where it becomes unstable; else it is followed on.
+
+    Returns
+    -------
+    EquilibriumSeries
+
+    Raises
+    ------
+    NotConverged
+        If no equilibrium can be found at a value, or none that is stable; ``series`` holds those before.
+    ModelError
+        If there is no such parameter, or a value is not finite.
+    AssemblyError
+        If the mechanism cannot be assembled at the first value.
+    """
+    points = checked(model, parameter, values)
+    way = _Way(model, parameter, number(t, {}, "s", "t"), dict(parameters or {}), stable)
+    done = EquilibriumSeries(model.name, parameter, points[:0], [], way.jumps)
+    x: Rest | None = None
+    for k, value in enumerate(points):
+        before = len(way.jumps)
+        try:
+            if x is None:
+                first = single(model, start=start, stable=stable, **way.given(value))
+                x = way.rest(first)
+                done.equilibria.append(first)
+            else:
+                x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
+                how = "following" if len(way.jumps) == before else "descent"
+                done.equilibria.append(_finished(x, how, {}))
+        except NotConverged as error:
+            raise stopped(done, value, error) from error
+        done.values = points[: k + 1]
+    return done
+
+
+def checked(model: Model, parameter: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
+    """The values as an array; refuses unknown parameters and what is no number."""
+    known = [*model.parameters, "t"]
+    if parameter not in known:
+        raise ModelError(f"{model.name!r} has no parameter {parameter!r}{suggest(parameter, known)}; {listing(known)}")
+    points = np.atleast_1d(np.asarray(values, float))
+    if points.ndim != 1 or not len(points) or not np.isfinite(points).all():
+        raise ModelError(f"values of {parameter!r} must be finite numbers in SI units, one at least, got {values!r}")
+    return points
+
+
+def stopped(done: Any, value: float, error: AnalysisError) -> NotConverged:
+    """The error of a series that cannot go on, with what was reached."""
+    n = len(done.values)
+    reached = f"the last of {n} reached is {done.parameter} = {done.values[-1]:.6g}" if n else "none was reached"
+    return NotConverged(
+        f"the series over {done.parameter!r} stops at {done.parameter} = {value:.6g}; {reached}. {error}",
+        getattr(error, "residuals", None),
+        series=done,
+    )
+
+
+@dataclass
+class _Way:
+    """What stays the same along a series, and where it has jumped."""
+
+    model: Model
+    parameter: str
+    t: float
+    parameters: dict[str, float]
+    stable: bool
+    jumps: list[Jump] = field(default_factory=list)
+
+    def given(self, value: float) -> dict[str, Any]:
+        """Time and parameters at a value."""
+        if self.parameter == "t":
+            return {"t": value, "parameters": self.parameters}
+        return {"t": self.t, "parameters": {**self.parameters, self.parameter: float(value)}}
+
+    def rest(self, e: Equilibrium) -> Rest:
+        """An equilibrium as a place to go on from."""
+        a = e.assembly
+        return Rest.at(a.compiled, a.t, a.q)
+
+    def at(self, x: Rest, value: float) -> Rest:
+        """The same place under another value."""
+        given = self.given(value)
+        c = compiled(self.model, parameters=given["parameters"])
+        q, _ = c.take(x.c, x.t, x.q, np.zeros(len(x.scale)))
+        return Rest(c, given["t"], q, x.lam)
+
+    def follow(self, x: Rest, here: float, there: float, halvings: int) -> Rest:
+        """On from one value to another, along the branch or by a jump."""
+        y = _contracted(self.at(x, there))
+        if y is not None:
+            return y
+        if halvings:
+            middle = here + 0.5 * (there - here)
+            return self.follow(self.follow(x, here, middle, halvings - 1), middle, there, halvings - 1)
+        return self.jump(x, there, lambda: _over(x, self.at(x, there)))
+
+    def settled(self, x: Rest, value: float) -> Rest:
+        """The place itself, or where it leads where it must be stable and is not."""
+        if self.stable and _stability(x)[0] == UNSTABLE:
+            return self.jump(x, value, lambda: _pushed(x))
+        return x
+
+    def jump(self, x: Rest, value: float, begin: Callable[[], Rest]) -> Rest:
+        """Where the forces lead from an equilibrium that has ceased to be."""
+        downhill = _descent(begin())
+        y = None if downhill is None else _newton(downhill)
+        if y is None:
+            raise _failure(downhill or x)
+        if _apart(x, y) > NEAR:
+            self.jumps.append(Jump(float(value), _finished(x, "following", {}), _finished(y, "descent", {})))
+        return y
+
+
+def _apart(x: Rest, y: Rest) -> float:
+    """How far the bodies are from one place to another, in parts of the length or by the entries of their rotations."""
+    v = np.zeros(len(x.scale))
+    a, b = (r.c.moving(r.t, r.q, v) for r in (x, y))
+    length = x.c.values.length
+    return max(max(np.abs(a[k].p - b[k].p).max() / length, np.abs(a[k].R - b[k].R).max()) for k in a)
+
+
+def _over(x: Rest, y: Rest) -> Rest:
+    """A little way along the direction of least stiffness, to the side that the forces push to.
+
+    Just beyond a limit point forces are too small to lead out of its neighbourhood.
+    """
+    _, _, _, direction, _ = _stability(x)
+    y = y.closed()
+    side = -1.0 if float(direction @ y.r) > 0.0 else 1.0
+    return y.moved(PUSH * side * direction / np.abs(direction).max(), 0.0 * y.lam).closed()
+
+
+def _contracted(x: Rest) -> Rest | None:
+    """Newton's method where it contracts from its first step on: what it finds is near; else None."""
+    last = LONGEST
+    for k in range(NEWTON):
+        step, lam = x.step()
+        size = np.abs(step).max(initial=0.0)
+        allowed = last if k == 0 else max(CONTRACTING * last, TINY)
+        if not size <= allowed:
+            return None
+        x, last = x.moved(step, lam), size
+        if size <= TINY**0.5 and _settled(x):
+            return x
+    return None
