@@ -51,7 +51,6 @@ def equilibrium(
 
     Parameters
     ----------
-    model : Model
     t : float [s]
         Time at which laws of forces and drivers are taken.
     parameters : mapping, optional

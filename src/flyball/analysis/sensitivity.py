@@ -68,7 +68,6 @@ def sensitivity(
 
     Parameters
     ----------
-    model : Model
     of : sequence of str
         Sensors, or curves of a result (``"slider.x"``). For ``"modes"`` none: all eigenvalues.
     to : sequence of str
