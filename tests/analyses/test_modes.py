@@ -79,3 +79,18 @@ def test_questions_that_make_no_sense():
         chain(2).modes(count=0)
     with pytest.raises(fb.AnalysisError, match="not in equilibrium"):
         rod(1.0).modes()
+
+
+def test_fewer_freedoms_than_asked_for():
+    """A row of 210 hanging parallelograms moves in one way: as many cranks and bars over again."""
+    n = 210
+    m = fb.Mechanism("row", planar=True, gravity=(0, -G))
+    for k in range(n + 1):
+        m.add(fb.Body(f"crank {k}", mass=1, inertia=1 / 12, position=(k, -0.5)))
+        m.add(fb.Revolute(f"A{k}", "ground", f"crank {k}", at=(k, 0)))
+        if k:
+            m.add(fb.Body(f"bar {k}", mass=1, inertia=1 / 12, position=(k - 0.5, -1)))
+            m.add(fb.Revolute(f"B{k}", f"crank {k - 1}", f"bar {k}", at=(k - 1, -1)))
+            m.add(fb.Revolute(f"C{k}", f"bar {k}", f"crank {k}", at=(k, -1)))
+    square = G * ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
+    assert m.modes(count=5).omega == pytest.approx([np.sqrt(square)], rel=1e-8)
