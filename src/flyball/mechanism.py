@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .analysis.mobility import Mobility
     from .results.result import Result
 
 
@@ -37,6 +38,12 @@ class Mechanism(Model):
         from .analysis.check import check
 
         return check(self)
+
+    def mobility(self, **options: Any) -> Mobility:
+        """Freedoms and redundant sets by name, with cures; see `flyball.analysis.mobility.mobility` for the options."""
+        from .analysis.mobility import mobility
+
+        return mobility(self, **options)
 
     def mass_properties(self, **options: Any) -> MassReport:
         """Masses, inertias and principal axes; see `flyball.analysis.mass.mass_properties` for the options."""
