@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from .model.model import Model
@@ -26,6 +27,12 @@ class Mechanism(Model):
         from .analysis.dynamics import simulate
 
         return simulate(self, t_end, **options)
+
+    def kinematics(self, times: int | Sequence[float] = 501, **options: Any) -> Result:
+        """Motion that drivers prescribe; see `flyball.analysis.kinematics.kinematics` for the options."""
+        from .analysis.kinematics import kinematics
+
+        return kinematics(self, times, **options)
 
     def assemble(self, **options: Any) -> Assembly:
         """Consistent positions and velocities near those described."""

@@ -68,7 +68,7 @@ def four_bar_driven(law: str = "1 + 6*t", ground=0.5, crank=0.2, coupler=0.5, ro
     for name, p, q, mass in (("crank", a, b, 1.0), ("coupler", b, c, 1.5), ("rocker", d, c, 0.8)):
         flat = planar_rod(name, p, q, mass)
         if space:
-            flat = fb.Body(name, mass=mass, inertia=(0.01, 0.02, flat.inertia), position=(*flat.position, 0),
+            flat = fb.Body(name, mass=mass, inertia=(1e-4, flat.inertia, flat.inertia), position=(*flat.position, 0),
                            orientation=(0, 0, flat.angle))  # fmt: skip
         m.add(flat)
     for name, i, j, at in (("A", "ground", "crank", a), ("B", "crank", "coupler", b), ("C", "coupler", "rocker", c),

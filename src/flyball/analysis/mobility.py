@@ -155,7 +155,12 @@ class Mobility:
 
 
 def mobility(
-    model: Model, a: Assembly | None = None, *, t: float = 0.0, parameters: Mapping[str, float] | None = None
+    model: Model,
+    a: Assembly | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    inertia: bool = False,
 ) -> Mobility:
     """Freedoms and redundancy at a position.
 
@@ -168,6 +173,8 @@ def mobility(
     t : float [s]
     parameters : mapping, optional
         Values of parameters in SI units, in place of the model's.
+    inertia : bool
+        Refuse bodies that can move without any inertia: where forces are to move them, they could not.
 
     Returns
     -------
@@ -176,7 +183,7 @@ def mobility(
     Raises
     ------
     ModelError
-        If a body can move without any inertia.
+        If a body can move without any inertia and may not.
     AssemblyError
         If velocities disagree though positions do not depend on one another.
     """
@@ -194,7 +201,7 @@ def mobility(
     G, size, scale = scaled_jacobian(c)
     nr, nv = (int(n) for n in G.shape)
     rank, dependent, motions = _dense(G.toarray()) if max(nr, nv) <= DENSE else _sparse(G)
-    if S.glob[SEMIDEFINITE] > 0.0:
+    if inertia and S.glob[SEMIDEFINITE] > 0.0:
         _check_inertia(model, a, _massless(a, G, scale) if motions is None else motions * scale[:, None])
     names: list[str] = []
     for k in np.flatnonzero(np.abs(dependent).max(axis=1, initial=0.0) > 1e-6).tolist():
