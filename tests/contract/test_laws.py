@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from flyball._jit import kernel
 from flyball.model.expressions import FUNCTIONS, Expression
-from flyball.system.laws import evaluate, evaluate_jet
+from flyball.system.laws import entire, evaluate, evaluate_jet
 from flyball.system.opcodes import BY_MOTION
 from flyball.system.program import compile_law
 
@@ -243,3 +243,24 @@ def test_long_sums_are_fine():
     law = Law(" + ".join(terms))
     assert law.value(0.3) == pytest.approx(sum(math.sin(0.3 * k) for k in range(150)))
     assert law.depth == 3
+
+
+@pytest.mark.parametrize(
+    ("law", "smooth"),
+    [
+        ("10*t/3 + sin(2*t)**2 - cosh(t)", True),
+        ("exp(-t)*atan(t) - 2**3*t", True),
+        ("1/t", False),
+        ("t/(1 + t)", False),
+        ("abs(t)", False),
+        ("where(t > 1, 1, 0)", False),
+        ("step(t, 0, 0, 1, 1)", False),
+        ("sqrt(t)", False),
+        ("t**(-2)", False),
+        ("tan(t)", False),
+    ],
+)
+def test_only_laws_without_jumps_and_kinks_are_entire(law, smooth):
+    code, const = [], []
+    at, _ = compile_law(Expression.parse(law), ("t",), (), code, const)
+    assert entire(np.array(code), at) is smooth

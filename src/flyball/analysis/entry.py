@@ -11,6 +11,7 @@ from ..numerics.integrators.tableaux import tableau
 from ..numerics.ldl import ldl_factor
 from ..system.follow import follow
 from ..system.motion import arrive, derivative, move, place, remember, report
+from ..system.residual import residuals
 from ..system.tables import COORDINATES, System, Work
 
 POSITION, MOTION, INTEGRATE, FOLLOW = range(4)
@@ -60,6 +61,12 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
     status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
     y[:] = Y[0]
     return status, clock.K[0]
+
+
+@kernel
+def residual_kernel(S, W, t, state, vdot, lam, steps, out):
+    """The equations at states near one state, see ``residuals``; compiled for complex numbers, when first needed."""
+    residuals(held(S), held(W), t, state, vdot, lam, steps, out)
 
 
 @kernel

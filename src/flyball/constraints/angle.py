@@ -44,6 +44,6 @@ def row(par, F, M, hint, data):
     o = 0.0 * par[0]
     bias = dot(n, sub(M[4], F[4])) + dot(n1, w)
     theta = atan2(s, c)
-    if par[0] > 0.5:
+    if par[0].real > 0.5:
         theta = unwrapped(theta, hint)
     return theta - par[6], (o, o, o), n, neg(n), bias

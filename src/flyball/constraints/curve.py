@@ -23,8 +23,8 @@ PASSES = 8
 @formula
 def point(par, s, data):
     """Position, first and second derivative of the curve at s: (x, x', x'', y, y', y'')."""
-    x, x1, x2 = spline(data, int(par[1]), s)
-    y, y1, y2 = spline(data, int(par[2]), s)
+    x, x1, x2 = spline(data, int(par[1].real), s)
+    y, y1, y2 = spline(data, int(par[2].real), s)
     return x, x1, x2, y, y1, y2
 
 

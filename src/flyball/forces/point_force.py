@@ -24,7 +24,7 @@ def inputs(par, F, M):
 @formula
 def in_world(par, F, M, laws):
     """The laws as components along the world's axes, or along the body's where par[0] says so."""
-    if par[0] > 0.5:
+    if par[0].real > 0.5:
         return mv(M[1], laws)
     return laws
 

@@ -155,6 +155,24 @@ class Model:
             last = e
         return last
 
+    def replace(self, e: Element) -> Any:
+        """Put a part in place of the one of its name and kind, and check it. Returns the new part.
+
+        Raises
+        ------
+        ModelError
+            If there is no such part, or a number makes no sense.
+        """
+        old = self[e.name]
+        if old.category != e.category:
+            raise ModelError(f"{e.title} cannot take the place of {old.title}")
+        self._check_references(e)
+        self.validate(e, self.environment())
+        parts = getattr(self, e.category)
+        parts[parts.index(old)] = e
+        self._names[e.name] = e
+        return e
+
     def _check_name(self, e: Element) -> None:
         if isinstance(e, Initial):
             if any(i.name == e.name for i in self.initial):

@@ -24,7 +24,7 @@ class Energy:
     def kinetic(self) -> np.ndarray:
         """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
         r, S = self._result.records, self._result.values.system
-        total = np.zeros(len(self._result.t))
+        total = r.zeros()
         for b in range(len(S.body_i)):
             _, R, w, v, _, _ = r.body(b)
             w_B = mtv(R, w)
@@ -35,7 +35,7 @@ class Energy:
     def gravity(self) -> np.ndarray:
         """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
         r, S = self._result.records, self._result.values.system
-        total = np.zeros(len(self._result.t))
+        total = r.zeros()
         for b in range(len(S.body_i)):
             total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
         return total
@@ -43,7 +43,7 @@ class Energy:
     @cached_property
     def elastic(self) -> np.ndarray:
         """Energy stored in springs."""
-        return sum((self._result[f.name].energy for f in self._result.model.forces), np.zeros(len(self._result.t)))
+        return sum((self._result[f.name].energy for f in self._result.model.forces), self._result.records.zeros())
 
     @property
     def potential(self) -> np.ndarray:
@@ -75,7 +75,7 @@ class Energy:
         """Total energy less all work put in less the total at the start: zero for an exact motion."""
         if not len(self._result.t):
             return np.zeros(0)
-        put_in = sum(self.work.values(), np.zeros(len(self._result.t)))
+        put_in = sum(self.work.values(), self._result.records.zeros())
         residue = self.total - put_in
         return residue - residue[0]
 

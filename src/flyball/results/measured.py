@@ -38,8 +38,7 @@ class Measured:
         return out
 
     def _found(self, m: int) -> tuple[np.ndarray, np.ndarray]:
-        n = self._result.records.n
-        value, rate = np.zeros(n), np.zeros(n)
+        value, rate = self._result.records.zeros(), self._result.records.zeros()
         for k in self._terms[m]:
             F, M, (g, f, tM, tF, _) = term(self._result, k)
             c = coefficient(self._result, k)
@@ -51,7 +50,7 @@ class Measured:
     def slots(self) -> np.ndarray:
         """What laws read: (3, slots, n), values first, then rates as values of their own."""
         n = len(self._result.values.structure.measured)
-        out = np.zeros((3, 2 * n, self._result.records.n))
+        out = self._result.records.zeros(3, 2 * n)
         if self._result.values.structure.slots:
             for m in range(n):
                 out[0, m], out[1, m] = self.quantity(m)

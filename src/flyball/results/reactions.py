@@ -49,7 +49,7 @@ class Reactions:
     def _of_rows(self, joint: str) -> Wrench:
         """What the joint's own rows do."""
         result, s = self._result, self._result.values.structure
-        force, torque = nothing(result.records.n)
+        force, torque = nothing(result.records)
         for k in s.terms_of.get(joint, ()):
             t = s.terms[k]
             _, _, (_, f, tM, tF, _) = term(result, k)
@@ -108,7 +108,7 @@ class Reactions:
     def _inertial(self) -> SimpleNamespace:
         """Kinematics, and gravity less what each body needs to move as it does."""
         S, records = self._result.values.system, self._result.records
-        W = SimpleNamespace(BK=records.W.BK, FB=np.zeros((len(S.body_i), 6, records.n)))
+        W = SimpleNamespace(BK=records.W.BK, FB=records.zeros(len(S.body_i), 6))
         gravity = tuple(S.glob[:3])
         for b in range(len(S.body_i)):
             _, R, w, _, alpha, a = records.body(b)
@@ -140,7 +140,7 @@ class Reactions:
         The row of such a driver is q - f(t, s): along s it acts with -df/ds times its multiplier.
         """
         result, s = self._result, self._result.values.structure
-        out = [np.zeros(result.records.n) for _ in s.measured]
+        out = [result.records.zeros() for _ in s.measured]
         for f in s.forces:
             if isinstance(f, CoordinateForce):
                 m, effort = result[f.name].pushes()
@@ -153,10 +153,10 @@ class Reactions:
     def _slope(self, law: int, slot: int) -> np.ndarray:
         """Derivative of a driver's law by a sensor."""
         result, S = self._result, self._result.values.system
-        stack = np.zeros((result.values.structure.depth + 1 + STACK_RESERVE, 3))
         sensed = result.measured.slots
+        stack = np.zeros((result.values.structure.depth + 1 + STACK_RESERVE, 3), result.records.dtype)
         slopes = [
             evaluate_jet(S.code, S.const, law, stack, float(t), sensed[:, :, i], slot)[1]
             for i, t in enumerate(result.t)
         ]
-        return np.array(slopes, float)
+        return np.array(slopes)

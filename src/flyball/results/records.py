@@ -34,9 +34,8 @@ class Records:
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
-        self.W = SimpleNamespace(
-            BK=np.zeros((nb, 24, self.n)), X=np.zeros((nv, 6, self.n)), O=np.zeros((nb, 3, self.n))
-        )
+        self.dtype = np.result_type(q, v, vdot, S.body_x, S.frame_x, S.const)  # complex for derivatives
+        self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
         for b in range(nb):
             pose(S, self.W, b, q.T)
             motion(S, self.W, b, v.T)
@@ -44,6 +43,10 @@ class Records:
         self._frames: dict[int, Record] = {}
         self._names = {b: name for name, b in x.structure.place.items() if b >= 0}
         self._wound = wound or {}
+
+    def zeros(self, *shape: int) -> np.ndarray:
+        """Nothing yet, at every time."""
+        return np.zeros((*shape, self.n), self.dtype)
 
     def _accelerate(self, vdot: np.ndarray) -> None:
         """Make the bias accelerations in W.BK true ones.
@@ -88,7 +91,7 @@ class Records:
         """Record of a point and axes carried by body b (-1: ground)."""
         if b >= 0:
             return carried(self.body(b), offset, turn)
-        zero = np.zeros(self.n)
+        zero = self.zeros()
         p, R, *rest = at_rest(offset, turn, zero)
         return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
 
@@ -98,7 +101,7 @@ class Records:
         It is the drawn angle in the drawn configuration and goes on from there, whichever coordinates are below.
         """
         if b < 0:
-            return np.zeros(self.n)
+            return self.zeros()
         return self._angles[self._names[b]] - self._wound.get(self._names[b], 0.0)
 
     @cached_property

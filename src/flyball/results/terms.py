@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ..constraints.registry import FORMULAS
 from ..math.vec import neg, scale
 from ..model.joint import Joint
 from ..system.rows import COEFFICIENT, parameters
-from .records import Record, coordinate_frames, turned
+from .records import Record, Records, coordinate_frames, turned
 
 if TYPE_CHECKING:
     from .result import Result
@@ -46,7 +44,7 @@ def along(result: Result, joint: Joint, what: str) -> Wrench:
     return scale(c.sign, force), scale(c.sign, torque)
 
 
-def nothing(n: int) -> Wrench:
-    """No wrench at all, at n times."""
-    zero = np.zeros(n)
+def nothing(records: Records) -> Wrench:
+    """No wrench at all, at every time."""
+    zero = records.zeros()
     return (zero,) * 3, (zero,) * 3

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..math.scalar import atan2, rounded
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
@@ -104,8 +105,8 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
         if b >= 0 and S.body_i[b, TREE] == PLANAR:
             out[name] = q[S.body_i[b, Q0] + 2]
         elif b >= 0:
-            near, angle = x.bodies[name].angle + since[b], np.arctan2(W.BK[b, 6], W.BK[b, 3])
-            out[name] = angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+            near, angle = x.bodies[name].angle + since[b], atan2(W.BK[b, 6], W.BK[b, 3])
+            out[name] = angle + 2.0 * np.pi * rounded((near - angle) / (2.0 * np.pi))
     return out
 
 

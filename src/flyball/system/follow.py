@@ -28,7 +28,7 @@ from ..numerics.integrators.explicit import (
     H,
     T,
 )
-from .laws import evaluate_jet
+from .laws import entire, evaluate_jet
 from .motion import arrive, write_row
 from .rows import BY_TIME
 from .solve import magnitude
@@ -117,6 +117,8 @@ def leaps(S, W, law, t, h, span, turns):
 
     By Hermite's and Simpson's rule, to EVEN; over a step that cannot be much shorter, by more than they can add up to.
     """
+    if entire(S.code, law):
+        return False
     f0, v0, a0 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
     _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
     f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)

@@ -44,24 +44,35 @@ BLURRED = 1e-6  # where redundancy leaves a reaction open, rounding over the reg
 
 
 @formula
-def returned(S, W):
-    """Loads that follow from the reactions now in W, into row RETURNED; the largest relative change."""
-    worst = 0.0
-    small = NOTHING * force_scale(S, W)
+def reaction_loads(S, W):
+    """Loads that follow from the reactions now in W, into row RETURNED."""
     for k in range(S.force_i.shape[0]):
         n = S.force_i[k, FORCE_LOAD]
         if n < 0:
             continue
-        force = (0.0, 0.0, 0.0)
-        torque = (0.0, 0.0, 0.0)
+        o = 0.0 * W.row[LAM, 0]
+        force = (o, o, o)
+        torque = (o, o, o)
         for x in range(S.load_i.shape[0]):
             if S.load_i[x, 0] == n:
                 term = S.load_i[x, 1]
                 c = W.row[LAM, S.term_i[term, TERM_ROW]] * S.term_x[term, COEFFICIENT]
                 force = add(force, scale(c, load3(W.T, term, 0)))
                 torque = add(torque, scale(c, load3(W.T, term, 3)))
-        new = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
-        W.sensed[RETURNED, n] = new
+        W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
+
+
+@formula
+def returned(S, W):
+    """Loads that follow from the reactions now in W, into row RETURNED; the largest relative change."""
+    reaction_loads(S, W)
+    worst = 0.0
+    small = NOTHING * force_scale(S, W)
+    for k in range(S.force_i.shape[0]):
+        n = S.force_i[k, FORCE_LOAD]
+        if n < 0:
+            continue
+        new = W.sensed[RETURNED, n]
         change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
         if not change <= worst:
             worst = change

@@ -168,6 +168,30 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
 
 
 @formula
+def entire(code, at):
+    """Whether a law is made of functions of time alone that have derivatives of every order everywhere.
+
+    Sums, products, quotients by constants, whole powers, sines and the like: it can neither jump nor have a kink.
+    """
+    for i in range(at + 2, at + 2 + 2 * code[at], 2):
+        operation = code[i]
+        operand = code[i + 1]
+        if operation == CALL:
+            smooth = operand == SIN or operand == COS or operand == NEGATE or operand == EXP or operand == TANH
+            if not (smooth or operand == SINH or operand == COSH or operand == ATAN):
+                return False
+        elif operation == WHOLE_POWER:
+            if operand < 0:
+                return False
+        elif operation == DIVIDE:
+            if code[i - 2] != CONSTANT:
+                return False
+        elif not (operation <= INPUT or operation == FREEZE or ADD <= operation <= MULTIPLY):
+            return False
+    return True
+
+
+@formula
 def put(stack, k, f, f1, f2):
     """Write one row of the stack."""
     stack[k, 0] = f

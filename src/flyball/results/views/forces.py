@@ -60,12 +60,12 @@ class ForceView(View):
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Values of a law over time."""
         if at < 0:
-            return np.zeros(len(a))
+            return self._result.records.zeros()
         s, S, t = self._x.structure, self._x.system, self._result.t
-        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3))
+        stack = np.zeros((s.depth + 1 + STACK_RESERVE, 3), self._result.records.dtype)
         sensed = self._result.measured.slots
         x = np.stack([t, a, b], axis=1)
-        out = np.zeros(len(t))
+        out = self._result.records.zeros()
         for i in range(len(t)):
             try:
                 out[i] = evaluate(S.code, S.const, at, stack, tuple(x[i]), sensed[:, :, i])
@@ -114,7 +114,7 @@ class ForceView(View):
         """Potential energy stored in it [J]."""
         e = self.element
         if e.energy is None:
-            return np.zeros(len(self._result.t))
+            return self._result.records.zeros()
         if isinstance(e, CoordinateForce):
             return e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
         self._between()

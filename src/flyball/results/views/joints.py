@@ -8,6 +8,7 @@ import numpy as np
 
 from ...constraints import angle
 from ...constraints.registry import FORMULAS
+from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
 from ...system.forest import step_of
@@ -49,12 +50,12 @@ class JointView(View):
             (self._heading(k) + r.angle(int(S.frame_i[k])), self._heading(k) + r.drawn_angle(int(S.frame_i[k])))
             for k in (i, j)
         )
-        return there - here - TURN * np.round((drawn_there - drawn_here) / TURN)
+        return there - here - TURN * rounded((drawn_there - drawn_here) / TURN)
 
-    def _heading(self, frame: int) -> float:
+    def _heading(self, frame: int) -> Any:
         """In the plane: the way that a frame's x axis points in its body."""
         R = self._x.system.frame_x[frame, 3:]
-        return float(np.arctan2(R[3], R[0]))
+        return atan2(R[3].item(), R[0].item())
 
     def __getattr__(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...math.scalar import atan2
 from ...model.body import GROUND, Body, Frame
 from ...model.geometry import matrix_to_quaternion
 from .base import View, stacked
@@ -60,7 +61,7 @@ class PointView(View):
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
             raise AttributeError(f"{self.element.title} moves in space and has no single angle; use rotation")
-        return self._result.records.angle(self._body) + np.arctan2(self._turn[1, 0], self._turn[0, 0])
+        return self._result.records.angle(self._body) + atan2(self._turn[1, 0].item(), self._turn[0, 0].item())
 
     @property
     def angular_velocity(self) -> np.ndarray:
