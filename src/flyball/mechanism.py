@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .analysis.mobility import Mobility
+    from .results.inverse import InverseDynamics
     from .results.result import Result
 
 
@@ -33,6 +34,14 @@ class Mechanism(Model):
         from .analysis.kinematics import kinematics
 
         return kinematics(self, times, **options)
+
+    def inverse_dynamics(
+        self, times: int | Sequence[float] = 501, motion: Any = None, **options: Any
+    ) -> InverseDynamics:
+        """Efforts and reactions; see `flyball.analysis.inverse_dynamics.inverse_dynamics` for the options."""
+        from .analysis.inverse_dynamics import inverse_dynamics
+
+        return inverse_dynamics(self, times, motion, **options)
 
     def assemble(self, **options: Any) -> Assembly:
         """Consistent positions and velocities near those described."""

@@ -29,6 +29,8 @@ TOLERANCE = 1e-8  # singular values below this part of the largest count as zero
 DENSE = 1500  # velocities up to which the rank comes from a singular value decomposition
 WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
 SHOWN = 64  # dependencies of a large mechanism whose elements are named
+CHANGED = 1e-6  # part of the largest that a self-stress does to a component, below which it leaves it alone
+COMPONENTS = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
 LINES = 12  # of a kind that are printed
 
 
@@ -340,33 +342,43 @@ def _check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
     )
 
 
-def undetermined(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, tuple[str, ...]]:
-    """Reaction components (world axes, on body_j) that self-stresses ``lam`` (nr, k) can change, of these elements."""
+def self_stresses(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, np.ndarray]:
+    """Wrenches (6, k) on ``body_j`` at the joint's point there that each of the self-stresses ``lam`` (nr, k) makes.
+
+    World axes, torques divided by the mechanism's length. The mechanism has been evaluated at the position.
+    """
     from ..constraints.registry import FORMULAS
     from ..system.records import load
     from ..system.rows import parameters
 
     c = a.compiled
     s, S, W = c.structure, c.values.system, c.work
-    out = {}
-    planar = s.model.planar
-    labels = ["force x", "force y", "force z", "torque x", "torque y", "torque z"]
-    wrenches: dict[str, np.ndarray] = {n: np.zeros((6, lam.shape[1])) for n in names}
+    out = {n: np.zeros((6, lam.shape[1])) for n in names}
     for name in names:
         for k in s.terms_of[name]:
             t = s.terms[k]
             par = parameters(S.term_x, k)
             hint = c.z[t.hint] if t.hint >= 0 else 0.0
-            _, f, tM, _, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
-            w = np.r_[f, np.array(tM) / c.values.length] * par[7]
-            wrenches[name] += np.outer(w, lam[t.row])
+            _, f, tM, tF, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
+            force, torque = np.array(f), np.array(tM)
+            if s.frames[t.M].role != "M":  # measured from M to F
+                force, torque = -force, np.array(tF)
+            out[name] += np.outer(np.r_[force, torque / c.values.length] * par[7], lam[t.row])
+    return out
+
+
+def undetermined(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, tuple[str, ...]]:
+    """Reaction components (world axes, on body_j) that self-stresses ``lam`` (nr, k) can change, of these elements."""
+    planar = a.compiled.structure.model.planar
+    wrenches = self_stresses(a, lam, names)
     largest = max(np.abs(w).max() for w in wrenches.values())
+    out = {}
     for name, w in wrenches.items():
-        free = np.abs(w).max(axis=1) > 1e-6 * largest
+        free = np.abs(w).max(axis=1) > CHANGED * largest
         if planar:
             free[[2, 3, 4]] = False
         text = tuple(
-            x if not planar else x.replace("torque z", "torque") for x, f in zip(labels, free, strict=True) if f
+            x if not planar else x.replace("torque z", "torque") for x, f in zip(COMPONENTS, free, strict=True) if f
         )
         if text:
             out[name] = text
