@@ -13,7 +13,10 @@ if TYPE_CHECKING:
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .analysis.mobility import Mobility
+    from .results.equilibrium import Equilibrium
     from .results.inverse import InverseDynamics
+    from .results.linear import LinearModel
+    from .results.modes import Modes
     from .results.result import Result
 
 
@@ -48,6 +51,30 @@ class Mechanism(Model):
         from .analysis.assemble import assemble
 
         return assemble(self, **options)
+
+    def equilibrium(self, **options: Any) -> Equilibrium:
+        """A static equilibrium near the mechanism as described, and whether it is stable.
+
+        See `flyball.analysis.equilibrium.equilibrium` for the options.
+        """
+        from .analysis.equilibrium import equilibrium
+
+        return equilibrium(self, **options)
+
+    def linearize(self, inputs: Sequence[str] = (), outputs: Sequence[str] = (), **options: Any) -> LinearModel:
+        """Linear equations about an equilibrium or a steady motion, with named inputs and outputs.
+
+        See `flyball.analysis.linearize.linearize` for the options.
+        """
+        from .analysis.linearize import linearize
+
+        return linearize(self, inputs, outputs, **options)
+
+    def modes(self, **options: Any) -> Modes:
+        """Natural motions about an equilibrium or a steady motion; see `flyball.analysis.modes.modes`."""
+        from .analysis.modes import modes
+
+        return modes(self, **options)
 
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -26,6 +26,7 @@ class Compiled:
     values: Values
     work: Work
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
+    parameters: dict[str, float] = field(default_factory=dict)  # values in place of the model's own
 
     @property
     def structure(self) -> Structure:
@@ -161,7 +162,7 @@ def compiled(
     w = work(s, x.system)
     w.option[STABILIZE] = NONE
     w.option[PASS] = 1e-13
-    return Compiled(x, w, _places(x))
+    return Compiled(x, w, _places(x), dict(parameters or {}))
 
 
 def _places(x: Values) -> np.ndarray:

@@ -8,7 +8,7 @@ nothing in them is solved. Directions that no equation sees together are taken i
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import ModelError
 from ..system.structure import Structure
 from ..system.tables import EFFORT, FORCE_ALONG, FORCE_F, FORCE_LAW, FORCE_M, LAM, NV, X_SOLVED, System, Work
-from ..system.values import work
+from ..system.values import Values, values, work
 from .compiled import Compiled
 from .entry import MOTION, residual_kernel
 
@@ -111,12 +111,26 @@ class Equations:
 
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model, (width,), the state's numbers held."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        return self._run(steps, as_complex(self.stepped(name).system))[0].imag / STEP
+
+    def stepped(self, name: str) -> Values:
+        """Numbers of the mechanism, a complex step along a parameter."""
         c = self.state.c
-        value = c.values.parameters[name]
-        changed = c.changed(c.values.parameters | {name: complex(value, STEP)})
-        system = as_complex(changed.system)
-        steps = np.zeros((1, 3 * c.structure.nv + 1), complex)
-        return self._run(steps, system)[0].imag / STEP
+        value = c.structure.model.environment(c.parameters)[name]
+        return values(c.structure, c.parameters | {name: complex(value, STEP)})  # type: ignore[arg-type]
+
+    def by_law(self, name: str) -> np.ndarray:
+        """Derivatives by a parameter that stands in laws only, (width,)."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        return self._run(steps, self.stepped_law(name).system)[0].imag / STEP
+
+    def stepped_law(self, name: str) -> Values:
+        """The same for a parameter that stands in laws only."""
+        c = self.state.c
+        system = as_complex(c.values.system)
+        system.const[list(c.structure.model.parameters).index(name)] += 1j * STEP
+        return replace(c.values, system=system)
 
     @cached_property
     def _system(self) -> tuple[System, Work]:
@@ -182,7 +196,7 @@ def refuse_functions(s: Structure) -> None:
 def as_complex(system: System) -> System:
     """The same tables in complex numbers."""
     parts = {k: x for k, x in system._asdict().items() if isinstance(x, np.ndarray) and x.dtype == np.float64}
-    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})
+    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})  # type: ignore[arg-type]
 
 
 def pattern(s: Structure, S: System) -> Any:

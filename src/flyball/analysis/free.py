@@ -49,6 +49,7 @@ class Free:
     chosen_v: np.ndarray
     scale: np.ndarray
     left: np.ndarray  # (f, nv): takes the chosen coordinates' changes from those of all
+    on_positions: np.ndarray  # (m,): which rows are constraints on positions
 
     @property
     def labels(self) -> list[str]:
@@ -61,9 +62,15 @@ class Free:
         bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ T.T}
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """The smallest velocities x with rows x = right, (nv, ...)."""
-        return self.scale[:, None] * np.linalg.lstsq(self.rows * self.scale, right, rcond=TOLERANCE)[0]
+    def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """The smallest x (nv, n) with rows x = right; the rows are all of them if not given."""
+        A = self.rows if rows is None else rows
+        return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=TOLERANCE)[0]
+
+    @staticmethod
+    def unseen(x: np.ndarray, basis: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """The x that differs by the basis' motions and is zero in the chosen rows."""
+        return x - basis @ x[chosen]
 
 
 def free(e: Equations) -> Free:
@@ -78,7 +85,8 @@ def free(e: Equations) -> Free:
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
     Z, chosen = _basis(holonomic, scale)
     Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale)
-    return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, np.eye(s.nv)[chosen])
+    left, on_positions = np.eye(s.nv)[chosen], np.r_[which, np.ones(len(given), bool)]
+    return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, on_positions)
 
 
 def prescribed(c: Compiled) -> np.ndarray:

@@ -23,7 +23,7 @@ from .dynamics import moved
 from .entry import FOLLOW, INTEGRATE
 from .freedoms import told
 from .geometry import positions_nearby
-from .mobility import Mobility, mobility, motions_of, rank_of, scaled_jacobian
+from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
 from .options import Options, output_times
 from .start import Start, begin_at
 
@@ -241,6 +241,8 @@ def _locked(start: Start, error: SimulationError) -> SingularityError | None:
     if base is not own:
         q, v = base.take(own, t, q, v)
     base.at(t, q, v)
+    if base.structure.nv > DENSE:
+        return None
     U, d, _ = np.linalg.svd(scaled_jacobian(base)[0].toarray(), full_matrices=False)
     n = base.structure.nv
     if len(d) < n or d[n - 1] > NARROW * d[0]:

@@ -1,12 +1,14 @@
 """The linear equations of motion with the constraints taken out: first order, and M, D, K where there is a second.
 
-Perturbed, the equations of motion and the constraints at a state are, with x a change of position along the velocities
-and u one of velocity, both co-moving (see ``steady``):
+With x a change of position along the velocities, u one of velocity, both seen from an evenly turning frame (see
+``steady``), and inputs w, the perturbed kinematics, equations of motion and constraints at a state are
 
-    x' + H x = u + N x,    M (u' + H u) + D u + K x - G^T l = -r_u d,    G x = -g_u d,    G u + V x = -n_u d
+    x' + H x = u + N x,    M (u' + H u) + D u + K x + r_w w = G^T l,
+    G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0
 
 K holds everything that forces, inertia and *reactions* do when positions change: joint forces turn with the bodies, so
-it is not the stiffness of the springs. With x = Z a and u = Zv b - G^+ V Z a the multipliers drop out.
+it is not the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out.
+Inputs that move the mechanism act through their rates too.
 """
 
 from __future__ import annotations
@@ -39,46 +41,85 @@ class Frame:
 
 
 @dataclass
+class Inputs:
+    """What m inputs do to the equations at a fixed state: r_w (nv, m), g_w (holonomic rows, m), n_w (all rows, m)."""
+
+    r: np.ndarray
+    g: np.ndarray
+    n: np.ndarray
+
+
+@dataclass
 class Reduced:
-    """x' = A x of the independent changes x = (a, b), and how all others follow from them.
+    """Linear equations in the changes s = (a, b) of the free coordinates and velocities, and the inputs.
+
+    Every array has columns for s (n), inputs, their first and their second rates (m each).
 
     Attributes
     ----------
-    A : ndarray (n, n)
-    position, velocity : ndarray (nv, n)
-        Changes of all positions and velocities per unit of x.
+    rate : ndarray (n, n + 3 m)
+        s' as it follows from s and the inputs.
+    position, velocity, acceleration, multipliers : ndarray
+        Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
     M, D, K : ndarray (f, f) or None
         M a'' + D a' + K a = 0 where all constraints are on positions.
     """
 
-    A: np.ndarray
+    rate: np.ndarray
     position: np.ndarray
     velocity: np.ndarray
-    M: np.ndarray | None
-    D: np.ndarray | None
-    K: np.ndarray | None
-    mass: np.ndarray  # M along the velocities that are free
+    acceleration: np.ndarray
+    multipliers: np.ndarray
+    M: np.ndarray | None = None
+    D: np.ndarray | None = None
+    K: np.ndarray | None = None
+
+    @property
+    def A(self) -> np.ndarray:
+        """System matrix, s' = A s without inputs."""
+        return self.rate[:, : len(self.rate)]
+
+    def inputs(self, part: np.ndarray) -> list[np.ndarray]:
+        """Columns of the inputs, of their first and of their second rates."""
+        return np.split(part[:, len(self.rate) :], 3, axis=1)
 
 
-def reduced(e: Equations, f: Free, frame: Frame) -> Reduced:
-    """Take the constraints out."""
-    r = e.at["r"]
+def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Reduced:
+    """Take the constraints out.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        If something free moves without inertia.
+    """
+    r, nv = e.at["r"], len(f.scale)
     M, D, K = (X[r].toarray() for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((len(f.rows) - e.residual[e.at["n"]].size, len(M)))])
-    Z, Zv, H = f.Z, f.Zv, frame.H
-    P = -f.solve(V @ Z) if V.any() else np.zeros_like(Z)
-    u = np.hstack([P, Zv])
-    x = np.hstack([Z, np.zeros_like(Zv)])
-    a_dot = f.left @ (u + (frame.N - H) @ x)
-    mass = Zv.T @ M @ Zv
-    forces = Zv.T @ (M @ (P @ a_dot) + (M @ H + D) @ u + K @ x)
-    b_dot = -np.linalg.solve(mass, forces) if len(mass) else np.zeros((0, x.shape[1]))
-    second: tuple = (None, None, None)
-    if Zv.shape == Z.shape:
-        turned = (H - frame.N) @ Z  # u = Z a' + turned a
-        second = (
-            Z.T @ M @ Z,
-            Z.T @ (M @ turned + M @ H @ Z + D @ Z),
-            Z.T @ (M @ H @ turned + D @ turned + K @ Z),
-        )
-    return Reduced(np.vstack([a_dot, b_dot]), x, u, *second, mass)
+    H, N = frame.H, frame.N
+    given = len(f.rows) - e.block("n").size
+    V = np.vstack([e.by_position[e.at["n"]].toarray(), np.zeros((given, nv))])
+    w = w or Inputs(np.zeros((nv, 0)), np.zeros((len(f.holonomic), 0)), np.zeros((len(f.rows), 0)))
+    none = np.zeros_like(w.r)
+    rates = np.zeros((len(f.rows), w.g.shape[1]))
+    rates[f.on_positions] = w.g
+    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.chosen)
+    P, U, U1 = (
+        f.unseen(-f.solve(b), f.Zv, f.chosen_v) if b.any() else np.zeros((nv, b.shape[1]))
+        for b in (V @ f.Z, V @ X + w.n, rates)
+    )
+    x = np.hstack([f.Z, np.zeros_like(f.Zv), X, none, none])
+    u = np.hstack([P, f.Zv, U, U1, none])
+    a_dot = f.left @ (u + (N - H) @ x)
+    known = P @ a_dot + np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), none, U, U1])
+    acting = np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), w.r, none, none])
+    others = (M @ H + D) @ u + K @ x + acting
+    b_dot = -np.linalg.solve(f.Zv.T @ M @ f.Zv, f.Zv.T @ (M @ known + others)) if f.Zv.shape[1] else a_dot[:0]
+    acceleration = f.Zv @ b_dot + known + H @ u
+    left = M @ (acceleration - H @ u) + others
+    multipliers = np.linalg.lstsq((f.rows * f.scale).T, f.scale[:, None] * left, rcond=1e-12)[0]
+    out = Reduced(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers)
+    if f.Zv.shape == f.Z.shape:
+        turned = (H - N) @ f.Z  # u = Z a' + turned a
+        out.M = f.Z.T @ M @ f.Z
+        out.D = f.Z.T @ (M @ turned + (M @ H + D) @ f.Z)
+        out.K = f.Z.T @ ((M @ H + D) @ turned + K @ f.Z)
+    return out

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..results.records import Records
+from ..system.names import velocity_names
 from ..system.tables import TREE, V0
 from ..system.tree import FREE, PLANAR, column, quaternion_at
 from .derivatives import Equations, State
@@ -92,7 +93,7 @@ def seen_from(x: State, e: Equations, f: Free) -> Frame:
     """
     still = np.zeros((len(x.v),) * 2)
     if not (np.abs(x.v) / f.scale).max(initial=0.0) > STILL * np.sqrt(1.0 + np.abs(x.vdot / f.scale).max(initial=0.0)):
-        _refuse_accelerated(x, e, f)
+        balanced(x, e)
         return Frame(np.zeros(3), still, still)
     for frame in frames(x):
         if is_steady(x, e, f, frame):
@@ -104,19 +105,27 @@ def seen_from(x: State, e: Equations, f: Free) -> Frame:
     )
 
 
-def _refuse_accelerated(x: State, e: Equations, f: Free) -> None:
-    """Refuse a state at rest that does not stay there."""
+def balanced(x: State, e: Equations) -> None:
+    """Refuse a state at rest that does not stay there.
+
+    Raises
+    ------
+    AnalysisError
+        Naming what is accelerated most.
+    """
+    names = velocity_names(x.c.structure)
+    scale = np.array([1.0 if n.unit == "m" else 1.0 / x.c.values.length for n in names])
     M = e.by_acceleration[e.at["r"]]
-    left = np.abs(f.scale * (M @ x.vdot))
+    left = np.abs(scale * (M @ x.vdot))
     rows, r = e.by_position[e.at["g"]], e.at["r"]
-    total = left.max(initial=0.0) + np.abs(f.scale * (rows.T @ x.lam)).max(initial=0.0)
-    total += np.abs(f.scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
+    total = left.max(initial=0.0) + np.abs(scale * (rows.T @ x.lam)).max(initial=0.0)
+    total += np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
     if left.max(initial=0.0) <= BALANCED * total:
         return
     d = int(np.argmax(left))
     raise AnalysisError(
-        f"the mechanism is not in equilibrium where it is: {f.names[d].name} is accelerated with "
-        f"{f.names[d].sign * x.vdot[d]:.3g} {f.names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
+        f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
+        f"{names[d].sign * x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
         f"about=m.equilibrium()"
     )
 

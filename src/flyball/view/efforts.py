@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from textwrap import wrap
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 
 NOTHING = 1e-9  # reactions below this part of the largest are rounding
 NAMED = 8
+WIDTH = 120  # letters of a line
 
 
 def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) -> Any:
@@ -45,22 +47,32 @@ def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) 
         sizes = {k: np.nanmax(np.abs(v), initial=0.0) for k, (u, v) in rest.items() if u == unit}
         least = NOTHING * _scale(found) * (1.0 if unit == "N" else found.result.values.length)
         shown = [k for k, size in sizes.items() if size > least][: 2 * MOST]
-        free = [k for k in sizes if np.isnan(rest[k][1]).any()]
-        more = f" and {len(free) - NAMED} more" if len(free) > NAMED else ""
-        note = f"undetermined, not drawn: {', '.join(free[:NAMED])}{more}" if free else ""
         if shown:
-            parts.append(Panel(what, tuple(Channel(k, unit, rest[k][1]) for k in shown), note))
-        elif note and parts:
-            last = parts[-1]
-            parts[-1] = Panel(last.label, last.curves, "; ".join(x for x in (last.note, note) if x))
+            parts.append(Panel(what, tuple(Channel(k, unit, rest[k][1]) for k in shown)))
     if not parts:
         raise ModelError(
             f"{found.result.model.name!r}: there is no drive, and the motion determines no reaction to draw"
         )
     with _drawing():
         drawing = _stacked(found.result, parts)
+        if note := _undrawn(rest):
+            drawing.supxlabel(note, fontsize=8, x=0.012, ha="left")
         _headed(drawing, f"{found.result.model.name}: inverse dynamics")
         return _handed_out(drawing, path)
+
+
+def _undrawn(curves: dict[str, tuple[str, np.ndarray]]) -> str:
+    """What is undetermined, joint by joint."""
+    free: dict[str, list[str]] = {}
+    for name, (_, values) in curves.items():
+        if np.isnan(values).any():
+            joint, _, what = name.rpartition(".")
+            free.setdefault(joint, []).append(what)
+    if not free:
+        return ""
+    told = "; ".join(f"{joint} {', '.join(what)}" for joint, what in list(free.items())[:NAMED])
+    more = f"; and {len(free) - NAMED} more joints" if len(free) > NAMED else ""
+    return "\n".join(wrap(f"undetermined by redundancy, not drawn: {told}{more}", WIDTH))
 
 
 def _scale(found: InverseDynamics) -> float:

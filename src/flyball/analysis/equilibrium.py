@@ -1,0 +1,199 @@
+"""Static equilibrium: where forces and reactions balance at rest, from a guess; whether it is stable.
+
+Newton's method on r(q, lam) = -f - G^T lam = 0, g(q) = 0 with the exact stiffness K (reactions turn with the bodies).
+Where it does not lead on, pseudo-transient continuation: a motion without inertia, evenly damped, whose steps grow as
+it comes to rest (Kelley and Keyes 1998). It goes the way that the forces push, so it ends in stable equilibria.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..errors import NotConverged
+from ..model.expressions import number
+from ..model.model import Model
+from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
+from ..system.names import velocity_names
+from .assemble import Assembly, assemble
+from .curves import snapshot
+from .derivatives import Equations, State
+from .free import Free, free
+from .preload import preloaded
+from .rest import Rest
+
+NEWTON, DESCENT = 40, 400  # steps
+LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
+BALANCED = 1e-9  # forces left, of those that act
+CLOSED = 1e-10  # of the mechanism's length
+SOFT, HARD, STUCK = 1e-4, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
+NEUTRAL = 1e-8  # stiffness below this part of what acts is none
+SHOWN = 6
+
+
+def equilibrium(
+    model: Model,
+    *,
+    t: float | str = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    start: Equilibrium | None = None,
+    stable: bool = False,
+    preload: Sequence[str] = (),
+) -> Equilibrium:
+    """A static equilibrium near the mechanism as described.
+
+    Drivers hold their coordinates where they are at ``t``. Velocities, dampers and inertia play no part.
+
+    Parameters
+    ----------
+    model : Model
+    t : float [s]
+        Time at which laws of forces and drivers are taken.
+    parameters : mapping, optional
+        Values in SI units in place of the model's.
+    start : Equilibrium, optional
+        Guess in place of the described positions: an equilibrium of the same mechanism.
+    stable : bool
+        Go on from an unstable equilibrium the way the forces push, to a stable one.
+    preload : sequence of str
+        Forces, by the names that `linearize` takes for inputs: instead of moving the mechanism, find what has to be
+        added to them for it to be in equilibrium where it is drawn.
+
+    Returns
+    -------
+    Equilibrium
+
+    Raises
+    ------
+    AssemblyError
+        If the mechanism cannot be assembled.
+    NotConverged
+        If there is none to be found: the message says what remains unbalanced. ``residuals`` holds, for each velocity,
+        the force or torque left.
+    """
+    a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
+    if start is not None:
+        q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
+        a = Assembly(a.compiled, a.t, q, np.zeros(a.compiled.structure.nv))
+    if preload:
+        x, found = preloaded(a, preload)
+        return _finished(x, "preload", found)
+    x = Rest.at(a.compiled, a.t, a.q)
+    way = "Newton's method"
+    arrived = _newton(x)
+    if arrived is None or (stable and _stability(arrived)[0] == UNSTABLE):
+        way = "descent"
+        downhill = _descent(x if arrived is None else _pushed(arrived))
+        arrived = None if downhill is None else _newton(downhill)
+        if arrived is None:
+            raise _failure(downhill or x)
+    return _finished(arrived, way, {})
+
+
+def _newton(x: Rest) -> Rest | None:
+    """Newton's method with steps of limited length; None where it does not settle."""
+    for _ in range(NEWTON):
+        step, lam = x.step()
+        longest = np.abs(step).max(initial=0.0)
+        if not np.isfinite(longest):
+            return None
+        x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
+        if longest < LONGEST and _settled(x):
+            return x
+    return None
+
+
+def _settled(x: Rest) -> bool:
+    return x.open() <= CLOSED and np.abs(x.r).max(initial=0.0) <= BALANCED * x.size
+
+
+def _pushed(x: Rest) -> Rest:
+    """A little way along the direction of least stiffness."""
+    _, _, _, direction, _ = _stability(x)
+    return x.moved(1e-2 * direction / np.abs(direction).max(), 0.0 * x.lam).closed()
+
+
+def _descent(x: Rest) -> Rest | None:
+    """Pseudo-transient continuation on the constraints; None where it gets no further."""
+    x = x.closed()
+    damping, left = HARD, np.abs(x.r).max(initial=0.0)
+    for _ in range(DESCENT):
+        if damping < SOFT or left <= BALANCED * x.size:
+            return x
+        step, lam = x.step(damping)
+        longest = np.abs(step).max(initial=0.0)
+        along = float(step @ -x.r)
+        if not along > 0.0 or longest > LONGEST:  # against the forces, or too far
+            damping *= 4.0
+            if damping > STUCK:
+                return None
+            continue
+        x = x.moved(step, lam).closed()
+        before, left = left, np.abs(x.r).max(initial=0.0)
+        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+    return None
+
+
+def _stability(x: Rest) -> tuple[str, Free, np.ndarray, np.ndarray, float]:
+    """(kind, freedoms, their stiffness, direction of least stiffness in scaled velocities, that stiffness)."""
+    e = Equations(State.resting(x.c, x.t, x.q, x.lam))
+    f = free(e)
+    if not f.Z.shape[1]:
+        return STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf
+    K = f.Z.T @ e.by_position[e.at["r"]] @ f.Z
+    Z, _ = np.linalg.qr(f.Z / x.scale[:, None])
+    own = Z.T @ x.K @ Z
+    w, V = np.linalg.eigh(0.5 * (own + own.T))
+    least = w[0] / x.size
+    kind = UNSTABLE if least < -NEUTRAL else MARGINAL if least <= NEUTRAL else STABLE
+    if np.abs(own - own.T).max() > NEUTRAL * x.size:  # no potential: divergence and flutter show in the motion
+        kind = _by_motion(e, f)
+    return kind, f, K, Z @ V[:, 0], float(least)
+
+
+def _by_motion(e: Equations, f: Free) -> str:
+    """Stability by the eigenvalues, damping included."""
+    r = e.at["r"]
+    M, D, K = (f.Z.T @ X[r] @ f.Z for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    n = len(M)
+    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
+    w = np.linalg.eigvals(A)
+    growth = w.real.max() / max(np.abs(w).max(), 1e-300)
+    return UNSTABLE if growth > NEUTRAL**0.5 else MARGINAL if growth > -(NEUTRAL**0.5) else STABLE
+
+
+def _finished(x: Rest, way: str, preload: dict[str, float]) -> Equilibrium:
+    kind, f, K, direction, least = _stability(x)
+    names = velocity_names(x.c.structure)
+    large = np.argsort(-np.abs(direction))[:SHOWN]
+    x.c.at(x.t, x.q, np.zeros(len(x.scale)))
+    return Equilibrium(
+        t=x.t,
+        stability=kind,
+        freedoms=tuple(f.labels),
+        stiffness=K,
+        weakest={names[d].name: float(direction[d]) for d in large if abs(direction[d]) > 1e-3},
+        least=least,
+        unbalanced=x.unbalanced(),
+        method=way,
+        parameters=dict(x.c.parameters),
+        result=snapshot(State.resting(x.c, x.t, x.q, x.lam)),
+        assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
+        preload=preload,
+    )
+
+
+def _failure(x: Rest) -> NotConverged:
+    """What remains where the search ended."""
+    left = x.equations.block("r")
+    names = velocity_names(x.c.structure)
+    residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    d = int(np.argmax(np.abs(x.r)))
+    unit = "N" if names[d].unit == "m" else "N*m"
+    return NotConverged(
+        f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {-left[d]:.3g} {unit} push "
+        f"along {names[d].name} and nothing holds against it. Give a better guess, or add what has to hold it: a "
+        f"spring, a stop, a driver",
+        residuals,
+    )

@@ -1,0 +1,192 @@
+"""Linear equations of motion about an equilibrium or a steady motion, with named inputs and outputs.
+
+Perturbed by inputs w, the reduced equations (see ``reduced``) read x' = A x + B0 w + B1 w' + B2 w''. Inputs that move
+the mechanism (drivers, lengths) act through their rates too, because the constraints hold for positions, velocities and
+accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the rates out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.model import Model
+from ..results.linear import LinearModel
+from .compiled import compiled
+from .curves import curve, slopes, snapshot
+from .derivatives import Equations, State
+from .free import Free, free, refuse_singular
+from .inputs import Input, with_inputs
+from .instant import instant
+from .reduced import Frame, Inputs, Reduced, reduced
+from .steady import kinematic, seen_from
+
+IMPROPER = 1e-9  # part of the largest number below which an output does not follow the rate of an input
+
+
+def linearize(
+    model: Model,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    about: Any = None,
+    t: float | str = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    coordinates: str = "auto",
+    frozen: bool = False,
+) -> LinearModel:
+    """Linear equations about an equilibrium or a steady motion.
+
+    Exact: the stiffness includes what reactions, inertia and gyroscopic terms do when positions change, constraints are
+    taken out without loss, and the derivatives are complex steps through the formulas of the simulation. A steady
+    motion (a turning governor, a conical pendulum, a rolling wheel) is seen from the evenly turning frame in which it
+    is steady.
+
+    Parameters
+    ----------
+    model : Model
+    inputs : sequence of str
+        Forces, torques and motors that have a law (``"push.x"`` where it has components): what is added to it;
+        drivers: what is added to their law; parameters.
+    outputs : sequence of str
+        Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``.
+    about : Result or Equilibrium, optional
+        Where: the end of a motion, or an equilibrium; else as described and assembled at ``t``.
+    t : float [s]
+    parameters : mapping, optional
+        Values in SI units in place of the model's.
+    coordinates : str
+        ``"auto"``, ``"absolute"`` or ``"joint"``: those that the states are changes of.
+    frozen : bool
+        The equations of this very instant, of a motion that need not be steady: their eigenvalues tell little.
+
+    Returns
+    -------
+    LinearModel
+
+    Raises
+    ------
+    AnalysisError
+        If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
+    SingularityError
+        At a singular position.
+    ModelError
+        If an input, output or parameter does not exist, or something moves without inertia.
+    """
+    if isinstance(inputs, str) or isinstance(outputs, str):
+        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
+    model, named = with_inputs(x.c.structure.model, inputs)
+    if named:
+        x = _in_copy(model, x)
+    e, f, frame = _about(x, frozen)
+    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+
+
+def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:
+    """The reduced linear equations at a state; errors as those of `linearize`."""
+    e, f, frame = _about(x, frozen)
+    return f, frame, _reduced(e, f, frame, None)
+
+
+def _about(x: State, frozen: bool) -> tuple[Equations, Free, Frame]:
+    e = Equations(x)
+    f = free(e)
+    refuse_singular(e, f)
+    still = np.zeros((len(x.v),) * 2)
+    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+
+
+def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
+    try:
+        return reduced(e, f, frame, inputs)
+    except np.linalg.LinAlgError:
+        M = f.Zv.T @ e.by_acceleration[e.at["r"]] @ f.Zv
+        k = int(np.argmin(np.abs(np.diag(M))))
+        raise ModelError(
+            f"nothing with inertia moves along {f.names[f.chosen_v[k]].name}: there is no linear equation of motion; "
+            f"give it a mass or a moment of inertia"
+        ) from None
+
+
+def _in_copy(model: Model, x: State) -> State:
+    """The same state of a copy of the model, whose laws have inputs."""
+    c = compiled(model, parameters=x.c.parameters, tree=x.c.structure.tree)
+    c.follow(x.c.hints)
+    return State.moving(c, x.t, x.q, x.v)
+
+
+def _effects(e: Equations, f: Free, inputs: list[Input]) -> Inputs:
+    """What the inputs do to the equations."""
+    prescribed = list(e.state.c.structure.prescribed)
+    by = [e.by_law(i.parameter) if i.parameter != i.name else e.by_parameter(i.name) for i in inputs]
+    W = np.array(by).reshape(len(inputs), e.width).T
+    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed])
+    given = given.reshape(len(prescribed), len(inputs))
+    g = np.vstack([W[e.at["g"]], given])[f.on_positions]
+    return Inputs(W[e.at["r"]], g, np.vstack([W[e.at["n"]], 0.0 * given]))
+
+
+def _outputs(e: Equations, r: Reduced, inputs: list[Input], names: Sequence[str]) -> np.ndarray:
+    """Outputs by the states, the inputs and their rates, (outputs, n + 3 m)."""
+    n = len(r.rate)
+    parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers)]
+    out = slopes(e.state, names, parts)
+    for k, i in enumerate(inputs):
+        values = e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
+        out[n + k] = slopes(e.state, names, [part[n + k : n + k + 1] for part in parts], values)[0]
+    return out.T
+
+
+def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
+    """A, B, C, D in the state in which rates of inputs do not appear."""
+    A, n = r.A, len(r.rate)
+    B, B1, B2 = r.inputs(r.rate)
+    C, (D, D1, D2) = y[:, :n], r.inputs(y)
+    shift = B1 + A @ B2
+    largest = 1.0 + np.abs(y).max(initial=0.0)
+    for rate, part in (("rate", D1 + C @ B2), ("second rate", D2)):
+        bad = np.argwhere(np.abs(part) > IMPROPER * largest)
+        if len(bad):
+            k, i = bad[0]
+            raise ModelError(
+                f"output {outputs[k]!r} follows the {rate} of input {inputs[i].name!r}, which no state-space model "
+                f"can; leave out one of the two"
+            )
+    return [A, B + A @ shift, C, D + C @ shift]
+
+
+def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
+    x, s = e.state, e.state.c.structure
+    shot = snapshot(x)
+    curves = [curve(shot, name) for name in outputs]
+    A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
+    named = [f.names[d] for d in f.chosen]
+    rates = [f.names[d] for d in f.chosen_v]
+    sign = np.array([n.sign for n in (*named, *rates)])
+    own = sign[: len(named)]
+    second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
+    return LinearModel(
+        name=s.model.name,
+        A=sign[:, None] * A * sign,
+        B=sign[:, None] * B,
+        C=C * sign,
+        D=D,
+        states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates)),
+        state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates)),
+        inputs=tuple(i.name for i in inputs),
+        input_units=tuple(i.unit for i in inputs),
+        outputs=tuple(outputs),
+        output_units=tuple(unit for unit, _ in curves),
+        output_values=np.array([float(values[0]) for _, values in curves]),
+        mass=second[0],
+        damping=second[1],
+        stiffness=second[2],
+        turning=frame.turning,
+        t=x.t,
+        motion=r.position[:, : len(sign)] * sign,
+        point=shot,
+    )

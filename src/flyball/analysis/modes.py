@@ -1,0 +1,129 @@
+"""Modes: eigenvalues and shapes of the linear equations, dense for all of them, sparse for the lowest of many.
+
+For large mechanisms at rest without damping, K x - G^T l = w^2 M x, G x = 0 is solved as it stands, by Lanczos
+iterations with shift and invert (Ericsson and Ruhe 1980): nothing is reduced, so sparse matrices stay sparse.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import AnalysisError, ModelError
+from ..model.model import Model
+from ..results.modes import STILL, Modes
+from ..system.names import velocity_names
+from .curves import snapshot
+from .derivatives import Equations, State
+from .instant import instant
+from .linearize import without_inputs
+from .steady import balanced
+
+DENSE = 600  # velocities up to which all modes are found
+RIGID = 1e-6  # shift, of the largest stiffness over the largest mass
+FEW = 10
+UNDAMPED = 1e-12
+
+
+def modes(
+    model: Model,
+    *,
+    about: Any = None,
+    t: float | str = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    coordinates: str = "auto",
+    count: int | None = None,
+    frozen: bool = False,
+) -> Modes:
+    """Natural motions about an equilibrium or a steady motion.
+
+    Parameters
+    ----------
+    model, about, t, parameters, coordinates, frozen
+        As for `flyball.analysis.linearize.linearize`.
+    count : int, optional
+        How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
+
+    Returns
+    -------
+    Modes
+
+    Raises
+    ------
+    AnalysisError, SingularityError, ModelError
+        As for `linearize`.
+    """
+    if count is not None and count < 1:
+        raise ModelError(f"count must be at least 1, got {count!r}")
+    x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
+    if len(x.v) > DENSE and x.c.structure.tree:
+        x, _ = instant(model, about, t=t, parameters=parameters, coordinates="absolute")
+    if len(x.v) > DENSE and not np.abs(x.v).max() > 0.0:
+        return _sparse(x, count or FEW)
+    f, frame, r = without_inputs(x, frozen)
+    w, V = np.linalg.eig(r.A) if len(r.A) else (np.zeros(0, complex), np.zeros((0, 0)))
+    one = np.flatnonzero(w.imag >= 0.0)
+    one = one[np.lexsort((-w[one].real, np.abs(w[one])))][:count]
+    shapes = r.position[:, : len(r.A)] @ V[:, one]
+    return _made(x, w[one].astype(complex), shapes, frame.turning)
+
+
+def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray) -> Modes:
+    names = velocity_names(x.c.structure)
+    length = np.array([1.0 if n.unit == "m" else x.c.values.length for n in names])
+    sign = np.array([n.sign for n in names])
+    for k in range(shapes.shape[1]):
+        size = length * np.abs(shapes[:, k])
+        if size.max(initial=0.0) > 0.0:
+            shapes[:, k] /= shapes[np.argmax(size), k]
+    largest = np.abs(w).max(initial=0.0)
+    w = np.where(np.abs(w.imag) <= STILL * largest, w.real, w) + 0j
+    own = sign[:, None] * shapes
+    units = tuple(n.unit for n in names)
+    return Modes(w, own, tuple(n.name for n in names), units, turning, snapshot(x))
+
+
+def _sparse(x: State, count: int) -> Modes:
+    """The slowest modes of a large mechanism at rest."""
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import LinearOperator, eigsh, splu
+
+    e = Equations(x)
+    balanced(x, e)
+    r = e.at["r"]
+    M, D, K = (X[r].tocsc() for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    if abs(D).max() > UNDAMPED * abs(K).max():
+        raise AnalysisError(
+            f"{x.c.structure.model.name!r} has {len(x.v)} velocities and damping; modes of so large a mechanism are "
+            f"found without damping only. Take the dampers out, or ask for coordinates='joint' if these are few"
+        )
+    G = e.by_position[e.at["g"]]
+    size = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
+    G = sp.diags(1.0 / np.where(size > 0.0, size, 1.0)) @ G
+    typical = abs(K).max()
+    shift = -RIGID * typical / abs(M).max()
+    symmetric = 0.5 * (K + K.T)
+    if abs(K - K.T).max() > 1e-8 * typical:
+        raise AnalysisError(
+            f"{x.c.structure.model.name!r} has {len(x.v)} velocities and forces without a potential, which turn with "
+            f"bodies; modes of so large a mechanism are found without them only"
+        )
+    n, m = len(x.v), G.shape[0]
+    A = sp.bmat([[symmetric - shift * M, G.T * typical], [G * typical, -1e-11 * typical * sp.identity(m)]]).tocsc()
+    solve = splu(A)
+
+    def invert(b: np.ndarray) -> np.ndarray:
+        b = np.r_[b.ravel(), np.zeros(m)]
+        y = solve.solve(b)
+        exact = sp.bmat([[symmetric - shift * M, G.T * typical], [G * typical, None]])
+        return (y + solve.solve(b - exact @ y))[:n]
+
+    inverse = LinearOperator((n, n), matvec=invert, dtype=float)
+    start = invert(M @ np.random.default_rng(0).standard_normal(n))
+    squares, V = eigsh(symmetric, k=count, M=M, sigma=shift, OPinv=inverse, which="LM", v0=start)
+    order = np.argsort(squares)
+    w = np.sqrt(squares[order].astype(complex))
+    w = np.where(squares[order] < 0.0, w.imag + 0j, 1j * w.real)
+    return _made(x, w, V[:, order].astype(complex), np.zeros(3))

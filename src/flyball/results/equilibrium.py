@@ -1,0 +1,97 @@
+"""A static equilibrium: where it is, what everything carries there, and whether it is stable."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .result import Result
+
+STABLE, MARGINAL, UNSTABLE = "stable", "marginal", "unstable"
+
+
+@dataclass
+class Equilibrium:
+    """A mechanism at rest under its forces. ``equilibrium["A.fx"]`` is what a curve of the result is there.
+
+    Attributes
+    ----------
+    stability : str
+        ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness,
+        in which reactions turn with the bodies; where forces have no potential, by the eigenvalues too.
+    freedoms : tuple of str
+        Coordinates that the stiffness belongs to.
+    stiffness : ndarray (f, f)
+        Of those.
+    weakest : dict
+        Direction of least stiffness: coordinate -> part.
+    least : float
+        That stiffness: energy per square of the mechanism's length or radian, as part of what acts.
+    preload : dict
+        Force -> what had to be added to its law [its unit].
+    unbalanced : float
+        The largest force left, as part of what acts.
+    method : str
+        What found it.
+    result : Result
+        Everything by name, as a result with one time.
+    """
+
+    t: float
+    stability: str
+    freedoms: tuple[str, ...]
+    stiffness: np.ndarray
+    weakest: dict[str, float]
+    least: float
+    unbalanced: float
+    method: str
+    parameters: dict[str, float]
+    result: Result = field(repr=False)
+    assembly: Any = field(repr=False)
+    preload: dict[str, float] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> Any:
+        """A curve's value there, or a part of the result."""
+        found = self.result[name]
+        return float(found[0]) if isinstance(found, np.ndarray) else found
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        out = [("equilibrium", f"{self.stability}, found by {self.method}"), ("time", f"{self.t:g} s")]
+        out += [("position", text) for text in self._positions()]
+        if self.freedoms:
+            parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
+            out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
+        out += [("preload", f"{k}: {v:.6g}") for k, v in self.preload.items()]
+        return [*out, ("unbalanced", f"{self.unbalanced:.1g} of what acts")]
+
+    def _positions(self) -> list[str]:
+        axes = ("x", "y", "angle") if self.result.planar else ("x", "y", "z")
+        bodies = [b.name for b in self.result.model.bodies]
+        return [
+            f"{b}: " + ", ".join(f"{a} {self[f'{b}.{a}']:.6g} {'rad' if a == 'angle' else 'm'}" for a in axes)
+            for b in bodies[:12]
+        ] + ([f"and {len(bodies) - 12} more bodies"] if len(bodies) > 12 else [])
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names, all curves included."""
+        kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "parameters")
+        out = {k: getattr(self, k) for k in kept}
+        out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist()}
+        curves = self.result.channels().items()
+        return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}
+
+    def html(self) -> str:
+        """The mechanism where it is, as the animation page's text."""
+        return self.result.html()
+
+    def to_html(self, path: str | os.PathLike) -> None:
+        """Write the page that shows the mechanism where it is."""
+        self.result.to_html(path)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())

@@ -1,0 +1,184 @@
+"""A linear model: x' = A x + B u, y = C x + D u, with names and units for everything."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.model import listing, suggest
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+@dataclass
+class LinearModel:
+    """Linear equations of a mechanism about a state.
+
+    The states are changes of as many coordinates as there are freedoms, then changes of their rates. Where inputs move
+    the mechanism (drivers), the states are shifted by multiples of the inputs.
+
+    Attributes
+    ----------
+    A, B, C, D : ndarray
+        x' = A x + B u, y = C x + D u; inputs and outputs are changes too.
+    states, inputs, outputs : tuple of str
+    state_units, input_units, output_units : tuple of str
+    output_values : ndarray
+        Outputs at the state itself.
+    mass, damping, stiffness : ndarray (f, f) or None
+        M, D and K of M a'' + D a' + K a = 0 in the first f states; None where constraints are on velocities only.
+    turning : ndarray (3,) [rad/s]
+        Angular velocity of the frame that the states are seen from, zero about an equilibrium.
+    t : float [s]
+    motion : ndarray (nv, n)
+        Changes of all positions along the mechanism's velocities, per unit of each state.
+    point : Result
+        The state itself, as a result with one time.
+    """
+
+    name: str
+    A: np.ndarray
+    B: np.ndarray
+    C: np.ndarray
+    D: np.ndarray
+    states: tuple[str, ...]
+    state_units: tuple[str, ...]
+    inputs: tuple[str, ...]
+    input_units: tuple[str, ...]
+    outputs: tuple[str, ...]
+    output_units: tuple[str, ...]
+    output_values: np.ndarray
+    mass: np.ndarray | None
+    damping: np.ndarray | None
+    stiffness: np.ndarray | None
+    turning: np.ndarray
+    t: float
+    motion: np.ndarray = field(repr=False)
+    point: Result = field(repr=False)
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """Eigenvalues of A [1/s], by imaginary, then real part."""
+        found = np.linalg.eigvals(self.A)
+        return found[np.lexsort((found.real, np.abs(found.imag)))]
+
+    def to_control(self) -> Any:
+        """The model as ``control.StateSpace``; its names have ``_`` in place of points and blanks.
+
+        Raises
+        ------
+        ImportError
+            If the package ``control`` is not installed.
+        """
+        try:
+            import control
+        except ImportError as error:
+            raise ImportError("this needs the package control: pip install 'flyball[control]'") from error
+        names = {k: [_plain(name) for name in getattr(self, k)] for k in ("states", "inputs", "outputs")}
+        return control.ss(self.A, self.B, self.C, self.D, name=_plain(self.name), **names)
+
+    def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
+        """Zeros, poles [1/s] and gain of a transfer function; the only input and output if not named.
+
+        G(s) = gain prod(s - zeros) / prod(s - poles). The zeros are the finite eigenvalues of the pencil ([A b; c d],
+        [I 0; 0 0]) (Emami-Naeini and Van Dooren 1982), the gain is found from G far from all of them.
+        """
+        from scipy.linalg import eigvals
+
+        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        n = len(self.A)
+        b, c, d = self.B[:, [i]], self.C[[k]], self.D[[k]][:, [i]]
+        poles = np.linalg.eigvals(self.A)
+        pencil, E = np.block([[self.A, b], [c, d]]), np.zeros((n + 1, n + 1))
+        E[:n, :n] = np.eye(n)
+        size = 1.0 + np.abs(poles).max(initial=0.0)
+        zeros = eigvals(pencil, E)
+        zeros = zeros[np.isfinite(zeros)]
+        zeros = zeros[np.abs(zeros) < 1e6 * size]
+        s = 1j * 2.0 * (size + np.abs(zeros).max(initial=0.0))
+        value = (c @ np.linalg.solve(s * np.eye(n) - self.A, b) + d)[0, 0]
+        gain = value * np.prod(s - poles) / np.prod(s - zeros)
+        return zeros, poles, float(gain.real)
+
+    def response(self, omega: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
+        """Frequency response G(i omega) of an input and an output at angular frequencies [rad/s]; complex, (n,)."""
+        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        one = np.eye(len(self.A))
+        b, c, d = self.B[:, i], self.C[k], self.D[k, i]
+        return np.array([c @ np.linalg.solve(1j * w * one - self.A, b) + d for w in np.atleast_1d(omega)])
+
+    def root_locus(self, gains: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
+        """Eigenvalues of the closed loop u = -k y for every gain k, (gains, n)."""
+        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        b, c, d = self.B[:, [i]], self.C[[k]], self.D[k, i]
+        found = [np.linalg.eigvals(self.A - b @ c * (g / (1.0 + g * d))) for g in gains]
+        return follow(np.array(found))
+
+    def bode(
+        self,
+        input: str | None = None,
+        output: str | None = None,
+        omega: Sequence[float] | None = None,
+        path: str | os.PathLike | None = None,
+    ) -> Any:
+        """Bode plot; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.linear import bode
+
+        return bode(self, input, output, omega, path)
+
+    def plot_root_locus(
+        self,
+        gains: Sequence[float],
+        input: str | None = None,
+        output: str | None = None,
+        path: str | os.PathLike | None = None,
+    ) -> Any:
+        """Root locus over the gain of a feedback; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.linear import root_locus
+
+        names = self._named("input", self.inputs, input), self._named("output", self.outputs, output)
+        title = f"u = -k y, u: {names[0]}, y: {names[1]}"
+        return root_locus(self.root_locus(gains, input, output), gains, "k", title, path)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        matrices = {k: getattr(self, k) for k in ("A", "B", "C", "D", "mass", "damping", "stiffness")}
+        out: dict[str, Any] = {"name": self.name, "t": self.t, "turning": self.turning.tolist()}
+        for what in ("states", "inputs", "outputs"):
+            units = getattr(self, f"{what[:-1]}_units")
+            out[what] = [{"name": n, "unit": u} for n, u in zip(getattr(self, what), units, strict=True)]
+        out |= {k: None if X is None else X.tolist() for k, X in matrices.items()}
+        return out | {"eigenvalues": [[float(w.real), float(w.imag)] for w in self.eigenvalues]}
+
+    def _place(self, what: str, names: tuple[str, ...], name: str | None) -> int:
+        return names.index(self._named(what, names, name))
+
+    def _named(self, what: str, names: tuple[str, ...], name: str | None) -> str:
+        if name is None and len(names) == 1:
+            return names[0]
+        if name not in names:
+            given = "say which" if name is None else f"there is no {what} {name!r}{suggest(name, list(names))}"
+            there = listing(list(names)) if names else f"it was linearised without any: linearize({what}s=[...])"
+            raise ModelError(f"{given}; {there}")
+        return name
+
+
+def _plain(name: str) -> str:
+    return "".join(c if c.isalnum() else "_" for c in name)
+
+
+def follow(roots: np.ndarray) -> np.ndarray:
+    """Sort each row's roots so that they go on from the row before, (rows, n)."""
+    from scipy.optimize import linear_sum_assignment
+
+    out = roots.copy()
+    for k in range(1, len(out)):
+        _, order = linear_sum_assignment(np.abs(out[k - 1][:, None] - out[k][None, :]))
+        out[k] = out[k][order]
+    return out

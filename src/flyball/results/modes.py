@@ -1,0 +1,133 @@
+"""Modes of a linear model: eigenvalues, frequencies, damping ratios and shapes."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from .result import Result
+
+STILL = 1e-7  # part of the largest eigenvalue below which one is zero
+
+
+@dataclass
+class Modes:
+    """Natural motions x(t) = Re(shape exp(eigenvalue t)), slowest first; one of each complex pair.
+
+    Attributes
+    ----------
+    eigenvalues : ndarray (n,) complex [1/s]
+    shapes : ndarray (nv, n) complex
+        Changes of all positions along the mechanism's velocities; the largest part, turns counted at the mechanism's
+        length, is 1.
+    names, units : tuple of str
+        Of what each row of the shapes is a change of.
+    turning : ndarray (3,) [rad/s]
+        Angular velocity of the frame that they are seen from.
+    point : Result
+        Where they are about.
+    """
+
+    eigenvalues: np.ndarray
+    shapes: np.ndarray
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    turning: np.ndarray
+    point: Result = field(repr=False)
+
+    @property
+    def omega(self) -> np.ndarray:
+        """Undamped angular frequencies |eigenvalue| [rad/s], 0 for rigid ones; what grows or decays counts too."""
+        return np.abs(self.eigenvalues)
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Frequencies of oscillation |Im eigenvalue| / 2 pi [Hz]; 0 for those that do not oscillate."""
+        return np.abs(self.eigenvalues.imag) / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> np.ndarray:
+        """-Re / |eigenvalue|: 0 undamped, 1 no oscillation, negative where the motion grows; 0 for rigid ones."""
+        size = np.abs(self.eigenvalues)
+        still = size <= STILL * size.max(initial=0.0)
+        return np.where(still, 0.0, -self.eigenvalues.real / np.where(still, 1.0, size))
+
+    @property
+    def kinds(self) -> tuple[str, ...]:
+        """``"oscillation"``, ``"decay"``, ``"unstable"`` or ``"rigid"`` for every mode."""
+        largest = np.abs(self.eigenvalues).max(initial=0.0)
+        out = []
+        for w in self.eigenvalues:
+            grows, still = w.real > STILL * largest, abs(w) <= STILL**0.5 * largest
+            out.append("rigid" if still else "unstable" if grows else "decay" if w.imag == 0.0 else "oscillation")
+        return tuple(out)
+
+    @property
+    def stable(self) -> bool:
+        """Whether no mode grows."""
+        return "unstable" not in self.kinds
+
+    def __len__(self) -> int:
+        return len(self.eigenvalues)
+
+    def shape(self, k: int, least: float = 0.01) -> dict[str, complex]:
+        """Mode k by name, largest parts first; parts below ``least`` of the largest are left out."""
+        size = np.abs(self.shapes[:, k])
+        order = np.argsort(-size, kind="stable")
+        return {self.names[d]: complex(self.shapes[d, k]) for d in order if size[d] > least * size.max(initial=0.0)}
+
+    def lines(self) -> list[tuple[str, str]]:
+        """A table for people."""
+        out = [("mode", f"{'frequency [Hz]':>15} {'omega [rad/s]':>15} {'damping ratio':>14}  kind         moves")]
+        for k in range(len(self)):
+            most = ", ".join(list(self.shape(k, 0.3))[:4])
+            figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {self.damping_ratio[k]:14.4g}"
+            out.append((str(k), f"{figures}  {self.kinds[k]:<12} {most}"))
+        if self.turning.any():
+            turning = ", ".join(f"{x:.4g}" for x in self.turning)
+            out.append(("seen from", f"a frame that turns with ({turning}) rad/s"))
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        modes = [
+            {
+                "eigenvalue": [float(w.real), float(w.imag)],
+                "frequency": float(self.frequency[k]),
+                "omega": float(self.omega[k]),
+                "damping_ratio": float(self.damping_ratio[k]),
+                "kind": self.kinds[k],
+                "shape": {n: [x.real, x.imag] for n, x in self.shape(k).items()},
+            }
+            for k, w in enumerate(self.eigenvalues)
+        ]
+        return {"turning": self.turning.tolist(), "modes": modes}
+
+    def motion(self, k: int, amplitude: float = 0.1, outputs: int = 81) -> Result:
+        """Mode k as a motion over one period, largest part ``amplitude`` (radians, or parts of the length).
+
+        Damping is left out, so that the motion repeats. A mode that does not oscillate goes out and back.
+        """
+        from .shapes import motion
+
+        return motion(self, k, amplitude, outputs)
+
+    def to_html(self, path: str | os.PathLike, **options: Any) -> None:
+        """Write a page in which the modes move; options as for `flyball.view.modes.page`."""
+        from ..view.modes import page
+        from ..view.writing import write
+
+        write(path, page(self, **options))
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Eigenvalues in the complex plane; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.linear import eigenvalues
+
+        return eigenvalues(self, path)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a:>4} {b}" for a, b in self.lines())
