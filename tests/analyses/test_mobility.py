@@ -221,6 +221,12 @@ def test_a_large_mechanism_is_named_too():
     assert "and 508 more" in str(found)
 
 
+def test_a_motion_in_which_very_many_bodies_move_is_found():
+    """600 windows: one freedom, in which all 1801 bodies move."""
+    (only,) = example("n_four_bar.py", windows=600).mobility().motions
+    assert (only.name, len(only.bodies)) == ("A0.angle", 1201)
+
+
 def test_the_command(tmp_path):
     path = tmp_path / "m.toml"
     bricard().save(path)

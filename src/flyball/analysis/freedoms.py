@@ -85,8 +85,8 @@ def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:
     return tuple(out)
 
 
-def _coordinates(a: Assembly) -> tuple[list[str], np.ndarray]:
-    """Coordinates that may name a motion, those next to ground first, then bodies' own; and their gradients by v."""
+def _coordinates(a: Assembly) -> tuple[list[str], Any]:
+    """Coordinates that may name a motion, those next to ground first, then bodies' own; and their sparse gradients."""
     own = a.compiled
     model = own.structure.model
     depth = _depths(model)
@@ -101,8 +101,7 @@ def _coordinates(a: Assembly) -> tuple[list[str], np.ndarray]:
     probe.follow(own.hints)
     probe.at(a.t, a.q, a.v)
     G = probe.sparse_jacobian()
-    rows = [probe.structure.slices[name].start for name in names]
-    return names, G[rows].toarray() if rows else np.zeros((0, own.structure.nv))
+    return names, G[[probe.structure.slices[name].start for name in names]]
 
 
 def told(c: Compiled) -> dict[str, float]:
@@ -129,7 +128,7 @@ def _depth(depth: dict[str, int], model: Any, j: Joint) -> int:
     return min(depth.get(model.carrier(n, j), 1 << 30) for n in (j.body_i, j.body_j))
 
 
-def _named(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], D: np.ndarray) -> list[FreeMotion]:
+def _named(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], D: Any) -> list[FreeMotion]:
     """Motions that the same bodies share, told apart by coordinates of joints, then by how the bodies turn and move.
 
     Each coordinate chosen has the rate 1 in its own motion and 0 in the others.
@@ -138,24 +137,27 @@ def _named(a: Assembly, basis: np.ndarray, bodies: list[str], names: list[str], 
     s = c.structure
     size = lengths(c)
     joints = {j.name for j in s.model.joints}
+    moving = set(bodies)
     first = [k for k, name in enumerate(names) if name.partition(".")[0] in joints]
-    later = [k for k, name in enumerate(names) if name.partition(".")[0] in bodies]
+    later = [k for k, name in enumerate(names) if name.partition(".")[0] in moving]
     turns = np.zeros((0, s.nv)) if s.model.planar else np.vstack([_spin(c, s.place[b]) for b in bodies])
     labels = [names[k] for k in first] + [""] * len(turns) + [names[k] for k in later]
-    rows = np.vstack([D[first], turns, D[later]])
-    weight = 1.0 / np.maximum(np.abs(rows) @ size, 1e-300)
-    left, chosen = basis, []
-    for k, row in enumerate(rows):
+    rates = np.vstack([D[first] @ basis, turns @ basis, D[later] @ basis])
+    full = np.concatenate([abs(D[first]) @ size, np.abs(turns) @ size, abs(D[later]) @ size])
+    left, chosen = np.eye(basis.shape[1]), []  # coefficients of what is not named yet
+    for k, row in enumerate(rates):
         if not left.shape[1]:
             break
         rate = row @ left
-        largest = np.abs(left / size[:, None]).max(axis=0)
         j = int(np.argmax(np.abs(rate)))
-        if np.abs(rate[j]) * weight[k] > CLEAR * largest[j]:
+        if not np.abs(rate[j]) > 0.0:
+            continue
+        largest = np.abs((basis @ left[:, j]) / size).max()
+        if np.abs(rate[j]) > CLEAR * largest * max(full[k], 1e-300):
             chosen.append(k)
-            rest = np.delete(left, j, axis=1) - np.outer(left[:, j] / rate[j], np.delete(rate, j))
-            left = rest / np.maximum(np.abs(rest / size[:, None]).max(axis=0, initial=0.0), 1e-300)
-    tidy = basis @ np.linalg.inv(rows[chosen] @ basis)
+            left = np.delete(left, j, axis=1) - np.outer(left[:, j] / rate[j], np.delete(rate, j))
+            left = left / np.maximum(np.sqrt((left**2).sum(axis=0)), 1e-300)
+    tidy = basis @ np.linalg.inv(rates[chosen])
     return [_motion(a, tidy[:, i], labels[k]) for i, k in enumerate(chosen)]
 
 

@@ -82,7 +82,11 @@ class Geometry:
                 f"joints with general dimensions would leave {self.generic}"
             )
         if not said:
-            said.append("general: no freedom rests on special dimensions or on this position")
+            said.append(
+                "no freedom is left"
+                if self.here == 0
+                else "general: no freedom rests on special dimensions or on this position"
+            )
         return "; ".join(said)
 
     def as_dict(self) -> dict[str, Any]:

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
 DENSE = 1500  # velocities up to which the rank comes from a singular value decomposition
 WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
+ADDED = 1e-13  # to the diagonal of such a matrix
 SHOWN = 64  # dependencies of a large mechanism whose elements are named
 CHANGED = 1e-6  # part of the largest that a self-stress does to a component, below which it leaves it alone
 COMPONENTS = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
@@ -281,29 +282,39 @@ def _null_space(A) -> tuple[int, np.ndarray]:
     """Dimension of the null space of a sparse positive semidefinite matrix, and up to `SHOWN` vectors of its basis.
 
     From A = L D L^T in a pattern and order of its own: where a pivot is nothing but what was added to the diagonal,
-    L^T x = e_k gives a vector of the null space.
+    L^T x = e_k gives a vector of the null space. Its pivot is x^T A x, so that of a vector spread over very many
+    entries is larger by their number: there the quotient of Rayleigh decides.
     """
     import scipy.sparse as sp
     from scipy.sparse.linalg import spsolve_triangular
 
     from ..numerics.ldl import analyse
 
-    A = A.tocoo()
     n = A.shape[0]
+    size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))
+    A = (sp.diags(1.0 / size) @ A @ sp.diags(1.0 / size)).tocoo()
     P, place = analyse(n, A.row, A.col)
     upper = P.perm[A.row] <= P.perm[A.col]  # each pair of entries counts once
     x = np.zeros(len(P.Ai))
     np.add.at(x, place[: A.nnz][upper], A.data[upper])
-    x[P.Ap[1:] - 1] += 1e-13
+    x[P.Ap[1:] - 1] += ADDED
     D, L = np.zeros(n), np.zeros(len(P.Li))
     _factor_entry()(P, x, L, D, np.zeros(n))
-    weak = np.flatnonzero(~(1.0 / D > WEAK))
-    ends = np.zeros((n, min(len(weak), SHOWN)))
-    ends[weak[: ends.shape[1]], np.arange(ends.shape[1])] = 1.0
-    if len(weak):
-        transposed = (sp.csc_matrix((L, P.Li, P.Lp), shape=(n, n)) + sp.identity(n, format="csc")).T.tocsr()
-        ends = spsolve_triangular(transposed, ends, lower=False)
-    return len(weak), ends[P.perm] / np.maximum(np.abs(ends).max(axis=0, initial=0.0), 1e-300)
+    transposed = (sp.csc_matrix((L, P.Li, P.Lp), shape=(n, n)) + sp.identity(n, format="csc")).T.tocsr()
+
+    def vectors(pivots: np.ndarray) -> np.ndarray:
+        ends = np.zeros((n, len(pivots)))
+        ends[pivots, np.arange(len(pivots))] = 1.0
+        return spsolve_triangular(transposed, ends, lower=False) if len(pivots) else ends
+
+    with np.errstate(divide="ignore"):
+        pivots = 1.0 / D
+    sure, doubtful = ~(pivots > WEAK), (pivots > WEAK) & (pivots < 10.0 * ADDED * n)
+    which = np.flatnonzero(doubtful)
+    quotients = pivots[which] / np.maximum((vectors(which) ** 2).sum(axis=0), 1.0)
+    weak = np.sort(np.r_[np.flatnonzero(sure), which[quotients < 10.0 * ADDED]])
+    ends = vectors(weak[:SHOWN])[P.perm] / size[:, None]
+    return len(weak), ends / np.maximum(np.abs(ends).max(axis=0, initial=0.0), 1e-300)
 
 
 def _factor_entry():

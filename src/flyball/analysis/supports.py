@@ -34,6 +34,9 @@ def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[
         basis = orthonormal(part)
         blocks = [basis[g] for g in groups]
         touched = [e for e, b in enumerate(blocks) if len(b) and np.abs(b).max() > SMALL]
+        if basis.shape[1] == 1:
+            out.append((touched, basis))
+            continue
         found = np.zeros((basis.shape[1], 0))
         while found.shape[1] < basis.shape[1]:
             P = min((_smallest(blocks, order, found) for order in (touched, touched[::-1])), key=_weight(blocks))
