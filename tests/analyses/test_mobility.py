@@ -221,6 +221,22 @@ def test_a_large_mechanism_is_named_too():
     assert "and 508 more" in str(found)
 
 
+def test_sets_of_a_large_mechanism():
+    """Ninety four-bars of hinges in space: 270 constraints too many, in sets of one loop each."""
+    m, flat = fb.Mechanism("many"), four_bar()
+    for i in range(90):
+        for b in flat.bodies:
+            m.add(fb.Body(f"{b.name} {i}", mass=1, inertia=(1, 1, 1), position=(b.position[0] + i, b.position[1], 0)))
+        for j in flat.joints:
+            first = "ground" if j.body_i == "ground" else f"{j.body_i} {i}"
+            at = (j.at[0] + i, j.at[1], 0)
+            m.add(fb.Revolute(f"{j.name} {i}", first, f"{j.body_j} {i}", at=at, axis=(0, 0, 1)))
+    found = m.mobility()
+    assert (found.freedoms, found.redundancy) == (90, 270)
+    assert {(len(s.elements), s.count) for s in found.sets} == {(4, 3)}
+    assert all(len({name[2:] for name in s.elements}) == 1 for s in found.sets)
+
+
 def test_a_motion_in_which_very_many_bodies_move_is_found():
     """600 windows: one freedom, in which all 1801 bodies move."""
     (only,) = example("n_four_bar.py", windows=600).mobility().motions

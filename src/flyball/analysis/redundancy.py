@@ -10,7 +10,8 @@ import numpy as np
 from ..model.body import Driver
 from ..system.tables import G_VALUE, NU
 from .cures import Cure, cures
-from .mobility import scaled_jacobian, undetermined
+from .mobility import SHOWN as MANY
+from .mobility import TOLERANCE, scaled_jacobian, undetermined
 from .supports import irreducible
 
 if TYPE_CHECKING:
@@ -101,7 +102,8 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
     c = a.compiled
     s = c.structure
     c.at(a.t, a.q, a.v)
-    size = np.maximum(scaled_jacobian(c)[1], 1e-300)
+    G, size, _ = scaled_jacobian(c)
+    size = np.maximum(size, 1e-300)
     names = list(s.slices)
     groups = [np.arange(r.start, r.stop) for r in s.slices.values()]
     found = irreducible(lam * size[:, None], groups)
@@ -110,14 +112,18 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
     those = [tuple(names[e] for e in elements) for elements, _ in found]
     tried = cures(there, those, positions)
     out = []
-    for elements, (_, basis), (cure, here_only) in zip(those, found, tried, strict=True):
+    for elements, (numbers, basis), (cure, here_only) in zip(those, found, tried, strict=True):
         what, gap = _contradiction(basis, g, nu, c.values.length)
         loose = undetermined(a, basis / size[:, None], list(elements))
         drivers = tuple(n for n in elements if isinstance(s.model[n], Driver))
         loose = {k: v for k, v in loose.items() if k not in drivers}
         here_only = not what and (here_only or shaky)
         cure = None if what or here_only else cure
-        out.append(RedundantSet(elements, basis.shape[1], what, gap, here_only, loose, cure, drivers))
+        count = basis.shape[1]
+        if lam.shape[1] == MANY:  # of a large mechanism not all dependencies are there; those of a set's own rows are
+            own = G[np.concatenate([groups[e] for e in numbers])].toarray()
+            count = len(own) - int(np.linalg.matrix_rank(own, tol=TOLERANCE * np.linalg.norm(own, 2)))
+        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers))
     return tuple(out)
 
 
