@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
     from .results.modes import Modes
+    from .results.optimum import Optimum
     from .results.result import Result
+    from .results.sensitivity import Sensitivity
+    from .results.singularities import Singularities
 
 
 class Mechanism(Model):
@@ -76,6 +79,21 @@ class Mechanism(Model):
 
         return modes(self, **options)
 
+    def sensitivity(self, of: Sequence[str] = (), to: Sequence[str] = (), **options: Any) -> Sensitivity:
+        """Derivatives of kinematics, reactions, equilibria, eigenvalues or motions by parameters.
+
+        See `flyball.analysis.sensitivity.sensitivity` for the options.
+        """
+        from .analysis.sensitivity import sensitivity
+
+        return sensitivity(self, of, to, **options)
+
+    def optimize(self, of: Sequence[str], to: Any, **options: Any) -> Optimum:
+        """Parameters for which quantities come nearest to a target; see `flyball.analysis.optimize.optimize`."""
+        from .analysis.optimize import optimize
+
+        return optimize(self, of, to, **options)
+
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""
         from .analysis.check import check
@@ -93,6 +111,12 @@ class Mechanism(Model):
         from .analysis.mass import mass_properties
 
         return mass_properties(self, **options)
+
+    def singularities(self, driver: str, range: Any, **options: Any) -> Singularities:
+        """Singular positions over a range of a driver; see `flyball.analysis.singularities.singularities`."""
+        from .analysis.singularities import singularities
+
+        return singularities(self, driver, range, **options)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the description to a TOML file; `flyball.load` reads it back exactly."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ class Compiled:
     values: Values
     work: Work
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
-    parameters: dict[str, float] = field(default_factory=dict)  # values in place of the model's own
+    parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
 
     @property
     def structure(self) -> Structure:
@@ -44,6 +45,8 @@ class Compiled:
         Turns and places are those nearest to the last ones.
         """
         s = self.structure
+        if np.iscomplexobj(self.values.system.body_x):
+            raise TypeError("the compiled code takes floats; complex tables are for the formulas")
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.r_[q, v, self.z]
@@ -73,7 +76,7 @@ class Compiled:
         for name, b in self.structure.place.items():
             if b >= 0:
                 p, R, w, u, _, _ = (np.array(part) for part in load(W.BK, b))
-                out[name] = BodyState(p, R.reshape(3, 3), u, w, float(angles.get(name, 0.0)))
+                out[name] = BodyState(p, R.reshape(3, 3), u, w, angles.get(name, 0.0))
         return out
 
     def take(self, other: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -130,6 +133,8 @@ class Compiled:
         S = self.values.system
         J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
         if root:
+            if np.iscomplexobj(J):
+                raise TypeError("the root of complex inertias is not known; give real parameters")
             w, V = np.linalg.eigh(J)
             J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
             translation = np.sqrt(translation)
@@ -149,11 +154,11 @@ class Compiled:
 def compiled(
     model: Model,
     *,
-    parameters: Mapping[str, float] | None = None,
+    parameters: Mapping[str, complex] | None = None,
     far: bool = False,
     positions: bool = False,
     holds: Sequence[Initial] = (),
-    held: Mapping[str, float] | None = None,
+    held: Mapping[str, complex] | None = None,
     tree: Sequence[str] = (),
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
@@ -170,7 +175,7 @@ def _places(x: Values) -> np.ndarray:
     those nearest to the followers.
     """
     s = x.structure
-    z = np.zeros(len(s.states))
+    z = np.zeros(len(s.states), x.q.dtype)
     for t in s.terms:
         if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
             z[t.hint] = x.poses.turned(t.owner)

@@ -49,6 +49,7 @@ class Free:
     chosen_v: np.ndarray
     scale: np.ndarray
     left: np.ndarray  # (f, nv): takes the chosen coordinates' changes from those of all
+    left_v: np.ndarray  # the same for velocities
     on_positions: np.ndarray  # (m,): which rows are constraints on positions
 
     @property
@@ -59,7 +60,7 @@ class Free:
     def turned(self, T: np.ndarray, later: Equations) -> Free:
         """The same motions turned by T (nv, nv), under the constraints of a later instant."""
         other = free(later)
-        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ T.T}
+        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ T.T, "left_v": self.left_v @ T.T}
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
     def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
@@ -68,9 +69,9 @@ class Free:
         return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=TOLERANCE)[0]
 
     @staticmethod
-    def unseen(x: np.ndarray, basis: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """The x that differs by the basis' motions and is zero in the chosen rows."""
-        return x - basis @ x[chosen]
+    def unseen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """The x that differs by the basis' motions and changes no chosen coordinate."""
+        return x - basis @ (left @ x)
 
 
 def free(e: Equations) -> Free:
@@ -85,8 +86,8 @@ def free(e: Equations) -> Free:
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
     Z, chosen = _basis(holonomic, scale)
     Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale)
-    left, on_positions = np.eye(s.nv)[chosen], np.r_[which, np.ones(len(given), bool)]
-    return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, on_positions)
+    left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
+    return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
 
 
 def prescribed(c: Compiled) -> np.ndarray:

@@ -101,9 +101,9 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     none = np.zeros_like(w.r)
     rates = np.zeros((len(f.rows), w.g.shape[1]))
     rates[f.on_positions] = w.g
-    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.chosen)
+    X = f.unseen(-f.solve(w.g, f.holonomic), f.Z, f.left)
     P, U, U1 = (
-        f.unseen(-f.solve(b), f.Zv, f.chosen_v) if b.any() else np.zeros((nv, b.shape[1]))
+        f.unseen(-f.solve(b), f.Zv, f.left_v) if b.any() else np.zeros((nv, b.shape[1]))
         for b in (V @ f.Z, V @ X + w.n, rates)
     )
     x = np.hstack([f.Z, np.zeros_like(f.Zv), X, none, none])

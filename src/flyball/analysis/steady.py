@@ -15,9 +15,8 @@ from ..errors import AnalysisError
 from ..results.records import Records
 from ..system.names import velocity_names
 from ..system.tables import TREE, V0
-from ..system.tree import FREE, PLANAR, column, quaternion_at
+from ..system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
 from .derivatives import Equations, State
-from .entry import MOTION
 from .free import Free
 from .reduced import Frame, reduced
 
@@ -69,11 +68,14 @@ def frames(x: State) -> list[Frame]:
 
 
 def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
-    """Whether the linear equations of a later instant are those of this one, seen from the frame."""
+    """Whether a moment later, moved on with the frame, the accelerations and linear equations are the same."""
     from scipy.linalg import expm
 
-    tau, later = _later(x)
+    tau, later = _later(x, frame)
     T = expm(tau * frame.H)
+    size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
+    if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= SAME * size:
+        return False
     then = Equations(later)
     g = f.turned(T, then)
     if np.abs(g.rows @ g.Zv).max(initial=0.0) > SAME * np.abs(g.rows).max(initial=0.0) * np.abs(g.Zv).max(initial=0.0):
@@ -119,7 +121,8 @@ def balanced(x: State, e: Equations) -> None:
     left = np.abs(scale * (M @ x.vdot))
     rows, r = e.by_position[e.at["g"]], e.at["r"]
     total = left.max(initial=0.0) + np.abs(scale * (rows.T @ x.lam)).max(initial=0.0)
-    total += np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
+    stiffness = abs(e.by_position[r]).T.multiply(scale).T.multiply(x.c.values.length * scale)
+    total += stiffness.max() + np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
     if left.max(initial=0.0) <= BALANCED * total:
         return
     d = int(np.argmax(left))
@@ -130,27 +133,33 @@ def balanced(x: State, e: Equations) -> None:
     )
 
 
-def _later(x: State) -> tuple[float, State]:
-    """(time, state) a short while later, by the classical Runge-Kutta method."""
-    c, y = x.c, x.y
-    nq, nv = len(x.q), len(x.v)
-    z = c.z.copy()
-    fastest = max(np.abs(c.work.BK[:, 12:15]).max(), np.abs(c.work.BK[:, 15:18]).max() / c.values.length)
-    h = SWING / fastest / STEPS
-    t = x.t
+def _later(x: State, frame: Frame) -> tuple[float, State]:
+    """(time, state) a short while later if velocities turn with the frame: no forces are asked, so nothing is stiff."""
+    from scipy.linalg import expm
 
-    def rate(t: float, y: np.ndarray) -> np.ndarray:
-        return c.at(t, y[:nq].copy(), y[nq : nq + nv].copy(), MOTION)[1]
+    c, z, q = x.c, x.c.z.copy(), x.q.copy()
+    c.at(x.t, x.q, x.v)
+    S, W = c.values.system, c.work
+    h = SWING / max(np.abs(W.BK[:, 12:15]).max(), np.abs(W.BK[:, 15:18]).max() / c.values.length) / STEPS
+    half, v = expm(0.5 * h * frame.H), x.v
+
+    def rate(q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        out = np.zeros_like(q)
+        rates(S, q, v, out)
+        return out
 
     for _ in range(STEPS):
-        k1 = rate(t, y)
-        k2 = rate(t + h / 2, y + h / 2 * k1)
-        k3 = rate(t + h / 2, y + h / 2 * k2)
-        k4 = rate(t + h, y + h * k3)
-        y, t = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4), t + h
-    later = State.moving(c, t, y[:nq].copy(), y[nq : nq + nv].copy())
+        middle = half @ v
+        end = half @ middle
+        k1 = rate(q, v)
+        k2 = rate(q + 0.5 * h * k1, middle)
+        k3 = rate(q + 0.5 * h * k2, middle)
+        k4 = rate(q + h * k3, end)
+        q, v = q + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4), end
+    normalise(S, q)
+    later = State.moving(c, x.t + STEPS * h, q, v)
     c.z = z
-    return t - x.t, later
+    return STEPS * h, later
 
 
 def _generator(x: State, turning: np.ndarray) -> np.ndarray:

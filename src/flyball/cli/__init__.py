@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from . import check, inverse_dynamics, kinematics, mobility, run, view  # noqa: F401  (each adds its subcommand)
+from . import check, inverse_dynamics, kinematics, mobility, run, singularities, view  # noqa: F401  (each adds one)
 from .common import app
 
 

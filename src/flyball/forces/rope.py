@@ -89,9 +89,9 @@ class Rope(CoordinateForce):
             return None
         points = [vector(p, planar, f"'at' of {self.title}") for p in n.at]
         for k, (a, b) in enumerate(itertools.pairwise(points)):
-            if not (a != b).any():
+            if not (a.real != b.real).any():
                 raise ModelError(
-                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.tolist())} m, where the rope "
+                    f"{self.title}: points {k + 1} and {k + 2} are both at {tuple(a.real.tolist())} m, where the rope "
                     f"between them has no direction; move one, or leave it out"
                 )
         return {f"P{k}": (p, np.eye(3)) for k, p in enumerate(points)}

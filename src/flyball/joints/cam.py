@@ -12,6 +12,8 @@ from pydantic import BeforeValidator
 from ..constraints import curve
 from ..constraints.blocks import CURVE, Row
 from ..errors import ModelError
+from ..math.scalar import absolute
+from ..math.spline import complex_cubic, packed
 from ..model.element import Length, Numbers, Point, Unit, element, nonnegative
 from ..model.geometry import vector
 from ..model.joint import Joint, WorldFrame
@@ -71,7 +73,7 @@ class Cam(Joint):
         if len(n.points) < 4 or not all(len(p) == 2 for p in n.points):
             raise ModelError(f"{self.title}: a profile needs four points or more, each (x, y), got {len(n.points)}")
         for k, d in enumerate(np.sqrt((np.diff(_closing(n.points, self.closed), axis=0) ** 2).sum(axis=1))):
-            if not d > 0.0:
+            if not d.real > 0.0:
                 raise ModelError(
                     f"{self.title}: points {k} and {(k + 1) % len(n.points)} of its profile coincide at "
                     f"{tuple(n.points[k])}; leave one out"
@@ -86,7 +88,7 @@ class Cam(Joint):
     def constants(self, n: SimpleNamespace, row: Row, F: WorldFrame, M: WorldFrame) -> tuple[float, ...]:
         """The side of the curve that the roller is on, and its radius; where the splines stand is told later."""
         _, side, gap = self.nearest(n, F, M)
-        bend = max(0.0, -self.sharpest(n, side)) * n.radius
+        bend = max(0.0, -self.sharpest(n, side)) * n.radius.real
         if bend >= 1.0:
             raise ModelError(
                 f"{self.title}: its roller of {n.radius:g} m does not fit into the profile, which bends with a radius "
@@ -94,25 +96,25 @@ class Cam(Joint):
             )
         return (0.0, 0.0, 0.0, side, 0.0, 0.0, n.radius)
 
-    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float, float]:
+    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[Any, float, Any]:
         """Parameter of the point of the profile nearest to M, the side that M is on (+1, -1), and its distance."""
         data = np.concatenate(self.curves(n))
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
-        s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
+        s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         x, _, _, y, _, _ = curve.point(par, s, data)
         p = F[1].T @ (M[0] - F[0])
-        guess = float(s[np.argmin((x - p[0]) ** 2 + (y - p[1]) ** 2)])
+        guess = float(s[np.argmin((x - p[0]).real ** 2 + (y - p[1]).real ** 2)])
         zero = np.zeros(3)
         i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))
         at = curve.foot(par, i, j, guess, data)
         delta = curve.local(par, i, j, at, data)[2]
-        return at, -1.0 if delta < 0.0 else 1.0, abs(delta)
+        return at, -1.0 if delta.real < 0.0 else 1.0, absolute(delta)
 
     def sharpest(self, n: SimpleNamespace, side: float) -> float:
         """Least curvature [1/m] towards the given side: negative where the profile is hollow there."""
-        data = np.concatenate(self.curves(n))
+        data = np.concatenate(self.curves(n)).real
         par = (0.0, 0.0, float(len(self.curves(n)[0])))
-        s = np.linspace(0.0, _chords(n.points, self.closed)[-1], 20 * len(n.points) + 1)
+        s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         _, x1, x2, _, y1, y2 = curve.point(par, s, data)
         return float((side * (x1 * y2 - y1 * x2) / (x1 * x1 + y1 * y1) ** 1.5).min())
 
@@ -122,7 +124,7 @@ class Cam(Joint):
 
 
 def _closing(points: tuple, closed: bool) -> np.ndarray:
-    p = np.array(points, float)
+    p = np.array(points)
     return np.vstack([p, p[:1]]) if closed else p
 
 
@@ -136,5 +138,10 @@ def _chords(points: tuple, closed: bool) -> np.ndarray:
 def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
     s = tuple(_chords(points, closed).tolist())
     outside: Any = "periodic" if closed else "linear"
+    if np.iscomplexobj(s):
+        real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
+        at, columns = np.array(s), _closing(points, closed).T
+        steps = (packed(at, c, complex_cubic(at, c, closed), outside).imag for c in columns)
+        return tuple((np.array(r) + 1j * d).tolist() for r, d in zip(real, steps, strict=True))  # type: ignore[return-value]
     x, y = (tuple(c) for c in _closing(points, closed).T.tolist())
     return tuple(Table(k, x=s, y=c, outside=outside).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]

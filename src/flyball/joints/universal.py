@@ -54,7 +54,7 @@ class Universal(Joint):
         a, b = (vector(x, planar, f"axes of {self.title}", direction=True) for x in n.axes)
         cosine = a @ b
         if abs(cosine) > 1e-6:
-            degrees = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
+            degrees = np.degrees(np.arccos(np.clip(cosine.real, -1, 1)))
             raise ModelError(f"{self.title}: its axes must be at right angles, these are at {degrees:.4g} deg")
         b = b - cosine * a
         b = b / np.sqrt(b @ b)

@@ -27,8 +27,8 @@ PIECE = 4  # numbers a piece
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
-    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats (a
-    list will do for single numbers).
+    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats or
+    complex numbers (a list will do for single numbers).
     """
     start, origin = piece(data, at, x)
     s = x - origin
@@ -41,12 +41,14 @@ def piece(data, at, x):
     if isinstance(x, float | int | complex):
         return found(data, at, x)
     count = int(data[at + 1].real)
-    breaks = data[at + BREAKS : at + BREAKS + count].real
+    all_breaks = data[at + BREAKS : at + BREAKS + count]
+    breaks = all_breaks.real
     period, x = data[at].real, np.real(x)
-    shift = period * np.floor((x - breaks[0]) / period) if period > 0.0 else 0.0 * x
+    turns = np.floor((x - breaks[0]) / period) if period > 0.0 else 0.0 * x
+    shift = period * turns
     k = np.searchsorted(breaks, x - shift, side="right")
     k = np.where(x - shift == breaks[-1], count - 1, k)
-    return at + BREAKS + count + PIECE * k, breaks[np.maximum(k - 1, 0)] + shift
+    return at + BREAKS + count + PIECE * k, all_breaks[np.maximum(k - 1, 0)] + data[at] * turns
 
 
 def found(data, at, x):
@@ -55,10 +57,11 @@ def found(data, at, x):
     count = int(data[at + 1].real)
     first = at + BREAKS
     period = data[at].real
-    shift = 0.0
+    turns = 0.0
     if period > 0.0:
         turns = (x - data[first].real) / period
-        shift = period * math.floor(turns) if turns - turns == 0.0 else turns
+        turns = float(math.floor(turns)) if turns - turns == 0.0 else turns
+    shift = period * turns
     low, high = 0, count
     while low < high:
         middle = (low + high) // 2
@@ -68,7 +71,44 @@ def found(data, at, x):
             high = middle
     if low == count and x - shift == data[first + count - 1].real:
         low = count - 1
-    return first + count + PIECE * low, data[first + max(low - 1, 0)].real + shift
+    return first + count + PIECE * low, data[first + max(low - 1, 0)] + data[at] * turns
+
+
+def complex_cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
+    """Coefficients (n - 1, 4) of the C2 cubic spline through four or more points whose numbers may be complex.
+
+    SciPy's takes no complex places. Ends are periodic or "not a knot" (de Boor, *A Practical Guide to Splines*, 1978,
+    chapter IV).
+    """
+    n, h = len(x), np.diff(x)
+    d = np.diff(y) / h
+    A, b = np.zeros((n, n), complex), np.zeros(n, complex)  # for the slopes at the points
+    for k in range(1, n - 1):
+        A[k, k - 1 : k + 2] = h[k], 2.0 * (h[k - 1] + h[k]), h[k - 1]
+        b[k] = 3.0 * (h[k] * d[k - 1] + h[k - 1] * d[k])
+    if periodic:
+        A[0, 0], A[0, n - 1] = 1.0, -1.0
+        A[n - 1, 1], A[n - 1, 0], A[n - 1, n - 2] = h[-1], 2.0 * (h[-1] + h[0]), h[0]
+        b[n - 1] = 3.0 * (h[0] * d[-1] + h[-1] * d[0])
+    else:
+        for end, beside, i, j in ((0, 1, 0, 1), (n - 1, n - 2, -1, -2)):
+            width = h[i] + h[j]
+            A[end, end], A[end, beside] = h[j], width
+            b[end] = ((h[i] + 2.0 * width) * h[j] * d[i] + h[i] ** 2 * d[j]) / width
+    slopes = np.linalg.solve(A, b)
+    left, right = slopes[:-1], slopes[1:]
+    return np.column_stack([y[:-1], left, (3.0 * d - 2.0 * left - right) / h, (left + right - 2.0 * d) / h**2])
+
+
+def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, outside: str) -> np.ndarray:
+    """The flat list of numbers: ``pieces`` between the points, and behind the ends what ``outside`` says."""
+    slopes: Any = 0.0, 0.0
+    if outside != "hold":
+        width = x[-1] - x[-2]
+        slopes = pieces[0, 1], pieces[-1, 1] + width * (2.0 * pieces[-1, 2] + 3.0 * width * pieces[-1, 3])
+    ends = [(y[0], slopes[0], 0.0, 0.0), (y[-1], slopes[1], 0.0, 0.0)]
+    period = x[-1] - x[0] if outside == "periodic" else 0.0
+    return np.r_[period, len(x), x, np.vstack([ends[:1], pieces, ends[1:]]).ravel()]
 
 
 def symbolic(data: Any, at: int, x: Any) -> Any:

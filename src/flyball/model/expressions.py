@@ -157,6 +157,10 @@ def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str
         advice = "check for division by zero and roots or logarithms of negative numbers"
         problem = f"'{value}' gives {result}" if isinstance(value, str | Expression) else f"the value is {value}"
         raise ModelError(f"{where}: {problem}, a finite number is wanted; {advice}")
+    if isinstance(result, complex) and isinstance(value, str | Expression):
+        # complex numbers know roots and logarithms of negative ones, which the real function has not
+        real = {name: x.real if isinstance(x, complex) else x for name, x in env.items()}
+        return complex(number(value, real, dimension, where), result.imag)
     return result
 
 

@@ -37,9 +37,15 @@ def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.
 
 
 def triad(z: np.ndarray) -> np.ndarray:
-    """Right-handed axes (columns) with the given unit vector as z; the world's axes where z is vertical."""
+    """Right-handed axes (columns) with the given unit vector as z; the world's axes where z is vertical.
+
+    The imaginary part of a complex z tilts the vertical by the shortest way.
+    """
     if z[2].real > 1.0 - 1e-12:
-        return np.eye(3)
+        if not np.iscomplexobj(z):
+            return np.eye(3)
+        dx, dy, _ = z.imag
+        return np.eye(3) + 1j * np.array([[0.0, 0.0, dx], [0.0, 0.0, dy], [-dx, -dy, 0.0]])
     helper = np.eye(3)[int(np.argmin(np.abs(z.real)))]
     x = np.cross(helper, z)
     x = x / np.sqrt((x * x).sum())

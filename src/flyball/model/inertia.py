@@ -169,7 +169,7 @@ def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
             f"(0 for a point mass), got {n.inertia}{six}"
         )
     J = np.diag(a) if a.shape == (3,) else a
-    if np.abs(J - J.T).max() > 1e-12 * np.abs(J).max():
+    if any(np.abs(A - A.T).max() > 1e-12 * np.abs(A).max() for A in (J.real, J.imag)):
         raise ModelError(f"{body.title}: its inertia matrix is not symmetric: {a.tolist()}")
     return J
 

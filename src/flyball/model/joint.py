@@ -118,7 +118,7 @@ class Joint(Element):
             raise ModelError(f"{self.title}: in a planar mechanism its axis is the normal; leave axis out")
         a = vector(axis, planar and self.planar_normal != "z", f"axis of {self.title}", direction=True)
         if planar and self.planar_normal == "z":
-            if abs(a[0]) + abs(a[1]) > 1e-12:
+            if abs(a[0]) + abs(a[1]) > 1e-12 or a[:2].imag.any():
                 raise ModelError(f"{self.title}: in a planar mechanism its axis is the normal; leave axis out")
             return np.eye(3)
         if planar:

@@ -80,7 +80,7 @@ class Model:
         self.initial: list[Initial] = []
         self._names: dict[str, Element] = {}
 
-    def environment(self, changed: Mapping[str, Number] | None = None) -> dict[str, float]:
+    def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
         """Values of the parameters in SI units, with some of them changed.
 
         Raises

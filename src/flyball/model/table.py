@@ -11,7 +11,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
-from ..math.spline import spline, symbolic
+from ..math.spline import packed, spline, symbolic
 from .element import Element, _plain, element
 from .grammar import CONSTANTS, FUNCTIONS
 from .units import to_si
@@ -85,15 +85,8 @@ class Table(Element):
     @cached_property
     def _array(self) -> np.ndarray:
         x, y = self._points()
-        periodic = self.outside == "periodic"
         with np.errstate(all="ignore"):
-            pieces = _MAKERS[self.interpolation](x, y, periodic)
-            slopes = 0.0, 0.0
-            if self.outside != "hold":
-                width = x[-1] - x[-2]
-                slopes = pieces[0, 1], pieces[-1, 1] + width * (2.0 * pieces[-1, 2] + 3.0 * width * pieces[-1, 3])
-        ends = [(y[0], slopes[0], 0.0, 0.0), (y[-1], slopes[1], 0.0, 0.0)]
-        return np.r_[x[-1] - x[0] if periodic else 0.0, len(x), x, np.vstack([ends[:1], pieces, ends[1:]]).ravel()]
+            return packed(x, y, _MAKERS[self.interpolation](x, y, self.outside == "periodic"), self.outside)
 
     def _points(self) -> tuple[np.ndarray, np.ndarray]:
         """The points in SI units, checked."""

@@ -1,4 +1,4 @@
-"""A static equilibrium: where it is, what everything carries there, and whether it is stable."""
+"""An equilibrium or steady motion: where it is, what everything carries there, and whether it is stable."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ STABLE, MARGINAL, UNSTABLE = "stable", "marginal", "unstable"
 
 @dataclass
 class Equilibrium:
-    """A mechanism at rest under its forces. ``equilibrium["A.fx"]`` is what a curve of the result is there.
+    """A mechanism at rest under its forces, or in steady motion.
+
+    ``equilibrium["A.fx"]`` is what a curve of the result is there.
 
     Attributes
     ----------
@@ -33,6 +35,8 @@ class Equilibrium:
         That stiffness: energy per square of the mechanism's length or radian, as part of what acts.
     preload : dict
         Force -> what had to be added to its law [its unit].
+    speeds : dict
+        Coordinate -> speed [rad/s or m/s], of a steady motion.
     unbalanced : float
         The largest force left, as part of what acts.
     method : str
@@ -53,6 +57,7 @@ class Equilibrium:
     result: Result = field(repr=False)
     assembly: Any = field(repr=False)
     preload: dict[str, float] = field(default_factory=dict)
+    speeds: dict[str, float] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Any:
         """A curve's value there, or a part of the result."""
@@ -61,11 +66,13 @@ class Equilibrium:
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
-        out = [("equilibrium", f"{self.stability}, found by {self.method}"), ("time", f"{self.t:g} s")]
+        what = "steady motion" if self.speeds else "equilibrium"
+        out = [(what, f"{self.stability}, found by {self.method}"), ("time", f"{self.t:g} s")]
         out += [("position", text) for text in self._positions()]
-        if self.freedoms:
+        if self.weakest:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
             out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
+        out += [("speed", f"{k}: {v:.9g}") for k, v in self.speeds.items()]
         out += [("preload", f"{k}: {v:.6g}") for k, v in self.preload.items()]
         return [*out, ("unbalanced", f"{self.unbalanced:.1g} of what acts")]
 
@@ -79,7 +86,7 @@ class Equilibrium:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names, all curves included."""
-        kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "parameters")
+        kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist()}
         curves = self.result.channels().items()

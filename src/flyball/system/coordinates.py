@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..math.scalar import atan2, rounded
+from ..math.scalar import atan2
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
@@ -38,7 +38,7 @@ class BodyState:
     R: np.ndarray
     v: np.ndarray
     w: np.ndarray
-    angle: float = 0.0
+    angle: Any = 0.0
 
 
 REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
@@ -50,7 +50,7 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
     ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
     """
     s = x.structure
-    q = np.zeros(s.nq)
+    q = np.zeros(s.nq, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
     for name, b in s.place.items():
         if b in hung:
@@ -71,7 +71,7 @@ def velocities(x: Values, bodies: Mapping[str, BodyState], W: Any = None) -> np.
     where W is not given.
     """
     s, body_i = x.structure, x.structure.tables["body_i"]
-    v = np.zeros(s.nv)
+    v = np.zeros(s.nv, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
     names = {b: name for name, b in s.place.items()}
     for name, b in s.place.items():
@@ -106,7 +106,7 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
             out[name] = q[S.body_i[b, Q0] + 2]
         elif b >= 0:
             near, angle = x.bodies[name].angle + since[b], atan2(W.BK[b, 6], W.BK[b, 3])
-            out[name] = angle + 2.0 * np.pi * rounded((near - angle) / (2.0 * np.pi))
+            out[name] = angle + _turns(near, angle)
     return out
 
 
@@ -137,7 +137,7 @@ def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mappi
                 b = AXES[crossing[0].axis]
             c = _cross(a, b)
             turned = turn @ b
-            angle = np.arctan2(c @ turned, b @ turned)
+            angle = atan2(c @ turned, b @ turned)
             turn = _about(a, -angle) @ turn
             q[at] = _with_turns(x, t, step.coordinate, angle, bodies, hints)
 
@@ -159,8 +159,8 @@ def _about(a: np.ndarray, angle: float) -> np.ndarray:
 
 
 def _with_turns(
-    x: Values, t: TreeJoint, what: str, angle: float, bodies: Mapping[str, BodyState], hints: Mapping[str, float]
-) -> float:
+    x: Values, t: TreeJoint, what: str, angle: Any, bodies: Mapping[str, BodyState], hints: Mapping[str, Any]
+) -> Any:
     """The angle with the whole turns that somebody told, or (in the plane) that the bodies' own angles say."""
     name = f"{t.joint.name}.{what}"
     if name in hints:
@@ -176,20 +176,25 @@ def _with_turns(
         near = at + now_by - drawn_by
     else:
         return angle
-    return angle + 2.0 * np.pi * np.round((near - angle) / (2.0 * np.pi))
+    return angle + _turns(near, angle)
+
+
+def _turns(near: Any, angle: Any) -> Any:
+    """Whole turns [rad] that bring an angle next to another one."""
+    return 2.0 * np.pi * np.round((near - angle).real / (2.0 * np.pi))
 
 
 def _normal(x: Values, t: TreeJoint) -> float:
     """Component along the plane's normal of the axis that a joint in the plane turns about."""
     R = x.poses.world(FrameSpec(0, t.joint, "F"))[1]
-    return float((R @ AXES[t.joint.planar_normal])[2])
+    return float((R @ AXES[t.joint.planar_normal])[2].real)
 
 
-def _planar_angle(turn: np.ndarray, t: TreeJoint) -> float:
+def _planar_angle(turn: np.ndarray, t: TreeJoint) -> Any:
     """Angle of a turn about a planar joint's normal."""
     b = AXES[NEXT[t.joint.planar_normal]]
     c = _cross(AXES[t.joint.planar_normal], b)
-    return float(np.arctan2(c @ turn @ b, b @ turn @ b))
+    return atan2(c @ turn @ b, b @ turn @ b)
 
 
 def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: np.ndarray) -> None:
@@ -204,7 +209,17 @@ def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: 
             at.append(int(S.body_i[link, V0]) + k)
     if at:
         rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
-        v[at] = np.linalg.lstsq(np.array(columns).T, rel, rcond=None)[0]
+        v[at] = _least_squares(np.array(columns).T, rel)
+
+
+def _least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """X that makes A x - b least; of complex numbers what carries the derivative, which conjugation would not."""
+    x = np.linalg.lstsq(A.real, b.real, rcond=None)[0]
+    if not (np.iscomplexobj(A) or np.iscomplexobj(b)):
+        return x
+    P = np.linalg.pinv(A.real)
+    dx = P @ (b.imag - A.imag @ x) + P @ P.T @ A.imag.T @ (b.real - A.real @ x)
+    return x + 1j * dx
 
 
 def _cross(a: Any, b: Any) -> np.ndarray:

@@ -1,6 +1,8 @@
 """Structure + parameter values -> floats: the System's tables and the drawn state.
 
-Runs again for every change of a parameter; nothing is compiled and no description is validated here.
+Runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters may be
+complex: all tables are then complex, and of a small imaginary part of one parameter their imaginary parts are its
+multiple by the exact derivatives (a complex step). What is chosen is chosen by real parts.
 """
 
 from __future__ import annotations
@@ -15,6 +17,7 @@ import numpy as np
 
 from ..constraints import angle, curve
 from ..constraints.registry import FORMULAS
+from ..math.scalar import absolute, maximum
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
 from ..model.element import resolve
@@ -24,6 +27,7 @@ from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .call import STACK_RESERVE
 from .coordinates import BodyState, positions, velocities
+from .inverse import inverse_inertia
 from .structure import FrameSpec, Structure, TermSpec
 from .tables import (
     BODY_P,
@@ -48,8 +52,6 @@ from .tables import (
 from .tree import REVOLUTE
 
 REGULARISATION = 1e-9
-THIN = 1e-9  # principal inertias below this part of the body's size count as none
-STAND_IN = 1e-6  # what is put in their place while factoring
 TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
 BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
 
@@ -69,7 +71,7 @@ class Values:
 
 
 def values(
-    s: Structure, parameters: Mapping[str, float] | None = None, holds: Mapping[str, float] | None = None
+    s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None
 ) -> Values:
     """Numbers of a mechanism.
 
@@ -77,31 +79,33 @@ def values(
     ----------
     s : Structure
     parameters : mapping, optional
-        Values in SI units in place of the model's own.
+        Values in SI units in place of the model's own. If one is complex, all tables and the state are.
     holds : mapping, optional
         Values of the coordinates that are held (see ``structure``).
     """
     model = s.model
     env = model.environment(parameters)
     numbers = {e.name: resolve(e, env) for e in model.elements()}
+    given = (*env.values(), *(holds or {}).values())
+    dtype: Any = complex if any(isinstance(x, complex) for x in given) else float
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
     pose = Poses(s, numbers, bodies)
-    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)])
+    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
     length = _length(s, frame_x, bodies)
     body_x, semidefinite = _body_x(s, bodies, frame_x, length)
     _tree_frames(s, pose, numbers, body_x)
-    const, curve_at = _constants(s, numbers, env)
-    term_x = _term_x(s, pose, numbers, holds or {}, curve_at)
-    glob = np.r_[model.gravity_vector(env), REGULARISATION, semidefinite, length]
+    const, curve_at = _constants(s, numbers, env, dtype)
+    term_x = _term_x(s, pose, numbers, holds or {}, curve_at, dtype)
+    glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers), t["angle_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers, dtype), t["angle_i"],
         t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip
-    x = Values(s, system, np.zeros(s.nq), np.zeros(s.nv), numbers, bodies, length, pose)
+    x = Values(s, system, np.zeros(s.nq, dtype), np.zeros(s.nv, dtype), numbers, bodies, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn), velocities(x, drawn)
     return x
@@ -202,38 +206,36 @@ class Poses:
         return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
 
 
-def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> float:
+def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> Any:
     """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
-    moving = s.tables["frame_i"] >= 0
-    reach = np.sqrt((frame_x[moving, :3] ** 2).sum(axis=1)).max(initial=0.0).real
-    centres = np.array([b.c for k, b in bodies.items() if k != GROUND]).real
-    spread = np.sqrt(((centres - centres.mean(axis=0)) ** 2).sum(axis=1)).max()
-    return float(max(reach, spread)) or 1.0
+    centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
+    ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
+    longest = ways[np.argmax((ways.real**2).sum(axis=1))]
+    length = np.sqrt((longest**2).sum())
+    return length if length.real > 0.0 else 1.0
 
 
-def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: float) -> tuple[np.ndarray, float]:
+def _reach(ways: np.ndarray) -> Any:
+    """The largest component of some ways, taken positive."""
+    flat = ways.ravel()
+    return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
+
+
+def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
     """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
     nb = len(s.tables["body_i"])
-    body_x = np.zeros((nb, BODY_WIDTH))
+    body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
     semidefinite = 0.0
-    of_body = [np.abs(frame_x[s.tables["frame_i"] == b, :3]).max(initial=0.0) for b in range(nb)]
+    of_body = [_reach(frame_x[s.tables["frame_i"] == b, :3]) for b in range(nb)]
     for name, b in s.place.items():
         if b < 0:
             continue
         d = bodies[name]
         J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = max(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2) or (
-            d.mass * length**2
-        )
-        w, V = np.linalg.eigh(J)
-        used = np.array([False, False, True]) if s.model.planar else np.array([True] * 3)
-        if s.model.planar:
-            w, V = np.diag(J), np.eye(3)
-        weak = used & (w < THIN * size)
-        more = np.where(weak, STAND_IN * size - w, 0.0)
-        inverse = (V * np.where(used, 1.0 / np.where(used, w + more, 1.0), 0.0)) @ V.T
-        more = (V * more) @ V.T
-        if weak.any():
+        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2)
+        size = size if size.real > 0.0 else d.mass * length**2
+        inverse, more = inverse_inertia(J, size, s.model.planar)
+        if more.any():
             semidefinite = 1.0
         body_x[b, MASS] = d.mass
         body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
@@ -280,14 +282,14 @@ def _leave_out(x: np.ndarray, kind: int) -> None:
         x[BODY_P : BODY_P + 3] = T @ x[BODY_P : BODY_P + 3]
         x[body], x[tree] = (T @ x[body].reshape(3, 3)).ravel(), np.eye(3).ravel()
     for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
-        if np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
+        if not x[rotation].imag.any() and np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
             x[rotation] = np.eye(3).ravel()
         x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
-def _constants(s: Structure, numbers: dict, env: Mapping[str, float]) -> tuple[np.ndarray, dict[str, int]]:
+def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
     """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
-    const = list(s.const or [0.0])
+    const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
     curve_at = {}
     for e in s.model.joints:
@@ -295,14 +297,14 @@ def _constants(s: Structure, numbers: dict, env: Mapping[str, float]) -> tuple[n
             curve_at[e.name] = len(const)
             for data in curves:
                 const += data
-    return np.array(const, float), curve_at
+    return np.array(const, dtype), curve_at
 
 
 def _term_x(
-    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, float], curve_at: Mapping[str, int]
+    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
 ) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
-    x = np.zeros((len(s.terms), 8))
+    x = np.zeros((len(s.terms), 8), dtype)
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
     for k, t in enumerate(s.terms):
@@ -341,8 +343,8 @@ def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:
-    x = np.zeros((len(s.forces), 16))
+def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: Any) -> np.ndarray:
+    x = np.zeros((len(s.forces), 16), dtype)
     for k, e in enumerate(s.forces):
         separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
         par = e.parameters(numbers[e.name], separation)
@@ -350,8 +352,9 @@ def _force_x(s: Structure, pose: Poses, numbers: dict) -> np.ndarray:
     return x
 
 
-def work(s: Structure, system: System, dtype: type = float) -> Work:
-    """Scratch arrays for one run."""
+def work(s: Structure, system: System, dtype: Any = None) -> Work:
+    """Scratch arrays for one run: of the tables' own kind of numbers, if not told."""
+    dtype = system.body_x.dtype if dtype is None else dtype
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
     n, ny, nl = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads)
 

@@ -1,0 +1,196 @@
+"""Mechanisms with parameters in all of their numbers, and the derivatives of their tables in two ways."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import warnings
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+import flyball as fb
+from flyball.errors import ModelError
+from flyball.model.element import Unit, fields_with
+from flyball.model.expressions import number
+from flyball.model.model import CATEGORIES
+from flyball.system.structure import Structure
+from flyball.system.tables import (
+    BODY_P,
+    BODY_R,
+    EXCESS,
+    INERTIA,
+    INVERSE,
+    LENGTH,
+    OFFSET,
+    PER_COMPACT,
+    PER_MASS,
+    TREE,
+    TREE_P,
+    TREE_R,
+)
+from flyball.system.tree import REVOLUTE
+from flyball.system.values import Values, values
+
+STEP = 1e-30
+STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # of the differences, one after the other where they do not agree
+Tables = dict[str, np.ndarray]
+Derivative = Callable[[], Tables]
+
+
+class _Numbers:
+    """Lets every number of a mechanism depend on the parameter of its field, each in its own way."""
+
+    def __init__(self, planar: bool, env: dict[str, float]) -> None:
+        self.planar, self.env = planar, env
+        self.names: dict[str, str] = {}  # field -> parameter
+        self.count = 0
+
+    def element(self, e: Any) -> Any:
+        """The element with parameters in its numbers, those of its shapes too."""
+        new = {}
+        for name, unit in fields_with(type(e), Unit).items():
+            value = getattr(e, name)
+            if value is not None and not (self.planar and name == "inertia_about"):
+                new[name] = self.value(value, f"{type(e).__name__}.{name}", unit.dimension)
+        if isinstance(e, fb.Body) and e.shape is not None:
+            shapes = tuple(self.element(s) for s in e.shapes())
+            new["shape"] = shapes if isinstance(e.shape, tuple) else shapes[0]
+        return dataclasses.replace(e, **new)
+
+    def value(self, x: Any, field: str, dimension: str | None) -> Any:
+        """What is written, with a multiple of the field's parameter added to each of its numbers."""
+        if isinstance(x, tuple):
+            if field == "Body.inertia" and isinstance(x[0], tuple):
+                upper = {(i, j): self.value(x[i][j], field, dimension) for i in range(3) for j in range(i, 3)}
+                return tuple(tuple(upper[min(i, j), max(i, j)] for j in range(3)) for i in range(3))
+            kept = 2 if self.planar and len(x) == 3 and x[2] == 0.0 else len(x)
+            return (*(self.value(y, field, dimension) for y in x[:kept]), *x[kept:])
+        found = number(x, self.env, dimension, field)
+        parameter = self.names.setdefault(field, f"p{len(self.names)}")
+        self.count += 1
+        weight = (abs(found) or 0.1) * (1.0 + 0.5 * math.cos(self.count)) * (-1.0) ** self.count
+        try:
+            x = repr(number(x, {}, dimension, field))
+        except ModelError:
+            x = f"({x})"
+        return f"{x} + {weight!r}*{parameter}"
+
+
+def with_parameters(m: fb.Mechanism) -> tuple[fb.Mechanism, dict[str, str]]:
+    """A copy of a mechanism with a parameter, zero as it stands, for each field of its elements; field -> parameter."""
+    numbers = _Numbers(m.planar, m.environment())
+    parts = [numbers.element(e) for category in CATEGORIES for e in getattr(m, category)]
+    gravity = numbers.value(m.gravity, "gravity", "m/s^2")
+    zeros = dict.fromkeys(numbers.names.values(), 0.0)
+    out = fb.Mechanism(m.name, planar=m.planar, gravity=gravity, parameters={**m.parameters, **zeros})
+    out.add(*parts)
+    return out, numbers.names
+
+
+def tables(x: Values) -> Tables:
+    """The numbers of the tables by name.
+
+    A constant rotation about a hinge's own axis may stand before or behind the hinge's (``_leave_out``); hinges are
+    therefore given by where they bring the body at two angles. ``scale ...`` are lengths and inertias that are no
+    physics but chosen as the largest of several, so that they have kinks: there the derivative is one of several.
+    """
+    S = x.system
+    X = S.body_x
+    out = {"mass": X[:, :INERTIA], "inertia": X[:, INERTIA:INVERSE]}
+    out |= {"per mass": X[:, PER_MASS : PER_MASS + 1], "offset": X[:, OFFSET : OFFSET + 1]}
+    for b, row in enumerate(X):
+        T, B = row[TREE_R : TREE_R + 9].reshape(3, 3), row[BODY_R : BODY_R + 9].reshape(3, 3)
+        angles = (0.0, 0.7) if S.body_i[b, TREE] == REVOLUTE else (0.0,)
+        poses = [T @ about_z(a) @ np.column_stack([B, row[BODY_P : BODY_P + 3]]) for a in angles]
+        out[f"tree joint {b}"] = np.concatenate([row[TREE_P : TREE_P + 3], *(p.ravel() for p in poses)])
+        if S.body_i[b, TREE] != REVOLUTE:
+            out[f"tree frames {b}"] = row[TREE_P:PER_MASS]
+    scaled = "scale of inverse" if X[:, EXCESS:TREE_P].any() else "inverse"
+    out |= {scaled: X[:, INVERSE:EXCESS], "scale of excess": X[:, EXCESS:TREE_P]}
+    out |= {"scale": np.r_[X[:, PER_COMPACT], S.glob[LENGTH]], "glob": S.glob[:LENGTH]}
+    out |= {name: getattr(S, name) for name in ("frame_x", "term_x", "force_x", "const")}
+    return out | {"q": x.q, "v": x.v}
+
+
+def about_z(angle: float) -> np.ndarray:
+    """Rotation about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def complex_tables(s: Structure, name: str) -> Tables:
+    """Tables with a complex step of a parameter; a number that loses its imaginary part on the way is an error."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = tables(values(s, {name: complex(s.model.environment()[name], STEP)}))
+    assert all(a.dtype == complex for a in found.values())
+    return found
+
+
+def compared(make: Callable[[float], Tables], exact: Tables, size: float) -> Iterator[str]:
+    """Which tables' derivatives (``exact``, imaginary parts by the step) are not those of ``make(change)``."""
+    base = make(0.0)
+    wrong = {k: ~_near(x.real, base[k], 1e-12, 1e-14 * largest(base[k])) for k, x in exact.items()}
+    yield from (f"{k}, real part: {exact[k].real[w]} for {base[k][w]}" for k, w in wrong.items() if w.any())
+    left = {k: np.ones(x.shape, bool) for k, x in exact.items()}
+    refused: ModelError | None = None
+    tried: Tables = {}
+    for step in STEPS:
+        if not any(x.any() for x in left.values()):
+            return
+        h = step * size
+        try:
+            near = {k: make(k * h) for k in (-4, -3, -2, -1, 1, 2, 3, 4)}
+        except ModelError as error:
+            refused = error
+            continue
+        for k, x in exact.items():
+            f = {j: near[j][k] for j in near} | {0: base[k]}
+            d = x.imag / STEP
+            noise = 1e-14 * np.maximum(largest(base[k]), k == "q") / h  # angles come from rotations, of size 1
+            if k.endswith("inverse"):
+                noise = noise * np.maximum(1.0, largest(base[k]) * largest(base["inertia"]))
+            tried[k] = (8.0 * (f[1] - f[-1]) - (f[2] - f[-2])) / (12.0 * h)
+            rows = np.maximum(largest(d), largest(tried[k]))
+            good = _near(d, tried[k], 1e-7, 1e-8 * rows + noise)
+            if k.startswith("scale"):
+                good |= _between(d, f, h, 1e-6 * rows + 10.0 * noise)
+            left[k] &= ~good
+    if not tried:
+        assert refused is not None
+        raise refused
+    for k, x in left.items():
+        if x.any():
+            yield f"{k}{np.argwhere(x)[0]}: {exact[k].imag[x][0] / STEP} for {tried[k][x][0]}"
+
+
+def errors_of(s: Structure, name: str, size: float) -> list[str]:
+    """Tables of which the complex step of a parameter does not give the derivative.
+
+    Raises
+    ------
+    ModelError
+        If the mechanism allows no change of this parameter.
+    """
+    value = s.model.environment()[name]
+    return list(compared(lambda change: tables(values(s, {name: value + change})), complex_tables(s, name), size))
+
+
+def largest(a: np.ndarray) -> Any:
+    """The largest size in each row of a table."""
+    return np.abs(a).max(axis=-1, keepdims=True, initial=0.0)
+
+
+def _near(a: np.ndarray, b: np.ndarray, relative: float, absolute: Any) -> np.ndarray:
+    return np.abs(a - b) <= relative * np.abs(b) + absolute
+
+
+def _between(d: np.ndarray, f: dict[int, np.ndarray], h: float, tolerance: Any) -> np.ndarray:
+    """Whether a slope is between those to the left and to the right."""
+    sides = [
+        (-25.0 * f[0] + 48.0 * f[w] - 36.0 * f[2 * w] + 16.0 * f[3 * w] - 3.0 * f[4 * w]) / (12.0 * w * h)
+        for w in (1, -1)
+    ]
+    return (np.minimum(*sides) - tolerance <= d) & (d <= np.maximum(*sides) + tolerance)
