@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from . import check, optimize, run, sensitivity, singularities, view  # noqa: F401  (each adds its subcommand)
+from . import (  # noqa: F401  (each adds its subcommand)
+    check,
+    inverse_dynamics,
+    kinematics,
+    mobility,
+    optimize,
+    run,
+    sensitivity,
+    singularities,
+    view,
+)
 from .common import app
 
 
