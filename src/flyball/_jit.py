@@ -63,6 +63,7 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self._dispatcher: Callable[..., Any] | None = None
+        self._ready = False
         update_wrapper(self, function)
 
     @property
@@ -78,14 +79,24 @@ class Kernel:
             self._dispatcher = made
         return self._dispatcher
 
+    @property
+    def cold(self) -> bool:
+        """Whether a call compiles first: nothing of this version is in memory or in the cache."""
+        try:
+            return not self.dispatcher.signatures and not self.dispatcher._cache._cache_file._load_index()
+        except Exception:  # internals of Numba: where they differ, say nothing
+            return False
+
     def __call__(self, *args: Any) -> Any:
-        if self._dispatcher is None or not getattr(self._dispatcher, "signatures", True):
+        if not self._ready:
             start_numba()
             from ._link import optimise_once
 
             with _lock, optimise_once(self.function.__qualname__):
-                return self.dispatcher(*args)
-        return self._dispatcher(*args)
+                out = self.dispatcher(*args)
+            self._ready = True
+            return out
+        return self._dispatcher(*args)  # type: ignore[misc]
 
 
 def start_numba() -> None:

@@ -12,7 +12,9 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .analysis.mobility import Mobility
     from .results.equilibrium import Equilibrium
+    from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
     from .results.locus import RootLocus
     from .results.modes import Modes
@@ -34,6 +36,20 @@ class Mechanism(Model):
         from .analysis.dynamics import simulate
 
         return simulate(self, t_end, **options)
+
+    def kinematics(self, times: int | Sequence[float] = 501, **options: Any) -> Result:
+        """Motion that drivers prescribe; see `flyball.analysis.kinematics.kinematics` for the options."""
+        from .analysis.kinematics import kinematics
+
+        return kinematics(self, times, **options)
+
+    def inverse_dynamics(
+        self, times: int | Sequence[float] = 501, motion: Any = None, **options: Any
+    ) -> InverseDynamics:
+        """Efforts and reactions; see `flyball.analysis.inverse_dynamics.inverse_dynamics` for the options."""
+        from .analysis.inverse_dynamics import inverse_dynamics
+
+        return inverse_dynamics(self, times, motion, **options)
 
     def assemble(self, **options: Any) -> Assembly:
         """Consistent positions and velocities near those described."""
@@ -100,6 +116,12 @@ class Mechanism(Model):
         from .analysis.check import check
 
         return check(self)
+
+    def mobility(self, **options: Any) -> Mobility:
+        """Freedoms and redundant sets by name, with cures; see `flyball.analysis.mobility.mobility` for the options."""
+        from .analysis.mobility import mobility
+
+        return mobility(self, **options)
 
     def mass_properties(self, **options: Any) -> MassReport:
         """Masses, inertias and principal axes; see `flyball.analysis.mass.mass_properties` for the options."""

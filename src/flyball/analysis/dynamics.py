@@ -72,13 +72,32 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
     begun.since = started
-    clock = _clock(begun, t_start, float(t_end), times, chosen)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
-    rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
-    owed = partial(owed_works, begun, clock, rows) if follow else None
-    if follow:
+    return moved(begun, t_end, times, chosen, FOLLOW if follow else INTEGRATE, progress)
+
+
+def moved(
+    begun: Start,
+    t_end: float,
+    times: np.ndarray,
+    o: Options,
+    task: int,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """The motion from where it begins, integrated (task INTEGRATE) or as drivers prescribe it (FOLLOW).
+
+    Raises
+    ------
+    SimulationError
+        If it cannot go on; its ``result`` holds the motion up to then.
+    """
+    clock = _clock(begun, begun.base.t, float(t_end), times, o)
+    rows, interrupted = _run(begun.assembly, clock, tableau(o.method), progress, task)
+    owed = None
+    if task == FOLLOW:
+        owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
-    return outcome(model, begun, clock, rows, chosen, interrupted, owed)
+    return outcome(begun.base.compiled.structure.model, begun, clock, rows, o, interrupted, owed)
 
 
 def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
@@ -89,7 +108,7 @@ def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) 
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = _energy_size(start.base, t_end - t)
+    real[ex.LEDGER] = _energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps

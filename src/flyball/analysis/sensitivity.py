@@ -16,7 +16,7 @@ from ..results.sensitivity import Sensitivity
 from .assemble import Assembly, assemble
 from .curves import curve, slopes, snapshot
 from .derivatives import Equations, State
-from .differences import check, derivative
+from .differences import Found, check, derivative
 from .driven import leaves_no_freedom
 from .dynamics import simulate
 from .equilibrium import equilibrium
@@ -28,7 +28,6 @@ from .start import Start
 from .tangent import Direction, Linear, Tangent, closed, tangent_step
 from .variation import Variation
 
-ANALYSES = ("instant", "motion", "equilibrium", "modes")
 FLAT = 1e-9  # stiffness, of what acts, below which an equilibrium's place is not determined
 
 
@@ -64,20 +63,17 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of quantities with respect to parameters.
 
-    Exact: complex steps through the formulas, along the change that the linearised constraints and equations of motion
-    prescribe. How an eigenvalue, or the start of a mechanism that no driver holds, changes is found by differences of
-    sixth order of what is exact at every value (relative error about 1e-10).
+    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How eigenvalues
+    change, and the start of a mechanism that no driver holds, comes from differences of sixth order (error 1e-10).
 
     Parameters
     ----------
-    model : Model
     of : sequence of str
-        Sensors, or curves of a result (``"slider.x"``, ``"A.fx"``). For ``"modes"`` none: all eigenvalues.
+        Sensors, or curves of a result (``"slider.x"``). For ``"modes"`` none: all eigenvalues.
     to : sequence of str
         Parameters; all of the model's if none is named.
     analysis : str
-        ``"instant"``: kinematics and reactions at ``t``; ``"motion"``: over a motion from ``t`` to ``t_end``;
-        ``"equilibrium"``: at the static equilibrium; ``"modes"``: eigenvalues.
+        ``"instant"`` (at ``t``), ``"motion"`` (from ``t`` to ``t_end``), ``"equilibrium"``, ``"modes"`` (eigenvalues).
     t, t_end : float [s]
     outputs : int or sequence of float
         Number of times of a motion, or the times [s].
@@ -88,7 +84,6 @@ def sensitivity(
     verify : bool
         Also by central differences of the whole analysis, with a step of 1e-5 of each parameter.
     rtol, atol : float
-        Tolerances of a motion.
 
     Returns
     -------
@@ -101,28 +96,36 @@ def sensitivity(
     SingularityError
         If what is asked has no derivative there.
     """
-    if isinstance(of, str) or isinstance(to, str):
-        raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
-    if analysis not in ANALYSES:
-        raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, ANALYSES)}; {listing(list(ANALYSES))}")
-    env = model.environment(parameters)
-    for name in to:
-        if name not in env:
-            known = list(env)
-            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
-    start = number(t, {}, "s", "t")
+    _refuse(model, of, to, analysis, parameters)
+    env, start = model.environment(parameters), number(t, {}, "s", "t")
     a = Question(model.snapshot(), tuple(of), tuple(to or env), start, dict(parameters or {}), about=about)
     if analysis == "motion":
         if t_end is None:
             raise ModelError("sensitivity of a motion: give t_end")
         a.times, a.rtol, a.atol = output_times(start, number(t_end, {}, "s", "t_end"), outputs), rtol, atol
-    out = {"instant": _instant, "motion": _motion, "equilibrium": _equilibrium, "modes": _modes}[analysis](a)
+    out = ANALYSES[analysis][0](a)
     out.parameters = {name: env[name] for name in a.to}
-    if verify:
-        found = {"instant": _at_instant, "motion": _at_motion, "equilibrium": _at_rest, "modes": _at_modes}[analysis](a)
-        parts = [check(a.model, a.parameters, name, found) for name in a.to]
-        out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
+    return _verified(a, analysis, out) if verify else out
+
+
+def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
+    """With the column of central differences."""
+    again = ANALYSES[analysis][1](a)
+    parts = [check(a.model, a.parameters, name, again) for name in a.to]
+    out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
     return out
+
+
+def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, parameters: Any) -> None:
+    """Refuse names that do not exist."""
+    if isinstance(of, str) or isinstance(to, str):
+        raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
+    if analysis not in ANALYSES:
+        raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, list(ANALYSES))}; {listing(list(ANALYSES))}")
+    known = list(model.environment(parameters))
+    for name in to:
+        if name not in known:
+            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
 
 
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
@@ -165,7 +168,7 @@ def _instant(a: Question) -> Sensitivity:
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
 
 
-def _at_instant(a: Question) -> Callable[[Mapping[str, float]], np.ndarray]:
+def _at_instant(a: Question) -> Found:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         b = assemble(a.model, t=a.t, parameters=parameters)
         return _row(State.moving(b.compiled, b.t, b.q, b.v), a.of)
@@ -206,7 +209,7 @@ def _driven(
         yield state, [closed(d, state, lin, still, still) for d in directions]
 
 
-def _at_motion(a: Question) -> Callable[[Mapping[str, float]], np.ndarray]:
+def _at_motion(a: Question) -> Found:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         r = simulate(
             a.model, a.times[-1], t_start=a.t, outputs=list(a.times), parameters=parameters, rtol=1e-12, atol=1e-13
@@ -241,7 +244,7 @@ def _equilibrium(a: Question) -> Sensitivity:
     )
 
 
-def _at_rest(a: Question) -> Callable[[Mapping[str, float]], np.ndarray]:
+def _at_rest(a: Question) -> Found:
     begin = equilibrium(a.model, t=a.t, parameters=a.parameters)
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
@@ -260,7 +263,7 @@ def _modes(a: Question) -> Sensitivity:
     return Sensitivity("modes", of, a.to, units, {}, np.array([a.t]), values[None], np.stack(parts, axis=-1)[None])
 
 
-def _at_modes(a: Question) -> Callable[[Mapping[str, float]], np.ndarray]:
+def _at_modes(a: Question) -> Found:
     known: list[np.ndarray] = []
     begin: list[Any] = []
 
@@ -280,3 +283,12 @@ def _at_modes(a: Question) -> Callable[[Mapping[str, float]], np.ndarray]:
     if not known:
         found(a.parameters)
     return found
+
+
+# what finds the derivatives, and what makes a function of the parameters for differences
+ANALYSES: dict[str, tuple[Callable[[Question], Sensitivity], Callable[[Question], Found]]] = {
+    "instant": (_instant, _at_instant),
+    "motion": (_motion, _at_motion),
+    "equilibrium": (_equilibrium, _at_rest),
+    "modes": (_modes, _at_modes),
+}

@@ -83,7 +83,7 @@ def equilibria(
             else:
                 x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
                 how = "following" if len(way.jumps) == before else "descent"
-                done.equilibria.append(_finished(x, how, {}))
+                done.equilibria.append(_finished(x, {}, how))
         except NotConverged as error:
             raise stopped(done, value, error) from error
         done.values = points[: k + 1]
@@ -164,7 +164,7 @@ class _Way:
         if y is None:
             raise _failure(downhill or x)
         if _apart(x, y) > NEAR:
-            self.jumps.append(Jump(float(value), _finished(x, "following", {}), _finished(y, "descent", {})))
+            self.jumps.append(Jump(float(value), _finished(x, {}, "following"), _finished(y, {}, "descent")))
         return y
 
 

@@ -7,7 +7,20 @@ from typing import Annotated
 
 import typer
 
-from . import check, equilibrium, linearize, modes, run, singularities, view  # noqa: F401  (each adds its subcommand)
+from . import (  # noqa: F401  (each adds its subcommand)
+    check,
+    equilibrium,
+    inverse_dynamics,
+    kinematics,
+    linearize,
+    mobility,
+    modes,
+    optimize,
+    run,
+    sensitivity,
+    singularities,
+    view,
+)
 from .common import app
 
 
