@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import sys
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import typer
+
+from ..errors import PerformanceNotice
 
 KERNELS = {  # of analysis/entry.py: what to say before they are compiled
     "motion_kernel": "compiling for this machine, once: about half a minute",
@@ -16,20 +19,20 @@ KERNELS = {  # of analysis/entry.py: what to say before they are compiled
 
 
 def announce_compiling(talk: bool, *kernels: str) -> None:
-    """On a terminal, say that the first use takes long, if it is the first use of kernels: the motion's by default."""
+    """On a terminal, say that the first use takes long, if it is the first use of kernels: the motion's by default.
+
+    The analyses' own notices, which are for those who call them from Python, are then not needed.
+    """
+    warnings.filterwarnings("ignore", "compiling ", PerformanceNotice)
     for name in kernels or ("motion_kernel",):
         if talk and sys.stderr.isatty() and _will_compile(name):
             typer.echo(KERNELS[name], err=True)
 
 
 def _will_compile(name: str) -> bool:
-    """Whether no compiled code of this version of a kernel is in the cache."""
     from ..analysis import entry
 
-    try:
-        return not getattr(entry, name).dispatcher._cache._cache_file._load_index()
-    except Exception:  # internals of Numba: where they differ, say nothing
-        return False
+    return getattr(entry, name).cold
 
 
 @contextmanager
