@@ -15,6 +15,7 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
+from . import partition
 from .assemble import Assembly
 from .driven import at_outputs, leaves_no_freedom, owed_works
 from .entry import FOLLOW, INTEGRATE, motion_kernel
@@ -72,16 +73,19 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
     begun.since = started
-    clock = _clock(begun, t_start, float(t_end), times, chosen)
+    if chosen.stabilization == "partitioning":
+        partition.choose(model, begun)
+    clock = clock_for(begun, t_start, float(t_end), times, chosen)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
-    rows, interrupted = _run(begun.assembly, clock, tableau(chosen.method), progress, FOLLOW if follow else INTEGRATE)
+    task = FOLLOW if follow else INTEGRATE
+    rows, interrupted = run_clock(begun.assembly, clock, tableau(chosen.method), progress, task)
     owed = partial(owed_works, begun, clock, rows) if follow else None
     if follow:
         rows = at_outputs(clock, rows)
     return outcome(model, begun, clock, rows, chosen, interrupted, owed)
 
 
-def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
+def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
     s, W = a.compiled.structure, a.compiled.work
@@ -118,7 +122,9 @@ def _energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
-def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int) -> tuple[np.ndarray, bool]:
+def run_clock(
+    a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int
+) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     width = 1 + len(a.y) + s.nv + len(S.row_i) + len(s.prescribed)

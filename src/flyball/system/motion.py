@@ -1,24 +1,21 @@
 """The motion as an ordinary differential equation: y = (q, v, z), z being works, turned angles, places on curves.
 
 Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g = 0 and G v = nu are kept by one smooth
-projection P, along M^-1 G^T; the integrator sees f(P(y)), so its order is kept.
+projection P, along M^-1 G^T or along dependent coordinates; the integrator sees f(P(y)), so its order is kept.
 """
 
 from __future__ import annotations
 
 from .._jit import formula
-from ..constraints import curve
-from ..constraints.angle import row as angle
 from ..math.scalar import atan2, cos, sin
-from ..math.vec import dot, sub
 from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
 from .laws import evaluate_jet
 from .loads import efforts, forces, gather, inertial
-from .records import load
-from .rows import BY_TIME, parameters, row_times
+from .partition import exchange
+from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
@@ -37,6 +34,7 @@ from .tables import (
     LENGTH,
     NU,
     OFFSET,
+    PARTED,
     PASS,
     PROJECTIONS,
     Q0,
@@ -47,9 +45,6 @@ from .tables import (
     SOLVER,
     STABILIZE,
     STATUS,
-    TERM_F,
-    TERM_HINT,
-    TERM_M,
     TOL_G,
     TOL_V,
     TREE,
@@ -60,8 +55,9 @@ from .tables import (
     X_SOLVED,
 )
 from .tree import REVOLUTE, normalise, rates, retract
+from .turns import progress, remember
 
-NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
+NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
 OLD, NEAR, HERE = range(3)
 PASSES = 16
@@ -69,6 +65,7 @@ CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
+LET_BE = 1e300  # violations that the choice of stabilization leaves alone
 FAR = 1e3  # a state this far off is given up at once
 
 
@@ -165,12 +162,17 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
+    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
+    if W.option[STABILIZE] == VELOCITIES:
+        tol_g = LET_BE
+    if W.option[STABILIZE] == POSITIONS:
+        tol_v = LET_BE
     place(S, W, t, q, z)
     if r.shape[0] == 0:
         move(S, W, t, v, z)
         return 0, 0.0, OLD
     worst = violation(W, r)
-    found = worst
+    found = worst if tol_g < LET_BE else 0.0
     last = 1e300
     factored = OLD
     for _ in range(PASSES):
@@ -209,6 +211,8 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         for d in range(step.shape[0]):
             v[d] += step[d]
     move(S, W, t, v, z)
+    if not tol_v < LET_BE:
+        worst = 0.0
     return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
 
 
@@ -225,6 +229,9 @@ def accelerate(S, W, t, p, dy, factored):
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
     x = W.vel[X_SOLVED]
+    if W.option[PARTED] > 0.0:  # from here on with the masses
+        W.option[PARTED] = 0.0
+        factored = OLD
     if factored == NEAR:
         if S.kinds[SOLVER] == SCHUR:
             reuse(S, W)
@@ -272,37 +279,6 @@ def accelerate(S, W, t, p, dy, factored):
 
 
 @formula
-def progress(S, W, z, dz):
-    """Rates of the states that count turns of angles and places on curves."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
-        n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
-        dz[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        par = parameters(S.term_x, k)
-        s = curve.foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
-        dz[S.term_i[k, TERM_HINT]] = curve.progress(par, F, M, s, S.const)[0]
-
-
-@formula
-def remember(S, W, z):
-    """Put the states that count turns and places where the poses in W say they are: no drift over long motions."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
-        h = S.angle_i[k, 2]
-        z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        h = S.term_i[k, TERM_HINT]
-        z[h] = curve.foot(parameters(S.term_x, k), F, M, z[h], S.const)
-
-
-@formula
 def finite(dy):
     """0, or NOT_FINITE."""
     s = 0.0
@@ -323,7 +299,7 @@ def derivative(t, y, dy, S, W):
     z = p[nq + W.vel.shape[1] :]
     prepare(S, W, t, q, v)
     factored = OLD
-    if W.option[STABILIZE] == STAGES:
+    if W.option[STABILIZE] >= STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
             W.info[STATUS] = status
@@ -353,6 +329,8 @@ def arrive(t, y, dy, S, W):
         if status != 0:
             W.info[STATUS] = status
             return status, found
+        if W.option[PARTED] > 0.0:
+            exchange(S, W)
     else:
         place(S, W, t, q, z)
         move(S, W, t, v, z)
