@@ -214,6 +214,7 @@ def mechanisms() -> dict[str, Any]:
     import flyball as fb
     from mechanisms import chain, flyball_planar, fourbars
 
+
     examples = Path(__file__).resolve().parents[1] / "examples"
     return {
         "four-bar": flyball_planar(fourbars(1)),
