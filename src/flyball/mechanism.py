@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .results.linear import LinearModel
     from .results.modes import Modes
     from .results.result import Result
+    from .results.singularities import Singularities
 
 
 class Mechanism(Model):
@@ -71,6 +72,12 @@ class Mechanism(Model):
         from .analysis.mass import mass_properties
 
         return mass_properties(self, **options)
+
+    def singularities(self, driver: str, range: Any, **options: Any) -> Singularities:
+        """Singular positions over a range of a driver; see `flyball.analysis.singularities.singularities`."""
+        from .analysis.singularities import singularities
+
+        return singularities(self, driver, range, **options)
 
     def save(self, path: str | os.PathLike) -> None:
         """Write the description to a TOML file; `flyball.load` reads it back exactly."""

@@ -29,6 +29,7 @@ PROMISED = {
     "rolling_race.toml",
     "rope_pendulum.toml",
     "slider_crank.toml",
+    "slider_crank_singularities.py",
     "spatial_four_bar.toml",
     "spatial_slider_crank.toml",
     "stewart.py",
