@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .results.comparison import Comparison
     from .results.equilibrium import Equilibrium
     from .results.linear import LinearModel
     from .results.modes import Modes
@@ -30,6 +31,15 @@ class Mechanism(Model):
         from .analysis.dynamics import simulate
 
         return simulate(self, t_end, **options)
+
+    def compare(self, t_end: float, **options: Any) -> Comparison:
+        """The same motion by several formulations of its equations: drift, energy and cost of each.
+
+        See `flyball.analysis.compare.compare` for the options.
+        """
+        from .analysis.compare import compare
+
+        return compare(self, t_end, **options)
 
     def assemble(self, **options: Any) -> Assembly:
         """Consistent positions and velocities near those described."""

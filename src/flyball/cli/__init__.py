@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from . import check, run, singularities, view  # noqa: F401  (each adds its subcommand)
+from . import check, compare, run, singularities, view  # noqa: F401  (each adds its subcommand)
 from .common import app
 
 
