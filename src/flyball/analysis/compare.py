@@ -92,18 +92,15 @@ def compare(
     Parameters
     ----------
     model : Model
-    t_end, t_start : float [s]
-    outputs : int or sequence of float
-        Times at which drift and energy are looked at.
+    t_end, t_start, outputs
+        As for `simulate`; drift and energy are looked at at the outputs.
     formulations : sequence of str, optional
         Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
         ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default.
     repeats : int
         Times that each is run for its cost, fewer where that takes long; 0 for none.
-    parameters, start
+    parameters, start, progress
         As for `simulate`.
-    progress : callable, optional
-        Called with the fraction done.
     **options
         Of `Options`: rtol, atol, method, alpha, beta, max_step, max_steps (without it a formulation is given up after
         twenty times the steps of the reference).
@@ -115,10 +112,8 @@ def compare(
 
     Raises
     ------
-    AssemblyError
-        If the start cannot be made consistent.
-    ModelError
-        For formulations or options that do not exist.
+    AssemblyError, ModelError
+        If the start cannot be made consistent; for formulations or options that do not exist.
     """
     names = _known(formulations)
     if not isinstance(repeats, (int, np.integer)) or repeats < 0:
@@ -126,14 +121,26 @@ def compare(
     chosen = _options(options)
     model = model.snapshot()
     t_start = number(t_start, {}, "s", "t_start") if start is None else start.final[0]
-    t_end = number(t_end, {}, "s", "t_end")
-    times = output_times(t_start, t_end, outputs)
+    span = (t_start, float(number(t_end, {}, "s", "t_end")))
+    times = output_times(*span, outputs)
     base = begin(model, t_start, parameters, start, "absolute")
-    job = _Task(model, (t_start, float(t_end)), times, chosen, base, parameters, start)
+    job = _Task(model, span, times, chosen, base, parameters, start)
     truth, told = _reference(job)
     if "max_steps" not in options:
         taken = truth.health.steps + truth.health.rejected if truth is not None else 0
         job.options = replace(chosen, max_steps=LIMIT * max(taken, 1000))
+    return _compared(job, names, repeats, truth, told, progress)
+
+
+def _compared(
+    job: _Task,
+    names: Sequence[str],
+    repeats: int,
+    truth: Result | None,
+    told: str,
+    progress: Callable[[float], None] | None,
+) -> Comparison:
+    """Run all, first to see what becomes of the motion, then for their cost."""
     starts: dict[str, Start] = {}
     rows = []
     for k, name in enumerate(names):
@@ -145,7 +152,7 @@ def compare(
         progress(1.0)
     energy = float(truth.energy.kinetic.max(initial=0.0)) if truth is not None else np.nan
     kept = {k: v for k, v in vars(job.options).items() if k not in ("coordinates", "stabilization")}
-    return Comparison(model.name, float(t_end), tuple(rows), told, energy, kept)
+    return Comparison(job.model.name, job.span[1], tuple(rows), told, energy, kept)
 
 
 def _known(names: Sequence[str] | None) -> list[str]:

@@ -65,7 +65,6 @@ CLOSED = 1e-9  # a projection that comes to rest above this has failed
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
 STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
-LET_BE = 1e300  # violations that the choice of stabilization leaves alone
 FAR = 1e3  # a state this far off is given up at once
 
 
@@ -152,27 +151,47 @@ def drift(S, W, v, out):
 def settle(S, W, t, q, v, z, tol_g, tol_v):
     """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
-    Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. Accepted states are taken
-    down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
-    lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
+    Along M^-1 G^T, or along dependent coordinates alone. Accepted states are taken down to rounding: near a singular
+    position a violation e, left standing at a distance s, is a mechanism with other lengths, whose motion leaves the
+    true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
     OLD, of poses NEARby or of those HERE).
     """
+    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
+    place(S, W, t, q, z)
+    if S.row_i.shape[0] == 0:
+        move(S, W, t, v, z)
+        return 0, 0.0, OLD
+    status = 0
+    found = 0.0
+    lost = 0.0
+    factored = OLD
+    if W.option[STABILIZE] != VELOCITIES:
+        status, found, factored = close(S, W, t, q, z, tol_g)
+        if status != 0:
+            return status, found, OLD
+    if W.option[STABILIZE] != POSITIONS:
+        status, lost, factored = steer(S, W, v, tol_v, factored)
+        if status != 0:
+            return status, found, OLD
+    else:  # positions follow the violated velocities and are put back: that is no error of the step
+        found = 0.0
+    move(S, W, t, v, z)
+    return 0, max(found / S.glob[LENGTH], lost), factored
+
+
+@formula
+def close(S, W, t, q, z, tol_g):
+    """Put q on g = 0 by Newton, until |g| passes, or until it is as small as rounding lets it be.
+
+    Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
+    """
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
-    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
-    if W.option[STABILIZE] == VELOCITIES:
-        tol_g = LET_BE
-    if W.option[STABILIZE] == POSITIONS:
-        tol_v = LET_BE
-    place(S, W, t, q, z)
-    if r.shape[0] == 0:
-        move(S, W, t, v, z)
-        return 0, 0.0, OLD
     worst = violation(W, r)
-    found = worst if tol_g < LET_BE else 0.0
+    found = worst
     last = 1e300
     factored = OLD
     for _ in range(PASSES):
@@ -199,21 +218,27 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
         return NOT_CLOSED, found, OLD
+    return 0, found, factored
+
+
+@formula
+def steer(S, W, v, tol_v, factored):
+    """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
+    none = W.vel[F_APPLIED]
+    step = W.vel[V3]
+    r = W.row[R2]
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (1.0 + size):
         if factored == NEAR:
             reuse(S, W)
         if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, OLD
+                return NOT_CLOSED, worst, OLD
             factored = HERE
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    move(S, W, t, v, z)
-    if not tol_v < LET_BE:
-        worst = 0.0
-    return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
+    return 0, worst / (S.glob[LENGTH] + size), factored
 
 
 @formula
