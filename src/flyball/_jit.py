@@ -78,6 +78,14 @@ class Kernel:
             self._dispatcher = made
         return self._dispatcher
 
+    @property
+    def cold(self) -> bool:
+        """Whether a call compiles first: nothing of this version is in memory or in the cache."""
+        try:
+            return not self.dispatcher.signatures and not self.dispatcher._cache._cache_file._load_index()
+        except Exception:  # internals of Numba: where they differ, say nothing
+            return False
+
     def __call__(self, *args: Any) -> Any:
         if self._dispatcher is None or not getattr(self._dispatcher, "signatures", True):
             start_numba()

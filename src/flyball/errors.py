@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 
 class FlyballError(Exception):
     """Any error raised by flyball on purpose."""
@@ -50,12 +52,13 @@ class AnalysisError(FlyballError):
 class AssemblyError(AnalysisError):
     """No position or velocity fulfils all constraints.
 
-    ``gaps`` holds, for each element that disagrees, how far it is from closed.
+    ``gaps`` holds, for each element that disagrees, how far it is from closed; ``best`` the best position found.
     """
 
-    def __init__(self, message: str, gaps: dict | None = None) -> None:
+    def __init__(self, message: str, gaps: dict | None = None, best: Any = None) -> None:
         super().__init__(message)
         self.gaps = gaps or {}
+        self.best = best
 
 
 class SimulationError(AnalysisError):
@@ -83,13 +86,16 @@ class SingularityError(AnalysisError):
     """An analysis was asked for at, or has run into, a singular position.
 
     ``where`` is the value of what was varied there (time [s] or a driver's coordinate), ``elements`` names those whose
-    constraints lose their independence.
+    constraints lose their independence, ``result`` holds what was computed up to there, if anything.
     """
 
-    def __init__(self, message: str, where: float = float("nan"), elements: tuple[str, ...] = ()) -> None:
+    def __init__(
+        self, message: str, where: float = float("nan"), elements: tuple[str, ...] = (), result: object = None
+    ) -> None:
         super().__init__(message)
         self.where = where
         self.elements = elements
+        self.result = result
 
 
 class NotConverged(AnalysisError):

@@ -12,11 +12,15 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
+    from .analysis.mobility import Mobility
     from .results.comparison import Comparison
     from .results.equilibrium import Equilibrium
+    from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
     from .results.modes import Modes
+    from .results.optimum import Optimum
     from .results.result import Result
+    from .results.sensitivity import Sensitivity
     from .results.singularities import Singularities
 
 
@@ -40,6 +44,20 @@ class Mechanism(Model):
         from .analysis.compare import compare
 
         return compare(self, t_end, **options)
+
+    def kinematics(self, times: int | Sequence[float] = 501, **options: Any) -> Result:
+        """Motion that drivers prescribe; see `flyball.analysis.kinematics.kinematics` for the options."""
+        from .analysis.kinematics import kinematics
+
+        return kinematics(self, times, **options)
+
+    def inverse_dynamics(
+        self, times: int | Sequence[float] = 501, motion: Any = None, **options: Any
+    ) -> InverseDynamics:
+        """Efforts and reactions; see `flyball.analysis.inverse_dynamics.inverse_dynamics` for the options."""
+        from .analysis.inverse_dynamics import inverse_dynamics
+
+        return inverse_dynamics(self, times, motion, **options)
 
     def assemble(self, **options: Any) -> Assembly:
         """Consistent positions and velocities near those described."""
@@ -71,11 +89,32 @@ class Mechanism(Model):
 
         return modes(self, **options)
 
+    def sensitivity(self, of: Sequence[str] = (), to: Sequence[str] = (), **options: Any) -> Sensitivity:
+        """Derivatives of kinematics, reactions, equilibria, eigenvalues or motions by parameters.
+
+        See `flyball.analysis.sensitivity.sensitivity` for the options.
+        """
+        from .analysis.sensitivity import sensitivity
+
+        return sensitivity(self, of, to, **options)
+
+    def optimize(self, of: Sequence[str], to: Any, **options: Any) -> Optimum:
+        """Parameters for which quantities come nearest to a target; see `flyball.analysis.optimize.optimize`."""
+        from .analysis.optimize import optimize
+
+        return optimize(self, of, to, **options)
+
     def check(self) -> Report:
         """Freedoms, redundancies, assembly and mass properties, without simulating."""
         from .analysis.check import check
 
         return check(self)
+
+    def mobility(self, **options: Any) -> Mobility:
+        """Freedoms and redundant sets by name, with cures; see `flyball.analysis.mobility.mobility` for the options."""
+        from .analysis.mobility import mobility
+
+        return mobility(self, **options)
 
     def mass_properties(self, **options: Any) -> MassReport:
         """Masses, inertias and principal axes; see `flyball.analysis.mass.mass_properties` for the options."""

@@ -79,7 +79,8 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         q, more = _newton(near, t, q, v)
         count += more
         if _misfit(near, t, q, v) > CLOSED or _misfit(far, t, q, v) > 1e-6:
-            raise _disagreement(far, t, q, v)
+            plain.follow(near.hints)
+            raise _disagreement(far, Assembly(plain, t, q, v))
     plain.follow(near.hints)
     described = v.copy()
     v = _velocities(model, plain, parameters, t, q, v, rates)
@@ -256,9 +257,16 @@ def _close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     return best, count
 
 
-def _disagreement(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> AssemblyError:
+def closed_near(c: Compiled, t: float, q: np.ndarray) -> np.ndarray | None:
+    """The closed position next to q, or None if none is found; of a mechanism with the rows of its positions."""
+    q, _ = _newton(c, t, q, np.zeros(c.structure.nv))
+    return q if _misfit(c, t, q, np.zeros(c.structure.nv)) <= CLOSED else None
+
+
+def _disagreement(c: Compiled, best: Assembly) -> AssemblyError:
     """The error that says which elements cannot be fulfilled together, worst first."""
-    _misfit(c, t, q, v)
+    t = best.t
+    _misfit(c, t, best.q, best.v)
     g = c.work.row[G_VALUE]
     gaps: dict[str, tuple[float, float, str]] = {}
     for name, rows in c.structure.slices.items():
@@ -284,6 +292,7 @@ def _disagreement(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> Assemb
         f"At the best position found {shown or 'rows disagree'}. Check lengths and the points of these joints, "
         f"the drivers, and initial values, or give a better guess",
         gaps={k: gaps[k][:2] for k in worst},
+        best=best,
     )
 
 
@@ -326,6 +335,7 @@ def _velocities(
             f"{model.name!r}: no velocities fulfil all constraints at t = {t:g} s; {listed} disagree. "
             f"Check drivers, initial rates and bodies with as_drawn=True",
             gaps={k: gaps[k] for k in bad},
+            best=Assembly(plain, t, q, v),
         )
     return v
 

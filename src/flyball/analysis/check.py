@@ -144,7 +144,7 @@ def check(model: Model) -> Report:
         If no position or velocity fulfils all constraints.
     """
     a = assemble(model)
-    m = mobility(model, a)
+    m = mobility(model, a, inertia=True)
     x = a.compiled.values
     weights = report(model, x, a.q)
     bodies = {name: _body(b, model.planar) for name, b in weights.bodies.items()}

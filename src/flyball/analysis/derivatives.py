@@ -8,13 +8,14 @@ nothing in them is solved. Directions that no equation sees together are taken i
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, PerformanceNotice
 from ..system.structure import Structure
 from ..system.tables import EFFORT, FORCE_ALONG, FORCE_F, FORCE_LAW, FORCE_M, LAM, NV, X_SOLVED, System, Work
 from ..system.values import Values, values, work
@@ -22,6 +23,7 @@ from .compiled import Compiled
 from .entry import MOTION, residual_kernel
 
 STEP = 1e-40
+NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
 CHUNK = 128  # directions a call
 
 
@@ -138,6 +140,8 @@ class Equations:
         return system, work(self.state.c.structure, system, complex)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
+        if residual_kernel.cold:  # type: ignore[attr-defined]
+            warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
         S, W = self._system if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))

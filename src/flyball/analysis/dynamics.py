@@ -73,16 +73,34 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
     begun.since = started
-    if chosen.stabilization == "partitioning":
-        partition.choose(model, begun)
-    clock = clock_for(begun, t_start, float(t_end), times, chosen)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
-    task = FOLLOW if follow else INTEGRATE
-    rows, interrupted = run_clock(begun.assembly, clock, tableau(chosen.method), progress, task)
-    owed = partial(owed_works, begun, clock, rows) if follow else None
-    if follow:
+    return moved(begun, t_end, times, chosen, FOLLOW if follow else INTEGRATE, progress)
+
+
+def moved(
+    begun: Start,
+    t_end: float,
+    times: np.ndarray,
+    o: Options,
+    task: int,
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """The motion from where it begins, integrated (task INTEGRATE) or as drivers prescribe it (FOLLOW).
+
+    Raises
+    ------
+    SimulationError
+        If it cannot go on; its ``result`` holds the motion up to then.
+    """
+    if o.stabilization == "partitioning":
+        partition.choose(begun.base.compiled.structure.model, begun)
+    clock = clock_for(begun, begun.base.t, float(t_end), times, o)
+    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), progress, task)
+    owed = None
+    if task == FOLLOW:
+        owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
-    return outcome(model, begun, clock, rows, chosen, interrupted, owed)
+    return outcome(begun.base.compiled.structure.model, begun, clock, rows, o, interrupted, owed)
 
 
 def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
@@ -93,7 +111,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Option
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = _energy_size(start.base, t_end - t)
+    real[ex.LEDGER] = _energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps

@@ -26,6 +26,7 @@ from .rest import Rest
 from .turning import turning as turn
 
 NEWTON, DESCENT = 40, 400  # steps
+ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
@@ -46,11 +47,10 @@ def equilibrium(
 ) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion.
 
-    Drivers hold their coordinates where they are at ``t``. Velocities, dampers and inertia play no part.
+    Drivers hold their coordinates where they are at ``t``; velocities, dampers and inertia play no part at rest.
 
     Parameters
     ----------
-    model : Model
     t : float [s]
         Time at which laws of forces and drivers are taken.
     parameters : mapping, optional
@@ -58,14 +58,13 @@ def equilibrium(
     start : Equilibrium, optional
         Guess in place of the described positions: an equilibrium of the same mechanism.
     stable : bool
-        Go on from an unstable equilibrium the way the forces push, to a stable one.
+        Go on from an unstable equilibrium to a stable one.
     preload : sequence of str
-        Forces, by the names that `linearize` takes for inputs: instead of moving the mechanism, find what has to be
-        added to them for it to be in equilibrium where it is drawn.
+        Forces, by the names that `linearize` takes for inputs: find what has to be added to them for the mechanism to
+        be in equilibrium where it is drawn.
     turning : sequence of str
-        Joints' coordinates that turn (or move) evenly while all others stand still, for instance the spindle of a
-        governor: a steady motion near the described positions and speeds is found. Speeds stay as described where
-        nothing else decides them.
+        Joints' coordinates that turn evenly while all others stand still, such as the spindle of a governor: a steady
+        motion is found. Speeds stay as described where nothing else decides them.
 
     Returns
     -------
@@ -76,8 +75,7 @@ def equilibrium(
     AssemblyError
         If the mechanism cannot be assembled.
     NotConverged
-        If there is none to be found: the message says what remains unbalanced. ``residuals`` holds, for each velocity,
-        the force or torque left.
+        If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
     """
     a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
     if start is not None:
@@ -86,8 +84,7 @@ def equilibrium(
     if turning:
         return _steady(a, turning)
     if preload:
-        x, found = preloaded(a, preload)
-        return _finished(x, "preload", found)
+        return _finished(*preloaded(a, preload), "preload")
     x = Rest.at(a.compiled, a.t, a.q)
     way = "Newton's method"
     arrived = _newton(x)
@@ -97,7 +94,7 @@ def equilibrium(
         arrived = None if downhill is None else _newton(downhill)
         if arrived is None:
             raise _failure(downhill or x)
-    return _finished(arrived, way, {})
+    return _finished(arrived, {}, way)
 
 
 def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
@@ -151,7 +148,7 @@ def _pushed(x: Rest) -> Rest:
 def _descent(x: Rest) -> Rest | None:
     """Pseudo-transient continuation on the constraints; None where it gets no further."""
     x = x.closed()
-    damping, left = HARD, np.abs(x.r).max(initial=0.0)
+    damping, left, way = HARD, np.abs(x.r).max(initial=0.0), 0.0
     for _ in range(DESCENT):
         if damping < SOFT or left <= BALANCED * x.size:
             return x
@@ -163,6 +160,9 @@ def _descent(x: Rest) -> Rest | None:
             if damping > STUCK:
                 return None
             continue
+        way += longest
+        if way > ENDLESS:
+            return None
         x = x.moved(step, lam).closed()
         before, left = left, np.abs(x.r).max(initial=0.0)
         damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
@@ -197,7 +197,7 @@ def _by_motion(e: Equations, f: Free) -> str:
     return UNSTABLE if growth > NEUTRAL**0.5 else MARGINAL if growth > -(NEUTRAL**0.5) else STABLE
 
 
-def _finished(x: Rest, way: str, preload: dict[str, float]) -> Equilibrium:
+def _finished(x: Rest, preload: dict[str, float], way: str) -> Equilibrium:
     kind, f, K, direction, least = _stability(x)
     names = velocity_names(x.c.structure)
     large = np.argsort(-np.abs(direction))[:SHOWN]

@@ -25,6 +25,8 @@ DENSE = 600  # velocities up to which all modes are found
 RIGID = 1e-6  # shift, of the largest stiffness over the largest mass
 FEW = 10
 UNDAMPED = 1e-12
+TINY = 1e-7  # directions of random motions below this part of the largest are none
+REFINED = 2  # times that a solution is improved: rows may be redundant
 
 
 def modes(
@@ -112,18 +114,43 @@ def _sparse(x: State, count: int) -> Modes:
         )
     n, m = len(x.v), G.shape[0]
     A = sp.bmat([[symmetric - shift * M, G.T * typical], [G * typical, -1e-11 * typical * sp.identity(m)]]).tocsc()
+    exact = sp.bmat([[symmetric - shift * M, G.T * typical], [G * typical, None]]).tocsr()
     solve = splu(A)
 
     def invert(b: np.ndarray) -> np.ndarray:
         b = np.r_[b.ravel(), np.zeros(m)]
         y = solve.solve(b)
-        exact = sp.bmat([[symmetric - shift * M, G.T * typical], [G * typical, None]])
-        return (y + solve.solve(b - exact @ y))[:n]
+        for _ in range(REFINED):
+            y += solve.solve(b - exact @ y)
+        return y[:n]
 
-    inverse = LinearOperator((n, n), matvec=invert, dtype=float)
-    start = invert(M @ np.random.default_rng(0).standard_normal(n))
-    squares, V = eigsh(symmetric, k=count, M=M, sigma=shift, OPinv=inverse, which="LM", v0=start)
-    order = np.argsort(squares)
+    squares, V = _few(invert, symmetric, M, 2 * count + 20)
+    if squares is None:
+        inverse = LinearOperator((n, n), matvec=invert, dtype=float)
+        start = invert(M @ np.random.default_rng(0).standard_normal(n))
+        squares, V = eigsh(symmetric, k=count, M=M, sigma=shift, OPinv=inverse, which="LM", v0=start)
+    order = np.argsort(squares)[:count]
     w = np.sqrt(squares[order].astype(complex))
     w = np.where(squares[order] < 0.0, w.imag + 0j, 1j * w.real)
     return _made(x, w, V[:, order].astype(complex), np.zeros(3))
+
+
+def _few(invert: Any, K: Any, M: Any, most: int) -> tuple[np.ndarray | None, np.ndarray]:
+    """All squares of frequencies and shapes, where there are fewer freedoms than ``most``; else None.
+
+    The inverse maps everything to motions that the constraints allow: as many random vectors as there are freedoms span
+    them.
+    """
+    from scipy.linalg import eigh
+
+    random = np.random.default_rng(1).standard_normal((K.shape[0], most))
+    found = np.array([invert(M @ x) for x in random.T]).T
+    found /= np.linalg.norm(found, axis=0)
+    U, d, _ = np.linalg.svd(found, full_matrices=False)
+    rank = int((d > TINY * d[0]).sum())
+    if rank == most:
+        return None, found
+    Z = np.array([invert(M @ x) for x in U[:, :rank].T]).T
+    Z, _ = np.linalg.qr(Z / np.linalg.norm(Z, axis=0))
+    squares, V = eigh(Z.T @ K @ Z, Z.T @ (M @ Z))
+    return squares, Z @ V

@@ -117,12 +117,20 @@ class Rest:
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Newton's step, scaled, and the change of multipliers; damped by so many times the identity."""
+        return self._solve(self.r, self.g, damping)
+
+    def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of positions along the velocities and of multipliers that make up for changes r and g."""
+        step, lam = self._solve(self.scale * r, self.per_row * g[self.holonomic], 0.0)
+        return self.scale * step, lam
+
+    def _solve(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
         import scipy.sparse as sp
 
         n = len(self.scale)
         K = self.K + damping * self.size * sp.identity(n)
-        A = sp.bmat([[K, -self.G.T * self.size], [self.G * self.size, None]]) if len(self.g) else K
-        x = _least(A, np.r_[-self.r, -self.g * self.size])
+        A = sp.bmat([[K, -self.G.T * self.size], [self.G * self.size, None]]) if len(g) else K
+        x = _least(A, np.r_[-r, -g * self.size])
         lam = np.zeros_like(self.lam)
         lam[self.holonomic] = x[n:] * self.size * self.per_row
         return x[:n], lam

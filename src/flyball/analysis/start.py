@@ -44,7 +44,14 @@ def begin(
     """
     base = _base(model, t, parameters, before)
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
-        mobility(model, base)  # refuses bodies that can move without inertia
+        mobility(model, base, inertia=True)
+    return begin_at(base, parameters, coordinates, before)
+
+
+def begin_at(
+    base: Assembly, parameters: Mapping[str, float] | None, coordinates: str, before: Result | None = None
+) -> Start:
+    """Begin where the mechanism is assembled already; choose coordinates."""
     a, why = in_coordinates(base, coordinates, parameters)
     y = a.y if before is None else _gone_on(before, a)
     return Start(base, a, y, why, _wound(base, a, y))

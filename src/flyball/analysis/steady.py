@@ -121,7 +121,8 @@ def balanced(x: State, e: Equations) -> None:
     left = np.abs(scale * (M @ x.vdot))
     rows, r = e.by_position[e.at["g"]], e.at["r"]
     total = left.max(initial=0.0) + np.abs(scale * (rows.T @ x.lam)).max(initial=0.0)
-    total += np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
+    stiffness = abs(e.by_position[r]).T.multiply(scale).T.multiply(x.c.values.length * scale)
+    total += stiffness.max() + np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
     if left.max(initial=0.0) <= BALANCED * total:
         return
     d = int(np.argmax(left))

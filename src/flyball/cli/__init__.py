@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from . import check, compare, run, singularities, view  # noqa: F401  (each adds its subcommand)
+from . import (  # noqa: F401  (each adds its subcommand)
+    check,
+    compare,
+    inverse_dynamics,
+    kinematics,
+    mobility,
+    optimize,
+    run,
+    sensitivity,
+    singularities,
+    view,
+)
 from .common import app
 
 

@@ -191,6 +191,12 @@ class Result:
 
         return plot(self, *names, path=path)
 
+    def plot_path(self, *points: Any, **options: Any) -> Any:
+        """Draw paths of points with their velocities; see `flyball.view.paths.plot_path` for the options."""
+        from ..view.paths import plot_path
+
+        return plot_path(self, *points, **options)
+
     def html(self, **options: Any) -> str:
         """The animation page as text; ``paths`` and ``show`` as in `flyball.view.animate.animation`."""
         from ..view.animate import animation

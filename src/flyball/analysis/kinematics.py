@@ -1,0 +1,264 @@
+"""Kinematics of driven mechanisms: where everything is, and how fast, when drivers say what moves.
+
+Positions are found at every time by Newton's method from a prediction, velocities and accelerations from the same
+rows (``system/follow.py``), so nothing drifts and no step leads to another branch. Masses and forces have no say in it;
+the reactions and efforts that belong to them come along.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
+from ..model.body import Driver
+from ..model.expressions import number
+from ..model.model import Model
+from ..results.result import Result
+from .assemble import Assembly, assemble
+from .compiled import compiled
+from .dynamics import moved
+from .entry import FOLLOW, INTEGRATE
+from .freedoms import told
+from .geometry import positions_nearby
+from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
+from .options import Options, output_times
+from .start import Start, begin_at
+
+TOLERANCES = {"rtol": 1e-10, "atol": 1e-12}
+NARROW = 1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position
+PART = 1e-2  # elements with less than this part of the largest share in a dependency are not named
+NAMED = 8
+
+Times = int | Sequence[float]
+
+
+def kinematics(
+    model: Model,
+    times: Times = 501,
+    *,
+    t_end: float | str | None = None,
+    t_start: float | str | None = None,
+    parameters: Mapping[str, float] | None = None,
+    coordinates: str = "auto",
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Positions, velocities and accelerations of a mechanism whose drivers leave no freedom.
+
+    Parameters
+    ----------
+    model : Model
+    times : int or sequence of float
+        Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times [s] themselves.
+    t_end : float [s]
+        Needed if ``times`` is a number.
+    t_start : float [s]
+        When the mechanism is assembled as drawn; it is followed from there, so that it stays on its branch and whole
+        turns count. 0 if not given, or the first time where that is earlier.
+    parameters : mapping, optional
+        Values of parameters in SI units, in place of the model's.
+    coordinates : ``"auto"``, ``"absolute"`` or ``"joint"``
+    progress : callable, optional
+        Called with the fraction done about twenty times a second.
+
+    Returns
+    -------
+    Result
+
+    Raises
+    ------
+    MobilityError
+        If drivers leave a freedom (``free`` names it), or prescribe what is prescribed already (``redundant`` names
+        the drivers).
+    SingularityError
+        If the mechanism locks, or begins where drivers do not decide its motion; ``where`` is the time, ``elements``
+        those whose constraints lose their independence, ``result`` holds the motion up to there.
+    AssemblyError
+        If no position fulfils all constraints at the start.
+    SimulationError
+        If a law cannot be followed, for instance because it jumps; its ``result`` holds the motion up to there.
+    """
+    started = time.perf_counter()
+    outputs, begin = wanted_times(times, t_start, t_end)
+    model = model.snapshot()
+    base = driven(model, begin, parameters)
+    start = begin_at(base, parameters, coordinates)
+    start.since = started
+    chosen = Options(**TOLERANCES, coordinates=coordinates)  # type: ignore[arg-type]
+    holonomic = all(r.holonomic for r in base.compiled.structure.rows)
+    try:
+        return moved(start, float(outputs[-1]), outputs, chosen, FOLLOW if holonomic else INTEGRATE, progress)
+    except SimulationError as error:
+        raise _locked(start, error) or error from None
+
+
+def wanted_times(times: Times, t_start: float | str | None, t_end: float | str | None) -> tuple[np.ndarray, float]:
+    """Ascending output times, and when the motion begins.
+
+    Raises
+    ------
+    ModelError
+        If they do not say when.
+    """
+    first = None if t_start is None else float(number(t_start, {}, "s", "t_start"))
+    last = None if t_end is None else float(number(t_end, {}, "s", "t_end"))
+    if isinstance(times, (int, np.integer)):
+        if last is None:
+            raise ModelError(f"{times} times until when? Give t_end [s], or the times themselves")
+        first = 0.0 if first is None else first
+        return output_times(first, last, int(times)), first
+    try:
+        at = np.atleast_1d(np.asarray(times, float))
+    except (TypeError, ValueError):
+        raise ModelError(f"times must be a number of times, or the times [s] themselves, not {times!r}") from None
+    if last is not None:
+        raise ModelError("t_end goes with a number of times; these times say themselves when they end")
+    if at.ndim != 1 or not len(at) or not np.isfinite(at).all() or not (np.diff(at) > 0).all():
+        raise ModelError("times must be finite and in ascending order")
+    first = min(0.0, float(at[0])) if first is None else first
+    if at[0] < first:
+        raise ModelError(f"the first time, {at[0]:g} s, is before the start at {first:g} s")
+    return at, first
+
+
+def driven(model: Model, t: float, parameters: Mapping[str, float] | None) -> Assembly:
+    """The mechanism assembled where it begins, in absolute coordinates, its drivers leaving no freedom.
+
+    Raises
+    ------
+    MobilityError, SingularityError, AssemblyError
+        As for `kinematics`.
+    """
+    try:
+        base = assemble(model, t=t, parameters=parameters)
+    except AssemblyError as error:
+        raise _contradiction(model, t, error) or error from None
+    found = mobility(model, base)
+    if found.freedoms:
+        raise _singular_start(found) or _under_driven(found)
+    if any(isinstance(model[name], Driver) for name in found.redundant):
+        raise _over_driven(found)
+    return base
+
+
+def _under_driven(found: Mobility) -> MobilityError:
+    a = found.found.assembly  # type: ignore[union-attr]
+    model = a.compiled.structure.model
+    motions = found.motions
+    told_of = "; ".join(m.text for m in motions[:NAMED])
+    more = f"; and {found.freedoms - NAMED} more" if found.freedoms > NAMED else ""
+    example = next((m.coordinate for m in motions if m.coordinate), "")
+    remedy = f"for instance Driver('drive', {example!r}, ...), or a joint" if example else "or a joint"
+    has = f"{len(model.drivers)} drivers" if len(model.drivers) != 1 else "one driver"
+    return MobilityError(
+        f"{model.name!r} is under-driven: its {has} leave{'s' if len(model.drivers) == 1 else ''} "
+        f"{found.freedoms} freedom{'s' if found.freedoms > 1 else ''}: {told_of}{more}. Add a driver for each, "
+        f"{remedy} that prevents it; or simulate() it, if forces are to move it",
+        free=tuple(m.name for m in motions),
+    )
+
+
+def _over_driven(found: Mobility) -> MobilityError:
+    model = found.found.assembly.compiled.structure.model  # type: ignore[union-attr]
+    sets = [s for s in found.sets if s.drivers]
+    drivers = tuple(dict.fromkeys(n for s in sets for n in s.drivers))
+    texts = []
+    for s in sets:
+        others = [n for n in s.elements if n not in s.drivers]
+        through = f" through {', '.join(others[:NAMED])}" if others else ""
+        texts.append(f"drivers {', '.join(s.drivers)} prescribe the same motion{through}" if len(s.drivers) > 1
+                     else f"driver {s.drivers[0]} prescribes what {', '.join(others[:NAMED])} do already")  # fmt: skip
+    return MobilityError(
+        f"{model.name!r} is over-driven: {'; '.join(texts)}. Leave out one driver of each set; two laws that agree "
+        f"only as far as they are rounded would lock the mechanism",
+        redundant=drivers,
+    )
+
+
+def _contradiction(model: Model, t: float, error: AssemblyError) -> MobilityError | SingularityError | None:
+    """The error that says which drivers contradict one another, if that is why there is no position or velocity.
+
+    Or that one asks for a velocity which the singular position that it starts from does not have.
+    """
+    if error.best is None:
+        return None
+    found = mobility(model, error.best)
+    if not any(isinstance(model[name], Driver) for name in found.redundant):
+        return None
+    sets = [s for s in found.sets if s.drivers and s.contradiction]
+    drivers = tuple(dict.fromkeys(n for s in sets for n in s.drivers))
+    if any(s.contradiction == "velocity" for s in sets) and (singular := _singular_start(found)) is not None:
+        return singular
+    if not drivers or (len(drivers) == 1 and sets[0].contradiction == "position"):
+        return None  # a single driver that asks for a position out of reach
+    return MobilityError(
+        f"{model.name!r} is over-driven: drivers {', '.join(drivers)} contradict one another at t = {t:g} s: "
+        f"{'; '.join(s.text for s in sets)}. Leave out one of them, or make their laws agree",
+        redundant=drivers,
+    )
+
+
+def _singular_start(found: Mobility) -> SingularityError | None:
+    """The error for a start where drivers do not decide the motion, though next to it they do."""
+    a = found.found.assembly  # type: ignore[union-attr]
+    c = a.compiled
+    if not c.structure.model.drivers or not found.redundancy or not found.freedoms:
+        return None
+    free = c.structure.model.snapshot()
+    free.drivers = []
+    loose = compiled(free, parameters=told(c))
+    loose.follow(c.hints)
+    there = mobility(free, Assembly(loose, a.t, a.q, a.v))
+    ranks = []
+    for q in positions_nearby(there.found.assembly, motions_of(there.found)):  # type: ignore[union-attr, arg-type]
+        c.at(a.t, q, a.v)
+        ranks.append(rank_of(c))
+    c.at(a.t, a.q, a.v)
+    if max(ranks, default=0) < c.structure.nv:
+        return None
+    names = found.redundant
+    return SingularityError(
+        f"{c.structure.model.name!r} begins in a singular position at t = {a.t:g} s: the constraints of "
+        f"{', '.join(names[:NAMED])} are not independent there, so drivers do not decide how it goes on, "
+        f"or cannot start it ({'; '.join(m.name for m in found.motions[:NAMED])} is free). Draw it a little way beside "
+        f"this position, or drive another coordinate",
+        where=a.t,
+        elements=names,
+    )
+
+
+def _locked(start: Start, error: SimulationError) -> SingularityError | None:
+    """The error that says what locks, if the motion ends at a singular position."""
+    result = error.result
+    if not isinstance(result, Result) or not np.isfinite(result.final[1]).all():
+        return None
+    base, own = start.base.compiled, start.assembly.compiled
+    s = own.structure
+    t, y = result.final
+    q, v, own.z = y[: s.nq].copy(), y[s.nq : s.nq + s.nv].copy(), y[s.nq + s.nv :].copy()
+    if base is not own:
+        q, v = base.take(own, t, q, v)
+    base.at(t, q, v)
+    if base.structure.nv > DENSE:
+        return None
+    U, d, _ = np.linalg.svd(scaled_jacobian(base)[0].toarray(), full_matrices=False)
+    n = base.structure.nv
+    if len(d) < n or d[n - 1] > NARROW * d[0]:
+        return None
+    share = np.abs(U[:, n - 1])
+    model = base.structure.model
+    names = tuple(k for k, rows in base.structure.slices.items() if share[rows].max(initial=0.0) > PART * share.max())
+    drivers = [k for k in names if isinstance(model[k], Driver)]
+    joints = [k for k in names if k not in drivers]
+    whose = f"driver{'s' if len(drivers) > 1 else ''} {', '.join(drivers)}" if drivers else "its drivers"
+    return SingularityError(
+        f"{model.name!r} locks at t = {t:.6g} s: {whose} cannot move it on through {', '.join(joints[:NAMED])}, whose "
+        f"constraints lose their independence there. Shorten the way of {'the driver' if drivers else 'its drivers'}, "
+        f"change lengths so that it reaches farther, or drive a coordinate that goes on turning there (singularities() "
+        f"follows the mechanism through such positions). The motion up to there is kept in the error's result",
+        where=float(t),
+        elements=names,
+        result=result,
+    )

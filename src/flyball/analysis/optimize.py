@@ -1,0 +1,218 @@
+"""Optimisation of parameters with exact derivatives: fitting curves, tuning springs, synthesis of linkages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..errors import AnalysisError, ModelError
+from ..model.expressions import number
+from ..model.model import Model, listing, suggest
+from ..results.optimum import Optimum
+from .sensitivity import sensitivity
+
+STEP = 1e-6  # of the quantities, for the slope of a function that the user gives
+REFUSED = 1e3  # times the first cost: what parameters cost with which the mechanism cannot be assembled
+
+Bounds = Mapping[str, tuple[float | str | None, float | str | None]]
+
+
+def optimize(
+    model: Model,
+    of: Sequence[str],
+    to: Sequence[str] | Bounds,
+    *,
+    target: Any = None,
+    minimize: Callable[[np.ndarray], float] | None = None,
+    weights: Any = 1.0,
+    analysis: str = "instant",
+    parameters: Mapping[str, float] | None = None,
+    evaluations: int = 200,
+    tolerance: float = 1e-10,
+    **options: Any,
+) -> Optimum:
+    """Find parameters for which quantities come nearest to a target, or a function of them is smallest.
+
+    Least squares by a trust region with the exact Jacobian (Branch, Coleman and Li 1999), minimisation by L-BFGS-B
+    (Byrd et al. 1995), both SciPy's; derivatives as in `sensitivity`.
+
+    Parameters
+    ----------
+    model : Model
+    of : sequence of str
+        Quantities, as in `sensitivity`; for modes none.
+    to : sequence of str, or mapping of str to (lowest, highest)
+        Parameters to be changed, with their bounds (None: none).
+    target : array
+        What the quantities should be: one number each, or (times, quantities) of a motion. Complex for eigenvalues.
+    minimize : callable, in place of ``target``
+        A smooth function of the quantities (times, of) that is to be smallest.
+    weights : float or array
+        Multiply the differences from the target.
+    analysis, options
+        As in `sensitivity`: ``analysis="motion"``, ``t_end=``, ``outputs=`` and so on.
+    parameters : mapping, optional
+        Values to begin with, in place of the model's.
+    evaluations : int
+        Most analyses to be made.
+    tolerance : float
+        Relative changes of cost and parameters below which the search ends.
+
+    Returns
+    -------
+    Optimum
+
+    Raises
+    ------
+    ModelError
+        If a quantity, parameter or option does not exist, or a bound is not met at the start.
+    AnalysisError
+        If the mechanism cannot be analysed at the start.
+    """
+    if (target is None) == (minimize is None):
+        raise ModelError("give either a target or a function to minimize")
+    search = Search(model, tuple(of), to, analysis, dict(parameters or {}), options)
+    if minimize is not None:
+        return search.minimum(minimize, evaluations, tolerance)
+    return search.fit(target, weights, evaluations, tolerance)
+
+
+class Search:
+    """Quantities and their derivatives as functions of scaled parameters."""
+
+    def __init__(
+        self,
+        model: Model,
+        of: tuple[str, ...],
+        to: Sequence[str] | Bounds,
+        analysis: str,
+        parameters: dict[str, float],
+        options: dict[str, Any],
+    ) -> None:
+        env = model.environment(parameters)
+        if isinstance(to, str) or not to:
+            raise ModelError("to names the parameters, for instance to=['crank'] or to={'crank': (0.1, '30 cm')}")
+        for name in to:
+            if name not in env:
+                raise ModelError(
+                    f"{model.name!r} has no parameter {name!r}{suggest(name, list(env))}; {listing(list(env))}"
+                )
+        self.model, self.of, self.names, self.analysis = model, of, tuple(to), analysis
+        self.parameters, self.options = parameters, options
+        self.start = np.array([env[name] for name in self.names])
+        self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
+        self.low, self.high = (self._bounds(to, k) for k in (0, 1))
+        self._known: tuple[np.ndarray, Any] | None = None
+        self.count = 0
+
+    def _bounds(self, to: Sequence[str] | Bounds, k: int) -> np.ndarray:
+        out = np.full(len(self.names), np.inf if k else -np.inf)
+        if isinstance(to, Mapping):
+            for i, name in enumerate(self.names):
+                bound = to[name][k]
+                if bound is not None:
+                    out[i] = number(bound, {}, None, f"bound of {name!r}") / self.scale[i]
+        x = self.start / self.scale
+        wrong = np.flatnonzero(x > out) if k else np.flatnonzero(x < out)
+        if len(wrong):
+            i = wrong[0]
+            raise ModelError(
+                f"parameter {self.names[i]!r} begins at {self.start[i]:g}, outside its bound {out[i] * self.scale[i]:g}"
+            )
+        return out
+
+    def at(self, x: np.ndarray) -> Any:
+        """Sensitivities at scaled parameters, kept until others are asked for."""
+        if self._known is None or not np.array_equal(self._known[0], x):
+            values = dict(zip(self.names, (x * self.scale).tolist(), strict=True))
+            self.count += 1
+            found = sensitivity(
+                self.model,
+                self.of,
+                self.names,
+                analysis=self.analysis,
+                parameters=self.parameters | values,
+                **self.options,
+            )
+            self._known = x.copy(), found
+        return self._known[1]
+
+    def fit(self, target: Any, weights: Any, evaluations: int, tolerance: float) -> Optimum:
+        """Least squares."""
+        from scipy.optimize import least_squares
+
+        x0 = self.start / self.scale
+        first = self.at(x0)
+        goal = np.broadcast_to(np.asarray(target), first.values.shape)
+
+        def split(r: np.ndarray) -> np.ndarray:
+            return r if np.isrealobj(r) else np.concatenate([r.real, r.imag])
+
+        def left(found: Any) -> np.ndarray:
+            return split((np.asarray(weights) * (found.values - goal)).ravel())
+
+        begin = left(first)
+        size = float(np.abs(begin).max(initial=0.0)) or 1.0
+
+        def residual(x: np.ndarray) -> np.ndarray:
+            try:
+                return left(self.at(x))
+            except AnalysisError:
+                return np.full(len(begin), REFUSED * size)
+
+        def jacobian(x: np.ndarray) -> np.ndarray:
+            found = self.at(x)
+            J = np.asarray(weights)[..., None] * found.derivatives if np.ndim(weights) else weights * found.derivatives
+            return np.array([split(J[..., k].ravel()) for k in range(len(x))]).T * self.scale
+
+        r = least_squares(
+            residual, x0, jacobian, bounds=(self.low, self.high), xtol=tolerance, ftol=tolerance, gtol=1e-15,
+            max_nfev=evaluations,
+        )  # fmt: skip
+        return self._optimum(r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, r.message)
+
+    def minimum(self, function: Callable[[np.ndarray], float], evaluations: int, tolerance: float) -> Optimum:
+        """Minimisation of a function of the quantities."""
+        from scipy.optimize import minimize
+
+        x0 = self.start / self.scale
+        first = float(function(self.at(x0).values))
+
+        def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
+            try:
+                found = self.at(x)
+            except AnalysisError:
+                return REFUSED * (abs(first) or 1.0), np.zeros(len(x))
+            slope = _slope(function, found.values)
+            return float(function(found.values)), np.einsum("ij,ijk->k", slope, found.derivatives) * self.scale
+
+        bounds = list(zip(self.low, self.high, strict=True))
+        options = {"maxfun": evaluations, "ftol": tolerance, "gtol": tolerance}
+        r = minimize(cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
+        return self._optimum(r.x, float(r.fun), first, bool(r.success), str(r.message))
+
+    def _optimum(self, x: np.ndarray, cost: float, first: float, success: bool, message: str) -> Optimum:
+        found = self.at(x)
+        best, start = (dict(zip(self.names, v.tolist(), strict=True)) for v in (x * self.scale, self.start))
+        near = 1e-9 * (1.0 + np.abs(x))
+        at_bound = tuple(
+            n for n, b in zip(self.names, (x - self.low < near) | (self.high - x < near), strict=True) if b
+        )
+        return Optimum(
+            best, start, cost, first, success, message.rstrip("."), self.count, self.of or found.of, found.t,
+            found.values, at_bound,
+        )  # fmt: skip
+
+
+def _slope(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:
+    """Derivatives of a function by the quantities, by central differences: it costs nothing to call."""
+    out = np.zeros(values.shape)
+    for i in np.ndindex(values.shape):
+        h = STEP * (1.0 + abs(values[i]))
+        up, down = values.copy(), values.copy()
+        up[i] += h
+        down[i] -= h
+        out[i] = (function(up) - function(down)) / (2.0 * h)
+    return out

@@ -1,0 +1,294 @@
+"""Sensitivities: exact derivatives of kinematics, reactions, equilibria, eigenvalues and motions by parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..errors import ModelError, SingularityError
+from ..model.expressions import number
+from ..model.model import Model, listing, suggest
+from ..results.linear import follow
+from ..results.sensitivity import Sensitivity
+from .assemble import Assembly, assemble
+from .curves import curve, slopes, snapshot
+from .derivatives import Equations, State
+from .differences import Found, check, derivative
+from .driven import leaves_no_freedom
+from .dynamics import simulate
+from .equilibrium import equilibrium
+from .instant import instant
+from .linearize import without_inputs
+from .options import output_times
+from .rest import Rest
+from .start import Start
+from .tangent import Direction, Linear, Tangent, closed, tangent_step
+from .variation import Variation
+
+FLAT = 1e-9  # stiffness, of what acts, below which an equilibrium's place is not determined
+
+
+@dataclass
+class Question:
+    """What is asked: of which quantities, by which parameters, where."""
+
+    model: Model
+    of: tuple[str, ...]
+    to: tuple[str, ...]
+    t: float
+    parameters: dict[str, float]
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    about: Any = None
+    rtol: float = 1e-9
+    atol: float = 1e-11
+
+
+def sensitivity(
+    model: Model,
+    of: Sequence[str] = (),
+    to: Sequence[str] = (),
+    *,
+    analysis: str = "instant",
+    t: float | str = 0.0,
+    t_end: float | str | None = None,
+    outputs: int | Sequence[float] = 51,
+    parameters: Mapping[str, float] | None = None,
+    about: Any = None,
+    verify: bool = False,
+    rtol: float = 1e-9,
+    atol: float = 1e-11,
+) -> Sensitivity:
+    """Derivatives of quantities with respect to parameters.
+
+    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How eigenvalues
+    change, and the start of a mechanism that no driver holds, comes from differences of sixth order (error 1e-10).
+
+    Parameters
+    ----------
+    of : sequence of str
+        Sensors, or curves of a result (``"slider.x"``). For ``"modes"`` none: all eigenvalues.
+    to : sequence of str
+        Parameters; all of the model's if none is named.
+    analysis : str
+        ``"instant"`` (at ``t``), ``"motion"`` (from ``t`` to ``t_end``), ``"equilibrium"``, ``"modes"`` (eigenvalues).
+    t, t_end : float [s]
+    outputs : int or sequence of float
+        Number of times of a motion, or the times [s].
+    parameters : mapping, optional
+        Values in SI units in place of the model's.
+    about : ``"equilibrium"`` or None
+        For modes: about the static equilibrium, or where the mechanism is drawn.
+    verify : bool
+        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter.
+    rtol, atol : float
+
+    Returns
+    -------
+    Sensitivity
+
+    Raises
+    ------
+    ModelError
+        If a quantity or parameter does not exist.
+    SingularityError
+        If what is asked has no derivative there.
+    """
+    _refuse(model, of, to, analysis, parameters)
+    env, start = model.environment(parameters), number(t, {}, "s", "t")
+    a = Question(model.snapshot(), tuple(of), tuple(to or env), start, dict(parameters or {}), about=about)
+    if analysis == "motion":
+        if t_end is None:
+            raise ModelError("sensitivity of a motion: give t_end")
+        a.times, a.rtol, a.atol = output_times(start, number(t_end, {}, "s", "t_end"), outputs), rtol, atol
+    out = ANALYSES[analysis][0](a)
+    out.parameters = {name: env[name] for name in a.to}
+    return _verified(a, analysis, out) if verify else out
+
+
+def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
+    """With the column of central differences."""
+    again = ANALYSES[analysis][1](a)
+    parts = [check(a.model, a.parameters, name, again) for name in a.to]
+    out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
+    return out
+
+
+def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, parameters: Any) -> None:
+    """Refuse names that do not exist."""
+    if isinstance(of, str) or isinstance(to, str):
+        raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
+    if analysis not in ANALYSES:
+        raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, list(ANALYSES))}; {listing(list(ANALYSES))}")
+    known = list(model.environment(parameters))
+    for name in to:
+        if name not in known:
+            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+
+
+def _row(x: State, names: Sequence[str]) -> np.ndarray:
+    """Values of curves at one state."""
+    shot = snapshot(x)
+    return np.array([float(curve(shot, name)[1][0]) for name in names])
+
+
+def _units(x: State, names: Sequence[str]) -> tuple[str, ...]:
+    shot = snapshot(x)
+    return tuple(curve(shot, name)[0] for name in names)
+
+
+def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: Sequence[Tangent]) -> np.ndarray:
+    """Derivatives of the quantities at a state, (of, to)."""
+    return np.array([slopes(x, a.of, d.parts, k.values)[0] for k, d in zip(directions, tangents, strict=True)]).T
+
+
+def start_tangents(a: Question, base: Assembly, x: State, directions: Sequence[Direction]) -> list[Tangent]:
+    """How the assembled start changes: where drivers do not tell, as the described positions and velocities do."""
+    lin = Linear(x)
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        b = assemble(a.model, t=a.t, parameters=parameters)
+        return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
+
+    out = []
+    for d in directions:
+        drawn = derivative(a.model, a.parameters, d.name, found)
+        out.append(closed(d, x, lin, *np.split(drawn, [len(x.v)])))
+    return out
+
+
+def _instant(a: Question) -> Sensitivity:
+    base = assemble(a.model, t=a.t, parameters=a.parameters)
+    x = State.moving(base.compiled, base.t, base.q, base.v)
+    e = Equations(x)
+    directions = [Direction(e, name) for name in a.to]
+    found = _columns(a, x, directions, start_tangents(a, base, x, directions))
+    return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
+
+
+def _at_instant(a: Question) -> Found:
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        b = assemble(a.model, t=a.t, parameters=parameters)
+        return _row(State.moving(b.compiled, b.t, b.q, b.v), a.of)
+
+    return found
+
+
+def _motion(a: Question) -> Sensitivity:
+    base = assemble(a.model, t=a.t, parameters=a.parameters)
+    x = State.moving(base.compiled, base.t, base.q, base.v)
+    e = Equations(x)
+    directions = [Direction(e, name) for name in a.to]
+    times = a.times if a.times[0] == a.t else np.r_[a.t, a.times]
+    if leaves_no_freedom(Start(base, base, base.y, "", {})):
+        way = _driven(a, x, directions, times)
+    else:
+        way = Variation(x, directions, start_tangents(a, base, x, directions)).run(times, a.rtol, a.atol)
+    values, found = [], []
+    for state, tangents in way:
+        values.append(_row(state, a.of))
+        found.append(_columns(a, state, directions, tangents))
+    kept = slice(len(times) - len(a.times), None)
+    return Sensitivity(
+        "motion", a.of, a.to, _units(x, a.of), {}, a.times, np.array(values)[kept], np.array(found)[kept]
+    )
+
+
+def _driven(
+    a: Question, x: State, directions: Sequence[Direction], times: np.ndarray
+) -> Iterator[tuple[State, list[Tangent]]]:
+    """States and tangents of a motion that drivers prescribe: the constraints alone decide both."""
+    r = simulate(a.model, times[-1], t_start=a.t, outputs=list(times), parameters=a.parameters, coordinates="absolute")
+    still = np.zeros(len(x.v))
+    for k, t in enumerate(times.tolist()):
+        x.c.z[:] = r.states[k]
+        state = State.moving(x.c, t, r.q[k], r.v[k])
+        lin = Linear(state)
+        yield state, [closed(d, state, lin, still, still) for d in directions]
+
+
+def _at_motion(a: Question) -> Found:
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        r = simulate(
+            a.model, a.times[-1], t_start=a.t, outputs=list(a.times), parameters=parameters, rtol=1e-12, atol=1e-13
+        )
+        return np.stack([curve(r, name)[1] for name in a.of], axis=1)
+
+    return found
+
+
+def _equilibrium(a: Question) -> Sensitivity:
+    found = equilibrium(a.model, t=a.t, parameters=a.parameters)
+    if abs(found.least) < FLAT:
+        weak = ", ".join(found.weakest)
+        raise SingularityError(
+            f"the equilibrium of {a.model.name!r} has no stiffness along {weak}: its place is not determined, so it "
+            f"has no derivatives; hold it there by a spring or a driver",
+            a.t,
+            tuple(found.weakest),
+        )
+    b = found.assembly
+    rest = Rest.at(b.compiled, b.t, b.q)
+    x = rest.equations.state
+    directions, tangents = [Direction(rest.equations, name) for name in a.to], []
+    still = np.zeros(len(x.v))
+    for d in directions:
+        left = d.along(x, still, still)
+        q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
+        tangents.append(Tangent(q, still, still, lam))
+    column = _columns(a, x, directions, tangents)
+    return Sensitivity(
+        "equilibrium", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], column[None]
+    )
+
+
+def _at_rest(a: Question) -> Found:
+    begin = equilibrium(a.model, t=a.t, parameters=a.parameters)
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        b = equilibrium(a.model, t=a.t, parameters=parameters, start=begin)
+        return _row(State.resting(b.assembly.compiled, a.t, b.assembly.q, b.result.multipliers[0]), a.of)
+
+    return found
+
+
+def _modes(a: Question) -> Sensitivity:
+    found = _at_modes(a)
+    values = found(a.parameters)
+    parts = [derivative(a.model, a.parameters, name, found) for name in a.to]
+    of = tuple(f"eigenvalue {k}" for k in range(len(values)))
+    units = ("1/s",) * len(of)
+    return Sensitivity("modes", of, a.to, units, {}, np.array([a.t]), values[None], np.stack(parts, axis=-1)[None])
+
+
+def _at_modes(a: Question) -> Found:
+    known: list[np.ndarray] = []
+    begin: list[Any] = []
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        about = None
+        if a.about == "equilibrium":
+            about = equilibrium(a.model, t=a.t, parameters=parameters, start=begin[0] if begin else None)
+            begin.append(about)
+        elif a.about is not None:
+            raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
+        x, _ = instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")
+        w = np.linalg.eigvals(without_inputs(x)[2].A)
+        w = w[np.lexsort((w.imag, np.abs(w)))].astype(complex)
+        known.append(w if not known else follow(np.array([known[0], w]))[1])
+        return known[-1]
+
+    if not known:
+        found(a.parameters)
+    return found
+
+
+# what finds the derivatives, and what makes a function of the parameters for differences
+ANALYSES: dict[str, tuple[Callable[[Question], Sensitivity], Callable[[Question], Found]]] = {
+    "instant": (_instant, _at_instant),
+    "motion": (_motion, _at_motion),
+    "equilibrium": (_equilibrium, _at_rest),
+    "modes": (_modes, _at_modes),
+}

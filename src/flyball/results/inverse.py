@@ -1,0 +1,261 @@
+"""What inverse dynamics finds: efforts of drives, reactions, and which of their components the motion determines."""
+
+from __future__ import annotations
+
+import csv
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..math.vec import cross, sub
+from ..model.coupling import Coupling
+from ..model.joint import Joint
+from ..model.model import listing, suggest
+
+if TYPE_CHECKING:
+    from .result import Result
+
+TOUCHED = 1e-6  # part of the largest self-stress below which a component is left alone
+ROUNDING = 1e-12  # part of a joint's largest reaction that is printed as nothing
+SPATIAL, PLANE = ("fx", "fy", "fz", "tx", "ty", "tz"), ("fx", "fy", "torque")
+INDEX = {"fx": 0, "fy": 1, "fz": 2, "tx": 3, "ty": 4, "tz": 5, "torque": 5}
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What drives a coordinate.
+
+    Attributes
+    ----------
+    name, coordinate : str
+        The driver and what it drives.
+    unit : str
+        Of the effort, ``"N"`` or ``"N*m"``.
+    effort : ndarray (n,)
+        Force or torque along the coordinate.
+    rate : ndarray (n,)
+        Of the coordinate [m/s] or [rad/s].
+    """
+
+    name: str
+    coordinate: str
+    unit: str
+    effort: np.ndarray
+    rate: np.ndarray
+
+    @property
+    def power(self) -> np.ndarray:
+        """What it puts in [W], (n,)."""
+        return self.effort * self.rate
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """A reaction over time, with what is undetermined left out.
+
+    Attributes
+    ----------
+    force, torque : ndarray (n, 3) [N], [N m]
+        nan where redundancy leaves a component undetermined.
+    undetermined : ndarray (n, 6) of bool
+        Components of force, then of torque.
+    one : ndarray (n, 6)
+        One of the many reactions that there are: that of the least multipliers. No physics decides for it.
+    """
+
+    force: np.ndarray
+    torque: np.ndarray
+    undetermined: np.ndarray
+    one: np.ndarray
+
+
+@dataclass(frozen=True)
+class InverseDynamics:
+    """Efforts and reactions of a motion; ``inverse["crank"]`` and the like read its `Result`.
+
+    Attributes
+    ----------
+    result : Result
+        The motion. Its reactions are one choice where redundancy leaves them undetermined; those given here are not.
+    drives : dict
+        Driver, or what ``motion`` named -> `Drive`.
+    determinacy : Determinacy
+        Self-stresses at every time.
+    """
+
+    result: Result
+    drives: dict[str, Drive]
+    determinacy: Any = field(repr=False)
+
+    @property
+    def t(self) -> np.ndarray:
+        """Times [s], (n,)."""
+        return self.result.t
+
+    @property
+    def efforts(self) -> dict[str, np.ndarray]:
+        """Effort of every drive [N] or [N m], (n,); nan where it is undetermined (in singular positions)."""
+        free = self.determinacy.efforts
+        return {k: np.where(free.get(d.name, False), np.nan, d.effort) for k, d in self.drives.items()}
+
+    def __getitem__(self, name: str) -> Any:
+        """A part or a curve of the motion."""
+        return self.result[name]
+
+    def reaction(self, joint: str, *, axes: str = "world") -> Wrench:
+        """Force and torque of a joint on its ``body_j``, about its point there.
+
+        Parameters
+        ----------
+        joint : str
+        axes : ``"world"``, ``"joint"`` or the name of one of its two bodies
+            Axes of the components. What is determined depends on them.
+
+        Raises
+        ------
+        ModelError
+            If there is no such joint.
+        """
+        e = self._joint(joint)
+        view = self.result[joint]
+        one = np.hstack(view.reaction(axes=axes))
+        stress = self._stress(joint)
+        if axes != "world" and stress is not None:
+            names = [self.result.model.carrier(x, e) for x in (e.body_i, e.body_j)]
+            full = [np.broadcast_to(x, len(self.t)) for x in view._axes(axes, names)]
+            R = np.stack(full, axis=1).reshape(-1, 3, 3)
+            stress = np.concatenate([np.einsum("nji,njk->nik", R, stress[:, i : i + 3]) for i in (0, 3)], axis=1)
+        return self._told(one, stress)
+
+    def together(self, *joints: str, on: str) -> Wrench:
+        """The sum of what joints do to a body: force, and torque about its mass centre, world axes.
+
+        Sums may be determined where none of their parts is: two hinges of a door carry its weight together, however
+        they share it.
+
+        Raises
+        ------
+        ModelError
+            If a joint does not exist or is not on the body.
+        """
+        result, x = self.result, self.result.values
+        centre = result.records.body(x.structure.place[result.model.body(on, result.model[joints[0]]).name])[0]
+        total, stresses = np.zeros((len(self.t), 6)), None
+        for name in joints:
+            e = self._joint(name)
+            ends = [result.model.carrier(n, e) for n in (e.body_i, e.body_j)]
+            if on not in ends:
+                raise ModelError(f"{e.title} joins {ends[0]!r} and {ends[1]!r}, it is not on {on!r}")
+            sign = 1.0 if on == ends[1] else -1.0
+            arm = sub(result.records.frame(x.structure.frame_at[name, "M", ""])[0], centre)
+            r = np.stack([np.broadcast_to(c, len(self.t)) for c in arm], axis=1)
+            force, torque = result[name].reaction()
+            total += sign * np.hstack([force, torque + np.stack(cross(tuple(r.T), tuple(force.T)), axis=1)])
+            if (stress := self._stress(name)) is not None:
+                moved = stress.copy()
+                moved[:, 3:] += np.cross(r[:, :, None] / x.length, stress[:, :3], axis=1)
+                stresses = sign * moved + (0.0 if stresses is None else stresses)
+        return self._told(total, stresses)
+
+    def _joint(self, name: str) -> Joint:
+        model = self.result.model
+        known = [j.name for j in model.joints]
+        if name not in known:
+            raise ModelError(f"{model.name!r} has no joint {name!r}{suggest(name, known)}; {listing(known)}")
+        return model[name]
+
+    def _stress(self, joint: str) -> np.ndarray | None:
+        return self.determinacy.wrenches.get(joint)
+
+    def _told(self, one: np.ndarray, stress: np.ndarray | None) -> Wrench:
+        free = np.zeros(one.shape, bool) if stress is None else np.abs(stress).max(axis=2) > TOUCHED
+        if self.result.planar:
+            free[:, 2:5] = False
+        shown = np.where(free, np.nan, one)
+        return Wrench(shown[:, :3], shown[:, 3:], free, one)
+
+    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+        """Efforts and reaction components by name: ``"A.angle"``, ``"B.fx"`` -> (unit, values); nan: undetermined."""
+        out = {k: (self.drives[k].unit, x) for k, x in self.efforts.items()}
+        for e in self.result.model.joints:
+            w = self.reaction(e.name)
+            both = np.hstack([w.force, w.torque])
+            for what in PLANE if self.result.planar else SPATIAL:
+                out[f"{e.name}.{what}"] = ("N" if what[0] == "f" else "N*m", both[:, INDEX[what]])
+        return out
+
+    @property
+    def undetermined(self) -> dict[str, np.ndarray]:
+        """What redundancy leaves undetermined at some time: ``"upper.fz"`` -> when, (n,) of bool; couplings too."""
+        out = {k: np.isnan(x) for k, (_, x) in self.channels().items() if np.isnan(x).any()}
+        couplings = {c.name for c in self.result.model.couplings if isinstance(c, Coupling)}
+        return out | {k: free for k, free in self.determinacy.efforts.items() if k in couplings}
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Label and text of what a reader wants to see first."""
+        n = len(self.t)
+        out = [("mechanism", f"{self.result.model.name}, {n} times from {self.t[0]:g} s to {self.t[-1]:g} s")]
+        for name, d in self.drives.items():
+            x, unit = self.efforts[name], d.unit.replace("*", " ")
+            if np.isnan(x).all():
+                out.append(("drive", f"{name}: undetermined"))
+                continue
+            effort = f"{np.nanmin(x):.4g} to {np.nanmax(x):.4g} {unit}, rms {np.sqrt(np.nanmean(x**2)):.4g} {unit}"
+            out.append(("drive", f"{name}: {effort}, power {d.power.min():.4g} to {d.power.max():.4g} W"))
+        for e in self.result.model.joints:
+            out.append(("reaction", self._line(e.name)))
+        return out
+
+    def _line(self, joint: str) -> str:
+        w = self.reaction(joint)
+        both, free = np.hstack([w.force, w.torque]), w.undetermined
+        names = PLANE if self.result.planar else SPATIAL
+        rounding = ROUNDING * np.abs(w.one).max(initial=0.0)
+        both = np.where(np.abs(both) < rounding, 0.0, both)
+        known = [(x, both[:, INDEX[x]]) for x in names if not free[:, INDEX[x]].all()]
+        text = ", ".join(
+            f"{x} {np.nanmin(v):.4g} to {np.nanmax(v):.4g} {'N' if x[0] == 'f' else 'N m'}" for x, v in known
+        )
+        never = [x for x in names if free[:, INDEX[x]].all()]
+        at_times = [x for x in names if free[:, INDEX[x]].any() and x not in never]
+        said = [text] if text else []
+        said += [f"undetermined: {', '.join(never)}"] if never else []
+        said += [f"undetermined at some times: {', '.join(at_times)}"] if at_times else []
+        return f"{joint}: {'; '.join(said)}"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data; what is undetermined is None."""
+        values = {k: (unit, [None if x != x else x for x in v.tolist()]) for k, (unit, v) in self.channels().items()}
+        return {
+            "name": self.result.model.name,
+            "t": self.t.tolist(),
+            "drives": {k: {"coordinate": d.coordinate, "unit": d.unit, "effort": values[k][1],
+                           "power": d.power.tolist()} for k, d in self.drives.items()},
+            "reactions": {k: {"unit": u, "values": x} for k, (u, x) in values.items() if k not in self.drives},
+            "undetermined": {k: x.tolist() for k, x in self.undetermined.items()},
+            "redundant": self.determinacy.count.tolist(),
+        }  # fmt: skip
+
+    def to_csv(self, path: str | os.PathLike) -> None:
+        """Times, efforts and reactions as a table; the header holds names and units, undetermined cells are empty."""
+        curves = self.channels()
+        rows = np.column_stack([self.t, *(v for _, v in curves.values())])
+        try:
+            with open(path, "w", encoding="utf-8", newline="") as file:
+                out = csv.writer(file)
+                out.writerow(["time [s]", *(f"{k} [{unit}]" for k, (unit, _) in curves.items())])
+                out.writerows([["" if x != x else repr(x) for x in row] for row in rows.tolist()])
+        except OSError as error:
+            raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Efforts and reactions over time; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.efforts import plot_efforts
+
+        return plot_efforts(self, path=path)
+
+    def __str__(self) -> str:
+        return "\n".join(f"{k:<9}  {v}" for k, v in self.lines())

@@ -1,0 +1,128 @@
+"""Equilibria against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.analyses.made import G, chain, rod
+
+
+@pytest.mark.parametrize(
+    ("drawn", "angle", "stability"), [(0.4, 0, "stable"), (1.5, 0, "stable"), (2.9, np.pi, "unstable")]
+)
+def test_a_rod_hangs_or_stands(drawn, angle, stability):
+    found = rod(drawn).equilibrium()
+    assert found["A.angle"] == pytest.approx(angle, abs=1e-9)
+    assert found.stability == stability
+    assert found["A.fy"] == pytest.approx(G, rel=1e-9)
+    assert found.unbalanced < 1e-9
+
+
+def test_downhill_from_an_unstable_one():
+    found = rod(np.pi).equilibrium(stable=True)
+    assert found.stability == "stable"
+    assert found.method == "descent"
+    assert np.cos(found["A.angle"]) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_far_from_it():
+    found = chain(6, 2.0).equilibrium(stable=True)
+    assert found.stability == "stable"
+    assert found["rod 5.y"] == pytest.approx(-5.5 / 6, abs=1e-8)
+
+
+def test_a_spring_against_the_weight():
+    """k (theta - 1) + (g / 2) sin theta = 0."""
+    m = rod(0.3)
+    m.add(fb.TorsionalSpringDamper("spring", joint="A", stiffness=20, angle=1.0))
+    angle = m.equilibrium()["A.angle"]
+    assert 20 * (angle - 1) + G / 2 * np.sin(angle) == pytest.approx(0, abs=1e-9)
+
+
+def test_a_hanging_chain():
+    """Links between two supports: with the horizontal pull H, tan of link k is (w (k + 1/2) - V) / H."""
+    n, span = 12, 0.7
+    m = fb.Mechanism("catenary", planar=True, gravity=(0, -G))
+    at = np.zeros(2)
+    for k in range(n):
+        angle = -1.0 if k < n // 2 else 1.0
+        way = np.array([np.cos(angle), np.sin(angle)]) / n
+        m.add(fb.Body(f"link {k}", mass=1, inertia=0.01, position=tuple(at + way / 2), angle=angle))
+        m.add(fb.Revolute(f"J{k}", "ground" if k == 0 else f"link {k - 1}", f"link {k}", at=tuple(at)))
+        at = at + way
+    m.add(fb.Frame("end", f"link {n - 1}", position=(0.5 / n, 0)))
+    m.add(fb.Frame("hook", "ground", position=(span, 0)))
+    m.add(fb.Revolute("last", "hook", "end"))
+    found = m.equilibrium()
+    assert found.stability == "stable"
+    slopes = np.tan([found[f"link {k}.angle"] for k in range(n)])
+    assert np.diff(slopes, 2) == pytest.approx(np.zeros(n - 2), abs=1e-8)
+    pull = abs(found["J0.fx"])
+    assert np.diff(slopes) == pytest.approx(np.full(n - 1, G / pull), rel=1e-8)
+    assert sum(np.cos(np.arctan(slopes))) / n == pytest.approx(span, rel=1e-9)
+
+
+def test_nothing_holds_it():
+    m = fb.Mechanism("free", planar=True, gravity=(0, -G))
+    m.add(fb.Body("stone", mass=2, inertia=1))
+    with pytest.raises(fb.NotConverged, match=r"-19.6 N push along stone.y and nothing holds") as found:
+        m.equilibrium()
+    assert found.value.residuals["stone.y"] == pytest.approx(-2 * G)
+
+
+def test_more_torque_than_the_weight_can_hold():
+    m = rod(0.5)
+    m.add(fb.Motor("motor", joint="A", torque="6"))
+    with pytest.raises(fb.NotConverged, match="no equilibrium of 'rod'"):
+        m.equilibrium()
+    held = m.equilibrium
+    m.replace(fb.Motor("motor", joint="A", torque="3"))
+    assert np.sin(held()["A.angle"]) == pytest.approx(3 / (G / 2), rel=1e-9)
+
+
+def test_marginal_where_nothing_pushes_back():
+    m = fb.Mechanism("wheel", planar=True, gravity=(0, -G))
+    m.add(fb.Body("wheel", mass=1, inertia=1))
+    m.add(fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    assert m.equilibrium().stability == "marginal"
+
+
+def test_flutter_of_a_follower_force():
+    """Ziegler's column: 2 m and m on two hinges with springs k, a follower force P: it flutters from 2.086 k / l on.
+
+    Ziegler (1952); the closed form (7/2 - sqrt 2) k / l without damping.
+    """
+
+    def column(load: float) -> fb.Mechanism:
+        m = fb.Mechanism("Ziegler", planar=True, parameters={"load": load})
+        for k, mass in enumerate((2.0, 1.0)):
+            m.add(fb.Body(f"rod {k}", mass=mass, inertia=1e-9, position=(0, k + 1.0)))
+            m.add(fb.Revolute(f"J{k}", "ground" if k == 0 else "rod 0", f"rod {k}", at=(0, float(k))))
+            m.add(fb.TorsionalSpringDamper(f"spring {k}", joint=f"J{k}", stiffness=1.0))
+        m.add(fb.PointForce("push", "rod 1", at=(0, 2), force=("0", "-load"), axes="body"))
+        return m
+
+    limit = 3.5 - np.sqrt(2)
+    assert column(0.999 * limit).equilibrium().stability != "unstable"
+    assert column(1.001 * limit).equilibrium().stability == "unstable"
+
+
+def test_preload():
+    """The pull of a rope from (0, 1) that holds a level rod: its moment about the hinge is (g / 2) m."""
+    m = rod(np.pi / 2)
+    m.add(fb.SpringDamper("rope", "ground", "rod", at=((0, 1), (1, 0)), stiffness=100))
+    found = m.equilibrium(preload=["rope"])
+    assert found.preload["rope"] == pytest.approx(G / 2 * np.sqrt(2), rel=1e-9)
+    assert found["rope.force"] == pytest.approx(G / 2 * np.sqrt(2), rel=1e-9)
+    assert found["A.angle"] == pytest.approx(np.pi / 2)
+    assert m.linearize(about=found).stiffness[0, 0] > 0
+    m.add(fb.SpringDamper("useless", "ground", "rod", at=((-1, 0), (1, 0)), stiffness=1))
+    with pytest.raises(fb.NotConverged, match="useless cannot balance 'rod'"):
+        m.equilibrium(preload=["useless"])
+
+
+def test_steady_motions_need_a_coordinate_that_turns():
+    with pytest.raises(fb.ModelError, match="name a joint's coordinate"):
+        rod().equilibrium(turning=["rod.x"])

@@ -1,0 +1,241 @@
+"""Linear equations against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.assemble import assemble
+from flyball.analysis.derivatives import Equations, State
+from flyball.analysis.free import free
+from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt
+
+LAYERS = ("absolute", "joint")
+
+
+def squares(L) -> float:
+    return float((L.stiffness / L.mass)[0, 0])
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_stiffness_of_joints_that_turn_with_bodies(layer):
+    """omega^2 = 1.5 g for a uniform rod of 1 m; the same upside down with the sign reversed."""
+    assert squares(rod().linearize(coordinates=layer)) == pytest.approx(14.715, rel=1e-10)
+    assert squares(rod(np.pi).linearize(coordinates=layer)) == pytest.approx(-14.715, rel=1e-10)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_hanging_parallelogram(layer):
+    """Two rods and a bar that goes round without turning: omega^2 = (1/2 + 1 + 1/2) g / (1/3 + 1 + 1/3)."""
+    assert squares(parallelogram().linearize(coordinates=layer)) == pytest.approx(11.772, rel=1e-10)
+
+
+def test_self_stress_changes_nothing():
+    """A third crank makes the reactions undetermined; whatever they are, the linear equations are the same."""
+    a = assemble(parallelogram(0.0, 3))
+    x = State.moving(a.compiled, 0.0, a.q, a.v)
+    U, d, _ = np.linalg.svd(a.compiled.jacobian())
+    own = U[:, (d > 1e-9 * d[0]).sum() :]
+    assert own.shape[1] == 1
+    found = []
+    for stress in (0.0, 100.0):
+        e = Equations(State(x.c, x.t, x.q, x.v, x.z, x.vdot, x.lam + stress * own[:, 0], x.effort))
+        Z = free(e).Z
+        found.append(Z.T @ e.by_position[e.at["r"]] @ Z)
+    assert found[1] == pytest.approx(found[0], rel=1e-11)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_conical_pendulum(layer):
+    """From the turning frame: omega^2 = (g / cos) (1 + 3 cos^2) at 1 rad (Routh, Advanced Rigid Dynamics, 1905)."""
+    L = conical_pendulum().linearize(coordinates=layer)
+    assert L.turning == pytest.approx([0, 0, np.sqrt(G / np.cos(1.0))], abs=1e-9)
+    w = L.eigenvalues
+    assert np.sort(w[2:].imag) == pytest.approx([-5.83588888, 5.83588888], abs=1e-7)
+    assert np.abs(w[2:].real).max() < 1e-7
+    assert abs(w[2].imag) == pytest.approx(np.sqrt(G / np.cos(1) * (1 + 3 * np.cos(1) ** 2)), rel=1e-10)
+    assert np.abs(w[:2]).max() < 1e-6  # a double zero: rounding shows by its square root
+
+
+def sleeping_top(spin: float) -> fb.Mechanism:
+    m = fb.Mechanism("top", gravity=(0, 0, -G))
+    m.add(fb.Body("top", mass=2, inertia=(0.02, 0.02, 0.005), position=(0, 0, 0.1), angular_velocity=(0, 0, spin)))
+    m.add(fb.Spherical("tip", "ground", "top", at=(0, 0, 0)))
+    return m
+
+
+@pytest.mark.parametrize("spin", [40.0, 80.0])
+@pytest.mark.parametrize("layer", LAYERS)
+def test_sleeping_top(layer, spin):
+    """A z'' - i C n z' - m g l z = 0 in the tilt z seen from the ground; asleep from C n > 2 sqrt(A m g l) on."""
+    A, C, mgl = 0.02 + 2 * 0.01, 0.005, 2 * G * 0.1
+    roots = np.roots([A, -1j * C * spin, -mgl])
+    L = sleeping_top(spin).linearize(coordinates=layer)
+    turned = 1j * L.turning[2]
+    wanted = np.concatenate([roots - turned, np.conj(roots - turned)])
+    for w in wanted:
+        assert np.abs(L.eigenvalues - w).min() < 1e-7 * abs(w)
+    assert (L.eigenvalues.real.max() < 1e-6) == (C * spin > 2 * np.sqrt(A * mgl))
+
+
+@pytest.mark.parametrize("part", [0.9, 1.1])
+def test_rolling_disk_upright(part):
+    """A thin uniform disk rolls stably from v^2 = g r / 3 on (Routh 1905; Neimark and Fufaev 1972)."""
+    r = 0.5
+    v = part * np.sqrt(G * r / 3)
+    m = fb.Mechanism("disk", gravity=(0, 0, -G))
+    I = r * r / 4
+    moving = {"velocity": (v, 0, 0), "angular_velocity": (0, v / r, 0)}
+    m.add(fb.Body("disk", mass=1, inertia=(I, I, 2 * I), position=(0, 0, r), orientation=(np.pi / 2, 0, 0), **moving))
+    m.add(fb.RollingDisk("road", "ground", "disk", at=(0, 0, r), axis=(0, 1, 0), radius=r))
+    L = m.linearize()
+    # 5/4 lean'' = g/r lean - 3 (v/r)^2 lean, in units of r (Neimark and Fufaev 1972, chapter 3)
+    square = (G / r - 3 * (v / r) ** 2) / 1.25
+    assert np.abs(L.eigenvalues - np.sqrt(complex(square))).min() < 1e-6
+    assert (L.eigenvalues.real.max() > 1e-3) == (part < 1)
+    assert len(L.states) == 8
+    assert L.mass is None
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("damping", [0.05, 0.3, 2.0])
+def test_watt_governor_on_an_engine(layer, damping):
+    """The symmetric mode's cubic, by hand; stable where Vyshnegradskii's (1876) criterion (Routh's for it) says so.
+
+    ball length^2 lift'' = ball length^2 w^2 sin cos - ball g length sin - damping lift', and
+    (engine + 2 ball length^2 sin^2) w' = torque (cos lift - cos set) - 4 ball length^2 sin cos w lift'.
+    """
+    m, p = watt(damping, 0.05)
+    steady = m.equilibrium(turning=["shaft.angle"])
+    assert steady.speeds["shaft.angle"] == pytest.approx(p["speed"], rel=1e-9)
+    assert steady["left hinge.angle"] == pytest.approx(p["set"], rel=1e-9)
+    s, c, w = np.sin(p["set"]), np.cos(p["set"]), p["speed"]
+    I = p["ball"] * p["length"] ** 2
+    J = p["engine"] + 2 * I * s * s
+    A = np.array(
+        [[0, 1, 0], [-(w**2) * s * s, -damping / I, 2 * w * s * c], [-p["torque"] * s / J, -4 * I * s * c * w / J, 0]]
+    )
+    L = m.linearize(about=steady, coordinates=layer)
+    for root in np.linalg.eigvals(A):
+        assert np.abs(L.eigenvalues - root).min() < 1e-6 * abs(root)
+    a1, a2, a3 = np.poly(A)[1:]
+    assert (steady.stability == "stable") == (a1 * a2 > a3)
+
+
+def cart(upright: bool = True) -> fb.Mechanism:
+    m = fb.Mechanism("cart", planar=True, gravity=(0, -G))
+    m.add(fb.Body("cart", mass=2, inertia=1))
+    m.add(fb.Body("rod", mass=1, inertia=1 / 12, position=(0, 0.5 if upright else -0.5)))
+    m.add(fb.Prismatic("rail", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Revolute("pin", "cart", "rod", at=(0, 0)))
+    m.add(fb.Sensor("tilt", "pin.angle"))
+    return m
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_cart_and_rod_pushed(layer):
+    """[3, -1/2; -1/2, 1/3] [x''; tilt''] + [0, 0; 0, -g/2] [x; tilt] = [push; 0]; the reaction carries the rod."""
+    m = cart()
+    m.add(fb.PointForce("push", "cart", force=("0", "0")))
+    L = m.linearize(["push.x"], ["tilt", "cart.x", "pin.fx", "rod.ax"], coordinates=layer)
+    M, K = np.array([[3, -0.5], [-0.5, 1 / 3]]), np.diag([0, -G / 2])
+    for s in (2.0, 0.3 + 1.7j):
+        x, tilt = np.linalg.solve(s * s * M + K, [1, 0])
+        rod_ax = s * s * (x - 0.5 * tilt)
+        got = (L.C @ np.linalg.solve(s * np.eye(4) - L.A, L.B) + L.D)[:, 0]
+        assert got == pytest.approx([tilt, x, rod_ax, rod_ax], rel=1e-9)
+    zeros, poles, gain = L.transfer("push.x", "tilt")
+    assert np.sort(poles.real)[[0, -1]] == pytest.approx([-np.sqrt(19.62), np.sqrt(19.62)], rel=1e-7)
+    assert gain == pytest.approx(2 / 3, rel=1e-6)
+    assert len(zeros) == 2
+    assert L.response([1.3], "push.x", "tilt")[0] == pytest.approx(np.linalg.solve(-1.69 * M + K, [1, 0])[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_driver_as_input(layer):
+    """A rod whose pin is moved: tilt / x = (s^2 / 2) / (s^2 / 3 + g / 2) up to sign; positions follow, rates cannot."""
+    m = cart(upright=False)
+    m.add(fb.Driver("shaker", "rail.displacement", "0"))
+    L = m.linearize(["shaker"], ["tilt", "cart.x"], coordinates=layer)
+    s = 1.7
+    got = (L.C @ np.linalg.solve(s * np.eye(2) - L.A, L.B) + L.D)[:, 0]
+    assert got == pytest.approx([-0.5 * s * s / (s * s / 3 + G / 2), 1.0], rel=1e-9)
+    with pytest.raises(fb.ModelError, match=r"'cart\.vx' follows the rate of input 'shaker'"):
+        m.linearize(["shaker"], ["cart.vx"], coordinates=layer)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_parameter_as_input(layer):
+    """A mass on a spring whose free length changes: m x'' + k x = k u."""
+    m = fb.Mechanism("mass", planar=True, parameters={"free": 0.5})
+    m.add(fb.Body("mass", mass=2, inertia=1, position=(0.5, 0)))
+    m.add(fb.Prismatic("rail", "ground", "mass", at=(0.5, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("spring", "ground", "mass", at=((0, 0), (0.5, 0)), stiffness=50, length="free", damping=3))
+    L = m.linearize(["free"], ["mass.x", "spring.force"], coordinates=layer)
+    s = 1 + 2j
+    x = 50 / (2 * s * s + 3 * s + 50)
+    got = (L.C @ np.linalg.solve(s * np.eye(2) - L.A, L.B) + L.D)[:, 0]
+    assert got == pytest.approx([x, 50 * (x - 1) + 3 * s * x], rel=1e-9)
+    found = L.to_control()
+    assert found(s)[0, 0] == pytest.approx(x, rel=1e-9)
+
+
+def test_root_locus_of_a_feedback():
+    """Position feedback u = -k y on a unit mass: s^2 + k = 0."""
+    m = fb.Mechanism("mass", planar=True)
+    m.add(fb.Body("mass", mass=1, inertia=1))
+    m.add(fb.Prismatic("rail", "ground", "mass", at=(0, 0), axis=(1, 0)))
+    m.add(fb.PointForce("push", "mass", force=("0", "0")))
+    L = m.linearize(["push.x"], ["mass.x"])
+    roots = L.root_locus([1.0, 4.0, 9.0])
+    assert np.sort(roots.imag, axis=1) == pytest.approx(np.array([[-1, 1], [-2, 2], [-3, 3]]), abs=1e-9)
+
+
+def test_an_instant_of_any_motion():
+    """Frozen: the coefficients of this very instant, a falling rod at 1 rad: theta'' = -1.5 g sin."""
+    m = rod(1.0)
+    with pytest.raises(fb.AnalysisError, match=r"not in equilibrium where it is: .* is accelerated"):
+        m.linearize()
+    m.add(fb.Initial("A.angle", rate=2.0))
+    with pytest.raises(fb.AnalysisError, match="no steady one"):
+        m.linearize()
+    L = m.linearize(frozen=True, coordinates="joint")
+    assert pytest.approx(np.array([[0, 1], [-1.5 * G * np.cos(1.0), 0]]), abs=1e-9) == L.A
+
+
+def test_what_does_not_exist_is_named():
+    m = cart()
+    with pytest.raises(fb.ModelError, match=r"no input 'pusch'.*"):
+        m.linearize(["pusch"])
+    with pytest.raises(fb.ModelError, match="'tild'"):
+        m.linearize(outputs=["tild"])
+    with pytest.raises(fb.ModelError, match="'pin' has no curve 'angel'"):
+        m.linearize(outputs=["pin.angel"])
+    with pytest.raises(fb.ModelError, match="no parameter 'mass'"):
+        m.linearize(parameters={"mass": 2.0})
+    with pytest.raises(fb.ModelError, match="lists of names"):
+        m.linearize("push")
+    with pytest.raises(fb.ModelError, match="about must be"):
+        m.linearize(about="here")
+
+
+def test_singular_positions_are_refused():
+    """A flat parallelogram can go on in two ways."""
+    m = fb.Mechanism("flat", planar=True)
+    for name, x in (("left", 0.0), ("right", 2.0)):
+        m.add(fb.Body(name, mass=1, inertia=0.1, position=(x + 0.5, 0)))
+        m.add(fb.Revolute(f"{name} foot", "ground", name, at=(x, 0)))
+    m.add(fb.Body("coupler", mass=1, inertia=0.1, position=(2.0, 0)))
+    m.add(fb.Revolute("left end", "left", "coupler", at=(1, 0)))
+    m.add(fb.Revolute("right end", "right", "coupler", at=(3, 0)))
+    with pytest.raises(fb.SingularityError, match="singular position") as found:
+        m.linearize()
+    assert set(found.value.elements) & {"left foot", "left end", "right end", "right foot"}
+
+
+def test_laws_without_derivatives_are_refused():
+    m = rod()
+    m.add(fb.Motor("motor", joint="A", torque=lambda t: 0.0))
+    with pytest.raises(fb.ModelError, match="Python function, which has no derivatives"):
+        m.linearize()

@@ -1,0 +1,96 @@
+"""Modes against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+from scipy.special import jn_zeros
+
+import flyball as fb
+from tests.analyses.made import G, chain, chain_matrices, rod
+
+
+def test_double_pendulum():
+    """The two modes of two rods, by Lagrange's equations in their angles."""
+    squares, V = eigh(*chain_matrices(2)[::-1])
+    for layer in ("absolute", "joint"):
+        found = chain(2).modes(coordinates=layer)
+        assert found.omega == pytest.approx(np.sqrt(squares), rel=1e-10)
+        assert found.frequency == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-10)
+        assert found.damping_ratio == pytest.approx([0, 0], abs=1e-12)
+        assert found.kinds == ("oscillation",) * 2
+        assert found.stable
+    for k in range(2):  # absolute angles of the rods are sums of the joints'
+        shape = [found.shapes[found.names.index(f"J{i}.angle"), k].real for i in range(2)]
+        wanted = V[:, k] / V[:, k][0]
+        assert np.cumsum(shape) / shape[0] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_damping_ratio_and_instability():
+    """theta'' + 2 zeta w theta' + w^2 theta = 0 with a hinge's damper; upside down one mode grows."""
+    m = rod(damping=1.0)
+    m.add(fb.TorsionalSpringDamper("damper", joint="A", damping="damping"))
+    w = np.sqrt(1.5 * G)
+    found = m.modes()
+    assert found.omega == pytest.approx([w], rel=1e-10)
+    assert found.damping_ratio == pytest.approx([1.0 / (2 * w / 3)], rel=1e-10)
+    up = rod(np.pi).modes()
+    assert not up.stable
+    assert set(up.kinds) == {"unstable", "decay"}
+    assert np.sort(up.eigenvalues.real) == pytest.approx([-w, w], rel=1e-10)
+
+
+def test_rigid_motions_are_told():
+    m = fb.Mechanism("two", planar=True)
+    for k in (0, 1):
+        m.add(fb.Body(f"mass {k}", mass=1, inertia=1, position=(k, 0)))
+        m.add(fb.Prismatic(f"rail {k}", "ground", f"mass {k}", at=(k, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("spring", "mass 0", "mass 1", at=((0, 0), (1, 0)), stiffness=8))
+    found = m.modes()
+    assert found.kinds.count("oscillation") == 1
+    assert found.omega.max() == pytest.approx(4.0, rel=1e-9)
+    assert set(found.kinds) == {"rigid", "oscillation"}
+
+
+def test_the_slowest_of_many():
+    """A chain of 250 links: sparse, against Lagrange's matrices, and near the hanging rope's Bessel zeros."""
+    n = 250
+    found = chain(n).modes(count=6)
+    M, K = chain_matrices(n)
+    assert len(found) == 6
+    assert found.omega == pytest.approx(np.sqrt(eigh(K, M, eigvals_only=True, subset_by_index=[0, 5])), rel=1e-8)
+    assert found.omega == pytest.approx(jn_zeros(0, 6) / 2 * np.sqrt(G), rel=1e-3)
+
+
+def test_a_mode_as_a_motion_keeps_the_joints_closed():
+    found = chain(3).modes()
+    r = found.motion(0, amplitude=1e-4)
+    gap = r["rod 1"].position - r["rod 0"].position
+    size = np.hypot(gap[:, 0], gap[:, 1])
+    assert r.t[-1] == pytest.approx(1 / found.frequency[0])
+    assert size == pytest.approx(np.full(len(r.t), 1 / 3), abs=1e-7)
+    swing = r["J0"].angle
+    assert swing[0] == pytest.approx(-swing[len(swing) // 2], rel=1e-3)
+
+
+def test_questions_that_make_no_sense():
+    with pytest.raises(fb.ModelError, match="count must be at least 1"):
+        chain(2).modes(count=0)
+    with pytest.raises(fb.AnalysisError, match="not in equilibrium"):
+        rod(1.0).modes()
+
+
+def test_fewer_freedoms_than_asked_for():
+    """A row of 210 hanging parallelograms moves in one way: as many cranks and bars over again."""
+    n = 210
+    m = fb.Mechanism("row", planar=True, gravity=(0, -G))
+    for k in range(n + 1):
+        m.add(fb.Body(f"crank {k}", mass=1, inertia=1 / 12, position=(k, -0.5)))
+        m.add(fb.Revolute(f"A{k}", "ground", f"crank {k}", at=(k, 0)))
+        if k:
+            m.add(fb.Body(f"bar {k}", mass=1, inertia=1 / 12, position=(k - 0.5, -1)))
+            m.add(fb.Revolute(f"B{k}", f"crank {k - 1}", f"bar {k}", at=(k - 1, -1)))
+            m.add(fb.Revolute(f"C{k}", f"bar {k}", f"crank {k}", at=(k, -1)))
+    square = G * ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
+    assert m.modes(count=5).omega == pytest.approx([np.sqrt(square)], rel=1e-8)
