@@ -63,6 +63,7 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self._dispatcher: Callable[..., Any] | None = None
+        self._ready = False
         update_wrapper(self, function)
 
     @property
@@ -87,13 +88,15 @@ class Kernel:
             return False
 
     def __call__(self, *args: Any) -> Any:
-        if self._dispatcher is None or not getattr(self._dispatcher, "signatures", True):
+        if not self._ready:
             start_numba()
             from ._link import optimise_once
 
             with _lock, optimise_once(self.function.__qualname__):
-                return self.dispatcher(*args)
-        return self._dispatcher(*args)
+                out = self.dispatcher(*args)
+            self._ready = True
+            return out
+        return self._dispatcher(*args)  # type: ignore[misc]
 
 
 def start_numba() -> None:

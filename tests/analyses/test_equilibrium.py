@@ -89,6 +89,15 @@ def test_marginal_where_nothing_pushes_back():
     assert m.equilibrium().stability == "marginal"
 
 
+def test_without_any_force_it_stays_where_it_is():
+    m = fb.Mechanism("crank", planar=True)
+    m.add(fb.Body("crank", mass=1, inertia=0.1, position=(0.3, 0.4)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Driver("motor", "A.angle", "1 + t"))
+    found = m.equilibrium(t=2.0)
+    assert found["A.angle"] == pytest.approx(3.0)
+    assert found["motor.effort"] == pytest.approx(0.0, abs=1e-12)
+
+
 def test_flutter_of_a_follower_force():
     """Ziegler's column: 2 m and m on two hinges with springs k, a follower force P: it flutters from 2.086 k / l on.
 

@@ -11,13 +11,14 @@ from functools import cached_property
 import numpy as np
 
 from ..system.names import velocity_names
-from ..system.tables import G_VALUE
+from ..system.tables import G_VALUE, MASS
 from ..system.tree import retract
 from .compiled import Compiled
 from .derivatives import Equations, State
 
 DENSE = 1200  # unknowns up to which a step is one of least squares
 LEAST = 1e-11  # singular values of the equations below this part of the largest are none
+NOTHING = 1e-9  # acceleration [m/s^2] of the whole mechanism that is none
 WEAK = 1e-10  # what is added to the sparse equations' diagonal, of their entries
 
 
@@ -96,7 +97,8 @@ class Rest:
     def size(self) -> float:
         """Energy that small ones are compared with: what acts, and what stiffness makes of a step of one."""
         acting = np.abs(self.r + self.G.T @ (self.lam[self.holonomic] / self.per_row)).max(initial=0.0)
-        return float(max(acting, np.abs(self.K.data).max(initial=0.0))) or 1.0
+        nothing = NOTHING * float(self.c.values.system.body_x[:, MASS].sum()) * self.c.values.length
+        return float(max(acting, np.abs(self.K.data).max(initial=0.0), nothing))
 
     def unbalanced(self) -> float:
         """The largest force that the best multipliers leave, of those that act."""

@@ -9,6 +9,7 @@ the constraints and the equations of motion miss, exactly; accelerations and mul
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -60,11 +61,11 @@ class Direction:
 class Linear:
     """Mass matrix and constraints at a state, ready to be solved with."""
 
-    def __init__(self, x: State) -> None:
+    def __init__(self, x: State, M: np.ndarray | None = None) -> None:
         c = x.c
         c.at(x.t, x.q, x.v)
         self.G = c.jacobian()
-        self.M = c.mass().toarray()
+        self.M = c.mass().toarray() if M is None else M
         self.which = np.array([r.holonomic for r in c.structure.rows], bool)
         self.scale = np.array([1.0 / np.sqrt(m) if m > 0.0 else 1.0 for m in np.diag(self.M)])
         n, m = len(self.M), len(self.G)
@@ -76,6 +77,11 @@ class Linear:
         self.H = self.size[:, None] * H
         self.A[:n, n:], self.A[n:, :n] = -self.H.T, self.H
 
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
+        return np.linalg.pinv(self.A, rcond=1e-12)
+
     def motion(self, right: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """The change x with G x = right that is smallest in kinetic energy."""
         rows = slice(None) if which is None else which
@@ -86,7 +92,7 @@ class Linear:
     def acceleration(self, r: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(dvdot, dlam) that take away what is missed of the equations of motion and of the constraints."""
         n = len(self.M)
-        x = np.linalg.lstsq(self.A, -np.r_[self.scale * r, self.size * a], rcond=1e-12)[0]
+        x = self.inverse @ -np.r_[self.scale * r, self.size * a]
         return self.scale * x[:n], self.size * x[n:]
 
 

@@ -14,8 +14,8 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from ..errors import SimulationError
-from ..system.tables import G_VALUE, NU
-from ..system.tree import normalise, rates, retract
+from ..system.tables import EFFORT, G_VALUE, LAM, NU, X_SOLVED
+from ..system.tree import normalise, retract
 from .compiled import Compiled
 from .derivatives import State
 from .entry import MOTION
@@ -42,6 +42,7 @@ class Variation:
     def __init__(self, x: State, directions: Sequence[Direction], start: Sequence[Tangent]) -> None:
         self.c: Compiled = x.c
         self.x = x
+        self.M = x.c.mass().toarray()
         self.directions = list(directions)
         self.nq, self.nv = len(x.q), len(x.v)
         self.nz = len(x.z)
@@ -84,12 +85,12 @@ class Variation:
     def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
         q, v, z, changes = self._split(y)
         normalise(self.c.values.system, q)
-        x = self._state(t, q, v)
         _, dy = self.c.at(t, q, v, MOTION)
+        W = self.c.work
+        x = State(self.c, t, q, v, self.c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
         out = np.zeros_like(y)
         out[: self.nq + self.nv + self.nz] = dy
-        rates(self.c.values.system, q, v, out)
-        lin, N = Linear(x), kinematic(x)
+        lin, N = Linear(x, self.M), kinematic(x)
         parts = out[self.nq + self.nv + self.nz :].reshape(changes.shape)
         for k, d in enumerate(self.directions):
             dq, dv = np.split(changes[k], 2)
@@ -105,13 +106,13 @@ class Variation:
         normalise(S, q)
         for _ in range(PASSES):
             self.c.at(t, q, v)
-            lin, g = Linear(State(self.c, t, q, v, self.c.z, v, self.x.lam, v)), self.c.work.row[G_VALUE].copy()
+            lin, g = Linear(State(self.c, t, q, v, self.c.z, v, self.x.lam, v), self.M), self.c.work.row[G_VALUE].copy()
             if not np.abs(g[lin.which]).max(initial=0.0) > CLOSED * self.c.values.length:
                 break
             retract(S, q, lin.motion(-g, lin.which))
         v += lin.motion(self.c.work.row[NU] - self.c.jacobian() @ v)
         x = self._state(t, q, v)
-        lin = Linear(x)
+        lin = Linear(x, self.M)
         for k, d in enumerate(self.directions):
             now = closed(d, x, lin, *np.split(changes[k], 2))
             changes[k] = np.r_[now.q, now.v]
@@ -120,7 +121,7 @@ class Variation:
     def _at(self, t: float, y: np.ndarray) -> tuple[State, list[Tangent]]:
         q, v, _, changes = self._split(y)
         x = self._state(t, q, v)
-        lin = Linear(x)
+        lin = Linear(x, self.M)
         return x, [closed(d, x, lin, *np.split(changes[k], 2)) for k, d in enumerate(self.directions)]
 
 
