@@ -42,7 +42,7 @@ def cases() -> Iterator[tuple[str, Any]]:
 
 def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], Any]:
     """(microseconds a stage, counts, start) of one mechanism."""
-    from flyball.analysis.dynamics import _clock, _run
+    from flyball.analysis.dynamics import clock_for, run_clock
     from flyball.analysis.entry import INTEGRATE
     from flyball.analysis.options import Options
     from flyball.analysis.start import begin
@@ -56,9 +56,9 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     found = []
     spent = 0.0
     while spent < CPU or len(found) < 3:
-        clock = _clock(start, 0.0, 10.0, np.array([10.0]), options)
+        clock = clock_for(start, 0.0, 10.0, np.array([10.0]), options)
         begun = time.process_time()
-        _run(start.assembly, clock, tableau("dop853"), None, INTEGRATE)
+        run_clock(start.assembly, clock, tableau("dop853"), None, INTEGRATE)
         seconds = time.process_time() - begun
         spent += seconds
         found.append(seconds / (clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]) / STAGES)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .analysis.mobility import Mobility
+    from .results.comparison import Comparison
     from .results.equilibrium import Equilibrium
     from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
@@ -36,6 +37,15 @@ class Mechanism(Model):
         from .analysis.dynamics import simulate
 
         return simulate(self, t_end, **options)
+
+    def compare(self, t_end: float, **options: Any) -> Comparison:
+        """The same motion by several formulations of its equations: drift, energy and cost of each.
+
+        See `flyball.analysis.compare.compare` for the options.
+        """
+        from .analysis.compare import compare
+
+        return compare(self, t_end, **options)
 
     def kinematics(self, times: int | Sequence[float] = 501, **options: Any) -> Result:
         """Motion that drivers prescribe; see `flyball.analysis.kinematics.kinematics` for the options."""

@@ -91,7 +91,7 @@ def exact():
 
 def fixed_steps(monkeypatch, h, method):
     """The motion with steps of one width."""
-    original = dynamics._clock
+    original = dynamics.clock_for
 
     def clock(start, *args):
         made = original(start, *args)
@@ -100,7 +100,7 @@ def fixed_steps(monkeypatch, h, method):
         start.assembly.compiled.work.option[[TOL_G, TOL_V]] = 1e-13, 1e-12
         return made
 
-    monkeypatch.setattr(dynamics, "_clock", clock)
+    monkeypatch.setattr(dynamics, "clock_for", clock)
     r = swinging().simulate(0.48, method=method, outputs=17)
     assert (r.health.steps, r.health.rejected) == (round(0.48 / h), 0)
     return r
@@ -158,14 +158,14 @@ def test_restart_from_a_saved_result(tmp_path):
 
 
 def one_step_a_call(monkeypatch):
-    original = dynamics._clock
+    original = dynamics.clock_for
 
     def clock(*args):
         made = original(*args)
         made.count[explicit.QUOTA] = 1
         return made
 
-    monkeypatch.setattr(dynamics, "_clock", clock)
+    monkeypatch.setattr(dynamics, "clock_for", clock)
     monkeypatch.setattr(dynamics, "SLICE", 1e-12)
 
 

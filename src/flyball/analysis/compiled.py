@@ -160,9 +160,10 @@ def compiled(
     holds: Sequence[Initial] = (),
     held: Mapping[str, complex] | None = None,
     tree: Sequence[str] = (),
+    coupled: bool = False,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, positions=positions, holds=holds, tree=tree)
+    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled)
     x = values(s, parameters, held)
     w = work(s, x.system)
     w.option[STABILIZE] = NONE

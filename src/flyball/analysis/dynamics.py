@@ -15,6 +15,7 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
+from . import partition
 from .assemble import Assembly
 from .driven import at_outputs, leaves_no_freedom, owed_works
 from .entry import FOLLOW, INTEGRATE, motion_kernel
@@ -91,8 +92,10 @@ def moved(
     SimulationError
         If it cannot go on; its ``result`` holds the motion up to then.
     """
-    clock = _clock(begun, begun.base.t, float(t_end), times, o)
-    rows, interrupted = _run(begun.assembly, clock, tableau(o.method), progress, task)
+    if o.stabilization == "partitioning":
+        partition.choose(begun.base.compiled.structure.model, begun)
+    clock = clock_for(begun, begun.base.t, float(t_end), times, o)
+    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), progress, task)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -100,7 +103,7 @@ def moved(
     return outcome(begun.base.compiled.structure.model, begun, clock, rows, o, interrupted, owed)
 
 
-def _clock(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
+def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
     s, W = a.compiled.structure, a.compiled.work
@@ -137,7 +140,9 @@ def _energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
-def _run(a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int) -> tuple[np.ndarray, bool]:
+def run_clock(
+    a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int
+) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     width = 1 + len(a.y) + s.nv + len(S.row_i) + len(s.prescribed)

@@ -18,6 +18,9 @@ STABILIZATION = {
     "projection-steps": motion.STEPS,
     "baumgarte": motion.BAUMGARTE,
     "none": motion.NONE,
+    "positions": motion.POSITIONS,
+    "velocities": motion.VELOCITIES,
+    "partitioning": motion.PARTITIONING,
 }
 FINEST = 1e-13  # relative tolerance below which rounding decides
 
@@ -28,9 +31,10 @@ class Options:
 
     ``coordinates``: ``absolute``, ``joint``, or ``auto`` for those in which a right-hand side costs less; the result's
     health says which and why. ``method``: an explicit Runge-Kutta pair. ``stabilization``: ``projection`` (states and
-    stages are kept on the constraints), ``projection-steps`` (states only), ``baumgarte`` with its two rates [1/s], or
-    ``none``. ``max_step`` [s]: give it where a law acts for a short time only; what is shorter than a step can go
-    unseen.
+    stages are kept on the constraints), ``projection-steps`` (states only), ``positions`` or ``velocities`` (only these
+    are kept), ``partitioning`` (dependent coordinates are solved for the independent ones), ``baumgarte`` with its two
+    rates [1/s], or ``none``; `Mechanism.compare` shows what they do. ``max_step`` [s]: give it where a law acts for a
+    short time only; what is shorter than a step can go unseen.
     """
 
     rtol: float = 1e-8

@@ -9,6 +9,7 @@ import typer
 
 from . import (  # noqa: F401  (each adds its subcommand)
     check,
+    compare,
     equilibrium,
     inverse_dynamics,
     kinematics,

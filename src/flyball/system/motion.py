@@ -1,24 +1,21 @@
 """The motion as an ordinary differential equation: y = (q, v, z), z being works, turned angles, places on curves.
 
 Index 1: [M G^T; G 0] [vdot; -lam] = [f; gamma]. The constraints g = 0 and G v = nu are kept by one smooth
-projection P, along M^-1 G^T; the integrator sees f(P(y)), so its order is kept.
+projection P, along M^-1 G^T or along dependent coordinates; the integrator sees f(P(y)), so its order is kept.
 """
 
 from __future__ import annotations
 
 from .._jit import formula
-from ..constraints import curve
-from ..constraints.angle import row as angle
 from ..math.scalar import atan2, cos, sin
-from ..math.vec import dot, sub
 from .call import STACK_RESERVE
 from .dispatch import row_biases, row_values
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
 from .laws import evaluate_jet
 from .loads import efforts, forces, gather, inertial
-from .records import load
-from .rows import BY_TIME, parameters, row_times
+from .partition import exchange
+from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tables import (
     ALPHA,
@@ -37,6 +34,7 @@ from .tables import (
     LENGTH,
     NU,
     OFFSET,
+    PARTED,
     PASS,
     PROJECTIONS,
     Q0,
@@ -47,9 +45,6 @@ from .tables import (
     SOLVER,
     STABILIZE,
     STATUS,
-    TERM_F,
-    TERM_HINT,
-    TERM_M,
     TOL_G,
     TOL_V,
     TREE,
@@ -60,8 +55,9 @@ from .tables import (
     X_SOLVED,
 )
 from .tree import REVOLUTE, normalise, rates, retract
+from .turns import progress, remember
 
-NONE, BAUMGARTE, STEPS, STAGES = 0, 1, 2, 3
+NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
 OLD, NEAR, HERE = range(3)
 PASSES = 16
@@ -155,20 +151,45 @@ def drift(S, W, v, out):
 def settle(S, W, t, q, v, z, tol_g, tol_v):
     """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
 
-    Newton along M^-1 G^T until |g| passes, or until it is as small as rounding lets it be. Accepted states are taken
-    down to rounding: near a singular position a violation e, left standing at a distance s, is a mechanism with other
-    lengths, whose motion leaves the true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
+    Along M^-1 G^T, or along dependent coordinates alone. Accepted states are taken down to rounding: near a singular
+    position a violation e, left standing at a distance s, is a mechanism with other lengths, whose motion leaves the
+    true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
 
     Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
     OLD, of poses NEARby or of those HERE).
     """
+    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
+    place(S, W, t, q, z)
+    if S.row_i.shape[0] == 0:
+        move(S, W, t, v, z)
+        return 0, 0.0, OLD
+    status = 0
+    found = 0.0
+    lost = 0.0
+    factored = OLD
+    if W.option[STABILIZE] != VELOCITIES:
+        status, found, factored = close(S, W, t, q, z, tol_g)
+        if status != 0:
+            return status, found, OLD
+    if W.option[STABILIZE] != POSITIONS:
+        status, lost, factored = steer(S, W, v, tol_v, factored)
+        if status != 0:
+            return status, found, OLD
+    else:  # positions follow the violated velocities and are put back: that is no error of the step
+        found = 0.0
+    move(S, W, t, v, z)
+    return 0, max(found / S.glob[LENGTH], lost), factored
+
+
+@formula
+def close(S, W, t, q, z, tol_g):
+    """Put q on g = 0 by Newton, until |g| passes, or until it is as small as rounding lets it be.
+
+    Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
+    """
     none = W.vel[F_APPLIED]
     step = W.vel[V3]
     r = W.row[R2]
-    place(S, W, t, q, z)
-    if r.shape[0] == 0:
-        move(S, W, t, v, z)
-        return 0, 0.0, OLD
     worst = violation(W, r)
     found = worst
     last = 1e300
@@ -197,19 +218,27 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
         W.info[PROJECTIONS] += 1
     if not worst <= CLOSED and not worst <= tol_g:
         return NOT_CLOSED, found, OLD
+    return 0, found, factored
+
+
+@formula
+def steer(S, W, v, tol_v, factored):
+    """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
+    none = W.vel[F_APPLIED]
+    step = W.vel[V3]
+    r = W.row[R2]
     worst, size = drift(S, W, v, r)
     if worst > tol_v * (1.0 + size):
         if factored == NEAR:
             reuse(S, W)
         if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
             if factor(S, W) != 0:
-                return NOT_CLOSED, found, OLD
+                return NOT_CLOSED, worst, OLD
             factored = HERE
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    move(S, W, t, v, z)
-    return 0, max(found / S.glob[LENGTH], worst / (S.glob[LENGTH] + size)), factored
+    return 0, worst / (S.glob[LENGTH] + size), factored
 
 
 @formula
@@ -225,6 +254,9 @@ def accelerate(S, W, t, p, dy, factored):
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
     x = W.vel[X_SOLVED]
+    if W.option[PARTED] > 0.0:  # from here on with the masses
+        W.option[PARTED] = 0.0
+        factored = OLD
     if factored == NEAR:
         if S.kinds[SOLVER] == SCHUR:
             reuse(S, W)
@@ -272,37 +304,6 @@ def accelerate(S, W, t, p, dy, factored):
 
 
 @formula
-def progress(S, W, z, dz):
-    """Rates of the states that count turns of angles and places on curves."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
-        n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
-        dz[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        par = parameters(S.term_x, k)
-        s = curve.foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
-        dz[S.term_i[k, TERM_HINT]] = curve.progress(par, F, M, s, S.const)[0]
-
-
-@formula
-def remember(S, W, z):
-    """Put the states that count turns and places where the poses in W say they are: no drift over long motions."""
-    for k in range(S.angle_i.shape[0]):
-        F = load(W.FK, S.angle_i[k, 0])
-        M = load(W.FK, S.angle_i[k, 1])
-        h = S.angle_i[k, 2]
-        z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        h = S.term_i[k, TERM_HINT]
-        z[h] = curve.foot(parameters(S.term_x, k), F, M, z[h], S.const)
-
-
-@formula
 def finite(dy):
     """0, or NOT_FINITE."""
     s = 0.0
@@ -323,7 +324,7 @@ def derivative(t, y, dy, S, W):
     z = p[nq + W.vel.shape[1] :]
     prepare(S, W, t, q, v)
     factored = OLD
-    if W.option[STABILIZE] == STAGES:
+    if W.option[STABILIZE] >= STAGES:
         status, _, factored = settle(S, W, t, q, v, z, W.option[TOL_G], W.option[TOL_V])
         if status != 0:
             W.info[STATUS] = status
@@ -353,6 +354,8 @@ def arrive(t, y, dy, S, W):
         if status != 0:
             W.info[STATUS] = status
             return status, found
+        if W.option[PARTED] > 0.0:
+            exchange(S, W)
     else:
         place(S, W, t, q, z)
         move(S, W, t, v, z)

@@ -31,6 +31,8 @@ from .tables import (
     LENGTH,
     MASS,
     NV,
+    PARTED,
+    PARTITION,
     PASS,
     PER_COMPACT,
     PER_MASS,
@@ -47,6 +49,7 @@ from .tables import (
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
+RIGID = 1e30  # times its own mass: what an independent coordinate weighs where only dependent ones may move
 STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
 
 
@@ -81,7 +84,19 @@ def turn_rows(S, W):
     """H = M^-1 G^T for the rows now in W."""
     for e in range(S.block_i.shape[0]):
         at = S.block_i[e, 1]
-        inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+        if W.option[PARTED] > 0.0:
+            turn_dependent(S, W, S.block_i[e, 0], at)
+        else:
+            inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+
+
+@formula
+def turn_dependent(S, W, b, at):
+    """A block of H with masses of the dependent coordinates alone: the independent ones do not move."""
+    n = S.body_i[b, NV]
+    for k in range(n):
+        per = S.body_x[b, PER_MASS] if k <= n // 3 else S.body_x[b, PER_COMPACT]
+        W.H[at + k] = per * W.G[at + k] if W.vel[PARTITION, S.body_i[b, V0] + k].real > 0.0 else 0.0
 
 
 @formula
@@ -141,9 +156,13 @@ def factor_coupled(S, W):
     lever = min(1.0, S.glob[LENGTH]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
+        d = S.mass_i[e, 0]
+        own = d == S.mass_i[e, 1]
+        if own:
+            per[d] = 1.0 / W.M[e]
+        if W.option[PARTED] > 0.0:  # masses of the dependent coordinates alone
+            W.M[e] *= (RIGID if W.vel[PARTITION, d].real < 0.0 else 1.0) if own else 0.0
         W.A[S.mass_i[e, 2]] = W.M[e]
-        if S.mass_i[e, 0] == S.mass_i[e, 1]:
-            per[S.mass_i[e, 0]] = 1.0 / W.M[e]
     for k in range(S.row_i.shape[0]):
         s = 0.0 * W.row[DIAGONAL, k]
         for e in range(S.row_p[k], S.row_p[k + 1]):
@@ -182,7 +201,7 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
     """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
     rhs = W.vel[V2]
-    semidefinite = S.glob[SEMIDEFINITE] > 0.0
+    semidefinite = S.glob[SEMIDEFINITE] > 0.0 and not W.option[PARTED] > 0.0
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
     pass_schur(S, W, rhs, x, lam, loaded)

@@ -72,6 +72,7 @@ class Structure:
     far: bool
     tree: tuple[str, ...]
     positions: bool = False  # without the rows that restrain velocities only
+    coupled: bool = False  # the coupled matrix in absolute coordinates too
     place: dict[str, int] = field(default_factory=dict)  # body name -> row of the body table
     tree_joints: dict[str, TreeJoint] = field(default_factory=dict)
     prescribed: dict[str, int] = field(default_factory=dict)  # driver -> row of the body table it prescribes
@@ -138,6 +139,7 @@ def structure(
     positions: bool = False,
     holds: Sequence[Initial] = (),
     tree: Sequence[str] = (),
+    coupled: bool = False,
 ) -> Structure:
     """Decide the tables of a mechanism.
 
@@ -152,6 +154,8 @@ def structure(
         Coordinates to be held at a value, as further rows.
     tree : sequence of str
         Names of joints that become tree joints instead of rows.
+    coupled : bool
+        Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
 
     Raises
     ------
@@ -162,7 +166,7 @@ def structure(
 
     if not model.bodies:
         raise ModelError(f"{model.name!r} has no bodies; add at least one")
-    s = Structure(model, far, tuple(tree), positions or far)
+    s = Structure(model, far, tuple(tree), positions or far, coupled)
     s.const = [0.0] * len(model.parameters)
     for table in model.tables:
         s.table_at[table.name] = len(s.const)

@@ -31,16 +31,17 @@ FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG = 0
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
-F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT = range(7)
+# (in the last: of each coordinate the size, > 0 if it depends on the others, < 0 if not, 0 if it is prescribed)
+F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
 # scratch; and the inverse Jacobian of the gaps
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
-STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS = range(8)
+STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED = range(9)
 # entries of Work.info
-STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT = range(7)
+STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT, EXCHANGES = range(8)
 
 # entries of System.kinds from its end, and what may stand in the first: how the equations are solved
 SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
@@ -95,15 +96,15 @@ class Work(NamedTuple):
     H: np.ndarray  # (nG,): M^-1 G^T
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
-    vel: np.ndarray  # (7, nv)
+    vel: np.ndarray  # (8, nv)
     sensed: np.ndarray  # (6 + nl, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
     stack: np.ndarray  # law evaluation
     y: np.ndarray  # (3, ny): states in the making
-    option: np.ndarray  # (8,): choices of the analysis, largest violations reported
-    info: np.ndarray  # (7,): status, guilty row, counters, how many loads' slopes are known
+    option: np.ndarray  # (9,): choices of the analysis, largest violations reported, what is solved for
+    info: np.ndarray  # (8,): status, guilty row, counters, how many loads' slopes are known, one more counter
 
 
 # kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24

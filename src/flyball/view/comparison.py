@@ -1,0 +1,86 @@
+"""Formulations of the same motion as pictures: drift and energy over time, and cost."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .plots import DASHES, PALETTE, _drawing, _figure, _handed_out, _headed
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+    from ..results.comparison import Comparison
+
+LEAST = 1e-18  # what is drawn for a violation of zero
+
+
+def comparison_plot(comparison: Comparison, path: str | os.PathLike | None = None) -> Any:
+    """Violations of positions and velocities and the deviation of energy over time, logarithmic; cost as bars.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    path : path, optional
+        Write a PNG, SVG or PDF file, by the suffix, instead of returning the figure.
+
+    Returns
+    -------
+    Figure, or None where a file was written.
+
+    Raises
+    ------
+    ModelError
+        If the file cannot be written.
+    """
+    with _drawing():
+        drawing = _figure(8.4, 11.0)
+        axes = drawing.subplots(2, 2)
+        _over_time(axes[0, 0], comparison, "g", "|g| [m, rad]")
+        _over_time(axes[0, 1], comparison, "gv", "|G v - ν| [m/s, rad/s]")
+        _over_time(axes[1, 0], comparison, "balance", "energy, deviation [J]")
+        _costs(axes[1, 1], comparison)
+        handles, labels = axes[0, 0].get_legend_handles_labels()
+        drawing.legend(handles, labels, loc="outside lower center", ncols=5)
+        _headed(drawing, f"{comparison.model}: formulations compared")
+        return _handed_out(drawing, path)
+
+
+def _style(k: int) -> dict[str, Any]:
+    return {"color": PALETTE[k % len(PALETTE)], "linestyle": DASHES[k // len(PALETTE) % len(DASHES)]}
+
+
+def _over_time(ax: Axes, comparison: Comparison, what: str, label: str) -> None:
+    for k, f in enumerate(comparison):
+        y = np.maximum(np.abs(getattr(f, what)), LEAST)
+        single = "o" if len(f.t) == 1 else None
+        ax.plot(f.t, y, label=f.name, linewidth=1.3, alpha=0.9, marker=single, **_style(k))
+        if len(f.t) and not f.success:
+            ax.plot(f.t[-1], y[-1], "x", color=PALETTE[k % len(PALETTE)], markersize=9, markeredgewidth=2.2)
+    ax.set_yscale("log")
+    ax.set_ylim(bottom=LEAST)
+    ax.margins(x=0.0)
+    ax.set_xlabel("time [s]")
+    ax.set_ylabel(label)
+    if any(not f.success for f in comparison):
+        ax.set_title("cross: it went no further")
+
+
+def _costs(ax: Axes, comparison: Comparison) -> None:
+    timed = any(np.isfinite(f.cpu) for f in comparison)
+    values = [1e3 * f.cpu if timed else float(f.evaluations) for f in comparison]
+    places = np.arange(len(values))
+    colors = [PALETTE[k % len(PALETTE)] for k in places]
+    hatches = ["//" if k >= len(PALETTE) else "" for k in places]  # dashed in the curves
+    ax.barh(places, np.nan_to_num(values), color=colors, hatch=hatches, edgecolor="white", linewidth=0.0, height=0.7)
+    for k, x in enumerate(values):
+        text = f" {x:.3g}" if np.isfinite(x) else " failed"
+        ax.text(np.nan_to_num(x), k, text, va="center", fontsize=9, color="#333333")
+    ax.set_yticks(places, [f.name for f in comparison])
+    ax.invert_yaxis()
+    ax.grid(axis="y", visible=False)
+    ax.margins(x=0.12)
+    ax.set_xlim(left=0.0)
+    ax.set_xlabel("time of the processor [ms]" if timed else "evaluations")
