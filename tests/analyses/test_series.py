@@ -169,6 +169,15 @@ def test_series_as_data_and_as_a_picture(tmp_path: Path) -> None:
         series.plot("C.angle")
 
 
+def test_soft_directions_beside_stiff_ones_are_followed_to_their_end() -> None:
+    """The governor, not turning: its balls fall by a right angle, then its slider hangs from two stiff springs."""
+    m = fb.load(Path(__file__).parents[2] / "examples" / "governor.toml")
+    x = m.equilibrium()
+    weight = 3000 * 0.1**3 * 9.81
+    assert x["slider.z"] == pytest.approx(-weight / (2 * 8e5), rel=1e-6)
+    assert x.stability == "marginal"  # it can be turned
+
+
 def oscillator() -> fb.Mechanism:
     m = fb.Mechanism("oscillator", planar=True, parameters={"c": 0.0, "k": 50.0})
     m.add(fb.Body("A", mass=2, inertia=1, position=(1, 0)))

@@ -30,7 +30,7 @@ ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which not
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
-SOFT, HARD, STUCK = 1e-4, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
+SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
 NEUTRAL = 1e-8  # stiffness below this part of what acts is none
 SHOWN = 6
 
