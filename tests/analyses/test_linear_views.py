@@ -147,6 +147,16 @@ def test_eigenvalues_are_drawn_where_they_are() -> None:
     assert (x[0], y[0]) == pytest.approx((-C / (2 * M), math.sqrt(K / M - (C / (2 * M)) ** 2)))
 
 
+def test_eigenvalues_far_to_the_left_are_told_of_instead_of_drawn() -> None:
+    m = two(0.5)
+    m.add(fb.Body("C", mass=0.01, inertia=1, position=(0, 1)))
+    m.add(fb.Translational("S", "ground", "C", at=(0, 1), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("heavy oil", "S.displacement", damping=20.0, stiffness=1.0))
+    figure = m.modes().plot()  # s = -c/m = -2000 1/s, and slowly -k/c
+    assert "not shown: 1 decaying faster, at -2000 to -2000 1/s" in figure.axes[0].get_title(loc="left")
+    assert figure.axes[0].get_xlim()[0] > -10
+
+
 def test_pictures_go_to_files(tmp_path: Path) -> None:
     linear, modes = cart().linearize(["u.x"], ["A.x"]), cart().modes()
     for k, draw in enumerate(

@@ -250,21 +250,34 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
     with _drawing():
         drawing = _figure(5.4)
         ax = drawing.subplots()
-        _framed(ax, w)
+        near = _telling(w, kinds)
+        _framed(ax, w[near])
         _rays(ax)
         for kind, (mark, color, fill) in looks.items():
-            own = w[kinds == kind]
+            own = w[near & (kinds == kind)]
             if len(own):
                 label = f"{kind} ({len(own)})"
                 style: dict[str, Any] = {"marker": mark, "color": color, "fillstyle": fill, "markersize": 8}
                 ax.plot(own.real, own.imag, linestyle="none", label=label, zorder=4, **style)
-        _numbered(ax, w, kinds)
-        ax.set_title("one of each complex pair; numbers as in the table of modes; rays: damping ratio")
+        _numbered(ax, w, kinds, near)
+        ax.set_title("one of each complex pair; numbers as in the table of modes; rays: damping ratio" + _far(w[~near]))
         if len(w):
             ax.legend(**BESIDE)
         _plane(ax)
         _headed(drawing, f"{modes.point.model.name}: eigenvalues")
         return _handed_out(drawing, path)
+
+
+def _telling(w: np.ndarray, kinds: np.ndarray) -> np.ndarray:
+    """Which eigenvalues are shown: without those that decay so fast that the others could not be told apart."""
+    size = np.abs(w)
+    slow = size[(kinds == "oscillation") | (kinds == "unstable")]
+    return (kinds != "decay") | (size <= (2.0 * FAR * slow.max() if len(slow) else np.inf))
+
+
+def _far(w: np.ndarray) -> str:
+    """Word of those that are not shown."""
+    return f"\nnot shown: {len(w)} decaying faster, at {w.real.max():.4g} to {w.real.min():.4g} 1/s" if len(w) else ""
 
 
 def _rays(ax: Axes) -> None:
@@ -292,11 +305,12 @@ def _rays(ax: Axes) -> None:
         )
 
 
-def _numbered(ax: Axes, w: np.ndarray, kinds: np.ndarray) -> None:
+def _numbered(ax: Axes, w: np.ndarray, kinds: np.ndarray, near: np.ndarray) -> None:
     """The modes' numbers beside them; those in the same place share a label."""
     (x0, x1), (y0, y1) = ax.get_xlim(), ax.get_ylim()
     places: list[tuple[complex, list[int]]] = []
-    for k, value in enumerate(w[:MOST]):
+    for k in np.flatnonzero(near)[:MOST].tolist():
+        value = w[k]
         at = complex((value.real - x0) / (x1 - x0), (value.imag - y0) / (y1 - y0))
         for there, numbers in places:
             if abs(at - there) < 0.03:
