@@ -44,8 +44,8 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     """(microseconds a stage, counts, start) of one mechanism."""
     from flyball.analysis.dynamics import clock_for, run_clock
     from flyball.analysis.entry import INTEGRATE
-    from flyball.analysis.options import Options
-    from flyball.analysis.start import begin
+    from flyball.analysis.motion.options import Options
+    from flyball.analysis.motion.start import begin
     from flyball.numerics.integrators import explicit as ex
     from flyball.numerics.integrators.tableaux import tableau
     from flyball.system.cost import counts

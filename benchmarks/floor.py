@@ -214,7 +214,6 @@ def mechanisms() -> dict[str, Any]:
     import flyball as fb
     from mechanisms import chain, flyball_planar, fourbars
 
-
     examples = Path(__file__).resolve().parents[1] / "examples"
     return {
         "four-bar": flyball_planar(fourbars(1)),
@@ -225,7 +224,7 @@ def mechanisms() -> dict[str, Any]:
 
 def main() -> None:
     from flyball.analysis.entry import MOTION
-    from flyball.analysis.start import begin
+    from flyball.analysis.motion.start import begin
     from flyball.system.motion import STAGES
     from flyball.system.tables import STABILIZE, TOL_G, TOL_V
 

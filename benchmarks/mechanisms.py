@@ -20,7 +20,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
-from flyball.analysis.start import begin
+from flyball.analysis.motion.start import begin
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]

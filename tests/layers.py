@@ -14,8 +14,8 @@ import pytest
 import flyball as fb
 from flyball.analysis import dynamics
 from flyball.analysis.assemble import Assembly
-from flyball.analysis.options import Options, options_from
-from flyball.analysis.start import Start, begin
+from flyball.analysis.motion.options import Options, options_from
+from flyball.analysis.motion.start import Start, begin
 
 LAYERS = ("absolute", "joint")
 AUTO = "auto"

@@ -12,10 +12,10 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.analysis import compare as comparing
-from flyball.analysis import partition
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.analysis.entry import MOTION
+from flyball.analysis.motion import partition
 from flyball.cli import app
 from flyball.system import motion
 from flyball.system.names import velocity_names

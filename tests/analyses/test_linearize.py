@@ -7,8 +7,8 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.assemble import assemble
-from flyball.analysis.derivatives import Equations, State
-from flyball.analysis.free import free
+from flyball.analysis.linear.derivatives import Equations, State
+from flyball.analysis.linear.free import free
 from tests.analyses.made import G, conical_pendulum, parallelogram, rod, watt
 
 LAYERS = ("absolute", "joint")

@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball import forces, joints
 from flyball.analysis.compiled import compiled
-from flyball.analysis.derivatives import Equations, State
+from flyball.analysis.linear.derivatives import Equations, State
 from flyball.errors import ExpressionError, ModelError
 from flyball.model.coupling import Coupling
 from flyball.model.expressions import Expression, number

@@ -15,13 +15,13 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
-from . import partition
 from .assemble import Assembly
-from .driven import at_outputs, leaves_no_freedom, owed_works
 from .entry import FOLLOW, INTEGRATE, motion_kernel
-from .options import STABILIZATION, Options, options_from, output_times
-from .outcome import outcome
-from .start import Start, begin
+from .motion import partition
+from .motion.driven import at_outputs, leaves_no_freedom, owed_works
+from .motion.options import STABILIZATION, Options, options_from, output_times
+from .motion.outcome import outcome
+from .motion.start import Start, begin
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 

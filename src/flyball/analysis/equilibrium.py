@@ -17,13 +17,13 @@ from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
 from ..system.names import velocity_names
 from .assemble import Assembly, assemble
-from .curves import snapshot
-from .derivatives import Equations, State
-from .free import Free, free
+from .linear.curves import snapshot
+from .linear.derivatives import Equations, State
+from .linear.free import Free, free
+from .linear.preload import preloaded
+from .linear.rest import Rest
+from .linear.turning import turning as turn
 from .linearize import without_inputs
-from .preload import preloaded
-from .rest import Rest
-from .turning import turning as turn
 
 NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more

@@ -19,7 +19,7 @@ from ..model.sensor import Sensor
 from ..model.table import Table
 from ..results.inverse import Drive, InverseDynamics
 from ..results.result import Result
-from .determinacy import determinacy
+from .freedom.determinacy import determinacy
 from .kinematics import Times, kinematics, wanted_times
 
 FEWEST = 4  # samples that make a curve with two continuous derivatives

@@ -16,13 +16,13 @@ from ..errors import ModelError
 from ..model.model import Model
 from ..results.linear import LinearModel
 from .compiled import compiled
-from .curves import curve, slopes, snapshot
-from .derivatives import Equations, State
-from .free import Free, free, refuse_singular
-from .inputs import Input, with_inputs
-from .instant import instant
-from .reduced import Frame, Inputs, Reduced, reduced
-from .steady import kinematic, seen_from
+from .linear.curves import curve, slopes, snapshot
+from .linear.derivatives import Equations, State
+from .linear.free import Free, free, refuse_singular
+from .linear.inputs import Input, with_inputs
+from .linear.instant import instant
+from .linear.reduced import Frame, Inputs, Reduced, reduced
+from .linear.steady import kinematic, seen_from
 
 IMPROPER = 1e-9  # part of the largest number below which an output does not follow the rate of an input
 

@@ -21,9 +21,9 @@ from .assemble import Assembly, assemble
 from .compiled import Compiled
 
 if TYPE_CHECKING:
-    from .freedoms import FreeMotion
-    from .geometry import Geometry
-    from .redundancy import RedundantSet
+    from .freedom.freedoms import FreeMotion
+    from .freedom.geometry import Geometry
+    from .freedom.redundancy import RedundantSet
 
 TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
 DENSE = 1500  # velocities up to which the rank comes from a singular value decomposition
@@ -84,7 +84,7 @@ class Mobility:
     @cached_property
     def sets(self) -> tuple[RedundantSet, ...]:
         """The independent sets of constraints that depend on one another, each as small as can be, with cures."""
-        from .redundancy import redundant_sets
+        from .freedom.redundancy import redundant_sets
 
         if self._there.gap:
             return redundant_sets(self._there, [], False)
@@ -94,14 +94,14 @@ class Mobility:
     @cached_property
     def motions(self) -> tuple[FreeMotion, ...]:
         """The free motions by name; of a large mechanism up to `SHOWN`."""
-        from .freedoms import free_motions
+        from .freedom.freedoms import free_motions
 
         return free_motions(self._there.assembly, motions_of(self._there))
 
     @cached_property
     def geometry(self) -> Geometry:
         """What the freedoms rest on: counting, special dimensions, or a singular position."""
-        from .geometry import geometry
+        from .freedom.geometry import geometry
 
         return geometry(self)
 

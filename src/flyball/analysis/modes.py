@@ -15,11 +15,11 @@ from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..results.modes import STILL, Modes
 from ..system.names import velocity_names
-from .curves import snapshot
-from .derivatives import Equations, State
-from .instant import instant
+from .linear.curves import snapshot
+from .linear.derivatives import Equations, State
+from .linear.instant import instant
+from .linear.steady import balanced
 from .linearize import without_inputs
-from .steady import balanced
 
 DENSE = 600  # velocities up to which all modes are found
 RIGID = 1e-6  # shift, of the largest stiffness over the largest mass

@@ -14,19 +14,19 @@ from ..model.model import Model, listing, suggest
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
 from .assemble import Assembly, assemble
-from .curves import curve, slopes, snapshot
-from .derivatives import Equations, State
-from .differences import Found, check, derivative
-from .driven import leaves_no_freedom
 from .dynamics import simulate
 from .equilibrium import equilibrium
-from .instant import instant
+from .linear.curves import curve, slopes, snapshot
+from .linear.derivatives import Equations, State
+from .linear.differences import Found, check, derivative
+from .linear.instant import instant
+from .linear.rest import Rest
+from .linear.tangent import Direction, Linear, Tangent, closed, tangent_step
+from .linear.variation import Variation
 from .linearize import without_inputs
-from .options import output_times
-from .rest import Rest
-from .start import Start
-from .tangent import Direction, Linear, Tangent, closed, tangent_step
-from .variation import Variation
+from .motion.driven import leaves_no_freedom
+from .motion.options import output_times
+from .motion.start import Start
 
 FLAT = 1e-9  # stiffness, of what acts, below which an equilibrium's place is not determined
 

@@ -21,7 +21,7 @@ from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
 from .equilibrium import LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, _settled, _stability
 from .equilibrium import equilibrium as single
-from .rest import Rest
+from .linear.rest import Rest
 
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2

@@ -14,12 +14,12 @@ from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.singularities import Branch, Singularities
-from .branches import Curve, crossing
-from .classify import point
-from .closure import Place
-from .freed import Freed, freed
-from .locate import branch_point, limit
-from .trace import SAME, STILL, Node, Tracer, Way
+from .singular.branches import Curve, crossing
+from .singular.classify import point
+from .singular.closure import Place
+from .singular.freed import Freed, freed
+from .singular.locate import branch_point, limit
+from .singular.trace import SAME, STILL, Node, Tracer, Way
 
 NEAR = 1e-4  # a start this near to a singular position is drawn there [1]
 EDGE = 1e-9  # of the range: how far beyond its ends a singular position may lie

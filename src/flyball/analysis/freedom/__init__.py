@@ -1,0 +1,1 @@
+"""Pieces of ``mobility``: free motions, dependent constraints, cures, which reactions are determined."""

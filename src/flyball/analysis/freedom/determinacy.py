@@ -1,0 +1,99 @@
+"""Which reactions a motion determines, position by position: what no self-stress can change."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model.body import Driver
+from ...model.coupling import Coupling
+from ...results.result import Result
+from ..assemble import Assembly
+from ..compiled import Compiled, compiled
+from ..mobility import CHANGED, DENSE, TOLERANCE, _null_space, lengths, self_stresses
+from .freedoms import told
+
+LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
+
+
+class Determinacy:
+    """Self-stresses of a mechanism along its motion.
+
+    Attributes
+    ----------
+    count : ndarray (n,) of int
+        Constraints too many at every time.
+    wrenches : dict
+        Joint -> what independent self-stresses do to its reaction, (n, 6, k): force and torque / length, world axes,
+        on ``body_j`` at the joint's point there. Joints that none touches are left out.
+    efforts : dict
+        Driver or coupling -> whether its effort is undetermined, (n,) of bool; the same.
+    """
+
+    def __init__(self, n: int) -> None:
+        self.count = np.zeros(n, np.int64)
+        self.wrenches: dict[str, np.ndarray] = {}
+        self.efforts: dict[str, np.ndarray] = {}
+
+
+def determinacy(result: Result) -> Determinacy:
+    """The self-stresses at every output time of a motion."""
+    n = len(result.t)
+    out = Determinacy(n)
+    own = compiled(result.model, parameters=told_by(result), tree=result.values.structure.tree)
+    base = own if not own.structure.tree else compiled(result.model, parameters=told(own))
+    if not len(base.structure.rows):
+        return out
+    found: list[tuple[int, dict[str, np.ndarray]]] = []
+    for k in range(n):
+        q, v = result.q[k].copy(), result.v[k].copy()
+        own.z = result.states[k].copy()
+        if base is not own:
+            q, v = base.take(own, result.t[k], q, v)
+        base.at(result.t[k], q, v)
+        lam = _dependencies(base)
+        out.count[k] = lam.shape[1]
+        if lam.shape[1]:
+            found.append((k, _stresses(Assembly(base, result.t[k], q, v), lam, out, k)))
+    width = int(out.count.max(initial=0))
+    for k, wrenches in found:
+        for name, w in wrenches.items():
+            out.wrenches.setdefault(name, np.zeros((n, 6, width)))[k, :, : w.shape[1]] = w
+    return out
+
+
+def told_by(result: Result) -> dict[str, float]:
+    """Values of the parameters that a result was computed with."""
+    names = list(result.model.parameters)
+    return dict(zip(names, result.values.system.const[: len(names)].tolist(), strict=True))
+
+
+def _dependencies(c: Compiled) -> np.ndarray:
+    """Multipliers (nr, k) that act on nothing, at the position last evaluated."""
+    S = c.values.system
+    nr, nv = len(S.row_i), c.structure.nv
+    if max(nr, nv) > DENSE:
+        from ..mobility import scaled_jacobian
+
+        G, size, _ = scaled_jacobian(c)
+        return _null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None]
+    row_p = S.row_p[: nr + 1]
+    G = np.zeros((nr, nv))
+    np.add.at(G, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[: row_p[-1]]), c.work.G[: row_p[-1]])
+    G *= lengths(c)
+    size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
+    U, d, _ = np.linalg.svd(G / size[:, None], full_matrices=True)
+    return U[:, int((d > TOLERANCE * d.max(initial=1e-300)).sum()) :] / size[:, None]
+
+
+def _stresses(a: Assembly, lam: np.ndarray, out: Determinacy, k: int) -> dict[str, np.ndarray]:
+    """What self-stresses do to joints; efforts of drivers and couplings that they change are noted."""
+    s = a.compiled.structure
+    part = np.abs(lam).max(axis=1) > LEAST * np.abs(lam).max()
+    names = [name for name, rows in s.slices.items() if part[rows].any()]
+    joints = [name for name in names if not isinstance(s.model[name], (Driver, Coupling))]
+    for name in names:
+        if name not in joints:
+            out.efforts.setdefault(name, np.zeros(len(out.count), bool))[k] = True
+    wrenches = self_stresses(a, lam, joints)
+    largest = max((np.abs(w).max() for w in wrenches.values()), default=0.0)
+    return {name: w / largest for name, w in wrenches.items() if np.abs(w).max() > CHANGED * largest}

@@ -1,0 +1,179 @@
+"""What the freedoms of a mechanism rest on: counting, special dimensions, or a position that is singular.
+
+Two experiments tell. The frames of all joints are shaken at random: what freedom is then lost rests on dimensions that
+no workshop hits exactly (Bricard's mechanism; axes that are in line). And the mechanism is moved along its free motions
+and closed again: where the rank is larger there, the position is singular and part of its freedom is for the moment
+only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...model.geometry import orientation_matrix
+from ...system.tables import NQ, Q0
+from ...system.tree import retract
+from ...system.values import work
+from ..assemble import Assembly, closed_near
+from ..compiled import Compiled, compiled
+from ..mobility import lengths, motions_of, rank_of
+from .freedoms import told
+
+if TYPE_CHECKING:
+    from ..mobility import Mobility
+
+SHAKEN = 0.03  # how far frames are shaken: part of the mechanism's length, and radians
+STEP = 0.04  # how far the mechanism is moved: the same
+TRIES = 6
+MOVED = 0.2  # part of a step that must be left of it when the mechanism is closed again
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """What freedoms rest on.
+
+    Attributes
+    ----------
+    here : int
+        Freedoms by rank at this position.
+    nearby : int
+        Freedoms by rank next to it, in positions that the mechanism can move to: those of its true motion.
+    generic : int
+        Freedoms that joints of the same kinds have with general dimensions.
+    gruebler : int
+        Freedoms by counting.
+    positions : list of ndarray
+        Positions next to this one in which it was looked at.
+    """
+
+    here: int
+    nearby: int
+    generic: int
+    gruebler: int
+    positions: list[np.ndarray] = field(default_factory=list, compare=False, repr=False)
+
+    @property
+    def singular(self) -> bool:
+        """Whether the rank is smaller here than next to it."""
+        return self.nearby < self.here
+
+    @property
+    def special(self) -> bool:
+        """Whether some of the true freedom rests on special dimensions."""
+        return self.generic < self.nearby
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        said = []
+        if self.singular and self.nearby == 0 and not self.positions:
+            said.append(
+                f"{_freedoms(self.here)} for the moment only: it can shake, but not move, from this singular position"
+            )
+        elif self.singular:
+            said.append(f"singular position: {_freedoms(self.here)} here, {self.nearby} next to it")
+        if self.special:
+            true = "true freedom" if self.nearby == 1 else "true freedoms"
+            said.append(
+                f"rests on special dimensions: Gruebler's count is {self.gruebler}, the {true} {self.nearby}; the same "
+                f"joints with general dimensions would leave {self.generic}"
+            )
+        if not said:
+            said.append(
+                "no freedom is left"
+                if self.here == 0
+                else "general: no freedom rests on special dimensions or on this position"
+            )
+        return "; ".join(said)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "here": self.here,
+            "nearby": self.nearby,
+            "generic": self.generic,
+            "singular": self.singular,
+            "special_dimensions": self.special,
+            "text": self.text,
+        }
+
+
+def _freedoms(n: int) -> str:
+    return f"{n} freedom{'' if n == 1 else 's'}"
+
+
+def geometry(m: Mobility) -> Geometry:
+    """What the freedoms of a count rest on."""
+    there = m.found
+    assert there is not None
+    if m.freedoms == 0:
+        return Geometry(0, 0, 0, m.gruebler)
+    a = there.assembly
+    positions = positions_nearby(a, motions_of(there))
+    c = a.compiled
+    still = np.zeros(c.structure.nv)
+    ranks = []
+    for q in positions:
+        c.at(a.t, q, still)
+        ranks.append(rank_of(c))
+    c.at(a.t, a.q, a.v)
+    nearby = m.velocities - max(ranks) if ranks else (0 if m.redundancy else m.freedoms)
+    generic = nearby if m.rows <= m.rank else min(nearby, m.velocities - _shaken_rank(a))
+    return Geometry(m.freedoms, nearby, generic, m.gruebler, positions)
+
+
+def positions_nearby(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
+    """Closed positions a small step along free motions, as far as there are any."""
+    c = a.compiled
+    model = c.structure.model
+    near = c
+    if not all(r.holonomic for r in c.structure.rows):
+        near = compiled(model, parameters=told(c), positions=True)
+        near.follow(c.hints)
+    scale = lengths(c)
+    random = np.random.default_rng(1)
+    k = motions.shape[1]
+    mixes = [*np.eye(k)[: TRIES // 2], *random.normal(size=(TRIES - min(k, TRIES // 2), k))]
+    out = []
+    for mix in mixes:
+        u = motions @ mix
+        d = STEP * c.values.length * u / max(float(np.abs(u / scale).max(initial=0.0)), 1e-300)
+        for step in (d, -d):
+            start = a.q.copy()
+            retract(c.values.system, start, step)
+            q = closed_near(near, a.t, start)
+            if q is not None and _way(c, q, a.q) > MOVED * _way(c, start, a.q):
+                out.append(q)
+                break
+    return out
+
+
+def _way(c: Compiled, q: np.ndarray, start: np.ndarray) -> float:
+    """How far apart positions are [m], turns counted by the mechanism's length."""
+    size = np.ones(len(q))
+    shifts = 2 if c.structure.model.planar else 3
+    for row in c.values.system.body_i:
+        size[row[Q0] + shifts : row[Q0] + row[NQ]] = c.values.length
+    return float(np.linalg.norm((q - start) * size))
+
+
+def _shaken_rank(a: Assembly) -> int:
+    """Rank where the frames of all joints are somewhere else, by a little and at random."""
+    c = compiled(a.compiled.structure.model, parameters=told(a.compiled))
+    s, S = c.structure, c.values.system
+    random = np.random.default_rng(2)
+    for k in range(len(S.frame_x)):
+        if s.frames[k].role == "world":
+            continue
+        shift, turn = SHAKEN * c.values.length * random.normal(size=3), SHAKEN * random.normal(size=3)
+        if s.model.planar:
+            shift[2] = turn[0] = turn[1] = 0.0
+        S.frame_x[k, :3] += shift
+        S.frame_x[k, 3:] = (S.frame_x[k, 3:].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
+    shaken = Compiled(c.values, work(s, S), c.z)
+    shaken.follow(a.compiled.hints)
+    shaken.at(a.t, a.q, a.v)
+    return rank_of(shaken)

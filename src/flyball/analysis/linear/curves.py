@@ -1,0 +1,88 @@
+"""Curves of a result at one state, and their derivatives along given directions of it: outputs by name.
+
+The formulas of the results run on complex arrays as on real ones, every direction being one of the times.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+import numpy as np
+
+from ...results.health import Health
+from ...results.result import Result
+from ...system.tables import G_VALUE, NU, V0
+from ...system.tree import retract
+from ...system.values import Values
+from ..assemble import Assembly
+from ..compiled import compiled
+from ..mobility import Mobility, mobility
+from .derivatives import STEP, State
+
+
+def snapshot(x: State, values: Values | None = None) -> Result:
+    """The state as a result with one time; one can go on from it."""
+    result = _result(x, values or x.c.values, *(np.zeros((1, n)) for n in _sizes(x)))
+    x.c.at(x.t, x.q, x.v)
+    row = x.c.work.row
+    health = result.health
+    health.violation = float(np.abs(row[G_VALUE]).max(initial=0.0))
+    health.velocity_violation = float(np.abs(x.c.sparse_jacobian() @ x.v - row[NU]).max(initial=0.0))
+    health.late = {"mobility": partial(_mobility, x)}
+    result.final = (x.t, x.y)
+    return result
+
+
+def _mobility(x: State) -> Mobility:
+    model = x.c.structure.model
+    base = compiled(model, parameters=x.c.parameters)
+    q, v = base.take(x.c, x.t, x.q, x.v)
+    return mobility(model, Assembly(base, x.t, q, v))
+
+
+def slopes(x: State, names: Sequence[str], d: Sequence[np.ndarray], values: Values | None = None) -> np.ndarray:
+    """Derivatives of curves along directions, (directions, names).
+
+    Parameters
+    ----------
+    x : State
+    names : sequence of str
+        Sensors, or curves of the result such as ``"slider.x"``.
+    d : four arrays (directions, nv), (.., nv), (.., nv), (.., multipliers)
+        Changes of positions along the velocities, of velocities, accelerations and multipliers.
+    values : Values, optional
+        The mechanism's numbers, already a complex step along a parameter (for one direction).
+    """
+    result = _result(x, values or x.c.values, *(1j * STEP * np.asarray(part) for part in d))
+    return np.array([curve(result, name)[1].imag / STEP for name in names]).T.reshape(len(d[0]), len(names))
+
+
+def curve(result: Result, name: str) -> tuple[str, np.ndarray]:
+    """(unit, values) of a sensor or of a curve of the result.
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name.
+    """
+    return result.channel(name if "." in name else f"{name}.value")
+
+
+def _sizes(x: State) -> tuple[int, int, int, int]:
+    n = len(x.v)
+    return n, n, n, len(x.lam) + len(x.c.structure.prescribed)
+
+
+def _result(x: State, values: Values, dq: np.ndarray, dv: np.ndarray, da: np.ndarray, dlam: np.ndarray) -> Result:
+    """A result whose times are the state with changes."""
+    n = len(dq)
+    q = np.repeat(x.q[:, None], n, axis=1).astype(dq.dtype)
+    retract(values.system, q, dq.T)
+    body_i = values.structure.tables["body_i"]
+    efforts = [x.effort[body_i[b, V0]] for b in values.structure.prescribed.values()]
+    z = np.repeat(x.z[None], n, axis=0)
+    lam = np.r_[x.lam, efforts] + dlam
+    health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+    t = np.full(n, x.t)
+    return Result(values.structure.model, values, t, np.ascontiguousarray(q.T), x.v + dv, z, x.vdot + da, lam, health)

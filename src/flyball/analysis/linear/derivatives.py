@@ -1,0 +1,256 @@
+"""Exact derivatives of the equations at a state, by complex steps through the compiled formulas.
+
+With a step i h along one direction the imaginary part of the result is h times the derivative, to rounding: nothing is
+subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of ``system/residual.py``:
+nothing in them is solved. Directions that no equation sees together are taken in one step (Curtis, Powell and Reid
+1974), so that a chain of a thousand bodies needs as many steps as one of three.
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...errors import ModelError, PerformanceNotice
+from ...system.structure import Structure
+from ...system.tables import EFFORT, FORCE_ALONG, FORCE_F, FORCE_LAW, FORCE_M, LAM, NV, X_SOLVED, System, Work
+from ...system.values import Values, values, work
+from ..compiled import Compiled
+from ..entry import MOTION, residual_kernel
+
+STEP = 1e-40
+NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
+CHUNK = 128  # directions a call
+
+
+@dataclass
+class State:
+    """A mechanism in motion at an instant, with what follows from it."""
+
+    c: Compiled
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    z: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray  # multipliers of the rows
+    effort: np.ndarray  # efforts of prescribed coordinates, (nv,), zero elsewhere
+
+    @classmethod
+    def moving(cls, c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> State:
+        """With the accelerations and multipliers that the equations of motion give."""
+        c.at(t, q, v, MOTION)
+        W = c.work
+        return cls(c, t, q, v, c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
+
+    @classmethod
+    def resting(cls, c: Compiled, t: float, q: np.ndarray, lam: np.ndarray | None = None) -> State:
+        """At rest, whatever the forces say, under given multipliers."""
+        nv, nr = c.structure.nv, len(c.structure.rows)
+        still = np.zeros(nv)
+        c.at(t, q, still)
+        return cls(c, t, q, still, c.z.copy(), still, np.zeros(nr) if lam is None else lam, still)
+
+    @property
+    def y(self) -> np.ndarray:
+        """State vector."""
+        return np.r_[self.q, self.v, self.z]
+
+
+class Equations:
+    """The residuals at a state and their derivatives.
+
+    Names of blocks: ``r`` = M vdot - f - G^T lam - effort, ``g``, ``n`` = G v - nu, ``a`` = G vdot - gamma, and
+    ``value``, ``rate``, ``acceleration`` of the measured quantities.
+    """
+
+    def __init__(self, state: State) -> None:
+        refuse_functions(state.c.structure)
+        self.state = state
+        s = state.c.structure
+        nv, nr, nm = s.nv, len(s.rows), len(s.measured)
+        ends = np.cumsum([0, nv, nr, nr, nr, nm, nm, nm])
+        names = ("r", "g", "n", "a", "value", "rate", "acceleration")
+        self.at = {k: slice(i, j) for k, i, j in zip(names, ends[:-1], ends[1:], strict=True)}
+        self.width = int(ends[-1])
+
+    @cached_property
+    def residual(self) -> np.ndarray:
+        """All residuals at the state, (width,)."""
+        out = self._run(np.zeros((1, 3 * self.state.c.structure.nv + 1), complex))[0].real
+        out[self.at["r"]] -= self.state.effort
+        return out
+
+    def block(self, name: str) -> np.ndarray:
+        """One block of the residuals at the state."""
+        return self.residual[self.at[name]]
+
+    @cached_property
+    def by_position(self):
+        """Derivatives by positions along the velocities, sparse (width, nv)."""
+        return self._jacobian(0)
+
+    @cached_property
+    def by_velocity(self):
+        """Derivatives by velocities, sparse (width, nv)."""
+        return self._jacobian(1)
+
+    @cached_property
+    def by_acceleration(self):
+        """Derivatives by accelerations, sparse (width, nv): the mass matrix in the rows of r."""
+        return self._jacobian(2)
+
+    @cached_property
+    def by_time(self) -> np.ndarray:
+        """Derivatives by time, (width,)."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        steps[0, -1] = 1j * STEP
+        return self._run(steps)[0].imag / STEP
+
+    def by_parameter(self, name: str) -> np.ndarray:
+        """Derivatives by a parameter of the model, (width,), the state's numbers held."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        return self._run(steps, as_complex(self.stepped(name).system))[0].imag / STEP
+
+    def stepped(self, name: str) -> Values:
+        """Numbers of the mechanism, a complex step along a parameter."""
+        c = self.state.c
+        value = c.structure.model.environment(c.parameters)[name]
+        return values(c.structure, c.parameters | {name: complex(value, STEP)})  # type: ignore[arg-type]
+
+    def by_law(self, name: str) -> np.ndarray:
+        """Derivatives by a parameter that stands in laws only, (width,)."""
+        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
+        return self._run(steps, self.stepped_law(name).system)[0].imag / STEP
+
+    def stepped_law(self, name: str) -> Values:
+        """The same for a parameter that stands in laws only."""
+        c = self.state.c
+        system = as_complex(c.values.system)
+        system.const[list(c.structure.model.parameters).index(name)] += 1j * STEP
+        return replace(c.values, system=system)
+
+    @cached_property
+    def _system(self) -> tuple[System, Work]:
+        system = as_complex(self.state.c.values.system)
+        return system, work(self.state.c.structure, system, complex)
+
+    def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
+        if residual_kernel.cold:  # type: ignore[attr-defined]
+            warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
+        S, W = self._system if system is None else (system, work(self.state.c.structure, system, complex))
+        x = self.state
+        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
+        out = np.zeros((len(steps), self.width), complex)
+        residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
+        if not np.isfinite(out.view(float)).all():
+            raise ModelError(f"the equations of {x.c.structure.model.name!r} are not finite at t = {x.t:.6g} s")
+        return out
+
+    def _jacobian(self, what: int):
+        """Derivatives by positions (0), velocities (1) or accelerations (2)."""
+        import scipy.sparse as sp
+
+        nv = self.state.c.structure.nv
+        touched, group = self._groups
+        groups = int(group.max(initial=-1)) + 1
+        rows, columns, entries = [], [], []
+        seen = sp.csc_matrix(touched)
+        for first in range(0, groups, CHUNK):
+            count = min(CHUNK, groups - first)
+            steps = np.zeros((count, 3 * nv + 1), complex)
+            mine = np.flatnonzero((group >= first) & (group < first + count))
+            steps[group[mine] - first, what * nv + mine] = 1j * STEP
+            found = self._run(steps).imag / STEP
+            for d in mine.tolist():
+                at = seen.indices[seen.indptr[d] : seen.indptr[d + 1]]
+                x = found[group[d] - first, at]
+                used = x != 0.0
+                rows.append(at[used])
+                columns.append(np.full(used.sum(), d))
+                entries.append(x[used])
+        where = (np.concatenate(rows), np.concatenate(columns))
+        return sp.csr_matrix((np.concatenate(entries), where), shape=(self.width, nv))
+
+    @cached_property
+    def _groups(self):
+        """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together."""
+        import scipy.sparse as sp
+
+        s = self.state.c.structure
+        if s.tree:
+            return sp.csc_matrix(np.ones((self.width, s.nv), bool)), np.arange(s.nv)
+        touched = sp.csc_matrix(pattern(s, self.state.c.values.system))
+        return touched, grouped(touched)
+
+
+def refuse_functions(s: Structure) -> None:
+    """Laws that are Python functions have no derivatives."""
+    if s.functions:
+        raise ModelError(
+            f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
+            f"give a table"
+        )
+
+
+def as_complex(system: System) -> System:
+    """The same tables in complex numbers."""
+    parts = {k: x for k, x in system._asdict().items() if isinstance(x, np.ndarray) and x.dtype == np.float64}
+    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})  # type: ignore[arg-type]
+
+
+def pattern(s: Structure, S: System) -> Any:
+    """Which residuals can depend on which velocity's coordinate, in absolute coordinates; sparse (width, nv).
+
+    An element's equations and the equations of motion of the bodies it acts on depend on the bodies that it touches;
+    elements with laws that name sensors also on what these measure.
+    """
+    import scipy.sparse as sp
+
+    nb, nr, nm = len(S.body_i), len(s.rows), len(s.measured)
+    body = np.repeat(np.arange(nb), S.body_i[:, NV])
+    of_row = [np.unique(body[S.col_i[S.row_p[k] : S.row_p[k + 1]]]) for k in range(nr + nm)]
+    named = sorted({m % nm for m in s.slots.values()}) if s.slots else []
+    also = np.unique(np.concatenate([of_row[nr + m] for m in named])) if named else np.zeros(0, int)
+    reach: list[tuple[np.ndarray, np.ndarray]] = [(np.arange(nb)[b : b + 1],) * 2 for b in range(nb)]
+    reach += [(at, at) for at in of_row[:nr]]
+    for force in S.force_i:
+        if force[FORCE_ALONG] == 1:
+            at = of_row[nr + force[FORCE_F]]
+        else:
+            at = S.frame_i[[force[FORCE_F], force[FORCE_M]]]
+            at = at[at >= 0]
+        has_law = (force[FORCE_LAW : FORCE_LAW + 3] >= 0).any()
+        reach.append((at, np.union1d(at, also) if has_law else at))
+    i = np.concatenate([np.repeat(a, len(b)) for a, b in reach])
+    j = np.concatenate([np.tile(b, len(a)) for a, b in reach])
+    bodies = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(nb, nb))
+    lines = sp.csr_matrix(
+        (
+            np.ones(sum(len(x) for x in of_row)),
+            (np.repeat(np.arange(nr + nm), [len(x) for x in of_row]), np.concatenate([*of_row, np.zeros(0, int)])),
+        ),
+        shape=(nr + nm, nb),
+    )
+    expand = sp.csr_matrix((np.ones(len(body)), (body, np.arange(len(body)))), shape=(nb, len(body)))
+    sensed, rows = lines[nr:], lines[:nr]
+    return sp.vstack([expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3]).astype(bool)
+
+
+def grouped(touched: Any) -> np.ndarray:
+    """Groups of columns no two of which have an entry in one row; each column's group, (n,)."""
+    rows = touched.tocsr()
+    group = np.full(touched.shape[1], -1)
+    for d in range(touched.shape[1]):
+        mine = touched.indices[touched.indptr[d] : touched.indptr[d + 1]]
+        near = np.concatenate([rows.indices[rows.indptr[r] : rows.indptr[r + 1]] for r in mine.tolist()] or [[]])
+        taken = set(group[near.astype(int)].tolist())
+        n = 0
+        while n in taken:
+            n += 1
+        group[d] = n
+    return group

@@ -1,0 +1,191 @@
+"""What the constraints leave free at a state: bases of positions' and velocities' changes, with coordinates to tell
+them by.
+
+A basis Z of the motions that G allows is made the identity in as many rows as there are freedoms, so that the numbers
+that multiply its columns are changes of named coordinates. These rows are those that Gaussian elimination with complete
+pivoting would choose: QR with column pivoting of an orthonormal basis (Businger and Golub 1965).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import SingularityError
+from ...system.names import Named, velocity_names
+from ...system.tables import BODY_LAW, G_VALUE, V0
+from ...system.tree import retract
+from ..compiled import Compiled
+from .derivatives import Equations
+
+TOLERANCE = 1e-8  # singular values below this part of the largest count as none; rows scaled to unit length
+CLOSED = 1e-10  # of the mechanism's length
+PASSES = 20
+STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
+
+
+@dataclass
+class Free:
+    """Freedoms at a state.
+
+    Attributes
+    ----------
+    names : list of Named
+        Of all velocities.
+    holonomic, rows : ndarray
+        Constraints on positions (n, nv), and those on velocities, which they are among (m, nv); prescribed coordinates
+        are constraints here.
+    Z, Zv : ndarray (nv, f), (nv, fv)
+        Bases of what they allow: the identity in the rows ``chosen`` and ``chosen_v``.
+    """
+
+    names: list[Named]
+    holonomic: np.ndarray
+    rows: np.ndarray
+    Z: np.ndarray
+    Zv: np.ndarray
+    chosen: np.ndarray
+    chosen_v: np.ndarray
+    scale: np.ndarray
+    left: np.ndarray  # (f, nv): takes the chosen coordinates' changes from those of all
+    left_v: np.ndarray  # the same for velocities
+    on_positions: np.ndarray  # (m,): which rows are constraints on positions
+
+    @property
+    def labels(self) -> list[str]:
+        """Names of the chosen coordinates."""
+        return [self.names[d].name for d in self.chosen]
+
+    def turned(self, T: np.ndarray, later: Equations) -> Free:
+        """The same motions turned by T (nv, nv), under the constraints of a later instant."""
+        other = free(later)
+        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ T.T, "left_v": self.left_v @ T.T}
+        return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
+
+    def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """The smallest x (nv, n) with rows x = right; the rows are all of them if not given."""
+        A = self.rows if rows is None else rows
+        return self.scale[:, None] * np.linalg.lstsq(A * self.scale, right, rcond=TOLERANCE)[0]
+
+    @staticmethod
+    def unseen(x: np.ndarray, basis: np.ndarray, left: np.ndarray) -> np.ndarray:
+        """The x that differs by the basis' motions and changes no chosen coordinate."""
+        return x - basis @ (left @ x)
+
+
+def free(e: Equations) -> Free:
+    """Freedoms at the state of some equations."""
+    c = e.state.c
+    s = c.structure
+    names = velocity_names(s)
+    scale = np.array([1.0 if n.unit == "m" else 1.0 / c.values.length for n in names])
+    G = e.by_velocity[e.at["n"]].toarray()
+    which = np.array([r.holonomic for r in s.rows], bool)
+    given = prescribed(c)
+    holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
+    Z, chosen = _basis(holonomic, scale)
+    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale)
+    left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
+    return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
+
+
+def prescribed(c: Compiled) -> np.ndarray:
+    """Unit rows (n, nv) for the coordinates that drivers prescribe, in the order of the structure's."""
+    body_i = c.structure.tables["body_i"]
+    out = np.zeros((len(c.structure.prescribed), c.structure.nv))
+    for k, b in enumerate(c.structure.prescribed.values()):
+        assert body_i[b, BODY_LAW] >= 0
+        out[k, body_i[b, V0]] = 1.0
+    return out
+
+
+def rank(G: np.ndarray, scale: np.ndarray) -> int:
+    """Rank of constraint rows."""
+    return len(G[0]) - _null(G, scale).shape[1] if len(G) else 0
+
+
+def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Orthonormal basis of the scaled motions that rows allow."""
+    A = G * scale
+    size = np.sqrt((A * A).sum(axis=1))
+    A = A[size > 0.0] / size[size > 0.0, None]
+    if not len(A):
+        return np.eye(len(scale))
+    _, d, Vt = np.linalg.svd(A)
+    return Vt[int((d > TOLERANCE * d[0]).sum()) :].T
+
+
+def _basis(G: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    from scipy.linalg import qr
+
+    N = _null(G, scale)
+    if not N.shape[1]:
+        return N, np.zeros(0, int)
+    *_, order = qr(N.T, mode="economic", pivoting=True)
+    chosen = np.sort(order[: N.shape[1]])
+    Z = scale[:, None] * N
+    Z = Z @ np.linalg.inv(Z[chosen])
+    Z[chosen] = np.eye(len(chosen))
+    return Z, chosen
+
+
+def refuse_singular(e: Equations, f: Free) -> None:
+    """Refuse a position where the constraints lose rank: nothing linear holds there.
+
+    Raises
+    ------
+    SingularityError
+        Naming the elements whose rows depend on each other here and do not nearby.
+    """
+    c, x = e.state.c, e.state
+    if not len(f.holonomic) or not f.Z.shape[1]:
+        return
+    here = rank(f.holonomic, f.scale)
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        a = f.Z @ (f.scale[f.chosen] * rng.standard_normal(f.Z.shape[1]))
+        a *= STEP / np.abs(a / f.scale).max()
+        G = _nearby(c, x.t, x.q, a, f.scale)
+        if G is not None and rank(G, f.scale) > here:
+            names = _lost(f, G, c)
+            raise SingularityError(
+                f"the mechanism is in a singular position at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
+                f"depend on each other here and not nearby, so that there is no linear model; move it away from there",
+                x.t,
+                names,
+            )
+
+
+def _nearby(c: Compiled, t: float, q: np.ndarray, step: np.ndarray, scale: np.ndarray) -> np.ndarray | None:
+    """Rows of the constraints on positions at the closed position near a step away; None if none is found."""
+    z, q, still = c.z.copy(), q.copy(), np.zeros(len(step))
+    which = np.array([r.holonomic for r in c.structure.rows], bool)
+    G = np.zeros((0, len(step)))
+    try:
+        for _ in range(PASSES):
+            retract(c.values.system, q, step)
+            c.at(t, q, still)
+            G, g = c.jacobian()[which], c.work.row[G_VALUE][which]
+            if np.abs(g).max(initial=0.0) < CLOSED * c.values.length:
+                return np.vstack([G, prescribed(c)])
+            step = (
+                -scale
+                * np.linalg.lstsq(
+                    np.vstack([G, prescribed(c)]) * scale, np.r_[g, np.zeros(len(prescribed(c)))], rcond=TOLERANCE
+                )[0]
+            )
+        return None
+    finally:
+        c.z = z
+
+
+def _lost(f: Free, G: np.ndarray, c: Compiled) -> tuple[str, ...]:
+    """Elements whose rows take part in dependencies that are not there nearby."""
+    A, B = (X * f.scale for X in (f.holonomic, G))
+    U, d, _ = np.linalg.svd(A)
+    here = U[:, int((d > TOLERANCE * d[0]).sum()) :]
+    there = np.linalg.svd(B)[0][:, : rank(G, f.scale)]
+    part = np.abs(here @ (here.T @ there)).max(axis=1)
+    of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
+    return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))

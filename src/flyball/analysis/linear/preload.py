@@ -1,0 +1,59 @@
+"""Preload: what has to be added to forces for a mechanism to be in equilibrium where it is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import ModelError, NotConverged
+from ...system.names import velocity_names
+from ..assemble import Assembly
+from ..compiled import compiled
+from .free import free
+from .inputs import with_inputs
+from .rest import Rest
+
+BALANCED = 1e-9  # forces left, of those that act
+
+
+def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]]:
+    """The mechanism at rest with the smallest preloads that balance it, and those.
+
+    The forces along the free motions Z have to vanish: Z^T (f + sum b_k w_k) = 0.
+
+    Raises
+    ------
+    ModelError
+        If there is no such force, or it has no law.
+    NotConverged
+        If these forces cannot balance it.
+    """
+    if isinstance(names, str):
+        names = [names]
+    model, inputs = with_inputs(a.compiled.structure.model, names)
+    for i in inputs:
+        if i.driver or i.name == i.parameter:
+            what = "driver" if i.driver else "parameter"
+            raise ModelError(f"{i.name!r} is a {what}; only forces and torques can be preloaded")
+    c = compiled(model, parameters=a.compiled.parameters)
+    c.follow(a.compiled.hints)
+    x = Rest.at(c, a.t, a.q)
+    e = x.equations
+    Z = free(e).Z
+    by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
+    w = np.linalg.lstsq(Z.T @ by, -Z.T @ e.block("r"), rcond=1e-10)[0]
+    changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
+    loaded = compiled(model, parameters=changed)
+    loaded.follow(c.hints)
+    y = Rest.at(loaded, a.t, a.q)
+    left = y.unbalanced()
+    if left > BALANCED:
+        d = int(np.argmax(np.abs(y.r)))
+        name = velocity_names(c.structure)[d]
+        raise NotConverged(
+            f"{', '.join(names)} cannot balance {model.name!r} where it is drawn: {-y.r[d] / y.scale[d]:.3g} "
+            f"{'N' if name.unit == 'm' else 'N*m'} remain along {name.name}; preload other forces too",
+            {n.name: float(-v) for n, v in zip(velocity_names(c.structure), y.equations.block("r"), strict=True)},
+        )
+    return y, dict(zip(names, w.tolist(), strict=True))

@@ -1,0 +1,122 @@
+"""How a state changes with a parameter: the linearised constraints and equations of motion, solved in real numbers.
+
+Along a change (dq, dv, dp) of positions, velocities and a parameter one complex step through the residuals gives what
+the constraints and the equations of motion miss, exactly; accelerations and multipliers follow by
+
+    M dvdot - G^T dlam = -(r along (dq, dv, dp)),    G dvdot = -(a along (dq, dv, dp))
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...system.tables import Q0, V0
+from ...system.tree import lengths, quaternion_at
+from ...system.values import Values, work
+from ..compiled import Compiled
+from ..entry import residual_kernel
+from .derivatives import STEP, Equations, State, as_complex
+from .free import TOLERANCE
+
+
+@dataclass
+class Tangent:
+    """Changes per unit of a parameter: of positions along the velocities, of velocities, accelerations, multipliers."""
+
+    q: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """As rows, for `curves.slopes`."""
+        return self.q[None], self.v[None], self.vdot[None], self.lam[None]
+
+
+class Direction:
+    """A parameter's complex step in the tables, and the residuals along it at any state."""
+
+    def __init__(self, e: Equations, name: str) -> None:
+        self.name = name
+        self.values: Values = e.stepped(name)
+        self.system = as_complex(self.values.system)
+        self.work = work(e.state.c.structure, self.system, complex)
+        self.e = e
+
+    def along(self, x: State, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
+        """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
+        nv = len(x.v)
+        steps = np.zeros((1, 3 * nv + 1), complex)
+        steps[0, :nv], steps[0, nv : 2 * nv] = 1j * STEP * dq, 1j * STEP * dv
+        out = np.zeros((1, self.e.width), complex)
+        y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
+        residual_kernel(self.system, self.work, complex(x.t), y, vdot, lam, steps, out)
+        return out[0].imag / STEP
+
+
+class Linear:
+    """Mass matrix and constraints at a state, ready to be solved with."""
+
+    def __init__(self, x: State, M: np.ndarray | None = None) -> None:
+        c = x.c
+        c.at(x.t, x.q, x.v)
+        self.G = c.jacobian()
+        self.M = c.mass().toarray() if M is None else M
+        self.which = np.array([r.holonomic for r in c.structure.rows], bool)
+        self.scale = np.array([1.0 / np.sqrt(m) if m > 0.0 else 1.0 for m in np.diag(self.M)])
+        n, m = len(self.M), len(self.G)
+        self.A = np.zeros((n + m, n + m))
+        S = self.scale
+        self.A[:n, :n] = S[:, None] * self.M * S
+        H = self.G * S
+        self.size = 1.0 / np.maximum(np.sqrt((H * H).sum(axis=1)), 1e-300)
+        self.H = self.size[:, None] * H
+        self.A[:n, n:], self.A[n:, :n] = -self.H.T, self.H
+
+    @cached_property
+    def inverse(self) -> np.ndarray:
+        """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
+        return np.linalg.pinv(self.A, rcond=1e-12)
+
+    def motion(self, right: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
+        """The change x with G x = right that is smallest in kinetic energy."""
+        rows = slice(None) if which is None else which
+        if not len(self.H[rows]):
+            return np.zeros(len(self.M))
+        return self.scale * np.linalg.lstsq(self.H[rows], (self.size * right)[rows], rcond=TOLERANCE)[0]
+
+    def acceleration(self, r: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(dvdot, dlam) that take away what is missed of the equations of motion and of the constraints."""
+        n = len(self.M)
+        x = self.inverse @ -np.r_[self.scale * r, self.size * a]
+        return self.scale * x[:n], self.size * x[n:]
+
+
+def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) -> Tangent:
+    """The tangent whose positions and velocities are nearest to the given ones and keep the constraints."""
+    at = d.e.at
+    dq = dq + lin.motion(-d.along(x, dq, dv)[at["g"]], lin.which)
+    dv = dv + lin.motion(-d.along(x, dq, dv)[at["n"]])
+    left = d.along(x, dq, dv)
+    return Tangent(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))
+
+
+def tangent_step(c: Compiled, q: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """The step along the velocities that leads from one position to another nearby, (nv,)."""
+    S = c.values.system
+    out = np.zeros(c.structure.nv)
+    for b in range(len(S.body_i)):
+        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
+        n = lengths(S, b)
+        out[v0 : v0 + n] = other[q0 : q0 + n] - q[q0 : q0 + n]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            (a, *u), (e, *p) = q[k : k + 4], other[k : k + 4]
+            turn = a * np.array(p) - e * np.array(u) - np.cross(u, p)
+            cosine = a * e + np.dot(u, p)
+            out[w : w + 3] = 2.0 * turn / cosine  # the Cayley step
+    return out

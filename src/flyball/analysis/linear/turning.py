@@ -1,0 +1,153 @@
+"""Steady motions to be found: a mechanism of which some coordinates turn evenly while all others stand still.
+
+In joint coordinates nothing then changes but those angles: r(q, v, 0, lam) = 0 and g(q) = 0 with v zero but for the
+speeds. Newton's method finds positions and speeds; a speed that no torque decides (a governor that turns freely) stays
+as described.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...errors import ModelError, NotConverged
+from ...model.joint import Joint
+from ...system.forest import step_of
+from ...system.names import velocity_names
+from ...system.structure import Structure
+from ...system.tables import BODY_LAW, V0
+from ...system.tree import retract
+from ..assemble import Assembly
+from ..motion.layer import in_coordinates
+from .derivatives import Equations, State
+from .free import prescribed
+
+PASSES = 60
+LONGEST = 0.2  # a step in radians, parts of the mechanism's length, or parts of a speed
+SETTLED = 1e-10
+LEAST = 1e-11  # singular values below this part of the largest are none
+
+
+@dataclass
+class Turning:
+    """A steady motion: its state in joint coordinates, and the speeds by name [rad/s or m/s]."""
+
+    state: State
+    speeds: dict[str, float]
+
+
+def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None) -> Turning:
+    """Find the steady motion near an assembly in absolute coordinates.
+
+    Raises
+    ------
+    ModelError
+        If a name is no coordinate of a joint, or of one that closes a loop.
+    NotConverged
+        If there is none nearby.
+    """
+    names = [names] if isinstance(names, str) else list(names)
+    b, _ = in_coordinates(a, "joint", parameters)
+    at = [_place(b, name) for name in names]
+    c, s = b.compiled, b.compiled.structure
+    v = np.zeros(c.structure.nv)
+    v[at] = b.v[at]
+    start = State(c, b.t, b.q, v, c.z.copy(), 0.0 * v, np.zeros(len(c.structure.rows)), 0.0 * v)
+    found, _ = _search(start, at, [])  # with the speeds as they are, if anything balances at these
+    if found is None:
+        found, start = _search(start, at, [d for d in at if s.tables["body_i"][_body(s, d), BODY_LAW] < 0])
+    if found is None:
+        raise _failure(start, names)
+    x = found
+    c.at(x.t, x.q, x.v)
+    sign = velocity_names(c.structure)
+    return Turning(
+        State.moving(c, x.t, x.q, x.v), {n: float(sign[d].sign * x.v[d]) for n, d in zip(names, at, strict=True)}
+    )
+
+
+def _search(x: State, at: list[int], free: list[int]) -> tuple[State | None, State]:
+    """Newton's method; None where it does not settle, and where it ended."""
+    for _ in range(PASSES):
+        x, size, left = _step(x, at, free)
+        if size < LONGEST and left < SETTLED:
+            return x, x
+    return None, x
+
+
+def _place(b: Assembly, name: str) -> int:
+    """The velocity of a joint's coordinate."""
+    s = b.compiled.structure
+    owner, _, what = name.partition(".")
+    element = s.model[owner]
+    if not isinstance(element, Joint) or what not in element.coordinates:
+        raise ModelError(f"turning={name!r}: name a joint's coordinate, for instance 'A.angle'")
+    row = step_of(s, owner, what)
+    if row is None:
+        raise ModelError(
+            f"turning={name!r}: {element.title} closes a loop of the mechanism; name a coordinate along the way from "
+            f"ground, one of {', '.join(n.name for n in velocity_names(s))}"
+        )
+    return int(s.tables["body_i"][row, V0])
+
+
+def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float, float]:
+    """One step of Newton's method: (state, size of the step, what was left before it)."""
+    c, s = x.c, x.c.structure
+    given = prescribed(c)
+    moving = np.array([d for d in range(s.nv) if d not in at and not given[:, d].any()], int)
+    scale = np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(s)])
+    e = Equations(x)
+    A, left, size = _equations(e, moving, np.array(free, int), given, scale)
+    step = np.linalg.lstsq(A, -left, rcond=LEAST)[0]
+    m, k, rows = len(moving), len(free), len(s.rows)
+    longest = float(np.abs(step[: m + k]).max(initial=0.0))
+    part = min(1.0, LONGEST / max(longest, 1e-300))
+    way = np.zeros(s.nv)
+    way[moving] = scale[moving] * step[:m] * part
+    q, v = x.q.copy(), x.v.copy()
+    retract(c.values.system, q, way)
+    v[free] += (1.0 + np.abs(v[free])) * step[m : m + k] * part
+    c.at(x.t, q, v)
+    lam, effort = x.lam + size * step[m + k : m + k + rows], x.effort + given.T @ (size * step[m + k + rows :])
+    return replace(x, q=q, v=v, z=c.z.copy(), lam=lam, effort=effort), longest, float(np.abs(left).max())
+
+
+def _equations(
+    e: Equations, moving: np.ndarray, free: np.ndarray, given: np.ndarray, scale: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """Scaled linear equations for changes of positions, speeds, multipliers and efforts: (A, right side, energy)."""
+    x, s = e.state, e.state.c.structure
+    length = x.c.values.length
+    r, n = e.at["r"], e.at["n"]
+    K, V = e.by_position[r].toarray(), e.by_position[n].toarray()
+    D, G = e.by_velocity[r].toarray(), e.by_velocity[n].toarray()
+    which = np.array([row.holonomic for row in s.rows], bool)
+    size = np.abs(K * np.outer(scale, scale)).max(initial=1e-300) + np.abs(scale * e.block("r")).max(initial=0.0)
+    by_place, by_speed = scale[moving], 1.0 + np.abs(x.v[free])
+    width = len(moving) + len(free)
+    A = np.zeros((s.nv + which.sum() + len(s.rows), width + len(s.rows) + len(given)))
+    forces, gaps, rates = np.split(A, [s.nv, s.nv + which.sum()])
+    forces[:, :width] = scale[:, None] * np.hstack([K[:, moving] * by_place, D[:, free] * by_speed]) / size
+    forces[:, width:] = -scale[:, None] * np.vstack([G, given]).T
+    gaps[:, : len(moving)] = G[which][:, moving] * by_place / length
+    rates[:, :width] = np.hstack([V[:, moving] * by_place, G[:, free] * by_speed])
+    return A, np.r_[scale * e.block("r") / size, e.block("g")[which] / length, e.block("n")], float(size)
+
+
+def _body(s: Structure, d: int) -> int:
+    """The row of the body table that a velocity belongs to."""
+    return int(np.searchsorted(s.tables["body_i"][:, V0], d, side="right")) - 1
+
+
+def _failure(x: State, names: list[str]) -> NotConverged:
+    left = Equations(x).block("r")
+    known = velocity_names(x.c.structure)
+    d = int(np.argmax(np.abs(left)))
+    return NotConverged(
+        f"no steady motion of {x.c.structure.model.name!r} was found in which {', '.join(names)} turn evenly and all "
+        f"else stands still: {-left[d]:.3g} remain along {known[d].name}. Give a better guess of positions and speeds",
+        {n.name: float(-value) for n, value in zip(known, left, strict=True)},
+    )

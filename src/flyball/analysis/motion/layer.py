@@ -1,0 +1,111 @@
+"""Absolute or joint coordinates: which are used for a motion, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from ...errors import ModelError
+from ...system.cost import cost
+from ...system.spanning import spanning
+from ...system.tables import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
+from ..assemble import Assembly
+from ..compiled import Compiled, compiled
+from ..entry import MOTION
+
+COORDINATES = ("auto", "absolute", "joint")
+THIN = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
+MOST = 8  # joints that are taken out of the forest, one after the other, before it is given up
+UNSOLVED = 1e-9  # what the solve may leave of the equations at the start
+
+
+def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | None) -> tuple[Assembly, str]:
+    """The assembled start in the coordinates to be used, and what they are and why.
+
+    Parameters
+    ----------
+    a : Assembly
+        In absolute coordinates.
+    wish : str
+        One of `COORDINATES`.
+    parameters : mapping, optional
+        As for assembly.
+
+    Raises
+    ------
+    ModelError
+        For an unknown wish.
+    """
+    known(wish)
+    if wish == "absolute":
+        return a, "absolute: as asked for"
+    c, why = _forest(a, parameters)
+    if c is None:
+        return a, f"absolute: {why}"
+    if wish == "auto":
+        here, there = cost(a.compiled.structure), cost(c.structure)
+        if here <= there:
+            return a, f"absolute: {_counts(a.compiled)} cost less than {_counts(c)} in joint coordinates"
+        why = f"{_counts(c)} cost less than {_counts(a.compiled)} in absolute coordinates"
+    else:
+        why = "as asked for"
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
+    return Assembly(c, a.t, q, v, a.moved, a.iterations, a.sped), f"joint: {why}{_cuts(c)}"
+
+
+def known(wish: str) -> None:
+    """Refuse unknown coordinates."""
+    if wish not in COORDINATES:
+        raise ModelError(f"unknown coordinates {wish!r}; choose one of {', '.join(COORDINATES)}")
+
+
+def _counts(c: Compiled) -> str:
+    return f"{c.structure.nv} velocities with {len(c.structure.rows)} rows"
+
+
+def _cuts(c: Compiled) -> str:
+    """Joints that close loops."""
+    s = c.structure
+    cut = [j.name for j in s.model.joints if j.name not in s.tree_joints]
+    if not cut:
+        return ""
+    return f"; rows remain for {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
+
+
+def _forest(a: Assembly, parameters: Mapping[str, float] | None) -> tuple[Compiled | None, str]:
+    """A forest that is sound where the mechanism starts; else none, and why."""
+    model = a.compiled.structure.model
+    avoided: list[str] = []
+    for _ in range(MOST):
+        tree = spanning(model, avoided)
+        if not tree:
+            what = " that has inertia along its coordinates" if avoided else ""
+            return None, f"no joint{what} can be a tree joint"
+        c = compiled(model, parameters=parameters, tree=tree)
+        bad = _unsound(c, a)
+        if bad is None:
+            return c, ""
+        avoided.append(bad)
+    return None, f"along {', '.join(avoided)} hardly any inertia moves"
+
+
+def _unsound(c: Compiled, a: Assembly) -> str | None:
+    """A tree joint along whose coordinates hardly any inertia moves, if there is one."""
+    s, S = c.structure, c.values.system
+    if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED:
+        return None
+    q, v = c.take(a.compiled, a.t, a.q, a.v)
+    c.at(a.t, q, v, MOTION)
+    M = np.zeros((s.nv, s.nv))
+    M[S.mass_i[:, 0], S.mass_i[:, 1]] = c.work.M
+    size = S.body_x[:, 0].sum()
+    for name, t in s.tree_joints.items():
+        at = [int(S.body_i[k, V0]) + i for k in t.links for i in range(int(S.body_i[k, NV]))]
+        scale = np.array(
+            [1.0 if p.kind == "P" else c.values.length for p in t.primitives for _ in range(3 if p.kind == "S" else 1)]
+        )
+        own = M[np.ix_(at, at)] / np.outer(scale, scale)
+        if at and np.linalg.eigvalsh(np.tril(own) + np.tril(own, -1).T)[0] < THIN * size:
+            return name
+    return None

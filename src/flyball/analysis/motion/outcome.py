@@ -1,0 +1,89 @@
+"""What comes out of a motion: the ``Result`` with its health, or the exception that says why there is no more."""
+
+from __future__ import annotations
+
+import time
+from functools import partial
+
+import numpy as np
+
+from ...errors import SimulationError
+from ...model.model import Model
+from ...numerics.integrators import explicit as ex
+from ...results import doubts
+from ...results.health import Health
+from ...results.result import Owed, Result
+from ...system.tables import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ..mobility import mobility
+from .options import Options
+from .reasons import reason, remarks
+from .residual import acceleration_violation
+from .start import Start
+
+
+def outcome(
+    model: Model,
+    start: Start,
+    clock: ex.Clock,
+    rows: np.ndarray,
+    o: Options,
+    interrupted: bool = False,
+    owed: Owed | None = None,
+) -> Result:
+    """Result and health; a failed run raises with its partial result. ``owed`` finds works when they are asked for.
+
+    Raises
+    ------
+    SimulationError
+        If the integration could not go on.
+    """
+    a = start.assembly
+    status = int(clock.count[ex.STATUS])
+    t = float(clock.real[ex.T])
+    message, cause = "reached the end", None
+    if interrupted:
+        message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+    elif status != ex.DONE:
+        message, cause = reason(a, start.base, clock)
+    health = _health(start, clock, o)
+    health.message, health.success = message, status == ex.DONE and not interrupted
+    s = a.compiled.structure
+    cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
+    t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
+    result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
+    result.final = (t, clock.y[0].copy())
+    result.owed = owed
+    result.wound = start.wound
+    health.late = {
+        "mobility": partial(mobility, model, start.base),
+        "energy_drift": partial(_energy_drift, result),
+        "acceleration_violation": partial(acceleration_violation, result),
+        "creep": partial(doubts.creep, result),
+        "warnings": partial(doubts.warnings, result),
+    }
+    if status not in (ex.DONE, ex.RUNNING):
+        raise SimulationError(message, result, t) from cause
+    return result
+
+
+def _health(start: Start, clock: ex.Clock, o: Options) -> Health:
+    """Figures of a run."""
+    W = start.assembly.compiled.work
+    return Health(
+        success=True,
+        message="",
+        violation=float(W.option[WORST_G]),
+        velocity_violation=float(W.option[WORST_V]),
+        steps=int(clock.count[ex.ACCEPTED]),
+        rejected=int(clock.count[ex.REJECTED]),
+        evaluations=int(W.info[EVALUATIONS]),
+        factorisations=int(W.info[FACTORISATIONS]),
+        seconds=time.perf_counter() - start.since,
+        options={k: getattr(o, k) for k in o.__dataclass_fields__},
+        remarks=remarks(start.assembly),
+        coordinates=start.coordinates,
+    )
+
+
+def _energy_drift(result: Result) -> float:
+    return result.energy.drift

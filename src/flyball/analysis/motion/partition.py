@@ -1,0 +1,47 @@
+"""The first choice of independent coordinates, for coordinate partitioning; ``system/partition.py`` changes it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model.model import Model
+from ...system.names import velocity_names
+from ...system.tables import BODY_LAW, PARTITION, V0
+from ..mobility import mobility
+from .start import Start
+
+
+def choose(model: Model, start: Start) -> None:
+    """Tell the compiled loop which coordinates depend on the others, and their sizes.
+
+    As many as the rank at the start: those that QR with column pivoting takes first, lengths measured by the
+    mechanism's and rows made unit vectors (Businger and Golub 1965).
+    """
+    from scipy.linalg import qr
+
+    a = start.assembly
+    c = a.compiled
+    c.at(a.t, a.q, a.v)
+    size = sizes(start)
+    body_i = c.structure.tables["body_i"]
+    given = body_i[body_i[:, BODY_LAW] >= 0, V0]
+    size[given] = 0.0
+    G = c.jacobian() * size
+    length = np.sqrt((G * G).sum(axis=1))
+    G = G[length > 0.0] / length[length > 0.0, None]
+    order = qr(G, mode="r", pivoting=True)[1] if len(G) else np.arange(len(size))
+    dependent = order[: len(size) - len(given) - mobility(model, start.base).freedoms]
+    c.work.vel[PARTITION] = -size
+    c.work.vel[PARTITION, dependent] *= -1.0
+
+
+def sizes(start: Start) -> np.ndarray:
+    """What a change of each coordinate is measured by: the mechanism's length, or a radian."""
+    c = start.assembly.compiled
+    return np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(c.structure)])
+
+
+def independent(start: Start) -> tuple[str, ...]:
+    """Names of the coordinates that are independent now."""
+    c = start.assembly.compiled
+    return tuple(n.name for n, p in zip(velocity_names(c.structure), c.work.vel[PARTITION], strict=True) if p < 0.0)

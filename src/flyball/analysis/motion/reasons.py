@@ -1,0 +1,272 @@
+"""Why an integration could not go on: the element behind it, in words, and the exception of a user's function."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...model.body import Driver
+from ...model.force import CoordinateForce
+from ...numerics.integrators import explicit as ex
+from ...system import motion
+from ...system.functions import fault
+from ...system.laws import evaluate, evaluate_jet
+from ...system.loads import wide
+from ...system.opcodes import BY_TIME
+from ...system.records import load
+from ...system.tables import (
+    BODY_LAW,
+    FORCE_F,
+    FORCE_LAW,
+    FORCE_LOAD,
+    FORCE_M,
+    GAMMA,
+    GUILTY,
+    LOAD,
+    NU,
+    NU_DOT,
+    RATE,
+    ROW_LAW,
+    ROW_WRAP,
+    STATUS,
+    TREE,
+    VALUE,
+)
+from ...system.tree import REVOLUTE
+from ..assemble import Assembly
+from ..entry import MOTION
+
+NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
+AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
+LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
+PARTS = ("value", "rate", "second derivative")
+SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
+
+
+def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
+    """What stopped the integration, and the exception that a user's function raised, if one did.
+
+    Parameters
+    ----------
+    a : Assembly
+        Its scratch is as the compiled loop has left it.
+    base : Assembly
+        The mechanism in absolute coordinates, where every joint and driver has rows.
+    clock : Clock
+        State of the integration.
+    """
+    name = a.compiled.structure.model.name
+    t = float(clock.real[ex.T])
+    kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
+    if clock.count[ex.STATUS] == ex.TOO_MANY:
+        return f"{name!r}: {_too_many(a, clock)}. {kept}", None
+    found = fault(a.compiled.work.stack, a.compiled.structure.functions)
+    if found is not None:
+        return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
+    text = (
+        of_drivers(a, clock)
+        or _not_finite(a, clock)
+        or _jammed(a, clock)
+        or _locked(a, base, clock)
+        or _stuck(a, clock)
+    )
+    return f"{name!r}: {text}. {kept}", None
+
+
+def remarks(a: Assembly) -> tuple[str, ...]:
+    """What went wrong on the way and was overcome, for the health report."""
+    found = fault(a.compiled.work.stack, a.compiled.structure.functions, overcome=True)
+    if found is None:
+        return ()
+    return (
+        f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
+        f"function is at fault, mend it",
+    )
+
+
+def of_drivers(a: Assembly, clock: ex.Clock) -> str:
+    """A driver whose law is not finite, or jumps, about now; else nothing."""
+    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+    t, span = float(clock.real[ex.T]), float(clock.real[ex.LARGEST])
+    stack = np.zeros_like(W.stack)
+    laws = [
+        (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
+        for k, row in enumerate(s.rows)
+        if isinstance(row.element, Driver)
+    ]
+    laws += [
+        (s.model[name], int(S.body_i[b, BODY_LAW]), S.body_i[b, TREE] == REVOLUTE) for name, b in s.prescribed.items()
+    ]
+    for driver, law, wrapped in laws:
+        with np.errstate(all="ignore"):
+            before, *after = (
+                evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
+            )
+        problem = _no_number(after) or _jump(before, after[0], NEAR * span, wrapped)
+        if problem:
+            return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
+    return ""
+
+
+def _no_number(after: list[tuple]) -> str:
+    """What is wrong with a law that has these values and derivatives soon after, if they are not finite."""
+    for jet in after:
+        for what, x in zip(PARTS, jet, strict=True):
+            if not math.isfinite(x):
+                return f"has the {what} {x:g} just after. Give a law that is finite and smooth over the whole time"
+    return ""
+
+
+def _jump(before: tuple, after: tuple, step: float, wrapped: bool) -> str:
+    """What is wrong with a law whose value and two derivatives are these just before and just after."""
+    if not all(map(math.isfinite, before)):
+        return ""
+    for k, remedy in ((0, "step5(t, t0, 0, t1, 1) goes over smoothly"), (1, "step5 or a cubic Table goes smoothly")):
+        change = after[k] - before[k]
+        if wrapped and k == 0:
+            change = math.atan2(math.sin(change), math.cos(change))
+        slope = max(abs(before[k + 1]), abs(after[k + 1]))
+        if abs(change) > SHARP * step * slope + 1e-7 * (abs(before[k]) + abs(after[k])) + 1e-12:
+            return (
+                f"jumps in its {PARTS[k]}, from {before[k]:.6g} to {after[k]:.6g}, which asks for an infinite force; "
+                f"{remedy}"
+            )
+    return ""
+
+
+def _not_finite(a: Assembly, clock: ex.Clock) -> str:
+    if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
+        return ""
+    t = float(clock.real[ex.T])
+    force = _broken_force(a, t)
+    if force:
+        return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
+    wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
+    return (
+        f"the equations of motion are not finite just after t = {t:.6g} s, first at "
+        f"{_component(a, int(np.argmax(wrong)))}. Look for a law that divides by zero or leaves its range"
+    )
+
+
+def _broken_force(a: Assembly, t: float) -> str:
+    """The force that is no number at the kinematics that the compiled loop has left, and why."""
+    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+    stack = np.zeros_like(W.stack)
+    forces: list[Any] = list(s.forces)
+    with np.errstate(all="ignore"):
+        for k, e in enumerate(forces):
+            F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
+            along = isinstance(e, CoordinateForce)
+            m = S.force_i[k, FORCE_F]
+            x, y = W.sensed[VALUE : RATE + 1, m] if along else e.inputs(par, F, M)
+            if not math.isfinite(x) or not math.isfinite(y):
+                return f"what {e.title} measures is no number. {e.fails}"
+            laws = [
+                evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed) if at >= 0 else 0.0
+                for at in S.force_i[k, FORCE_LAW : FORCE_LAW + 3].tolist()
+            ]
+            if not np.isfinite(laws).all():
+                given = (
+                    "".join(f", {n} = {v:.6g}" for n, v in zip(e.outputs, (x, y), strict=False)) if e.outputs else ""
+                )
+                return (
+                    f"the law of {e.title} gives {laws} for t = {t:.6g}{given}. Look for a division by zero or a range "
+                    f"that it leaves"
+                )
+            pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+            out = (
+                e.effort(par, x, y, laws, pressed)
+                if isinstance(e, CoordinateForce)
+                else np.ravel(e.wrench(par, F, M, tuple(laws), (x, y)))
+            )
+            if not np.isfinite(out).all():
+                return f"the force of {e.title} is no number. {e.fails}"
+    return ""
+
+
+def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
+    """The elements for whose rows there are no accelerations where the motion stopped, if so."""
+    t, y, own, c = float(clock.real[ex.T]), clock.y[0], a.compiled, base.compiled
+    if not len(c.structure.rows) or not np.isfinite(y).all():
+        return ""
+    nq, nv = own.structure.nq, own.structure.nv
+    q, v, own.z = y[:nq].copy(), y[nq : nq + nv].copy(), y[nq + nv :].copy()
+    if c is not own:
+        q, v = c.take(own, t, q, v)
+    _, dy = c.at(t, q, v, MOTION)
+    x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
+    if not np.isfinite(x).all():
+        return ""
+    G, gamma = c.sparse_jacobian(), c.work.row[GAMMA]
+    gap = np.abs(G @ x - gamma)
+    if not gap.max() > LOCKED * (np.abs(gamma).max() + 1e-9):
+        return ""
+    names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
+    return (
+        f"at t = {clock.real[ex.T]:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: "
+        f"in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
+        f"than its links allow), or it is drawn in a singular position with velocities that it cannot have"
+    )
+
+
+def _jammed(a: Assembly, clock: ex.Clock) -> str:
+    W = a.compiled.work
+    if W.info[STATUS] != motion.JAMMED:
+        return ""
+    e: Any = a.compiled.structure.forces[int(W.info[GUILTY])]
+    return (
+        f"{e.title} jams joint {e.joint!r} at t = {clock.real[ex.T]:.6g} s: friction loads the joint by as much as the "
+        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
+        f"over which the joint carries moments (bending_length, twist_length)"
+    )
+
+
+def _stuck(a: Assembly, clock: ex.Clock) -> str:
+    rows, W = a.compiled.structure.rows, a.compiled.work
+    k = int(W.info[GUILTY])
+    where = f" near {rows[k].element.title}" if rows else ""
+    if rows and isinstance(rows[k].element, Driver):
+        where += f" (whose law there has the rate {W.row[NU, k]:.4g} and the second derivative {W.row[NU_DOT, k]:.4g})"
+    t = f"t = {clock.real[ex.T]:.6g} s"
+    begun = clock.count[ex.STARTED] != 0
+    what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
+    return (
+        f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "
+        f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
+        f"a force that changes abruptly"
+    )
+
+
+def _too_many(a: Assembly, clock: ex.Clock) -> str:
+    slowest = _component(a, _pacemaker(clock))
+    return (
+        f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "
+        f"{clock.real[ex.H]:.3g} s wide by now, for the sake of {slowest}. Give more steps (max_steps=), a larger "
+        f"rtol, or less stiffness (friction too is stiff) there"
+    )
+
+
+def _pacemaker(clock: ex.Clock) -> int:
+    """The component of the state whose derivative changed most within the last step, by its tolerance."""
+    n = clock.count[ex.CONTROLLED]
+    with np.errstate(all="ignore"):
+        change = np.ptp(clock.K[:, :n], axis=0) / (clock.real[ex.ATOL] + clock.real[ex.RTOL] * np.abs(clock.y[0, :n]))
+    return int(np.argmax(np.nan_to_num(change)))
+
+
+def _component(a: Assembly, i: int) -> str:
+    """Name of the body or tree joint that a component of the state belongs to."""
+    s = a.compiled.structure
+    for joint in s.tree_joints.values():
+        for b in joint.links:
+            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
+            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
+                return f"joint {joint.joint.name!r}"
+    for name, b in s.place.items():
+        if b >= 0:
+            q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
+            if q0 <= i < q0 + nq or s.nq + v0 <= i < s.nq + v0 + nv:
+                return f"body {name!r}"
+    return "a measured quantity"

@@ -1,0 +1,101 @@
+"""Where a motion starts, in which coordinates: as described and assembled, or where an earlier result ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import ModelError
+from ...model.model import Model
+from ...results.records import wound
+from ...results.result import Result
+from ...system.tables import G_VALUE, Q0, SEMIDEFINITE
+from ..assemble import Assembly, assemble
+from ..compiled import compiled
+from ..mobility import mobility
+from .layer import in_coordinates
+
+
+@dataclass
+class Start:
+    """A consistent start in the coordinates of the motion."""
+
+    base: Assembly  # in absolute coordinates
+    assembly: Assembly
+    y: np.ndarray
+    coordinates: str  # which they are, and why
+    wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
+    since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
+
+
+def begin(
+    model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None, coordinates: str
+) -> Start:
+    """Assemble, or go on from an earlier result; choose coordinates.
+
+    Raises
+    ------
+    AssemblyError
+        If the start cannot be made consistent.
+    ModelError
+        If a body can move without inertia, or the earlier result is of another mechanism.
+    """
+    base = _base(model, t, parameters, before)
+    if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+        mobility(model, base, inertia=True)
+    return begin_at(base, parameters, coordinates, before)
+
+
+def begin_at(
+    base: Assembly, parameters: Mapping[str, float] | None, coordinates: str, before: Result | None = None
+) -> Start:
+    """Begin where the mechanism is assembled already; choose coordinates."""
+    a, why = in_coordinates(base, coordinates, parameters)
+    y = a.y if before is None else _gone_on(before, a)
+    return Start(base, a, y, why, _wound(base, a, y))
+
+
+def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
+    s = a.compiled.structure
+    if not s.tree or not s.model.planar:
+        return {}
+    moving = base.compiled.moving(base.t, base.q, base.v)
+    return wound(a.compiled.values, y[: s.nq], {name: state.angle for name, state in moving.items()})
+
+
+def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None) -> Assembly:
+    """Where to start from, in absolute coordinates: assembled as described, or where an earlier result ended."""
+    if before is None:
+        return assemble(model, t=t, parameters=parameters)
+    c = compiled(model, parameters=parameters, tree=before.values.structure.tree)
+    y = before.state_at_end(c)
+    nq, nv = c.structure.nq, c.structure.nv
+    q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
+    c.at(t, q, v)
+    gap = np.abs(c.work.row[G_VALUE]).max(initial=0.0)
+    if not gap <= 1e-6 * c.values.length:
+        raise ModelError(
+            f"the result of {before.model.name!r} ends where the constraints of {model.name!r} are {gap:.3g} from "
+            f"fulfilled; it cannot be gone on with. Were parameters changed?"
+        )
+    if not c.structure.tree:
+        return Assembly(c, t, q.copy(), v.copy())
+    plain = compiled(model, parameters=parameters)
+    q, v = plain.take(c, t, q, v)
+    for name, more in before.wound.items():
+        q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
+    return Assembly(plain, t, q, v)
+
+
+def _gone_on(before: Result, a: Assembly) -> np.ndarray:
+    """The state that an earlier result ended in: to the bit in its own coordinates, works and turns included."""
+    s, old = a.compiled.structure, before.values.structure
+    y = before.final[1].copy()
+    if s.tree == old.tree:
+        a.compiled.z = y[s.nq + s.nv :].copy()
+        return y
+    states = dict(zip(old.states, y[old.nq + old.nv :].tolist(), strict=True))
+    z = [states.get(name, known) for name, known in a.compiled.hints.items()]
+    return np.r_[a.q, a.v, z]

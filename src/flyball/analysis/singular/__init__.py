@@ -1,0 +1,1 @@
+"""Pieces of ``singularities``: the curve of positions, and what happens at its singular points."""
