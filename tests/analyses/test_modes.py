@@ -94,3 +94,14 @@ def test_fewer_freedoms_than_asked_for():
             m.add(fb.Revolute(f"C{k}", f"bar {k}", f"crank {k}", at=(k, -1)))
     square = G * ((n + 1) / 2 + n) / ((n + 1) / 3 + n)
     assert m.modes(count=5).omega == pytest.approx([np.sqrt(square)], rel=1e-8)
+
+
+def test_slow_modes_beside_fast_ones_are_no_rigid_ones():
+    m = fb.Mechanism("two", planar=True)
+    for k, stiffness in enumerate((0.01, 1e8)):
+        m.add(fb.Body(f"mass {k}", mass=1, inertia=1, position=(1, k)))
+        m.add(fb.Prismatic(f"rail {k}", "ground", f"mass {k}", at=(1, k), axis=(1, 0)))
+        m.add(fb.SpringDamper(f"spring {k}", "ground", f"mass {k}", at=((0, k), (1, k)), stiffness=stiffness))
+    found = m.modes()
+    assert found.kinds == ("oscillation",) * 2
+    assert found.omega == pytest.approx([0.1, 1e4], rel=1e-9)

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
-from ..results.modes import STILL, Modes
+from ..results.modes import Modes
 from ..system.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
@@ -24,6 +24,7 @@ from .linearize import without_inputs
 DENSE = 600  # velocities up to which all modes are found
 RIGID = 1e-6  # shift, of the largest stiffness over the largest mass
 FEW = 10
+REAL = 1e-12  # imaginary parts below this part of the fastest eigenvalue are rounding
 UNDAMPED = 1e-12
 TINY = 1e-7  # directions of random motions below this part of the largest are none
 REFINED = 2  # times that a solution is improved: rows may be redundant
@@ -69,10 +70,10 @@ def modes(
     one = np.flatnonzero(w.imag >= 0.0)
     one = one[np.lexsort((-w[one].real, np.abs(w[one])))][:count]
     shapes = r.position[:, : len(r.A)] @ V[:, one]
-    return _made(x, w[one].astype(complex), shapes, frame.turning)
+    return _made(x, w[one].astype(complex), shapes, frame.turning, float(np.abs(w).max(initial=0.0)))
 
 
-def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray) -> Modes:
+def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray, fastest: float) -> Modes:
     names = velocity_names(x.c.structure)
     length = np.array([1.0 if n.unit == "m" else x.c.values.length for n in names])
     sign = np.array([n.sign for n in names])
@@ -80,11 +81,10 @@ def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray) -> M
         size = length * np.abs(shapes[:, k])
         if size.max(initial=0.0) > 0.0:
             shapes[:, k] /= shapes[np.argmax(size), k]
-    largest = np.abs(w).max(initial=0.0)
-    w = np.where(np.abs(w.imag) <= STILL * largest, w.real, w) + 0j
+    w = np.where(np.abs(w.imag) <= REAL * fastest, w.real, w) + 0j
     own = sign[:, None] * shapes
     units = tuple(n.unit for n in names)
-    return Modes(w, own, tuple(n.name for n in names), units, turning, snapshot(x))
+    return Modes(w, own, tuple(n.name for n in names), units, turning, snapshot(x), fastest)
 
 
 def _sparse(x: State, count: int) -> Modes:
@@ -132,7 +132,7 @@ def _sparse(x: State, count: int) -> Modes:
     order = np.argsort(squares)[:count]
     w = np.sqrt(squares[order].astype(complex))
     w = np.where(squares[order] < 0.0, w.imag + 0j, 1j * w.real)
-    return _made(x, w, V[:, order].astype(complex), np.zeros(3))
+    return _made(x, w, V[:, order].astype(complex), np.zeros(3), float(np.sqrt(typical / abs(M).max())))
 
 
 def _few(invert: Any, K: Any, M: Any, most: int) -> tuple[np.ndarray | None, np.ndarray]:

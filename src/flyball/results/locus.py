@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .modes import STILL
+STILL = 1e-7  # part of the largest eigenvalue below which growth is rounding
 
 
 class Crossing(NamedTuple):

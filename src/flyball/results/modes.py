@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from .result import Result
 
 ROUNDING = 1e-9  # damping ratios below this are written as 0
-STILL = 1e-7  # part of the largest eigenvalue below which one is zero
+STILL = 1e-6  # part of the fastest eigenvalue below which one is zero: a double zero shows rounding by its square root
+GROWS = 1e-6  # damping ratios above minus this are not growth
 
 
 @dataclass
@@ -31,6 +32,8 @@ class Modes:
         Angular velocity of the frame that they are seen from.
     point : Result
         Where they are about.
+    fastest : float [1/s]
+        Size of the largest eigenvalue, those that were not asked for included: what zeros are compared with.
     """
 
     eigenvalues: np.ndarray
@@ -39,6 +42,11 @@ class Modes:
     units: tuple[str, ...]
     turning: np.ndarray
     point: Result = field(repr=False)
+    fastest: float = 0.0
+
+    @property
+    def _still(self) -> np.ndarray:
+        return np.abs(self.eigenvalues) <= STILL * max(self.fastest, np.abs(self.eigenvalues).max(initial=0.0))
 
     @property
     def omega(self) -> np.ndarray:
@@ -54,16 +62,15 @@ class Modes:
     def damping_ratio(self) -> np.ndarray:
         """-Re / |eigenvalue|: 0 undamped, 1 no oscillation, negative where the motion grows; 0 for rigid ones."""
         size = np.abs(self.eigenvalues)
-        still = size <= STILL * size.max(initial=0.0)
+        still = self._still
         return np.where(still, 0.0, -self.eigenvalues.real / np.where(still, 1.0, size))
 
     @property
     def kinds(self) -> tuple[str, ...]:
         """``"oscillation"``, ``"decay"``, ``"unstable"`` or ``"rigid"`` for every mode."""
-        largest = np.abs(self.eigenvalues).max(initial=0.0)
         out = []
-        for w in self.eigenvalues:
-            grows, still = w.real > STILL * largest, abs(w) <= STILL**0.5 * largest
+        for w, still in zip(self.eigenvalues, self._still, strict=True):
+            grows = w.real > GROWS * abs(w)
             out.append("rigid" if still else "unstable" if grows else "decay" if w.imag == 0.0 else "oscillation")
         return tuple(out)
 
