@@ -63,7 +63,6 @@ class Kernel:
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
         self._dispatcher: Callable[..., Any] | None = None
-        self._ready = False
         update_wrapper(self, function)
 
     @property
@@ -76,8 +75,19 @@ class Kernel:
             made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(self.function)
             if not config.DISABLE_JIT:
                 made._cache = _cache_class()(self.function)
+                made._compile_for_args = self._compiling(made._compile_for_args)
             self._dispatcher = made
         return self._dispatcher
+
+    def _compiling(self, compile_for: Callable[..., Any]) -> Callable[..., Any]:
+        """Numba's compilation for new types of arguments, done our way, one at a time."""
+        from ._link import optimise_once
+
+        def compile_once(*args: Any, **options: Any) -> Any:
+            with _lock, optimise_once(self.function.__qualname__):
+                return compile_for(*args, **options)
+
+        return compile_once
 
     @property
     def cold(self) -> bool:
@@ -88,15 +98,7 @@ class Kernel:
             return False
 
     def __call__(self, *args: Any) -> Any:
-        if not self._ready:
-            start_numba()
-            from ._link import optimise_once
-
-            with _lock, optimise_once(self.function.__qualname__):
-                out = self.dispatcher(*args)
-            self._ready = True
-            return out
-        return self._dispatcher(*args)  # type: ignore[misc]
+        return (self._dispatcher or self.dispatcher)(*args)
 
 
 def start_numba() -> None:
