@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -135,3 +137,64 @@ def test_preload():
 def test_steady_motions_need_a_coordinate_that_turns():
     with pytest.raises(fb.ModelError, match="name a joint's coordinate"):
         rod().equilibrium(turning=["rod.x"])
+
+
+def with_block(m: fb.Mechanism, stiffness: float, mass: float = 1.0) -> fb.Mechanism:
+    """The same with a block beside it, on a spring so stiff that it hides everything else; nothing connects them."""
+    m.add(fb.Body("block", mass=mass, inertia=1, position=(3, 0)))
+    m.add(fb.Translational("slide", "ground", "block", at=(3, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("bush", "ground", "block", at=((2, 0), (3, 0)), stiffness=stiffness))
+    return m
+
+
+@pytest.mark.parametrize(("stiffness", "mass"), [(1e3, 1.0), (1e9, 1.0), (1e3, 1e6)])
+def test_nothing_stiff_or_heavy_beside_it_hides_what_is_wrong(stiffness, mass):
+    with pytest.raises(fb.AnalysisError, match="not in equilibrium"):
+        with_block(rod(0.3), stiffness, mass).linearize()
+    up = with_block(rod(np.pi), stiffness, mass)
+    assert up.equilibrium().stability == "unstable"
+    assert not up.modes().stable
+    assert not up.modes(count=1).stable
+    m = with_block(rod(np.pi / 2), stiffness, mass)
+    m.add(fb.PointForce("p", "rod", at=(0, 0), force=("0", "0")))
+    with pytest.raises(fb.NotConverged, match="cannot balance"):
+        m.equilibrium(preload=["p.x"])
+    m = with_block(rod(0.3), stiffness, mass)
+    m.add(fb.TorsionalSpringDamper("spring", joint="A", stiffness=20, angle=1.0))
+    angle = m.equilibrium()["A.angle"]
+    assert 20 * (angle - 1) + G / 2 * np.sin(angle) == pytest.approx(0, abs=1e-8)
+
+
+def test_bricards_mechanism_rests_where_it_swings_about():
+    """By symmetry at a right angle; the drawn position, a little off, is none."""
+    m = fb.load(Path(__file__).parents[2] / "examples" / "bricard.toml")
+    found = m.equilibrium()
+    assert found.stability == "stable"
+    assert found.unbalanced < 1e-9
+    assert m.modes(about=found).stable
+
+
+@pytest.mark.parametrize("size", [1e-3, 1e3])
+def test_any_size_and_mass(size):
+    mass = size**3
+    m = fb.Mechanism("rod", planar=True, gravity=(0, -G))
+    m.add(
+        fb.Body("rod", mass=mass, inertia=mass * size**2 / 12, position=(0.2 * size, -0.4 * size), angle=np.arctan(0.5))
+    )
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    with pytest.raises(fb.AnalysisError, match="not in equilibrium"):
+        m.modes()
+    found = m.equilibrium()
+    assert found.stability == "stable"
+    r = np.hypot(0.2, 0.4) * size
+    w = np.sqrt(mass * G * r / (mass * size**2 / 12 + mass * r**2))
+    assert m.modes(about=found).omega == pytest.approx([w], rel=1e-9)
+
+
+def test_a_sled_rests_across_a_slope_on_its_edge():
+    m = fb.Mechanism("sled", planar=True, gravity=(0, -G))
+    m.add(fb.Body("sled", mass=2, inertia=1))
+    m.add(fb.KnifeEdge("edge", "ground", "sled", at=(0, 0), axis=(1, 0)))
+    found = m.equilibrium()
+    assert found["sled.y"] == pytest.approx(0, abs=1e-12)
+    assert found.unbalanced < 1e-9

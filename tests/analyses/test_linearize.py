@@ -239,3 +239,39 @@ def test_laws_without_derivatives_are_refused():
     m.add(fb.Motor("motor", joint="A", torque=lambda t: 0.0))
     with pytest.raises(fb.ModelError, match="Python function, which has no derivatives"):
         m.linearize()
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_parameter_of_a_law_that_drives(layer):
+    """A cart driven by amp sin(w t) carries a rod: tilt'' / 3 + g tilt / 2 = x'' / 2 with x = amp at this instant."""
+    m = cart(upright=False)
+    m.parameters["amp"] = 0.0
+    m.add(fb.Driver("shaker", "rail.displacement", "amp*cos(2*t)"))
+    L = m.linearize(["amp"], ["tilt", "cart.x"], coordinates=layer)
+    s = 1.7
+    got = (L.C @ np.linalg.solve(s * np.eye(2) - L.A, L.B) + L.D)[:, 0]
+    assert got == pytest.approx([-0.5 * s * s / (s * s / 3 + G / 2), 1.0], rel=1e-9)
+
+
+def test_about_an_equilibrium_of_other_numbers():
+    """Where it was found, the mechanism as it is now: a stiffer spring counts, another mechanism is refused."""
+    m = rod(k=1.0)
+    m.add(fb.TorsionalSpringDamper("spring", joint="A", stiffness="k"))
+    found = m.equilibrium()
+    assert m.linearize(about=found).stiffness[0, 0] == pytest.approx(1 + G / 2)
+    assert m.linearize(about=found, parameters={"k": 100.0}).stiffness[0, 0] == pytest.approx(100 + G / 2)
+    m.add(fb.TorsionalSpringDamper("more", joint="A", stiffness=10))
+    assert m.linearize(about=found).stiffness[0, 0] == pytest.approx(11 + G / 2)
+    with pytest.raises(fb.ModelError, match="which has other bodies"):
+        cart().linearize(about=found)
+
+
+def test_nothing_can_move():
+    m = fb.Mechanism("block", planar=True, gravity=(0, -G))
+    m.add(fb.Body("block", mass=1, inertia=1))
+    m.add(fb.Fixed("weld", "ground", "block", at=(0, 0)))
+    for layer in LAYERS:
+        L = m.linearize(outputs=["weld.fy"], coordinates=layer)
+        assert L.A.shape == (0, 0)
+        assert L.output_values == pytest.approx([G])
+        assert len(m.modes(coordinates=layer)) == 0

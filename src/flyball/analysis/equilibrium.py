@@ -17,16 +17,19 @@ from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
 from ..system.names import velocity_names
 from .assemble import Assembly, assemble
+from .linear.balance import acting
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
 from .linear.free import Free, free
 from .linear.preload import preloaded
 from .linear.rest import Rest
+from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
 
 NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
+ARRIVED = 1e-7  # Newton's last step: the next one would be its square
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
@@ -92,13 +95,24 @@ def _searched(x: Rest, stable: bool) -> Equilibrium:
     """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
     way = "Newton's method"
     arrived = _newton(x)
-    if arrived is None or (stable and _stability(arrived)[0] == UNSTABLE):
+    unstable = arrived is not None and _stability(arrived)[0] == UNSTABLE
+    if arrived is not None and unstable and not stable and _far(x, arrived):
+        downhill = _descent(x)  # Newton has led up a hill that the guess is not on
+        below = None if downhill is None else _newton(downhill)
+        if below is not None and _stability(below)[0] != UNSTABLE:
+            return _finished(below, {}, "descent")
+    if arrived is None or (stable and unstable):
         way = "descent"
         downhill = _descent(x if arrived is None else _pushed(arrived))
         arrived = None if downhill is None else _newton(downhill)
         if arrived is None:
             raise _failure(downhill or x)
     return _finished(arrived, {}, way)
+
+
+def _far(x: Rest, y: Rest) -> bool:
+    """Whether two positions are more than a long step apart."""
+    return bool(np.abs(tangent_step(x.c, x.q, y.q) / x.scale).max(initial=0.0) > LONGEST)
 
 
 def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
@@ -117,7 +131,7 @@ def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
         stiffness=r.K if r.K is not None else np.zeros((0, 0)),
         weakest={},
         least=float("nan"),
-        unbalanced=float(np.abs(Equations(x).block("r")).max(initial=0.0)),
+        unbalanced=found.unbalanced,
         method="Newton's method",
         parameters=dict(c.parameters),
         result=snapshot(x),
@@ -134,13 +148,11 @@ def _newton(x: Rest) -> Rest | None:
         if not np.isfinite(longest):
             return None
         x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
-        if longest < LONGEST and _settled(x):
-            return x
+        if longest < ARRIVED and x.open() <= CLOSED:
+            best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
+            if best.settled(BALANCED):
+                return best
     return None
-
-
-def _settled(x: Rest) -> bool:
-    return x.open() <= CLOSED and np.abs(x.r).max(initial=0.0) <= BALANCED * x.size
 
 
 def _pushed(x: Rest) -> Rest:
@@ -154,7 +166,7 @@ def _descent(x: Rest) -> Rest | None:
     x = x.closed()
     damping, left, way = HARD, np.abs(x.r).max(initial=0.0), 0.0
     for _ in range(DESCENT):
-        if damping < SOFT or left <= BALANCED * x.size:
+        if damping < SOFT or x.settled(BALANCED):
             return x
         step, lam = x.step(damping)
         longest = np.abs(step).max(initial=0.0)
@@ -174,30 +186,38 @@ def _descent(x: Rest) -> Rest | None:
 
 
 def _stability(x: Rest) -> tuple[str, Free, np.ndarray, np.ndarray, float]:
-    """(kind, freedoms, their stiffness, direction of least stiffness in scaled velocities, that stiffness)."""
+    """(kind, freedoms, their stiffness, direction of least stiffness in scaled velocities, that stiffness).
+
+    The stiffness along a direction is a part of what springs, weights and reactions do along it by themselves.
+    """
     e = Equations(State.resting(x.c, x.t, x.q, x.lam))
     f = free(e)
-    if not f.Z.shape[1]:
+    if not f.Zv.shape[1]:
         return STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf
-    K = f.Z.T @ e.by_position[e.at["r"]] @ f.Z
-    Z, _ = np.linalg.qr(f.Z / x.scale[:, None])
+    K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
+    Z, _ = np.linalg.qr(f.Zv / x.scale[:, None])
     own = Z.T @ x.K @ Z
     w, V = np.linalg.eigh(0.5 * (own + own.T))
-    least = w[0] / x.size
-    kind = UNSTABLE if least < -NEUTRAL else MARGINAL if least <= NEUTRAL else STABLE
-    if np.abs(own - own.T).max() > NEUTRAL * x.size:  # no potential: divergence and flutter show in the motion
+    along = np.abs(Z @ V)
+    acts = np.einsum("ik,ik->k", along, abs(x.K) @ along) + (x.scale * acting(e)) @ along**2
+    parts = w / np.where(acts > 0.0, acts, 1.0)
+    k = int(np.argmin(parts))
+    kind = UNSTABLE if parts[k] < -NEUTRAL else MARGINAL if parts[k] <= NEUTRAL else STABLE
+    if np.abs(own - own.T).max() > NEUTRAL * np.abs(own).max():  # no potential: flutter shows in the motion
         kind = _by_motion(e, f)
-    return kind, f, K, Z @ V[:, 0], float(least)
+    return kind, f, K, Z @ V[:, k], float(parts[k])
 
 
 def _by_motion(e: Equations, f: Free) -> str:
     """Stability by the eigenvalues, damping included."""
+    from scipy.linalg import eigvals
+
     r = e.at["r"]
-    M, D, K = (f.Z.T @ X[r] @ f.Z for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    n = len(M)
-    A = np.block([[np.zeros((n, n)), np.eye(n)], [-np.linalg.solve(M, K), -np.linalg.solve(M, D)]])
-    w = np.linalg.eigvals(A)
-    growth = w.real.max() / max(np.abs(w).max(), 1e-300)
+    M, D, K = (f.Zv.T @ X[r] @ f.Zv for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    one, none = np.eye(len(M)), np.zeros_like(M)
+    w = eigvals(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
+    w = w[np.isfinite(w)]
+    growth = (w.real / np.maximum(np.abs(w), 1e-300)).max(initial=-1.0)
     return UNSTABLE if growth > NEUTRAL**0.5 else MARGINAL if growth > -(NEUTRAL**0.5) else STABLE
 
 

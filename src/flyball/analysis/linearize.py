@@ -17,14 +17,14 @@ from ..model.model import Model
 from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import curve, slopes, snapshot
-from .linear.derivatives import Equations, State
+from .linear.derivatives import Equations, State, by_prescription
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.steady import kinematic, seen_from
 
-IMPROPER = 1e-9  # part of the largest number below which an output does not follow the rate of an input
+IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
 
 
 def linearize(
@@ -121,13 +121,18 @@ def _in_copy(model: Model, x: State) -> State:
 
 def _effects(e: Equations, f: Free, inputs: list[Input]) -> Inputs:
     """What the inputs do to the equations."""
-    prescribed = list(e.state.c.structure.prescribed)
-    by = [e.by_law(i.parameter) if i.parameter != i.name else e.by_parameter(i.name) for i in inputs]
+    by, g, n = [], [], []
+    for i in inputs:
+        stepped = e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
+        by.append(e.by_values(stepped))
+        told = by_prescription(e.state, stepped)
+        g.append(told[0])
+        n.append(told[1])
     W = np.array(by).reshape(len(inputs), e.width).T
-    given = -np.array([[float(i.driver == name) for i in inputs] for name in prescribed])
-    given = given.reshape(len(prescribed), len(inputs))
-    g = np.vstack([W[e.at["g"]], given])[f.on_positions]
-    return Inputs(W[e.at["r"]], g, np.vstack([W[e.at["n"]], 0.0 * given]))
+    prescribed = len(e.state.c.structure.prescribed)
+    given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
+    g_w = np.vstack([W[e.at["g"]], given])[f.on_positions]
+    return Inputs(W[e.at["r"]], g_w, np.vstack([W[e.at["n"]], rates]))
 
 
 def _outputs(e: Equations, r: Reduced, inputs: list[Input], names: Sequence[str]) -> np.ndarray:
@@ -147,9 +152,9 @@ def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequen
     B, B1, B2 = r.inputs(r.rate)
     C, (D, D1, D2) = y[:, :n], r.inputs(y)
     shift = B1 + A @ B2
-    largest = 1.0 + np.abs(y).max(initial=0.0)
+    known = np.abs(D) + np.abs(D1) + np.abs(D2) + np.abs(C) @ (np.abs(B) + np.abs(B1) + np.abs(B2))
     for rate, part in (("rate", D1 + C @ B2), ("second rate", D2)):
-        bad = np.argwhere(np.abs(part) > IMPROPER * largest)
+        bad = np.argwhere(np.abs(part) > IMPROPER * known)
         if len(bad):
             k, i = bad[0]
             raise ModelError(

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
-from ..results.modes import Modes
+from ..results.modes import GROWS, Modes
 from ..system.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
@@ -64,13 +64,17 @@ def modes(
     if len(x.v) > DENSE and x.c.structure.tree:
         x, _ = instant(model, about, t=t, parameters=parameters, coordinates="absolute")
     if len(x.v) > DENSE and not np.abs(x.v).max() > 0.0:
-        return _sparse(x, count or FEW)
+        return _sparse(x, count or FEW, frozen)
     f, frame, r = without_inputs(x, frozen)
     w, V = np.linalg.eig(r.A) if len(r.A) else (np.zeros(0, complex), np.zeros((0, 0)))
     one = np.flatnonzero(w.imag >= 0.0)
-    one = one[np.lexsort((-w[one].real, np.abs(w[one])))][:count]
+    one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
+    rest = one[count:] if count is not None else one[:0]
+    one = one[:count]
     shapes = r.position[:, : len(r.A)] @ V[:, one]
-    return _made(x, w[one].astype(complex), shapes, frame.turning, float(np.abs(w).max(initial=0.0)))
+    found = _made(x, w[one].astype(complex), shapes, frame.turning, float(np.abs(w).max(initial=0.0)))
+    found.growing = bool((w[rest].real > GROWS * np.abs(w[rest])).any())
+    return found
 
 
 def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray, fastest: float) -> Modes:
@@ -87,13 +91,19 @@ def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray, fast
     return Modes(w, own, tuple(n.name for n in names), units, turning, snapshot(x), fastest)
 
 
-def _sparse(x: State, count: int) -> Modes:
+def _sparse(x: State, count: int, frozen: bool) -> Modes:
     """The slowest modes of a large mechanism at rest."""
     import scipy.sparse as sp
     from scipy.sparse.linalg import LinearOperator, eigsh, splu
 
     e = Equations(x)
-    balanced(x, e)
+    if not frozen:
+        balanced(x, e)
+    if not all(row.holonomic for row in x.c.structure.rows):
+        raise AnalysisError(
+            f"{x.c.structure.model.name!r} has {len(x.v)} velocities and constraints on velocities only; modes of so "
+            f"large a mechanism are found without such constraints only"
+        )
     r = e.at["r"]
     M, D, K = (X[r].tocsc() for X in (e.by_acceleration, e.by_velocity, e.by_position))
     if abs(D).max() > UNDAMPED * abs(K).max():

@@ -28,7 +28,7 @@ from .motion.driven import leaves_no_freedom
 from .motion.options import output_times
 from .motion.start import Start
 
-FLAT = 1e-9  # stiffness, of what acts, below which an equilibrium's place is not determined
+FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
 
 @dataclass

@@ -19,7 +19,7 @@ from ..model.model import Model, listing, suggest
 from ..results.equilibrium import UNSTABLE, Equilibrium
 from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
-from .equilibrium import LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, _settled, _stability
+from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, _stability
 from .equilibrium import equilibrium as single
 from .linear.rest import Rest
 
@@ -197,6 +197,6 @@ def _contracted(x: Rest) -> Rest | None:
         if not size <= allowed:
             return None
         x, last = x.moved(step, lam), size
-        if size <= TINY**0.5 and _settled(x):
+        if size <= TINY**0.5 and x.open() <= CLOSED and x.settled(BALANCED):
             return x
     return None

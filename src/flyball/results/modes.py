@@ -32,6 +32,8 @@ class Modes:
         Angular velocity of the frame that they are seen from.
     point : Result
         Where they are about.
+    growing : bool
+        Whether a mode that was not asked for grows.
     fastest : float [1/s]
         Size of the largest eigenvalue, those that were not asked for included: what zeros are compared with.
     """
@@ -43,6 +45,7 @@ class Modes:
     turning: np.ndarray
     point: Result = field(repr=False)
     fastest: float = 0.0
+    growing: bool = False
 
     @property
     def _still(self) -> np.ndarray:
@@ -76,8 +79,8 @@ class Modes:
 
     @property
     def stable(self) -> bool:
-        """Whether no mode grows."""
-        return "unstable" not in self.kinds
+        """Whether no mode grows, those that were not asked for included; of large mechanisms those listed."""
+        return not self.growing and "unstable" not in self.kinds
 
     def __len__(self) -> int:
         return len(self.eigenvalues)

@@ -16,8 +16,23 @@ from typing import Any
 import numpy as np
 
 from ...errors import ModelError, PerformanceNotice
+from ...system.laws import evaluate_jet
+from ...system.opcodes import BY_TIME
 from ...system.structure import Structure
-from ...system.tables import EFFORT, FORCE_ALONG, FORCE_F, FORCE_LAW, FORCE_M, LAM, NV, X_SOLVED, System, Work
+from ...system.tables import (
+    BODY_LAW,
+    EFFORT,
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_LAW,
+    FORCE_M,
+    LAM,
+    NV,
+    OFFSET,
+    X_SOLVED,
+    System,
+    Work,
+)
 from ...system.values import Values, values, work
 from ..compiled import Compiled
 from ..entry import MOTION, residual_kernel
@@ -113,8 +128,12 @@ class Equations:
 
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model, (width,), the state's numbers held."""
+        return self.by_values(self.stepped(name))
+
+    def by_values(self, stepped: Values) -> np.ndarray:
+        """Derivatives along a complex step of the mechanism's numbers, (width,)."""
         steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
-        return self._run(steps, as_complex(self.stepped(name).system))[0].imag / STEP
+        return self._run(steps, as_complex(stepped.system))[0].imag / STEP
 
     def stepped(self, name: str) -> Values:
         """Numbers of the mechanism, a complex step along a parameter."""
@@ -124,8 +143,7 @@ class Equations:
 
     def by_law(self, name: str) -> np.ndarray:
         """Derivatives by a parameter that stands in laws only, (width,)."""
-        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
-        return self._run(steps, self.stepped_law(name).system)[0].imag / STEP
+        return self.by_values(self.stepped_law(name))
 
     def stepped_law(self, name: str) -> Values:
         """The same for a parameter that stands in laws only."""
@@ -173,6 +191,8 @@ class Equations:
                 rows.append(at[used])
                 columns.append(np.full(used.sum(), d))
                 entries.append(x[used])
+        if not rows:
+            return sp.csr_matrix((self.width, nv))
         where = (np.concatenate(rows), np.concatenate(columns))
         return sp.csr_matrix((np.concatenate(entries), where), shape=(self.width, nv))
 
@@ -186,6 +206,19 @@ class Equations:
             return sp.csc_matrix(np.ones((self.width, s.nv), bool)), np.arange(s.nv)
         touched = sp.csc_matrix(pattern(s, self.state.c.values.system))
         return touched, grouped(touched)
+
+
+def by_prescription(x: State, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
+    """What a complex step of the numbers does to prescribed coordinates: to q - f(t), and to v - f'(t); (n,) each."""
+    S = as_complex(stepped.system)
+    stack = np.zeros((x.c.structure.depth + 1, 3), complex)
+    out = []
+    for b in x.c.structure.prescribed.values():
+        law = int(S.body_i[b, BODY_LAW])
+        f, f1, _ = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
+        out.append((-(f - S.body_x[b, OFFSET]).imag / STEP, -np.imag(f1) / STEP))
+    found = np.array(out).reshape(-1, 2)
+    return found[:, 0], found[:, 1]
 
 
 def refuse_functions(s: Structure) -> None:

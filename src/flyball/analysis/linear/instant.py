@@ -8,8 +8,10 @@ from typing import Any
 from ...errors import ModelError
 from ...model.expressions import number
 from ...model.model import Model
+from ...results.equilibrium import Equilibrium
 from ...results.result import Result
 from ..assemble import Assembly, assemble
+from ..compiled import compiled
 from ..motion.layer import in_coordinates
 from ..motion.start import begin
 from .derivatives import State
@@ -33,7 +35,7 @@ def instant(
     t : float [s]
         Time, where ``about`` does not tell it.
     parameters : mapping, optional
-        Values in SI units in place of the model's; those of an equilibrium are its own.
+        Values in SI units in place of the model's, and of those that an equilibrium was found with.
     coordinates : str
         ``"auto"``, ``"absolute"`` or ``"joint"``.
 
@@ -47,11 +49,36 @@ def instant(
     if isinstance(about, Result):
         start = begin(model, about.final[0], parameters, about, coordinates)
         a, why = start.assembly, start.coordinates
-    elif isinstance(getattr(about, "assembly", None), Assembly):
-        a, why = in_coordinates(about.assembly, coordinates, about.parameters)  # type: ignore[union-attr]
+    elif isinstance(about, Equilibrium):
+        known = {**about.parameters, **(parameters or {})}
+        a, why = in_coordinates(_there(model, about, known), coordinates, known)
     elif about is None:
         base = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
         a, why = in_coordinates(base, coordinates, parameters)
     else:
         raise ModelError(f"about must be a result or an equilibrium, got {type(about).__name__}")
     return State.moving(a.compiled, a.t, a.q, a.v), why
+
+
+def _there(model: Model, about: Equilibrium, parameters: Mapping[str, float]) -> Assembly:
+    """The mechanism where an equilibrium found it; whether it rests there now is for others to see.
+
+    Raises
+    ------
+    ModelError
+        If the equilibrium is of another mechanism, or a preload of one that has been changed.
+    """
+    old = about.assembly.compiled
+    if about.preload:
+        own = old.structure.model
+        loaded = {name.partition(".")[0] for name in about.preload}
+        parts, others = ([e for e in m.elements() if e.name not in loaded] for m in (model, own))
+        if parts != others:
+            raise ModelError(f"{model.name!r} is not what it was when its preload was found; find it again")
+        model = own
+    if [b.name for b in model.bodies] != [b.name for b in old.structure.model.bodies]:
+        raise ModelError(f"about is an equilibrium of {old.structure.model.name!r}, which has other bodies")
+    c = compiled(model.snapshot(), parameters=parameters)
+    t, q, v = about.assembly.t, about.assembly.q, about.assembly.v
+    q, v = c.take(old, t, q, v)
+    return Assembly(c, t, q, v)

@@ -29,8 +29,7 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     NotConverged
         If these forces cannot balance it.
     """
-    if isinstance(names, str):
-        names = [names]
+    names = [names] if isinstance(names, str) else list(dict.fromkeys(names))
     model, inputs = with_inputs(a.compiled.structure.model, names)
     for i in inputs:
         if i.driver or i.name == i.parameter:
@@ -47,8 +46,7 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     loaded = compiled(model, parameters=changed)
     loaded.follow(c.hints)
     y = Rest.at(loaded, a.t, a.q)
-    left = y.unbalanced()
-    if left > BALANCED:
+    if not y.settled(BALANCED):
         d = int(np.argmax(np.abs(y.r)))
         name = velocity_names(c.structure)[d]
         raise NotConverged(

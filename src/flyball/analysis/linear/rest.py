@@ -11,14 +11,13 @@ from functools import cached_property
 import numpy as np
 
 from ...system.names import velocity_names
-from ...system.tables import G_VALUE, MASS
 from ...system.tree import retract
 from ..compiled import Compiled
+from .balance import acting, allowed
 from .derivatives import Equations, State
 
 DENSE = 1200  # unknowns up to which a step is one of least squares
 LEAST = 1e-11  # singular values of the equations below this part of the largest are none
-NOTHING = 1e-9  # acceleration [m/s^2] of the whole mechanism that is none
 WEAK = 1e-10  # what is added to the sparse equations' diagonal, of their entries
 
 
@@ -56,22 +55,16 @@ class Rest:
         return np.array([self.c.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.c.structure)])
 
     @cached_property
-    def holonomic(self) -> np.ndarray:
-        """Which rows are constraints on positions."""
-        return np.array([r.holonomic for r in self.c.structure.rows], bool)
-
-    @cached_property
     def G(self):
-        """Constraints on positions, scaled to unit rows; sparse."""
+        """All constraints, those on velocities too: none of them lets a displacement through. Unit rows; sparse."""
         import scipy.sparse as sp
 
-        G = self.equations.by_position[self.equations.at["g"]][self.holonomic] @ sp.diags(self.scale)
-        return sp.diags(self.per_row) @ G
+        return sp.diags(self.per_row) @ self.equations.by_velocity[self.equations.at["n"]] @ sp.diags(self.scale)
 
     @cached_property
     def per_row(self) -> np.ndarray:
         """What makes the rows' length one."""
-        G = self.equations.by_position[self.equations.at["g"]][self.holonomic]
+        G = self.equations.by_velocity[self.equations.at["n"]]
         size = np.sqrt(np.asarray((G.multiply(G)) @ (self.scale**2)).ravel())
         return 1.0 / np.where(size > 0.0, size, 1.0)
 
@@ -90,32 +83,36 @@ class Rest:
 
     @cached_property
     def g(self) -> np.ndarray:
-        """Constraints' violations, scaled as G."""
-        return self.per_row * self.equations.block("g")[self.holonomic]
+        """Constraints' violations, scaled as G; those on velocities have none."""
+        which = np.array([r.holonomic for r in self.c.structure.rows], bool)
+        return np.where(which, self.per_row * self.equations.block("g"), 0.0)
 
     @cached_property
     def size(self) -> float:
-        """Energy that small ones are compared with: what acts, and what stiffness makes of a step of one."""
-        acting = np.abs(self.r + self.G.T @ (self.lam[self.holonomic] / self.per_row)).max(initial=0.0)
-        nothing = NOTHING * float(self.c.values.system.body_x[:, MASS].sum()) * self.c.values.length
-        return float(max(acting, np.abs(self.K.data).max(initial=0.0), nothing))
+        """The largest energy that acts or that stiffness makes of a step of one."""
+        most = np.abs(self.scale * acting(self.equations)).max(initial=0.0)
+        return float(max(most, np.abs(self.K.data).max(initial=0.0), 1e-300))
+
+    def settled(self, part: float) -> bool:
+        """Whether every equation is balanced, but for a part of what acts in it."""
+        return bool((np.abs(self.equations.block("r")) <= allowed(self.equations, part)).all())
 
     def unbalanced(self) -> float:
-        """The largest force that the best multipliers leave, of those that act."""
+        """The largest force that the best multipliers leave, of those that act in its equation."""
         best = Rest(self.c, self.t, self.q, self.balancing())
-        return float(np.abs(best.r).max(initial=0.0)) / self.size
+        left, rounding = np.abs(best.equations.block("r")), allowed(best.equations, 0.0)
+        acts = acting(best.equations)
+        return float(np.where(left > rounding, left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
 
     def open(self) -> float:
         """The largest gap, of the mechanism's length or in radians."""
-        self.c.at(self.t, self.q, np.zeros_like(self.scale))
-        return float(np.abs(self.c.work.row[G_VALUE][self.holonomic]).max(initial=0.0)) / self.c.values.length
+        return float(np.abs(self.equations.block("g")).max(initial=0.0)) / self.c.values.length
 
     def balancing(self) -> np.ndarray:
         """Multipliers that leave the least of the forces."""
-        out = self.lam.copy()
-        if self.holonomic.any():
-            out[self.holonomic] += self.per_row * _least(self.G.T, self.r)
-        return out
+        if not len(self.g):
+            return self.lam
+        return self.lam + self.per_row * _least(self.G.T, self.r)
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Newton's step, scaled, and the change of multipliers; damped by so many times the identity."""
@@ -123,19 +120,27 @@ class Rest:
 
     def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Changes of positions along the velocities and of multipliers that make up for changes r and g."""
-        step, lam = self._solve(self.scale * r, self.per_row * g[self.holonomic], 0.0)
+        step, lam = self._solve(self.scale * r, self.per_row * g, 0.0)
         return self.scale * step, lam
 
     def _solve(self, r: np.ndarray, g: np.ndarray, damping: float) -> tuple[np.ndarray, np.ndarray]:
+        """The linear equations, every row and column by its own stiffness: soft directions beside stiff ones count."""
         import scipy.sparse as sp
 
         n = len(self.scale)
-        K = self.K + damping * self.size * sp.identity(n)
-        A = sp.bmat([[K, -self.G.T * self.size], [self.G * self.size, None]]) if len(g) else K
-        x = _least(A, np.r_[-r, -g * self.size])
-        lam = np.zeros_like(self.lam)
-        lam[self.holonomic] = x[n:] * self.size * self.per_row
-        return x[:n], lam
+        K = (self.K + damping * self.size * sp.identity(n)).tocsr()
+        stiff = np.asarray(abs(K).max(axis=1).todense()).ravel() if n else np.zeros(0)
+        weakest = 1e-14 * stiff.max(initial=0.0)
+        own = 1.0 / np.sqrt(np.where(stiff > weakest, stiff, stiff.max(initial=1e-300) or 1.0))
+        D = sp.diags(own)
+        if not len(g):
+            return own * _least(D @ K @ D, -own * r), np.zeros(0)
+        G = self.G @ D
+        rows = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
+        rows = 1.0 / np.where(rows > 0.0, rows, 1.0)
+        G = sp.diags(rows) @ G
+        x = _least(sp.bmat([[D @ K @ D, -G.T], [G, None]]), np.r_[-own * r, -rows * g])
+        return own * x[:n], rows * x[n:] * self.per_row
 
     def moved(self, step: np.ndarray, lam: np.ndarray) -> Rest:
         """A scaled step on."""
@@ -147,7 +152,7 @@ class Rest:
         """Back on the constraints, with the multipliers that balance best."""
         now = self
         for _ in range(8):
-            if now.open() < 1e-12 or not len(now.g):
+            if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
                 break
             now = now.moved(_least(now.G, -now.g), 0.0 * now.lam)
         return Rest.at(now.c, now.t, now.q)

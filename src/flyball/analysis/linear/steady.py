@@ -16,6 +16,7 @@ from ...results.records import Records
 from ...system.names import velocity_names
 from ...system.tables import TREE, V0
 from ...system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
+from .balance import allowed, sizes
 from .derivatives import Equations, State
 from .free import Free
 from .reduced import Frame, reduced
@@ -71,9 +72,11 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
     """Whether a moment later, moved on with the frame, the accelerations and linear equations are the same."""
     from scipy.linalg import expm
 
+    size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
+    if not np.abs((x.vdot - frame.H @ x.v) / f.scale).max() <= SAME * size:
+        return False  # the velocities do more than turn with the frame
     tau, later = _later(x, frame)
     T = expm(tau * frame.H)
-    size = np.abs(x.v / f.scale).max() ** 2 + np.abs(x.vdot / f.scale).max()
     if not np.abs((later.vdot - T @ x.vdot) / f.scale).max() <= SAME * size:
         return False
     then = Equations(later)
@@ -116,16 +119,11 @@ def balanced(x: State, e: Equations) -> None:
         Naming what is accelerated most.
     """
     names = velocity_names(x.c.structure)
-    scale = np.array([1.0 if n.unit == "m" else 1.0 / x.c.values.length for n in names])
-    M = e.by_acceleration[e.at["r"]]
-    left = np.abs(scale * (M @ x.vdot))
-    rows, r = e.by_position[e.at["g"]], e.at["r"]
-    total = left.max(initial=0.0) + np.abs(scale * (rows.T @ x.lam)).max(initial=0.0)
-    stiffness = abs(e.by_position[r]).T.multiply(scale).T.multiply(x.c.values.length * scale)
-    total += stiffness.max() + np.abs(scale * (e.residual[r] - M @ x.vdot + rows.T @ x.lam)).max(initial=0.0)
-    if left.max(initial=0.0) <= BALANCED * total:
+    left = np.abs(e.by_acceleration[e.at["r"]] @ x.vdot)
+    may = allowed(e, BALANCED)
+    if not (left > may).any():
         return
-    d = int(np.argmax(left))
+    d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * sizes(e), 0.0)))
     raise AnalysisError(
         f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
         f"{names[d].sign * x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "

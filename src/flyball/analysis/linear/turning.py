@@ -21,12 +21,14 @@ from ...system.tables import BODY_LAW, V0
 from ...system.tree import retract
 from ..assemble import Assembly
 from ..motion.layer import in_coordinates
+from .balance import acting, allowed
 from .derivatives import Equations, State
 from .free import prescribed
 
 PASSES = 60
 LONGEST = 0.2  # a step in radians, parts of the mechanism's length, or parts of a speed
-SETTLED = 1e-10
+SETTLED = 1e-9  # what is left of an equation of motion, of what acts in it
+ARRIVED = 1e-7  # Newton's last step
 LEAST = 1e-11  # singular values below this part of the largest are none
 
 
@@ -36,6 +38,7 @@ class Turning:
 
     state: State
     speeds: dict[str, float]
+    unbalanced: float  # the largest force left, of those that act in its equation
 
 
 def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None) -> Turning:
@@ -62,19 +65,28 @@ def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] |
         raise _failure(start, names)
     x = found
     c.at(x.t, x.q, x.v)
-    sign = velocity_names(c.structure)
-    return Turning(
-        State.moving(c, x.t, x.q, x.v), {n: float(sign[d].sign * x.v[d]) for n, d in zip(names, at, strict=True)}
-    )
+    known = velocity_names(s)
+    speeds = {name: float(known[d].sign * x.v[d]) for name, d in zip(names, at, strict=True)}
+    e = Equations(x)
+    left, acts = np.abs(e.block("r")), acting(e)
+    left = np.where(left > allowed(e, 0.0), left / np.where(acts > 0.0, acts, 1.0), 0.0)
+    return Turning(State.moving(c, x.t, x.q, x.v), speeds, float(left.max(initial=0.0)))
 
 
 def _search(x: State, at: list[int], free: list[int]) -> tuple[State | None, State]:
     """Newton's method; None where it does not settle, and where it ended."""
     for _ in range(PASSES):
-        x, size, left = _step(x, at, free)
-        if size < LONGEST and left < SETTLED:
+        x, size = _step(x, at, free)
+        if size < ARRIVED and _settled(x):
             return x, x
     return None, x
+
+
+def _settled(x: State) -> bool:
+    """Whether positions, speeds and multipliers fulfil the equations with all accelerations zero."""
+    e = Equations(x)
+    gaps = np.abs(e.block("g")).max(initial=0.0) / x.c.values.length + np.abs(e.block("n")).max(initial=0.0)
+    return bool(gaps < 1e-9 and (np.abs(e.block("r")) <= allowed(e, SETTLED)).all())
 
 
 def _place(b: Assembly, name: str) -> int:
@@ -93,15 +105,17 @@ def _place(b: Assembly, name: str) -> int:
     return int(s.tables["body_i"][row, V0])
 
 
-def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float, float]:
-    """One step of Newton's method: (state, size of the step, what was left before it)."""
+def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float]:
+    """One step of Newton's method: (state, size of the step)."""
     c, s = x.c, x.c.structure
     given = prescribed(c)
     moving = np.array([d for d in range(s.nv) if d not in at and not given[:, d].any()], int)
     scale = np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(s)])
     e = Equations(x)
     A, left, size = _equations(e, moving, np.array(free, int), given, scale)
-    step = np.linalg.lstsq(A, -left, rcond=LEAST)[0]
+    by_row = 1.0 / np.maximum(np.abs(A).max(axis=1), 1e-300)
+    by_column = 1.0 / np.maximum(np.abs(by_row[:, None] * A).max(axis=0), 1e-300)
+    step = by_column * np.linalg.lstsq(by_row[:, None] * A * by_column, -by_row * left, rcond=LEAST)[0]
     m, k, rows = len(moving), len(free), len(s.rows)
     longest = float(np.abs(step[: m + k]).max(initial=0.0))
     part = min(1.0, LONGEST / max(longest, 1e-300))
@@ -112,7 +126,7 @@ def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float, float
     v[free] += (1.0 + np.abs(v[free])) * step[m : m + k] * part
     c.at(x.t, q, v)
     lam, effort = x.lam + size * step[m + k : m + k + rows], x.effort + given.T @ (size * step[m + k + rows :])
-    return replace(x, q=q, v=v, z=c.z.copy(), lam=lam, effort=effort), longest, float(np.abs(left).max())
+    return replace(x, q=q, v=v, z=c.z.copy(), lam=lam, effort=effort), longest
 
 
 def _equations(
