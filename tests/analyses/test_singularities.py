@@ -232,3 +232,18 @@ def test_rolling_is_refused():
     m.add(fb.Driver("push", f"{m.bodies[0].name}.x", "t"))
     with pytest.raises(fb.ModelError, match="restrain velocities only"):
         m.singularities("push", (0, 1))
+
+
+def test_turns_are_counted_on():
+    """A crank that turns all the way comes to any angle; a parallelogram is flat twice in every turn."""
+    m = fb.Mechanism("parallelogram", planar=True)
+    at = {"left": (0.0, 0.0), "right": (2.0, 0.0)}
+    for name, foot in at.items():
+        m.add(fb.Body(name, mass=1, inertia=0.1, position=(foot[0], 0.5)))
+        m.add(fb.Revolute(f"{name} foot", "ground", name, at=foot))
+    m.add(fb.Body("bar", mass=1, inertia=0.1, position=(1, 1)))
+    m.add(fb.Revolute("B", "left", "bar", at=(0, 1)), fb.Revolute("C", "right", "bar", at=(2, 1)))
+    m.add(fb.Driver("motor", "left foot.angle", "t"))
+    found = m.singularities("motor", ("600 deg", "1000 deg"))
+    flat = np.degrees([p.a for p in found])
+    assert sorted(flat) == pytest.approx([630, 810, 990], abs=1e-4)

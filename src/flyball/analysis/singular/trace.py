@@ -23,6 +23,7 @@ TURN = 0.12  # the most that a step may turn the tangent [rad]
 LEAST = 1e-7  # the shortest step [1]
 SAME = 1e-5  # points nearer than this are one [1]
 SMALL = 0.1  # part of the largest singular value below which others may vanish together with the least
+HALF_TURN = 3.0  # of a driver's angle [rad]
 STILL = 1e-8  # a driver's part of the tangent below this is none
 ON_IT = 1e-6  # singular values below this are avoided by changing the step
 
@@ -114,7 +115,8 @@ class Tracer:
             if not within(new.x.a):
                 way.end = "end of the range"
                 return way
-            if home is not None and new.s - first.s > 4.0 * self.step and self._home(new, home):
+            again = home is not None and abs(new.x.a - home.x.a) < HALF_TURN  # a whole turn on is another value
+            if home is not None and again and new.s - first.s > 4.0 * self.step and self._home(new, home):
                 way.end = "closed"
                 return way
             h = min(2.0 * (new.s - last.s), self._longest(new))
@@ -213,5 +215,5 @@ class Tracer:
             self._note(low.s, low.x, way)
 
     def _note(self, s: float, x: Place, way: Way) -> None:
-        if all(np.linalg.norm(self.c.way(x, y)) > SAME for _, y in way.found):
+        if all(np.linalg.norm(self.c.way(x, y)) > SAME or abs(x.a - y.a) > HALF_TURN for _, y in way.found):
             way.found.append((s, x))
