@@ -275,3 +275,25 @@ def test_nothing_can_move():
         assert L.A.shape == (0, 0)
         assert L.output_values == pytest.approx([G])
         assert len(m.modes(coordinates=layer)) == 0
+
+
+def test_what_changes_with_time_is_refused():
+    """Laws of time while it rests, and outputs that do not turn with a steady motion."""
+    m = rod(a=1.0)
+    m.add(fb.Motor("motor", joint="A", torque="-(5 + 4*cos(3*t))*angle"))
+    with pytest.raises(fb.AnalysisError, match="change with time"):
+        m.modes()
+    assert m.modes(frozen=True).omega == pytest.approx([np.sqrt((G / 2 + 9) * 3)], rel=1e-9)
+    turning = conical_pendulum()
+    with pytest.raises(fb.ModelError, match=r"output 'bob\.x' does not turn with the mechanism"):
+        turning.linearize(outputs=["bob.x"])
+    assert turning.linearize(outputs=["hinge.angle", "bob.z"]).C.shape == (2, 4)
+
+
+def test_a_preloaded_motor_is_an_input_too():
+    m = rod(np.pi / 2)
+    m.add(fb.Motor("motor", joint="A", torque="0"))
+    held = m.equilibrium(preload=["motor", "motor"])
+    assert held.preload["motor"] == pytest.approx(G / 2)
+    L = m.linearize(["motor"], ["A.angle"], about=held)
+    assert L.B[1, 0] == pytest.approx(3.0)

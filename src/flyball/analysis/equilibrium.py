@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..errors import NotConverged
+from ..errors import ModelError, NotConverged
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
@@ -82,6 +82,10 @@ def equilibrium(
     """
     a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
     if start is not None:
+        if not isinstance(start, Equilibrium) or list(start.assembly.compiled.structure.place) != list(
+            a.compiled.structure.place
+        ):
+            raise ModelError(f"start must be an equilibrium of {model.name!r}, or of one with the same bodies")
         q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
         a = Assembly(a.compiled, a.t, q, np.zeros(a.compiled.structure.nv))
     if turning:
@@ -244,14 +248,12 @@ def _finished(x: Rest, preload: dict[str, float], way: str) -> Equilibrium:
 
 def _failure(x: Rest) -> NotConverged:
     """What remains where the search ended."""
-    left = x.equations.block("r")
+    best = Rest.at(x.c, x.t, x.q)
     names = velocity_names(x.c.structure)
+    left = best.equations.block("r")
     residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
-    d = int(np.argmax(np.abs(x.r)))
-    unit = "N" if names[d].unit == "m" else "N*m"
     return NotConverged(
-        f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {-left[d]:.3g} {unit} push "
-        f"along {names[d].name} and nothing holds against it. Give a better guess, or add what has to hold it: a "
-        f"spring, a stop, a driver",
+        f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
+        f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
         residuals,
     )

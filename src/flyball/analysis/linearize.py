@@ -22,8 +22,9 @@ from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.steady import kinematic, seen_from
+from .linear.steady import kinematic, moved_on, seen_from
 
+TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
 
 
@@ -83,7 +84,32 @@ def linearize(
     if named:
         x = _in_copy(model, x)
     e, f, frame = _about(x, frozen)
-    return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
+    r = _reduced(e, f, frame, _effects(e, f, named))
+    if frame.turning.any() and (named or outputs):
+        _refuse_turning(e, f, r, frame, named, outputs)
+    return _model(e, f, r, frame, named, outputs)
+
+
+def _refuse_turning(
+    e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]
+) -> None:
+    """Refuse inputs and outputs that do not turn with the mechanism: their coefficients would change with time."""
+    then, g, own = moved_on(e.state, f, frame)
+    later = _reduced(then, g, own, _effects(then, g, inputs))
+    n = len(r.rate)
+    for what, names, now, other in (
+        ("output", outputs, _outputs(e, r, inputs, outputs), _outputs(then, later, inputs, outputs)),
+        ("input", [i.name for i in inputs], r.inputs(r.rate)[0].T, later.inputs(later.rate)[0].T),
+    ):
+        for k, name in enumerate(names):
+            if np.abs(other[k, :n] - now[k, :n]).max(initial=0.0) > TURNED * (
+                1e-300 + np.abs(now[k, :n]).max(initial=0.0)
+            ):
+                raise ModelError(
+                    f"{what} {name!r} does not turn with the mechanism: seen from the frame in which the motion is "
+                    f"steady it changes with time. Take one that does, such as a joint's coordinate or drive, or ask "
+                    f"for this very instant with frozen=True"
+                )
 
 
 def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:

@@ -57,6 +57,8 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
             )
         e, field, at, of = known[name]
         parameter = f"input_{k}_of_{''.join(c if c.isalnum() else '_' for c in name)}"
+        while parameter in out.parameters:  # a preload's
+            parameter += "_"
         out.parameters[parameter] = 0.0
         _replace(out, e, field, at, of, parameter)
         inputs.append(Input(name, parameter, of.dimension or "SI", e.name if isinstance(e, Driver) else ""))

@@ -47,11 +47,9 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     loaded.follow(c.hints)
     y = Rest.at(loaded, a.t, a.q)
     if not y.settled(BALANCED):
-        d = int(np.argmax(np.abs(y.r)))
-        name = velocity_names(c.structure)[d]
         raise NotConverged(
-            f"{', '.join(names)} cannot balance {model.name!r} where it is drawn: {-y.r[d] / y.scale[d]:.3g} "
-            f"{'N' if name.unit == 'm' else 'N*m'} remain along {name.name}; preload other forces too",
+            f"{', '.join(names)} cannot balance {model.name!r} where it is drawn: {y.pushed()} all the same; preload "
+            f"other forces too",
             {n.name: float(-v) for n, v in zip(velocity_names(c.structure), y.equations.block("r"), strict=True)},
         )
     return y, dict(zip(names, w.tolist(), strict=True))

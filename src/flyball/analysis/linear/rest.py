@@ -15,6 +15,7 @@ from ...system.tree import retract
 from ..compiled import Compiled
 from .balance import acting, allowed
 from .derivatives import Equations, State
+from .free import free
 
 DENSE = 1200  # unknowns up to which a step is one of least squares
 LEAST = 1e-11  # singular values of the equations below this part of the largest are none
@@ -103,6 +104,17 @@ class Rest:
         left, rounding = np.abs(best.equations.block("r")), allowed(best.equations, 0.0)
         acts = acting(best.equations)
         return float(np.where(left > rounding, left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
+
+    def pushed(self) -> str:
+        """The largest force that is left along a free coordinate, in words."""
+        f = free(self.equations)
+        force = -f.Zv.T @ self.equations.block("r")
+        if not len(force):
+            return "no force"
+        size = self.scale[f.chosen_v]
+        k = int(np.argmax(np.abs(force * size)))
+        name = f.names[f.chosen_v[k]]
+        return f"{force[k]:.3g} {'N' if name.unit == 'm' else 'N*m'} push along {name.name}"
 
     def open(self) -> float:
         """The largest gap, of the mechanism's length or in radians."""

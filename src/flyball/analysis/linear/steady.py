@@ -14,7 +14,8 @@ import numpy as np
 from ...errors import AnalysisError
 from ...results.records import Records
 from ...system.names import velocity_names
-from ...system.tables import TREE, V0
+from ...system.opcodes import INPUT
+from ...system.tables import FORCE_LAW, TREE, V0, System
 from ...system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
 from .balance import allowed, sizes
 from .derivatives import Equations, State
@@ -99,7 +100,10 @@ def seen_from(x: State, e: Equations, f: Free) -> Frame:
     still = np.zeros((len(x.v),) * 2)
     if not (np.abs(x.v) / f.scale).max(initial=0.0) > STILL * np.sqrt(1.0 + np.abs(x.vdot / f.scale).max(initial=0.0)):
         balanced(x, e)
-        return Frame(np.zeros(3), still, still)
+        at_rest = Frame(np.zeros(3), still, still)
+        if timed(x.c.values.system):
+            _refuse_changing(x, e, f, at_rest)
+        return at_rest
     for frame in frames(x):
         if is_steady(x, e, f, frame):
             return frame
@@ -129,6 +133,41 @@ def balanced(x: State, e: Equations) -> None:
         f"{names[d].sign * x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
         f"about=m.equilibrium()"
     )
+
+
+def timed(S: System) -> bool:
+    """Whether a law of a force follows time."""
+    for law in S.force_i[:, FORCE_LAW : FORCE_LAW + 3].ravel().tolist():
+        if law >= 0:
+            program = S.code[law + 2 : law + 2 + 2 * S.code[law]].reshape(-1, 2)
+            if (program == (INPUT, 0)).all(axis=1).any():
+                return True
+    return False
+
+
+def _refuse_changing(x: State, e: Equations, f: Free, frame: Frame) -> None:
+    """Refuse linear equations that are others a moment later, though the mechanism rests."""
+    now = reduced(e, f, frame).A
+    fastest = float(np.sqrt(np.abs(now).max(initial=0.0))) or 1.0
+    z = x.c.z.copy()
+    then = reduced(Equations(State.moving(x.c, x.t + SWING / fastest, x.q, x.v)), f, frame).A
+    x.c.at(x.t, x.q, x.v)
+    x.c.z = z
+    if np.abs(then - now).max(initial=0.0) > SAME * np.abs(now).max(initial=0.0):
+        raise AnalysisError(
+            "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
+            "those of this very instant with frozen=True"
+        )
+
+
+def moved_on(x: State, f: Free, frame: Frame) -> tuple[Equations, Free, Frame]:
+    """The same equations a short while later, the bases turned with the frame."""
+    from scipy.linalg import expm
+
+    tau, later = _later(x, frame)
+    then = Equations(later)
+    own = Frame(frame.turning, _generator(later, frame.turning), kinematic(later))
+    return then, f.turned(expm(tau * frame.H), then), own
 
 
 def _later(x: State, frame: Frame) -> tuple[float, State]:
