@@ -257,3 +257,23 @@ def test_the_command(tmp_path):
     assert data["reactions"]["lower.fx"]["values"] == [None] * 5
     assert CliRunner().invoke(app, ["inverse-dynamics", str(path), "--motion", "upper.angle"]).exit_code == 2
     assert CliRunner().invoke(app, ["inverse-dynamics", str(path), "-o", str(out)]).exit_code == 3
+
+
+def test_a_singular_instant_is_told():
+    """A slider that is pushed to the dead centre of its crank: the force that this takes has no bound."""
+    m = fb.Mechanism("press", planar=True)
+    m.add(fb.Body("crank", mass=1, inertia=0.01, position=(0, 0.05)))
+    m.add(fb.Body("rod", mass=1, inertia=0.02, position=(0.14, 0.05)))
+    x = 0.28284271247461906
+    m.add(fb.Body("slider", mass=1, inertia=0.01, position=(x, 0)))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "rod", at=(0, 0.1)))
+    m.add(fb.Revolute("C", "rod", "slider", at=(x, 0)))
+    m.add(fb.Translational("D", "ground", "slider", at=(x, 0), axis=(1, 0)))
+    m.add(fb.Driver("push", "slider.x", f"{x} + t"))
+    end = 0.4 - x
+    told = dict(m.inverse_dynamics([0.0, 0.5 * end], None).lines())
+    assert "warning" not in told
+    found = m.inverse_dynamics(np.linspace(0.0, end * (1 - 1e-13), 11))
+    assert found.near_singular[-1]
+    assert not found.near_singular[:-1].any()
+    assert "singular position" in dict(found.lines())["warning"]

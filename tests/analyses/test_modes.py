@@ -105,3 +105,11 @@ def test_slow_modes_beside_fast_ones_are_no_rigid_ones():
     found = m.modes()
     assert found.kinds == ("oscillation",) * 2
     assert found.omega == pytest.approx([0.1, 1e4], rel=1e-9)
+
+
+def test_no_freedom_no_modes():
+    m = rod(0.3)
+    m.add(fb.Driver("motor", "A.angle", "2*t"))
+    found = m.modes()
+    assert len(found) == 0
+    assert "no freedom" in repr(found)

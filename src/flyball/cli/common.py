@@ -40,7 +40,7 @@ def reported(as_json: bool) -> Iterator[None]:
         yield
     except FlyballError as error:
         code = FAILED if isinstance(error, AnalysisError) else BAD_INPUT
-        fail(str(error), type(error).__name__, code, as_json)
+        fail(str(error).replace("about=m.equilibrium()", "--equilibrium"), type(error).__name__, code, as_json)
     except KeyboardInterrupt:
         fail("interrupted", "KeyboardInterrupt", INTERRUPTED, as_json)
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 TOUCHED = 1e-6  # part of the largest self-stress below which a component is left alone
+NEAR = 1e-4  # singular values below this part of their usual size are those of a singular position
 ROUNDING = 1e-12  # part of a joint's largest reaction that is printed as nothing
 SPATIAL, PLANE = ("fx", "fy", "fz", "tx", "ty", "tz"), ("fx", "fy", "torque")
 INDEX = {"fx": 0, "fy": 1, "fz": 2, "tx": 3, "ty": 4, "tz": 5, "torque": 5}
@@ -207,7 +208,23 @@ class InverseDynamics:
             out.append(("drive", f"{name}: {effort}, power {d.power.min():.4g} to {d.power.max():.4g} W"))
         for e in self.result.model.joints:
             out.append(("reaction", self._line(e.name)))
+        if (near := self.near_singular).any():
+            at = ", ".join(f"{t:g}" for t in self.t[near][:4])
+            out.append(
+                (
+                    "warning",
+                    f"singular position at or beside t = {at} s: forces there grow without bound, or are rounding",
+                )
+            )
         return out
+
+    @property
+    def near_singular(self) -> np.ndarray:
+        """Times at which constraints all but lose their independence, or do, and at others not; (n,) of bool."""
+        d = self.determinacy
+        usual = np.median(d.least) if len(d.least) else 1.0
+        fewest = d.count.min(initial=np.iinfo(np.int64).max)
+        return (d.count > fewest) | (d.least < NEAR * usual)
 
     def _line(self, joint: str) -> str:
         w = self.reaction(joint)

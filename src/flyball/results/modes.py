@@ -100,6 +100,8 @@ class Modes:
             ratio = ratio if abs(ratio) > ROUNDING else 0.0
             figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {ratio:14.4g}"
             out.append((str(k), f"{figures}  {self.kinds[k]:<12} {most}"))
+        if not len(self):
+            return [("modes", "none: no freedom is left to move in")]
         if self.turning.any():
             turning = ", ".join(f"{x:.4g}" for x in self.turning)
             out.append(("seen from", f"a frame that turns with ({turning}) rad/s"))

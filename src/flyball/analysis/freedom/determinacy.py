@@ -22,6 +22,8 @@ class Determinacy:
     ----------
     count : ndarray (n,) of int
         Constraints too many at every time.
+    least : ndarray (n,)
+        The smallest singular value of the constraints that counts, of the largest: near zero near a singular position.
     wrenches : dict
         Joint -> what independent self-stresses do to its reaction, (n, 6, k): force and torque / length, world axes,
         on ``body_j`` at the joint's point there. Joints that none touches are left out.
@@ -30,6 +32,7 @@ class Determinacy:
     """
 
     def __init__(self, n: int) -> None:
+        self.least = np.ones(n)
         self.count = np.zeros(n, np.int64)
         self.wrenches: dict[str, np.ndarray] = {}
         self.efforts: dict[str, np.ndarray] = {}
@@ -50,7 +53,7 @@ def determinacy(result: Result) -> Determinacy:
         if base is not own:
             q, v = base.take(own, result.t[k], q, v)
         base.at(result.t[k], q, v)
-        lam = _dependencies(base)
+        lam, out.least[k] = _dependencies(base)
         out.count[k] = lam.shape[1]
         if lam.shape[1]:
             found.append((k, _stresses(Assembly(base, result.t[k], q, v), lam, out, k)))
@@ -67,22 +70,23 @@ def told_by(result: Result) -> dict[str, float]:
     return dict(zip(names, result.values.system.const[: len(names)].tolist(), strict=True))
 
 
-def _dependencies(c: Compiled) -> np.ndarray:
-    """Multipliers (nr, k) that act on nothing, at the position last evaluated."""
+def _dependencies(c: Compiled) -> tuple[np.ndarray, float]:
+    """Multipliers (nr, k) that act on nothing, at the position last evaluated; the least singular value that counts."""
     S = c.values.system
     nr, nv = len(S.row_i), c.structure.nv
     if max(nr, nv) > DENSE:
         from ..mobility import scaled_jacobian
 
         G, size, _ = scaled_jacobian(c)
-        return _null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None]
+        return _null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None], 1.0
     row_p = S.row_p[: nr + 1]
     G = np.zeros((nr, nv))
     np.add.at(G, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[: row_p[-1]]), c.work.G[: row_p[-1]])
     G *= lengths(c)
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
     U, d, _ = np.linalg.svd(G / size[:, None], full_matrices=True)
-    return U[:, int((d > TOLERANCE * d.max(initial=1e-300)).sum()) :] / size[:, None]
+    rank = int((d > TOLERANCE * d.max(initial=1e-300)).sum())
+    return U[:, rank:] / size[:, None], float(d[rank - 1] / d[0]) if rank else 1.0
 
 
 def _stresses(a: Assembly, lam: np.ndarray, out: Determinacy, k: int) -> dict[str, np.ndarray]:

@@ -98,6 +98,8 @@ def seen_from(x: State, e: Equations, f: Free) -> Frame:
         If the state is neither an equilibrium nor a steady motion; the message says what is accelerated.
     """
     still = np.zeros((len(x.v),) * 2)
+    if not f.Zv.shape[1]:  # drivers leave no freedom: there is nothing to be steady
+        return Frame(np.zeros(3), still, still)
     if not (np.abs(x.v) / f.scale).max(initial=0.0) > STILL * np.sqrt(1.0 + np.abs(x.vdot / f.scale).max(initial=0.0)):
         balanced(x, e)
         at_rest = Frame(np.zeros(3), still, still)
