@@ -86,15 +86,15 @@ def linearize(
     return _model(e, f, _reduced(e, f, frame, _effects(e, f, named)), frame, named, outputs)
 
 
-def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:
-    """The reduced linear equations at a state; errors as those of `linearize`."""
-    e, f, frame = _about(x, frozen)
+def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> tuple[Free, Frame, Reduced]:
+    """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
+    e, f, frame = _about(x, frozen, like)
     return f, frame, _reduced(e, f, frame, None)
 
 
-def _about(x: State, frozen: bool) -> tuple[Equations, Free, Frame]:
+def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
-    f = free(e)
+    f = free(e, like)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
     return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)

@@ -19,6 +19,7 @@ from .equilibrium import equilibrium
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State
 from .linear.differences import Found, check, derivative
+from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed, tangent_step
@@ -255,33 +256,43 @@ def _at_rest(a: Question) -> Found:
 
 
 def _modes(a: Question) -> Sensitivity:
-    found = _at_modes(a)
-    values = found(a.parameters)
-    parts = [derivative(a.model, a.parameters, name, found) for name in a.to]
-    of = tuple(f"eigenvalue {k}" for k in range(len(values)))
-    units = ("1/s",) * len(of)
-    return Sensitivity("modes", of, a.to, units, {}, np.array([a.t]), values[None], np.stack(parts, axis=-1)[None])
-
-
-def _at_modes(a: Question) -> Found:
-    known: list[np.ndarray] = []
-    begin: list[Any] = []
+    state = _states(a)
+    f, _, base = without_inputs(state(a.parameters))
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
+        return without_inputs(state(parameters), like=f)[2].A
+
+    slopes_ = np.array([derivative(a.model, a.parameters, name, found) for name in a.to]).reshape(-1, *base.A.shape)
+    w, dw = changes(base.A, slopes_, a.to)
+    of = tuple(f"eigenvalue {k}" for k in range(len(w)))
+    return Sensitivity("modes", of, a.to, ("1/s",) * len(of), {}, np.array([a.t]), w[None], dw[None])
+
+
+def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
+    """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
+    if a.about not in (None, "equilibrium"):
+        raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
+    begin: list[Any] = []
+
+    def state(parameters: Mapping[str, float]) -> State:
         about = None
         if a.about == "equilibrium":
             about = equilibrium(a.model, t=a.t, parameters=parameters, start=begin[0] if begin else None)
             begin.append(about)
-        elif a.about is not None:
-            raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
-        x, _ = instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")
-        w = np.linalg.eigvals(without_inputs(x)[2].A)
-        w = w[np.lexsort((w.imag, np.abs(w)))].astype(complex)
-        known.append(w if not known else follow(np.array([known[0], w]))[1])
-        return known[-1]
+        return instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")[0]
 
-    if not known:
-        found(a.parameters)
+    return state
+
+
+def _at_modes(a: Question) -> Found:
+    state = _states(a)
+    A = without_inputs(state(a.parameters))[2].A
+    first, _ = changes(A, np.zeros((0, *A.shape)), ())
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        w = np.linalg.eigvals(without_inputs(state(parameters))[2].A).astype(complex)
+        return follow(np.array([first, w]))[1]
+
     return found
 
 
