@@ -13,21 +13,20 @@ from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
-from .assemble import Assembly, assemble
+from .assemble import assemble
 from .dynamics import simulate
 from .equilibrium import equilibrium
+from .linear.begun import held, start_tangents
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State
 from .linear.differences import Found, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.rest import Rest
-from .linear.tangent import Direction, Linear, Tangent, closed, tangent_step
+from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.variation import Variation
 from .linearize import without_inputs
-from .motion.driven import leaves_no_freedom
 from .motion.options import output_times
-from .motion.start import Start
 
 FLAT = 1e-9  # stiffness, of what acts, below which an equilibrium's place is not determined
 
@@ -145,27 +144,12 @@ def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: S
     return np.array([slopes(x, a.of, d.parts, k.values)[0] for k, d in zip(directions, tangents, strict=True)]).T
 
 
-def start_tangents(a: Question, base: Assembly, x: State, directions: Sequence[Direction]) -> list[Tangent]:
-    """How the assembled start changes: where drivers do not tell, as the described positions and velocities do."""
-    lin = Linear(x)
-
-    def found(parameters: Mapping[str, float]) -> np.ndarray:
-        b = assemble(a.model, t=a.t, parameters=parameters)
-        return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
-
-    out = []
-    for d in directions:
-        drawn = derivative(a.model, a.parameters, d.name, found)
-        out.append(closed(d, x, lin, *np.split(drawn, [len(x.v)])))
-    return out
-
-
 def _instant(a: Question) -> Sensitivity:
     base = assemble(a.model, t=a.t, parameters=a.parameters)
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    found = _columns(a, x, directions, start_tangents(a, base, x, directions))
+    found = _columns(a, x, directions, start_tangents(a.model, a.parameters, base, x, directions))
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
 
 
@@ -183,10 +167,12 @@ def _motion(a: Question) -> Sensitivity:
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
     times = a.times if a.times[0] == a.t else np.r_[a.t, a.times]
-    if leaves_no_freedom(Start(base, base, base.y, "", {})):
+    if held(base):
         way = _driven(a, x, directions, times)
     else:
-        way = Variation(x, directions, start_tangents(a, base, x, directions)).run(times, a.rtol, a.atol)
+        way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
+            times, a.rtol, a.atol
+        )
     values, found = [], []
     for state, tangents in way:
         values.append(_row(state, a.of))

@@ -84,8 +84,8 @@ def free(e: Equations, like: Free | None = None) -> Free:
     which = np.array([r.holonomic for r in s.rows], bool)
     given = prescribed(c)
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
-    Z, chosen = _basis(holonomic, scale, like and like.chosen)
-    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale, like and like.chosen_v)
+    Z, chosen = _basis(holonomic, scale, None if like is None else like.chosen)
+    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale, None if like is None else like.chosen_v)
     left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
     return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
 

@@ -51,6 +51,11 @@ class Direction:
         self.work = work(e.state.c.structure, self.system, complex)
         self.e = e
 
+    @staticmethod
+    def derivative(x: np.ndarray) -> np.ndarray:
+        """By the parameter, of numbers that carry its step."""
+        return np.imag(x) / STEP
+
     def along(self, x: State, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
         nv = len(x.v)
@@ -116,6 +121,21 @@ def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) 
     dv = dv + lin.motion(-d.along(x, dq, dv)[at["n"]])
     left = d.along(x, dq, dv)
     return Tangent(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))
+
+
+def tangent_rate(c: Compiled, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """The change along the velocities that changes of the coordinates are, (nv,)."""
+    S = c.values.system
+    out = np.zeros(c.structure.nv)
+    for b in range(len(S.body_i)):
+        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
+        n = lengths(S, b)
+        out[v0 : v0 + n] = dq[q0 : q0 + n]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            (a, *u), (e, *p) = q[k : k + 4], dq[k : k + 4]
+            out[w : w + 3] = 2.0 * (a * np.array(p) - e * np.array(u) - np.cross(u, p))
+    return out
 
 
 def tangent_step(c: Compiled, q: np.ndarray, other: np.ndarray) -> np.ndarray:
