@@ -22,6 +22,7 @@ from .linear.derivatives import Equations, State
 from .linear.differences import Found, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
+from .linear.jumps import refuse_jumps
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.variation import Variation
@@ -170,6 +171,7 @@ def _motion(a: Question) -> Sensitivity:
     if held(base):
         way = _driven(a, x, directions, times)
     else:
+        refuse_jumps(a.model, a.to)
         way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
             times, a.rtol, a.atol
         )
