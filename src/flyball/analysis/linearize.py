@@ -23,6 +23,7 @@ from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.steady import kinematic, seen_from
+from .linear.undetermined import refuse_undetermined
 
 IMPROPER = 1e-9  # part of the largest number below which an output does not follow the rate of an input
 
@@ -74,7 +75,8 @@ def linearize(
     SingularityError
         At a singular position.
     ModelError
-        If an input, output or parameter does not exist, or something moves without inertia.
+        If an input, output or parameter does not exist, something moves without inertia, or an output is a reaction
+        that redundant constraints leave undetermined.
     """
     if isinstance(inputs, str) or isinstance(outputs, str):
         raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
@@ -163,6 +165,7 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
     curves = [curve(shot, name) for name in outputs]
+    refuse_undetermined(x, outputs)
     A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]

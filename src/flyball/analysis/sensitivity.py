@@ -25,6 +25,7 @@ from .linear.instant import instant
 from .linear.jumps import refuse_jumps
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed
+from .linear.undetermined import refuse_undetermined
 from .linear.variation import Variation
 from .linearize import without_inputs
 from .motion.options import output_times
@@ -64,8 +65,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of quantities with respect to parameters.
 
-    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How eigenvalues
-    change, and the start of a mechanism that no driver holds, comes from differences of sixth order (error 1e-10).
+    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the matrix
+    behind eigenvalues changes, and a start that assembly had to look for, comes from differences of sixth order whose
+    step is chosen by their error.
 
     Parameters
     ----------
@@ -83,7 +85,8 @@ def sensitivity(
     about : ``"equilibrium"`` or None
         For modes: about the static equilibrium, or where the mechanism is drawn.
     verify : bool
-        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter.
+        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter (of what would change
+        the mechanism by the whole, for one that is zero).
     rtol, atol : float
 
     Returns
@@ -93,7 +96,8 @@ def sensitivity(
     Raises
     ------
     ModelError
-        If a quantity or parameter does not exist.
+        If a quantity or parameter does not exist, a reaction is left undetermined by redundant constraints, or a law
+        jumps where a motion comes to.
     SingularityError
         If what is asked has no derivative there.
     """
@@ -142,6 +146,7 @@ def _units(x: State, names: Sequence[str]) -> tuple[str, ...]:
 
 def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: Sequence[Tangent]) -> np.ndarray:
     """Derivatives of the quantities at a state, (of, to)."""
+    refuse_undetermined(x, a.of)
     return np.array([slopes(x, a.of, d.parts, k.values)[0] for k, d in zip(directions, tangents, strict=True)]).T
 
 
