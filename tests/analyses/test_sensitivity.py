@@ -147,6 +147,20 @@ def test_a_spring_is_tuned():
     assert found.cost < 1e-12 < found.start_cost
 
 
+def test_a_function_of_eigenvalues_is_minimised():
+    """The damping at which a mass on a spring of 25 N/m loses e^-3 of its swing a second, at its own frequency."""
+    m = fb.Mechanism("mass", planar=True, parameters={"k": 9.0, "c": 1.0})
+    m.add(fb.Body("mass", mass=1, inertia=1, position=(1, 0)))
+    m.add(fb.Translational("rail", "ground", "mass", at=(1, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("s", "ground", "mass", at=((0, 0), (1, 0)), stiffness="k", damping="c"))
+
+    def off(values):
+        return float(abs(values[0, 1] - (-3 + 4j)) ** 2)
+
+    found = m.optimize([], {"k": (1, 100), "c": (0, 50)}, minimize=off, analysis="modes")
+    assert found.parameters == pytest.approx({"k": 25.0, "c": 6.0}, rel=1e-4)
+
+
 def test_a_slider_crank_is_fitted_and_a_stroke_is_minimised():
     m = slider_crank()
     wanted = m.sensitivity(["slider.x"], ["r"], analysis="motion", t_end=0.6, outputs=13).values

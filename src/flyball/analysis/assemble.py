@@ -146,7 +146,7 @@ def _misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
     return float(np.abs(g).max(initial=0.0)) if np.isfinite(g).all() else np.inf
 
 
-def _movable(c: Compiled) -> np.ndarray:
+def movable(c: Compiled) -> np.ndarray:
     """1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
     s = c.structure
     out = np.ones(s.nv)
@@ -157,14 +157,14 @@ def _movable(c: Compiled) -> np.ndarray:
     return out
 
 
-def _weights(c: Compiled) -> np.ndarray:
+def inverse_weights(c: Compiled) -> np.ndarray:
     """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
     body_i = c.structure.tables["body_i"]
     w = np.ones(c.structure.nv)
     for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True):
         k = {3: 2, 6: 3}.get(int(n), 0)
         w[v0 + k : v0 + n] = 1.0 / c.values.length**2
-    return w * _movable(c)
+    return w * movable(c)
 
 
 def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
@@ -205,7 +205,7 @@ def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
     import scipy.sparse as sp
 
-    w = _weights(c)
+    w = inverse_weights(c)
     R = sp.diags(np.sqrt(w)).tocsr()
     limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
     size = _misfit(c, t, q, v)
@@ -238,7 +238,7 @@ def _newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.nda
 
 def _close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
     """Close from far: Newton from the guess, then from shaken guesses when it is caught short of closed."""
-    w = _weights(c)
+    w = inverse_weights(c)
     best, count = _newton(c, t, q, v)
     least = _misfit(c, t, best, v)
     random = np.random.default_rng(0)
@@ -318,7 +318,7 @@ def _velocities(
     size = max(1.0, float(np.abs(v).max(initial=0.0)), float(np.abs(nu).max(initial=0.0)))
     if np.abs(r).max() < 1e-13 * size:
         return v
-    R = c.inverse_mass_root(_movable(c))
+    R = c.inverse_mass_root(movable(c))
     last = np.inf
     for _ in range(ITERATIONS):
         worst = float(np.abs(r).max())

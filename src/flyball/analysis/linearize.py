@@ -23,6 +23,7 @@ from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.steady import kinematic, moved_on, seen_from
+from .linear.undetermined import refuse_undetermined
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
@@ -75,7 +76,8 @@ def linearize(
     SingularityError
         At a singular position.
     ModelError
-        If an input, output or parameter does not exist, or something moves without inertia.
+        If an input, output or parameter does not exist, something moves without inertia, or an output is a reaction
+        that redundant constraints leave undetermined.
     """
     if isinstance(inputs, str) or isinstance(outputs, str):
         raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
@@ -112,15 +114,15 @@ def _refuse_turning(
                 )
 
 
-def without_inputs(x: State, frozen: bool = False) -> tuple[Free, Frame, Reduced]:
-    """The reduced linear equations at a state; errors as those of `linearize`."""
-    e, f, frame = _about(x, frozen)
+def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> tuple[Free, Frame, Reduced]:
+    """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
+    e, f, frame = _about(x, frozen, like)
     return f, frame, _reduced(e, f, frame, None)
 
 
-def _about(x: State, frozen: bool) -> tuple[Equations, Free, Frame]:
+def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
-    f = free(e)
+    f = free(e, like)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
     return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
@@ -194,6 +196,7 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
     curves = [curve(shot, name) for name in outputs]
+    refuse_undetermined(x, outputs)
     A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]

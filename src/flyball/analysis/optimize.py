@@ -186,7 +186,9 @@ class Search:
             except AnalysisError:
                 return REFUSED * (abs(first) or 1.0), np.zeros(len(x))
             slope = _slope(function, found.values)
-            return float(function(found.values)), np.einsum("ij,ijk->k", slope, found.derivatives) * self.scale
+            return float(function(found.values)), np.einsum(
+                "ij,ijk->k", slope.conj(), found.derivatives
+            ).real * self.scale
 
         bounds = list(zip(self.low, self.high, strict=True))
         options = {"maxfun": evaluations, "ftol": tolerance, "gtol": tolerance}
@@ -207,12 +209,16 @@ class Search:
 
 
 def _slope(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:
-    """Derivatives of a function by the quantities, by central differences: it costs nothing to call."""
-    out = np.zeros(values.shape)
+    """Derivatives of a function by the quantities, by central differences: it costs nothing to call.
+
+    By the real and the imaginary part of complex ones, as real and imaginary part.
+    """
+    out = np.zeros(values.shape, values.dtype)
     for i in np.ndindex(values.shape):
         h = STEP * (1.0 + abs(values[i]))
-        up, down = values.copy(), values.copy()
-        up[i] += h
-        down[i] -= h
-        out[i] = (function(up) - function(down)) / (2.0 * h)
+        for way in (1.0, 1.0j) if np.iscomplexobj(values) else (1.0,):
+            up, down = values.copy(), values.copy()
+            up[i] += h * way
+            down[i] -= h * way
+            out[i] += way * (function(up) - function(down)) / (2.0 * h)
     return out

@@ -13,20 +13,22 @@ from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
-from .assemble import Assembly, assemble
+from .assemble import assemble
 from .dynamics import simulate
 from .equilibrium import equilibrium
+from .linear.begun import held, start_tangents
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State
 from .linear.differences import Found, check, derivative
+from .linear.eigenvalues import changes
 from .linear.instant import instant
+from .linear.jumps import refuse_jumps
 from .linear.rest import Rest
-from .linear.tangent import Direction, Linear, Tangent, closed, tangent_step
+from .linear.tangent import Direction, Linear, Tangent, closed
+from .linear.undetermined import refuse_undetermined
 from .linear.variation import Variation
 from .linearize import without_inputs
-from .motion.driven import leaves_no_freedom
 from .motion.options import output_times
-from .motion.start import Start
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
@@ -63,8 +65,9 @@ def sensitivity(
 ) -> Sensitivity:
     """Derivatives of quantities with respect to parameters.
 
-    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How eigenvalues
-    change, and the start of a mechanism that no driver holds, comes from differences of sixth order (error 1e-10).
+    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the matrix
+    behind eigenvalues changes, and a start that assembly had to look for, comes from differences of sixth order whose
+    step is chosen by their error.
 
     Parameters
     ----------
@@ -82,7 +85,8 @@ def sensitivity(
     about : ``"equilibrium"`` or None
         For modes: about the static equilibrium, or where the mechanism is drawn.
     verify : bool
-        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter.
+        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter (of what would change
+        the mechanism by the whole, for one that is zero).
     rtol, atol : float
 
     Returns
@@ -92,7 +96,8 @@ def sensitivity(
     Raises
     ------
     ModelError
-        If a quantity or parameter does not exist.
+        If a quantity or parameter does not exist, a reaction is left undetermined by redundant constraints, or a law
+        jumps where a motion comes to.
     SingularityError
         If what is asked has no derivative there.
     """
@@ -141,22 +146,8 @@ def _units(x: State, names: Sequence[str]) -> tuple[str, ...]:
 
 def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: Sequence[Tangent]) -> np.ndarray:
     """Derivatives of the quantities at a state, (of, to)."""
+    refuse_undetermined(x, a.of)
     return np.array([slopes(x, a.of, d.parts, k.values)[0] for k, d in zip(directions, tangents, strict=True)]).T
-
-
-def start_tangents(a: Question, base: Assembly, x: State, directions: Sequence[Direction]) -> list[Tangent]:
-    """How the assembled start changes: where drivers do not tell, as the described positions and velocities do."""
-    lin = Linear(x)
-
-    def found(parameters: Mapping[str, float]) -> np.ndarray:
-        b = assemble(a.model, t=a.t, parameters=parameters)
-        return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
-
-    out = []
-    for d in directions:
-        drawn = derivative(a.model, a.parameters, d.name, found)
-        out.append(closed(d, x, lin, *np.split(drawn, [len(x.v)])))
-    return out
 
 
 def _instant(a: Question) -> Sensitivity:
@@ -164,7 +155,7 @@ def _instant(a: Question) -> Sensitivity:
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    found = _columns(a, x, directions, start_tangents(a, base, x, directions))
+    found = _columns(a, x, directions, start_tangents(a.model, a.parameters, base, x, directions))
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
 
 
@@ -182,10 +173,13 @@ def _motion(a: Question) -> Sensitivity:
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
     times = a.times if a.times[0] == a.t else np.r_[a.t, a.times]
-    if leaves_no_freedom(Start(base, base, base.y, "", {})):
+    if held(base):
         way = _driven(a, x, directions, times)
     else:
-        way = Variation(x, directions, start_tangents(a, base, x, directions)).run(times, a.rtol, a.atol)
+        refuse_jumps(a.model, a.to)
+        way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
+            times, a.rtol, a.atol
+        )
     values, found = [], []
     for state, tangents in way:
         values.append(_row(state, a.of))
@@ -255,33 +249,43 @@ def _at_rest(a: Question) -> Found:
 
 
 def _modes(a: Question) -> Sensitivity:
-    found = _at_modes(a)
-    values = found(a.parameters)
-    parts = [derivative(a.model, a.parameters, name, found) for name in a.to]
-    of = tuple(f"eigenvalue {k}" for k in range(len(values)))
-    units = ("1/s",) * len(of)
-    return Sensitivity("modes", of, a.to, units, {}, np.array([a.t]), values[None], np.stack(parts, axis=-1)[None])
-
-
-def _at_modes(a: Question) -> Found:
-    known: list[np.ndarray] = []
-    begin: list[Any] = []
+    state = _states(a)
+    f, _, base = without_inputs(state(a.parameters))
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
+        return without_inputs(state(parameters), like=f)[2].A
+
+    slopes_ = np.array([derivative(a.model, a.parameters, name, found) for name in a.to]).reshape(-1, *base.A.shape)
+    w, dw = changes(base.A, slopes_, a.to)
+    of = tuple(f"eigenvalue {k}" for k in range(len(w)))
+    return Sensitivity("modes", of, a.to, ("1/s",) * len(of), {}, np.array([a.t]), w[None], dw[None])
+
+
+def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
+    """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
+    if a.about not in (None, "equilibrium"):
+        raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
+    begin: list[Any] = []
+
+    def state(parameters: Mapping[str, float]) -> State:
         about = None
         if a.about == "equilibrium":
             about = equilibrium(a.model, t=a.t, parameters=parameters, start=begin[0] if begin else None)
             begin.append(about)
-        elif a.about is not None:
-            raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
-        x, _ = instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")
-        w = np.linalg.eigvals(without_inputs(x)[2].A)
-        w = w[np.lexsort((w.imag, np.abs(w)))].astype(complex)
-        known.append(w if not known else follow(np.array([known[0], w]))[1])
-        return known[-1]
+        return instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")[0]
 
-    if not known:
-        found(a.parameters)
+    return state
+
+
+def _at_modes(a: Question) -> Found:
+    state = _states(a)
+    A = without_inputs(state(a.parameters))[2].A
+    first, _ = changes(A, np.zeros((0, *A.shape)), ())
+
+    def found(parameters: Mapping[str, float]) -> np.ndarray:
+        w = np.linalg.eigvals(without_inputs(state(parameters))[2].A).astype(complex)
+        return follow(np.array([first, w]))[1]
+
     return found
 
 

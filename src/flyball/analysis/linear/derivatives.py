@@ -36,8 +36,8 @@ from ...system.tables import (
 from ...system.values import Values, values, work
 from ..compiled import Compiled
 from ..entry import MOTION, residual_kernel
+from .loads import STEP, as_complex, by_reactions, complex_tables
 
-STEP = 1e-40
 NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
 CHUNK = 128  # directions a call
 
@@ -120,6 +120,11 @@ class Equations:
         return self._jacobian(2)
 
     @cached_property
+    def by_reactions(self) -> np.ndarray:
+        """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
+        return by_reactions(self.state, *self._system)
+
+    @cached_property
     def by_time(self) -> np.ndarray:
         """Derivatives by time, (width,)."""
         steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
@@ -154,8 +159,7 @@ class Equations:
 
     @cached_property
     def _system(self) -> tuple[System, Work]:
-        system = as_complex(self.state.c.values.system)
-        return system, work(self.state.c.structure, system, complex)
+        return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
         if residual_kernel.cold:  # type: ignore[attr-defined]
@@ -228,12 +232,6 @@ def refuse_functions(s: Structure) -> None:
             f"law {s.functions[0].text!r} is a Python function, which has no derivatives; write it as an expression or "
             f"give a table"
         )
-
-
-def as_complex(system: System) -> System:
-    """The same tables in complex numbers."""
-    parts = {k: x for k, x in system._asdict().items() if isinstance(x, np.ndarray) and x.dtype == np.float64}
-    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})  # type: ignore[arg-type]
 
 
 def pattern(s: Structure, S: System) -> Any:

@@ -1,7 +1,8 @@
 """Central differences by a parameter: of sixth order where a derivative is wanted, of second where one is checked.
 
-What is differenced is solved to rounding and smooth in the parameter, so that the sixth order's error is some 1e-11 of
-the derivative.
+The step begins as a part of the parameter, or of the change of it that would change the mechanism by the whole, and is
+made smaller or larger until the differences of sixth and of fourth order agree best: what is differenced is solved to
+rounding, so that the error is some 1e-11 of the derivative.
 """
 
 from __future__ import annotations
@@ -10,29 +11,86 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from ...errors import AnalysisError
 from ...model.model import Model
+from ...system.names import velocity_names
+from ...system.values import values
+from ..compiled import compiled
+from .loads import STEP as COMPLEX
 
 STEP, CHECK = 2e-3, 1e-5  # of the parameter
-WEIGHTS = {1: 0.75, 2: -0.15, 3: 1.0 / 60.0}
+SIXTH = np.array([0.75, -0.15, 1.0 / 60.0])
+FOURTH = np.array([2.0 / 3.0, -1.0 / 12.0, 0.0])
+AGREED = 1e-9  # of the derivative
+ROUNDED = 1e-11  # of what is differenced
+TRIES = 7
 
 Found = Callable[[Mapping[str, float]], np.ndarray]
 
 
 def derivative(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> np.ndarray:
-    """Derivative by a parameter of what a function makes of the parameters; sixth order."""
-    h, at = _step(model, parameters, name, STEP)
-    return sum(w * (found(at(k)) - found(at(-k))) for k, w in WEIGHTS.items()) / h  # type: ignore[return-value]
+    """Derivative by a parameter of what a function makes of the parameters; sixth order.
+
+    Raises
+    ------
+    AnalysisError
+        That of the function, if it fails however small the step is.
+    """
+    value = model.environment(parameters)[name]
+
+    def at(h: float) -> tuple[float, np.ndarray, bool]:
+        sides = [[found({**parameters, name: value + s * k * h}) for s in (1, -1)] for k in (1, 2, 3)]
+        D = np.array([a - b for a, b in sides])
+        best, other = (np.tensordot(weights, D, 1) / h for weights in (SIXTH, FOURTH))
+        error, size = (float(np.abs(X).max(initial=0.0)) for X in (best - other, best))
+        largest = max(float(np.abs(a).max(initial=0.0)) for pair in sides for a in pair)
+        if error <= AGREED * size:
+            error = 0.0
+        return error, best, error * h <= ROUNDED * largest
+
+    h = STEP * _whole(model, parameters, name)
+    best: tuple[float, np.ndarray] | None = None
+    way = 0.1
+    for _ in range(TRIES):
+        try:
+            error, found_, rounded = at(h)
+        except AnalysisError:
+            if way > 1.0:
+                break
+            h *= way
+            continue
+        better = best is None or error < best[0]
+        if better:
+            way = 10.0 if best is None and rounded else way
+            best = error, found_
+        if error == 0.0 or (rounded and way < 1.0) or (not better and way > 1.0):
+            break
+        h *= way
+    return at(h)[1] if best is None else best[1]
 
 
 def check(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> np.ndarray:
-    """The same, second order."""
-    h, at = _step(model, parameters, name, CHECK)
-    return (found(at(1)) - found(at(-1))) / (2.0 * h)
-
-
-def _step(
-    model: Model, parameters: Mapping[str, float], name: str, part: float
-) -> tuple[float, Callable[[int], Mapping[str, float]]]:
+    """The same with one small step, second order."""
     value = model.environment(parameters)[name]
-    h = part * (abs(value) or 1.0)
-    return h, lambda k: {**parameters, name: value + k * h}
+    h = CHECK * _whole(model, parameters, name)
+    return (found({**parameters, name: value + h}) - found({**parameters, name: value - h})) / (2.0 * h)
+
+
+def _whole(model: Model, parameters: Mapping[str, float], name: str) -> float:
+    """The parameter itself; if it is zero, the change of it that changes something of the mechanism by the whole.
+
+    Places count as parts of the mechanism's length, other numbers as parts of the largest of their kind.
+    """
+    value = float(np.real(model.environment(parameters)[name]))
+    if value:
+        return abs(value)
+    c = compiled(model, parameters=parameters)
+    v = values(c.structure, {**c.parameters, name: complex(value, COMPLEX)})
+    length = c.values.length
+    scales = [(v.system.frame_x[:, :3], length)]
+    places = np.array([n.unit == "m" for n in velocity_names(c.structure)])
+    scales += [(v.v[places], length), (v.v[~places], 1.0), (v.q, length)]
+    for table in (v.system.body_x, v.system.term_x, v.system.force_x, v.system.glob):
+        scales += [(x, np.abs(x.real).max()) for x in np.atleast_2d(table).T if len(x) and np.abs(x.real).max() > 0.0]
+    effect = max((float(np.abs(np.imag(x)).max(initial=0.0)) / COMPLEX / s for x, s in scales), default=0.0)
+    return 1.0 / effect if effect > 0.0 else 1.0

@@ -74,8 +74,8 @@ class Free:
         return x - basis @ (left @ x)
 
 
-def free(e: Equations) -> Free:
-    """Freedoms at the state of some equations."""
+def free(e: Equations, like: Free | None = None) -> Free:
+    """Freedoms at the state of some equations, told by the coordinates that those of another are told by, if given."""
     c = e.state.c
     s = c.structure
     names = velocity_names(s)
@@ -84,8 +84,8 @@ def free(e: Equations) -> Free:
     which = np.array([r.holonomic for r in s.rows], bool)
     given = prescribed(c)
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
-    Z, chosen = _basis(holonomic, scale)
-    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale)
+    Z, chosen = _basis(holonomic, scale, None if like is None else like.chosen)
+    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale, None if like is None else like.chosen_v)
     left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
     return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
 
@@ -116,14 +116,15 @@ def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
     return Vt[int((d > TOLERANCE * d[0]).sum()) :].T
 
 
-def _basis(G: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     from scipy.linalg import qr
 
     N = _null(G, scale)
     if not N.shape[1]:
         return N, np.zeros(0, int)
-    *_, order = qr(N.T, mode="economic", pivoting=True)
-    chosen = np.sort(order[: N.shape[1]])
+    if chosen is None or len(chosen) != N.shape[1]:
+        *_, order = qr(N.T, mode="economic", pivoting=True)
+        chosen = np.sort(order[: N.shape[1]])
     Z = scale[:, None] * N
     Z = Z @ np.linalg.inv(Z[chosen])
     Z[chosen] = np.eye(len(chosen))

@@ -7,7 +7,9 @@ With x a change of position along the velocities, u one of velocity, both seen f
     G x + g_w w = 0,       G u + V x + n_w w + g_w w' = 0
 
 K holds everything that forces, inertia and *reactions* do when positions change: joint forces turn with the bodies, so
-it is not the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out.
+it is not the stiffness of the springs. With x = Z a + X w and u = Zv b + P a + U w + U1 w' the multipliers drop out
+of the equations along Zv; joint friction follows the reactions, adds F to the -G^T that they act by, and needs another
+projection (``_left``).
 Inputs that move the mechanism act through their rates too.
 """
 
@@ -18,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from .derivatives import Equations
-from .free import Free
+from .free import TOLERANCE, Free
+from .loads import refuse_undetermined
 
 
 @dataclass
@@ -112,14 +115,34 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     known = P @ a_dot + np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), none, U, U1])
     acting = np.hstack([np.zeros((nv, f.Z.shape[1] + f.Zv.shape[1])), w.r, none, none])
     others = (M @ H + D) @ u + K @ x + acting
-    b_dot = -np.linalg.solve(f.Zv.T @ M @ f.Zv, f.Zv.T @ (M @ known + others)) if f.Zv.shape[1] else a_dot[:0]
+    by_multipliers = -f.rows.T
+    Y = f.Zv
+    if e.state.c.structure.loads:
+        by_multipliers[:, : e.block("n").size] += e.by_reactions
+        Y = _left(e, f)
+    b_dot = -np.linalg.solve(Y.T @ M @ f.Zv, Y.T @ (M @ known + others)) if f.Zv.shape[1] else a_dot[:0]
     acceleration = f.Zv @ b_dot + known + H @ u
     left = M @ (acceleration - H @ u) + others
-    multipliers = np.linalg.lstsq((f.rows * f.scale).T, f.scale[:, None] * left, rcond=1e-12)[0]
+    multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
     out = Reduced(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers)
     if f.Zv.shape == f.Z.shape:
         turned = (H - N) @ f.Z  # u = Z a' + turned a
-        out.M = f.Z.T @ M @ f.Z
-        out.D = f.Z.T @ (M @ turned + (M @ H + D) @ f.Z)
-        out.K = f.Z.T @ ((M @ H + D) @ turned + K @ f.Z)
+        out.M = Y.T @ M @ f.Z
+        out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
+        out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
     return out
+
+
+def _left(e: Equations, f: Free) -> np.ndarray:
+    """Y (nv, fv) with Y^T dr/dl = 0, so that the multipliers drop out; Zv where no friction follows the reactions.
+
+    Y is Zv less what the constraints' own directions C make up for: Y^T = Zv^T - Zv^T R (C^T R)^+ C^T.
+    """
+    F = np.zeros(f.rows.T.shape)
+    F[:, : e.block("n").size] = e.by_reactions
+    refuse_undetermined(e.state.c.structure, (f.rows * f.scale)[: e.block("n").size], e.by_reactions)
+    R = f.scale[:, None] * (F - f.rows.T)
+    U, d, _ = np.linalg.svd((f.rows * f.scale).T, full_matrices=False)
+    C = U[:, d > TOLERANCE * d.max(initial=1e-300)]
+    Z = f.Zv / f.scale[:, None]
+    return f.scale[:, None] * (Z - C @ (Z.T @ R @ np.linalg.pinv(C.T @ R, rcond=1e-12)).T)

@@ -3,7 +3,9 @@
 Along a change (dq, dv, dp) of positions, velocities and a parameter one complex step through the residuals gives what
 the constraints and the equations of motion miss, exactly; accelerations and multipliers follow by
 
-    M dvdot - G^T dlam = -(r along (dq, dv, dp)),    G dvdot = -(a along (dq, dv, dp))
+    M dvdot + (F - G^T) dlam = -(r along (dq, dv, dp)),    G dvdot = -(a along (dq, dv, dp))
+
+F is what joint friction makes of the reactions (``loads``).
 """
 
 from __future__ import annotations
@@ -13,13 +15,15 @@ from functools import cached_property
 
 import numpy as np
 
+from ...system.names import velocity_names
 from ...system.tables import Q0, V0
 from ...system.tree import lengths, quaternion_at
 from ...system.values import Values, work
 from ..compiled import Compiled
 from ..entry import residual_kernel
-from .derivatives import STEP, Equations, State, as_complex
+from .derivatives import Equations, State
 from .free import TOLERANCE
+from .loads import STEP, as_complex, by_reactions, complex_tables, refuse_undetermined
 
 
 @dataclass
@@ -47,6 +51,11 @@ class Direction:
         self.work = work(e.state.c.structure, self.system, complex)
         self.e = e
 
+    @staticmethod
+    def derivative(x: np.ndarray) -> np.ndarray:
+        """By the parameter, of numbers that carry its step."""
+        return np.imag(x) / STEP
+
     def along(self, x: State, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
         nv = len(x.v)
@@ -64,6 +73,7 @@ class Linear:
     def __init__(self, x: State, M: np.ndarray | None = None) -> None:
         c = x.c
         c.at(x.t, x.q, x.v)
+        self.x = x
         self.G = c.jacobian()
         self.M = c.mass().toarray() if M is None else M
         self.which = np.array([r.holonomic for r in c.structure.rows], bool)
@@ -80,7 +90,15 @@ class Linear:
     @cached_property
     def inverse(self) -> np.ndarray:
         """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
-        return np.linalg.pinv(self.A, rcond=1e-12)
+        A = self.A
+        if self.x.c.structure.loads:
+            n, s = len(self.M), self.x.c.structure
+            F = by_reactions(self.x, *complex_tables(self.x.c))
+            turns = np.array([1.0 if d.unit == "m" else 1.0 / self.x.c.values.length for d in velocity_names(s)])
+            refuse_undetermined(s, self.G * turns, F)
+            A = A.copy()
+            A[:n, n:] += self.scale[:, None] * F * self.size
+        return np.linalg.pinv(A, rcond=1e-12)
 
     def motion(self, right: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """The change x with G x = right that is smallest in kinetic energy."""
@@ -103,6 +121,21 @@ def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) 
     dv = dv + lin.motion(-d.along(x, dq, dv)[at["n"]])
     left = d.along(x, dq, dv)
     return Tangent(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))
+
+
+def tangent_rate(c: Compiled, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
+    """The change along the velocities that changes of the coordinates are, (nv,)."""
+    S = c.values.system
+    out = np.zeros(c.structure.nv)
+    for b in range(len(S.body_i)):
+        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
+        n = lengths(S, b)
+        out[v0 : v0 + n] = dq[q0 : q0 + n]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            (a, *u), (e, *p) = q[k : k + 4], dq[k : k + 4]
+            out[w : w + 3] = 2.0 * (a * np.array(p) - e * np.array(u) - np.cross(u, p))
+    return out
 
 
 def tangent_step(c: Compiled, q: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -146,6 +146,8 @@ def _equations(
     forces, gaps, rates = np.split(A, [s.nv, s.nv + which.sum()])
     forces[:, :width] = scale[:, None] * np.hstack([K[:, moving] * by_place, D[:, free] * by_speed]) / size
     forces[:, width:] = -scale[:, None] * np.vstack([G, given]).T
+    if s.loads:
+        forces[:, width : width + len(s.rows)] += scale[:, None] * e.by_reactions
     gaps[:, : len(moving)] = G[which][:, moving] * by_place / length
     rates[:, :width] = np.hstack([V[:, moving] * by_place, G[:, free] * by_speed])
     return A, np.r_[scale * e.block("r") / size, e.block("g")[which] / length, e.block("n")], float(size)

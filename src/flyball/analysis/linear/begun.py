@@ -1,0 +1,85 @@
+"""How the assembled start of a mechanism changes with a parameter.
+
+Where drivers leave no freedom the constraints tell it. Elsewhere the start is the described positions and velocities,
+put on the constraints by steps of least size: so are their changes, which carry the parameter's complex step. Where
+assembly had a longer way to go, its result is differenced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...model.model import Model
+from ..assemble import Assembly, assemble, inverse_weights, movable
+from ..motion.driven import leaves_no_freedom
+from ..motion.start import Start
+from .derivatives import State
+from .differences import derivative
+from .free import TOLERANCE
+from .tangent import Direction, Linear, Tangent, closed, tangent_rate, tangent_step
+
+ROUNDED = 1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
+
+
+def start_tangents(
+    model: Model, parameters: Mapping[str, float], base: Assembly, x: State, directions: Sequence[Direction]
+) -> list[Tangent]:
+    """Changes of the start with each parameter.
+
+    Parameters
+    ----------
+    model : Model
+    parameters : mapping
+        Values in place of the model's.
+    base : Assembly
+        The start.
+    x : State
+        The same with accelerations and multipliers.
+    directions : sequence of Direction
+        Parameters.
+    """
+    lin, still = Linear(x), np.zeros(len(x.v))
+    if held(base):
+        return [closed(d, x, lin, still, still) for d in directions]
+    if as_described(model, base):
+        return [closed(d, x, lin, *_described(d, base, x)) for d in directions]
+
+    def found(p: Mapping[str, float]) -> np.ndarray:
+        b = assemble(model, t=base.t, parameters=p)
+        return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
+
+    return [closed(d, x, lin, *np.split(derivative(model, parameters, d.name, found), 2)) for d in directions]
+
+
+def held(base: Assembly) -> bool:
+    """Whether drivers leave no freedom."""
+    return leaves_no_freedom(Start(base, base, base.y, "", {}))
+
+
+def as_described(model: Model, base: Assembly) -> bool:
+    """Whether the start is what the description says, to rounding."""
+    drawn, length = base.compiled.values, base.compiled.values.length
+    apart = np.abs(tangent_step(base.compiled, drawn.q, base.q)).max(initial=0.0)
+    faster = np.abs(base.v - drawn.v).max(initial=0.0)
+    near = apart <= ROUNDED * min(1.0, length) and faster <= ROUNDED * np.abs(base.v).max(initial=0.0)
+    return bool(near) and not model.initial
+
+
+def _described(d: Direction, base: Assembly, x: State) -> tuple[np.ndarray, np.ndarray]:
+    """Changes of the described positions and velocities, put on the constraints in the way of assembly."""
+    c, at = base.compiled, d.e.at
+    dq = tangent_rate(c, x.q, d.derivative(d.values.q))
+    dv = d.derivative(d.values.v)
+    c.at(x.t, x.q, x.v)
+    G = c.jacobian()
+    which = np.array([r.holonomic for r in c.structure.rows], bool)
+    size = np.sqrt(inverse_weights(c))
+    left = d.along(x, dq, dv)[at["g"]][which]
+    if which.any():
+        dq -= size * np.linalg.lstsq(G[which] * size, left, rcond=TOLERANCE)[0]
+    R = c.inverse_mass_root(movable(c))
+    if len(G):
+        dv -= R @ np.linalg.lstsq(G @ R, d.along(x, dq, dv)[at["n"]], rcond=TOLERANCE)[0]
+    return dq, dv

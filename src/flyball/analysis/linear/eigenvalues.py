@@ -1,0 +1,109 @@
+"""How eigenvalues change with a matrix: dw = y^H dA x / y^H x (Lancaster 1964), groups of equal ones together.
+
+Where an eigenvalue is repeated with as many eigenvectors, its first changes are the eigenvalues of dA within them.
+Where it has too few, it has no derivative, unless dA leaves these alone: a mechanism that can move away as a whole has
+two zeros and keeps them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import SingularityError
+
+EQUAL = 1e-9  # difference of eigenvalues, of the matrix' size, below which they are one
+ROUNDED = 100.0 * np.finfo(float).eps  # of the matrix' size: what is uncertain of it
+PLAIN = 1e-6  # part of the matrix' size by which a group of equal eigenvalues differs from a multiple of the identity
+ALONE = 1e-7  # of its own size: changes of a group without all its eigenvectors below this are none
+
+
+def changes(A: np.ndarray, dA: np.ndarray, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues and their derivatives.
+
+    Parameters
+    ----------
+    A : ndarray (n, n)
+    dA : ndarray (k, n, n)
+        Derivatives of A by k parameters.
+    names : tuple of str
+        Of these.
+
+    Returns
+    -------
+    w : ndarray (n,)
+        Sorted by absolute and imaginary value.
+    dw : ndarray (n, k)
+
+    Raises
+    ------
+    SingularityError
+        If an eigenvalue has no derivative.
+    """
+    from scipy.linalg import eig, matrix_balance
+
+    if not len(A):
+        return np.zeros(0, complex), np.zeros((0, len(dA)), complex)
+    B, (scale, _) = matrix_balance(A, permute=False, separate=True)
+    dB = dA / scale[:, None] * scale
+    w, left, right = eig(B, left=True)
+    order = np.lexsort((w.imag, np.abs(w)))
+    w, left, right = w[order], left[:, order], right[:, order]
+    size = float(np.linalg.norm(B, 2)) or 1.0
+    out = np.zeros((len(w), len(dA)), complex)
+    for group in _groups(w, np.abs((left.conj() * right).sum(axis=0)), size):
+        if len(group) == 1:
+            y, x = left[:, group[0]], right[:, group[0]]
+            out[group[0]] = np.array([y.conj() @ d @ x for d in dB]) / (y.conj() @ x)
+        else:
+            out[group] = _together(B, dB, w, group, size, names)
+    return w.astype(complex), out
+
+
+def _groups(w: np.ndarray, angle: np.ndarray, size: float) -> list[list[int]]:
+    """Indices of eigenvalues that are the same as far as can be told; ``angle`` is |y^H x| of unit vectors."""
+    blur = size * np.maximum(EQUAL, np.minimum(ROUNDED / np.maximum(angle, 1e-300), 1e-4))
+    near = np.abs(w[:, None] - w) <= np.maximum(blur[:, None], blur)
+    left, out = set(range(len(w))), []
+    while left:
+        group, more = set(), {min(left)}
+        while more:
+            group |= more
+            more = {int(j) for i in more for j in np.flatnonzero(near[i])} - group
+        left -= group
+        out.append(sorted(group))
+    return out
+
+
+def _together(
+    B: np.ndarray, dB: np.ndarray, w: np.ndarray, group: list[int], size: float, names: tuple[str, ...]
+) -> np.ndarray:
+    """Derivatives of equal eigenvalues, (group, k)."""
+    V, W = (_subspace(X, v, len(group)) for X, v in ((B, w[group]), (B.conj().T, w[group].conj())))
+    inner = np.linalg.inv(W.conj().T @ V)
+    own = inner @ (W.conj().T @ B @ V)
+    plain = np.abs(own - np.trace(own) / len(group) * np.eye(len(group))).max() <= PLAIN * size
+    out = np.zeros((len(group), len(dB)), complex)
+    for k, d in enumerate(dB):
+        inside = inner @ (W.conj().T @ d @ V)
+        if plain:
+            found = np.linalg.eigvals(inside)
+            out[:, k] = found[np.lexsort((found.imag, found.real))]
+        elif np.abs(inside).max() > ALONE * np.abs(d).max() * np.abs(inner).max():
+            value = complex(np.mean(w[group]))
+            raise SingularityError(
+                f"the eigenvalue {value.real:.4g}{value.imag:+.4g}j 1/s is {len(group)}-fold and has fewer "
+                f"eigenvectors: it has no derivative by {names[k]!r}. Ask a little to the side of this value"
+            )
+    return out
+
+
+def _subspace(B: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
+    """Orthonormal basis (n, count) of what belongs to these eigenvalues."""
+    from scipy.linalg import schur
+
+    def nearest(z: complex) -> float:
+        return float(np.abs(values - z).min())
+
+    T = np.diag(schur(B, "complex")[0])
+    last = np.sort([nearest(z) for z in T])[count - 1]
+    return schur(B, "complex", sort=lambda z: nearest(z) <= last * (1.0 + 1e-9) + 1e-300)[1][:, :count]

@@ -1,0 +1,98 @@
+"""What multipliers do to the equations of motion besides G^T lam: joint friction follows the reactions of its joint.
+
+In r = M vdot - f - G^T lam the forces f then depend on lam, so that dr/dlam = -G^T + F. F is found by a complex step of
+each multiplier that presses on a joint with friction.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...errors import ModelError
+from ...system.structure import Structure
+from ...system.tables import TERM_ROW, System, Work
+from ...system.values import work
+from ..compiled import Compiled
+from ..entry import residual_kernel
+
+if TYPE_CHECKING:
+    from .derivatives import State
+
+STEP = 1e-40
+FREE = 1e-8  # singular values of rows of unit size below this part of the largest are none
+FELT = 1e-9  # part of its largest entry below which F leaves a self-stress alone
+
+
+def pressing(s: Structure) -> np.ndarray:
+    """The rows whose multipliers some friction depends on."""
+    return np.unique(s.tables["term_i"][s.tables["load_i"][:, 1], TERM_ROW]) if s.loads else np.zeros(0, int)
+
+
+def as_complex(system: System) -> System:
+    """The same tables in complex numbers."""
+    parts = {k: x for k, x in system._asdict().items() if isinstance(x, np.ndarray) and x.dtype == np.float64}
+    return system._replace(**{k: x.astype(complex) for k, x in parts.items()})  # type: ignore[arg-type]
+
+
+def complex_tables(c: Compiled) -> tuple[System, Work]:
+    """Tables and scratch in complex numbers."""
+    system = as_complex(c.values.system)
+    return system, work(c.structure, system, complex)
+
+
+def by_reactions(x: State, system: System, W: Work) -> np.ndarray:
+    """F, what is added to -G^T in the derivatives of r by the multipliers, (nv, rows).
+
+    Parameters
+    ----------
+    x : State
+    system, W : System, Work
+        Its tables and scratch in complex numbers.
+    """
+    s = x.c.structure
+    nv, nr = s.nv, len(s.rows)
+    out = np.zeros((nv, nr))
+    width = nv + 3 * nr + 3 * len(s.measured)
+    steps, found = np.zeros((1, 3 * nv + 1), complex), np.zeros((1, width), complex)
+    y, vdot = x.y.astype(complex), x.vdot.astype(complex)
+    rows = pressing(s)
+    for k in rows.tolist():
+        lam = x.lam.astype(complex)
+        lam[k] += 1j * STEP
+        residual_kernel(system, W, complex(x.t), y, vdot, lam, steps, found)
+        out[:, k] = found[0, :nv].imag / STEP
+    if len(rows):
+        x.c.at(x.t, x.q, x.v)
+        G = x.c.jacobian()
+        out[:, rows] += G[rows].T
+        out[:, np.abs(out).max(axis=0) <= FELT * np.abs(G).max(initial=0.0)] = 0.0
+    return out
+
+
+def refuse_undetermined(s: Structure, G: np.ndarray, F: np.ndarray) -> None:
+    """Refuse friction under reactions that redundancy leaves open: what it does then depends on what nobody knows.
+
+    Parameters
+    ----------
+    s : Structure
+    G : ndarray (rows, nv)
+        Constraint rows, turns counted in lengths.
+    F : ndarray (nv, rows)
+
+    Raises
+    ------
+    ModelError
+        Naming the frictions.
+    """
+    size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
+    U, d, _ = np.linalg.svd(G / size[:, None])
+    free = U[:, int((d > FREE * d.max(initial=1e-300)).sum()) :] / size[:, None]
+    if not free.size or not np.abs(F @ free).max(initial=0.0) > FREE * np.abs(F).max() * np.abs(free).max():
+        return
+    names = [e.name for e in s.loads if np.abs(free[s.slices[e.joint]]).max(initial=0.0) > FREE * np.abs(free).max()]  # type: ignore[attr-defined]
+    raise ModelError(
+        f"the friction of {', '.join(names)} depends on reactions that redundant constraints leave undetermined, so "
+        f"there are no linear equations; take the redundancy out (m.mobility() names it)"
+    )
