@@ -141,7 +141,10 @@ def test_a_spring_is_tuned():
     m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
     m.add(fb.TorsionalSpringDamper("spring", joint="A", stiffness="k"))
     w = 2 * np.pi * 1.5
-    found = m.optimize([], ["k"], analysis="modes", target=[-1j * w, 1j * w])
+    assert m.optimize([], ["k"], analysis="modes", target=[1j * w]).parameters["k"] == pytest.approx(w * w * 2 / 3 - G)
+    with pytest.raises(fb.ModelError, match="does not fit eigenvalue 0, eigenvalue 1"):
+        m.optimize([], ["k"], analysis="modes", target=[1j * w, 2j * w, 3])
+    found = m.optimize([], ["k"], analysis="modes", target=[1j * w, -1j * w])
     assert found.success
     assert found.parameters["k"] == pytest.approx(w * w * 2 / 3 - G, rel=1e-8)
     assert found.cost < 1e-12 < found.start_cost
@@ -182,6 +185,11 @@ def test_optimisation_asks_for_sense():
     m = slider_crank()
     with pytest.raises(fb.ModelError, match="either a target or a function"):
         m.optimize(["slider.x"], ["r"])
+    with pytest.raises(fb.ModelError, match=r"does not fit slider\.x, slider\.vx"):
+        m.optimize(["slider.x", "slider.vx"], ["r"], target=[0.3])
+    assert m.optimize(["slider.x"], ["l"], target=["80 cm"]).parameters["l"] == pytest.approx(0.6)
+    with pytest.raises(fb.ModelError, match="say which quantities"):
+        m.sensitivity([], ["r"])
     with pytest.raises(fb.ModelError, match="no parameter 'rr'"):
         m.optimize(["slider.x"], ["rr"], target=[0.6])
     with pytest.raises(fb.ModelError, match=r"'r' begins at 0.2, outside its bound 0.3"):

@@ -76,8 +76,7 @@ def linearize(
     SingularityError
         At a singular position.
     ModelError
-        If an input, output or parameter does not exist, something moves without inertia, or an output is a reaction
-        that redundant constraints leave undetermined.
+        If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
     """
     if isinstance(inputs, str) or isinstance(outputs, str):
         raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")

@@ -46,7 +46,8 @@ def optimize(
     to : sequence of str, or mapping of str to (lowest, highest)
         Parameters to be changed, with their bounds (None: none).
     target : array
-        What the quantities should be: one number each, or (times, quantities) of a motion. Complex for eigenvalues.
+        What the quantities should be, in SI units or with units: one number each, or (times, quantities) of a motion.
+        Eigenvalues [1/s] in any order, one of each complex pair.
     minimize : callable, in place of ``target``
         A smooth function of the quantities (times, of) that is to be smallest.
     weights : float or array
@@ -145,7 +146,7 @@ class Search:
 
         x0 = self.start / self.scale
         first = self.at(x0)
-        goal = np.broadcast_to(np.asarray(target), first.values.shape)
+        goal = _goal(target, first.values, self.of or first.of, self.analysis)
 
         def split(r: np.ndarray) -> np.ndarray:
             return r if np.isrealobj(r) else np.concatenate([r.real, r.imag])
@@ -206,6 +207,36 @@ class Search:
             best, start, cost, first, success, message.rstrip("."), self.count, self.of or found.of, found.t,
             found.values, at_bound,
         )  # fmt: skip
+
+
+def _goal(target: Any, values: np.ndarray, of: Sequence[str], analysis: str) -> np.ndarray:
+    """The target in the shape of the quantities; eigenvalues in any order, of each complex pair one will do.
+
+    Raises
+    ------
+    ModelError
+        If it does not fit them.
+    """
+    parts = [number(x, {}, None, "target") if isinstance(x, str) else x for x in np.asarray(target, object).ravel()]
+    try:
+        goal = np.array(parts, complex if analysis == "modes" else float)
+    except (TypeError, ValueError):
+        raise ModelError(f"target: {target!r} are no numbers") from None
+    if analysis == "modes":
+        order = np.lexsort((values[0].real, values[0].imag))
+        if len(goal) < values.shape[1]:
+            goal = np.concatenate([goal, np.conj(goal[goal.imag != 0.0])])
+        if len(goal) == values.shape[1]:
+            out = np.empty_like(goal)
+            out[order] = goal[np.lexsort((goal.real, goal.imag))]
+            return out[None]
+    elif goal.size == values.size and np.shape(target) in (values.shape, values.shape[1:], values.shape[:1]):
+        return goal.reshape(values.shape)
+    times = f" at {len(values)} times" if len(values) > 1 else ""
+    raise ModelError(
+        f"the target has the shape {np.shape(target)}, which does not fit {', '.join(of)}{times}; give one number for "
+        f"each quantity{', a row for each time (outputs=)' if times else ''}"
+    )
 
 
 def _slope(function: Callable[[np.ndarray], float], values: np.ndarray) -> np.ndarray:

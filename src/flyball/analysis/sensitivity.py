@@ -66,8 +66,7 @@ def sensitivity(
     """Derivatives of quantities with respect to parameters.
 
     Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the matrix
-    behind eigenvalues changes, and a start that assembly had to look for, comes from differences of sixth order whose
-    step is chosen by their error.
+    behind eigenvalues changes, and a start that assembly had to find, comes from differences of sixth order.
 
     Parameters
     ----------
@@ -85,8 +84,7 @@ def sensitivity(
     about : ``"equilibrium"`` or None
         For modes: about the static equilibrium, or where the mechanism is drawn.
     verify : bool
-        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter (of what would change
-        the mechanism by the whole, for one that is zero).
+        Also by central differences of the whole analysis.
     rtol, atol : float
 
     Returns
@@ -96,8 +94,7 @@ def sensitivity(
     Raises
     ------
     ModelError
-        If a quantity or parameter does not exist, a reaction is left undetermined by redundant constraints, or a law
-        jumps where a motion comes to.
+        If a name does not exist, a reaction is left undetermined by redundancy, or a law jumps during a motion.
     SingularityError
         If what is asked has no derivative there.
     """
@@ -123,6 +120,8 @@ def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
 
 def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, parameters: Any) -> None:
     """Refuse names that do not exist."""
+    if not len(of) and analysis != "modes":
+        raise ModelError("say which quantities: of=['slider.x'], for instance")
     if isinstance(of, str) or isinstance(to, str):
         raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
     if analysis not in ANALYSES:

@@ -70,7 +70,6 @@ def _target(texts: list[str], count: int) -> Any:
         return found
     if len(texts) != count:
         raise ModelError(f"{count} quantities need as many targets, got {len(texts)}")
-    try:
-        return np.array([[float(x) for x in texts]])
-    except ValueError as error:
-        raise ModelError(f"--target: {error}") from None
+    from ..model.expressions import number
+
+    return np.array([[float(number(x, {}, None, "--target")) for x in texts]])
