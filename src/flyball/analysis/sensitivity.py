@@ -19,7 +19,7 @@ from .equilibrium import equilibrium
 from .linear.begun import held, start_tangents
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State
-from .linear.differences import Found, check, derivative
+from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
@@ -66,8 +66,7 @@ def sensitivity(
     """Derivatives of quantities with respect to parameters.
 
     Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the matrix
-    behind eigenvalues changes, and a start that assembly had to look for, comes from differences of sixth order whose
-    step is chosen by their error.
+    behind eigenvalues changes, and a start that assembly had to look for, are differences of sixth order.
 
     Parameters
     ----------
@@ -85,8 +84,7 @@ def sensitivity(
     about : ``"equilibrium"`` or None
         For modes: about the static equilibrium, or where the mechanism is drawn.
     verify : bool
-        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter (of what would change
-        the mechanism by the whole, for one that is zero).
+        Also by central differences of the whole analysis, with a step of 1e-5 of each parameter.
     rtol, atol : float
 
     Returns
@@ -96,8 +94,7 @@ def sensitivity(
     Raises
     ------
     ModelError
-        If a quantity or parameter does not exist, a reaction is left undetermined by redundant constraints, or a law
-        jumps where a motion comes to.
+        If a name does not exist, a reaction is left undetermined, or a law jumps where a motion comes to.
     SingularityError
         If what is asked has no derivative there.
     """
@@ -255,8 +252,10 @@ def _modes(a: Question) -> Sensitivity:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         return without_inputs(state(parameters), like=f)[2].A
 
-    slopes_ = np.array([derivative(a.model, a.parameters, name, found) for name in a.to]).reshape(-1, *base.A.shape)
-    w, dw = changes(base.A, slopes_, a.to)
+    dA = np.array([derivative(a.model, a.parameters, name, found) for name in a.to])
+    w, dw = changes(
+        base.A, dA.reshape(len(a.to), *base.A.shape), lambda k: aside(a.model, a.parameters, a.to[k], found)
+    )
     of = tuple(f"eigenvalue {k}" for k in range(len(w)))
     return Sensitivity("modes", of, a.to, ("1/s",) * len(of), {}, np.array([a.t]), w[None], dw[None])
 
@@ -280,7 +279,7 @@ def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
 def _at_modes(a: Question) -> Found:
     state = _states(a)
     A = without_inputs(state(a.parameters))[2].A
-    first, _ = changes(A, np.zeros((0, *A.shape)), ())
+    first, _ = changes(A, np.zeros((0, *A.shape)))
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         w = np.linalg.eigvals(without_inputs(state(parameters))[2].A).astype(complex)
