@@ -63,13 +63,16 @@ def test_critical_damping_has_no_derivative():
 
 
 def test_what_moves_away_as_a_whole_keeps_its_zeros():
-    """Two masses and a spring: w^2 = k (1/M + 1)."""
+    """Two masses and a spring, w^2 = k (1/M + 1), beside a third mass that nothing holds."""
     m = fb.Mechanism("free", planar=True, parameters={"k": 1.0, "M": 2.0})
     for name, x, mass in (("a", 0, "M"), ("b", 1, 1.0)):
         m.add(fb.Body(name, mass=mass, inertia=1, position=(x, 0)))
         m.add(fb.Translational(f"rail {name}", "ground", name, at=(x, 0), axis=(1, 0)))
     m.add(fb.SpringDamper("spring", "a", "b", at=((0, 0), (1, 0)), stiffness="k"))
+    m.add(fb.Body("c", mass=1, inertia=1, position=(0, 3)))
+    m.add(fb.Translational("rail c", "ground", "c", at=(0, 3), axis=(1, 0)))
     found = m.sensitivity(to=["k", "M"], analysis="modes")
+    found.derivatives, found.values = found.derivatives[:, 2:], found.values[:, 2:]
     assert np.abs(found.derivatives[0, :2]).max() < 1e-12
     w = np.sqrt(1.5)
     assert np.abs(found.derivatives[0, 2:, 0].imag) == pytest.approx(1.5 / (2 * w), rel=1e-8)
@@ -90,3 +93,21 @@ def test_a_place_is_counted_from_anywhere():
     here, there = found(0.0), found(500.0)
     assert here.difference < 1e-5
     assert there.derivatives == pytest.approx(here.derivatives, rel=1e-6, abs=1e-9)
+
+
+def test_critical_damping_is_told_apart_from_what_moves_away():
+    m = carts(50.0, 100.0, damping=20.0)
+    m.add(fb.Body("free", mass=1, inertia=1, position=(0, 3)))
+    m.add(fb.Translational("rail", "ground", "free", at=(0, 3), axis=(1, 0)))
+    with pytest.raises(fb.SingularityError, match="no derivative by 'k2'"):
+        m.sensitivity(to=["k2"], analysis="modes")
+
+
+def test_what_is_balanced_for_one_value_only_is_told():
+    """A rod that a spring of one stiffness alone holds level."""
+    m = fb.Mechanism("rod", planar=True, gravity=(0, -G), parameters={"k": 20.0})
+    m.add(fb.Body("rod", mass=2, inertia=1, position=(0.5, 0)))
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.TorsionalSpringDamper("spring", joint="A", stiffness="k", angle=0.5 * 2 * G / 20))
+    with pytest.raises(fb.AnalysisError, match=r"to the side of 'k' = 20, the mechanism is not in equilibrium"):
+        m.sensitivity(analysis="modes")

@@ -19,7 +19,7 @@ from .equilibrium import equilibrium
 from .linear.begun import held, start_tangents
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State
-from .linear.differences import Found, check, derivative
+from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
@@ -254,8 +254,10 @@ def _modes(a: Question) -> Sensitivity:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         return without_inputs(state(parameters), like=f)[2].A
 
-    slopes_ = np.array([derivative(a.model, a.parameters, name, found) for name in a.to]).reshape(-1, *base.A.shape)
-    w, dw = changes(base.A, slopes_, a.to)
+    dA = np.array([derivative(a.model, a.parameters, name, found) for name in a.to])
+    w, dw = changes(
+        base.A, dA.reshape(len(a.to), *base.A.shape), lambda k: aside(a.model, a.parameters, a.to[k], found)
+    )
     of = tuple(f"eigenvalue {k}" for k in range(len(w)))
     return Sensitivity("modes", of, a.to, ("1/s",) * len(of), {}, np.array([a.t]), w[None], dw[None])
 
@@ -279,7 +281,7 @@ def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
 def _at_modes(a: Question) -> Found:
     state = _states(a)
     A = without_inputs(state(a.parameters))[2].A
-    first, _ = changes(A, np.zeros((0, *A.shape)), ())
+    first, _ = changes(A, np.zeros((0, *A.shape)))
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         w = np.linalg.eigvals(without_inputs(state(parameters))[2].A).astype(complex)

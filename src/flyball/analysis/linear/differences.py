@@ -54,7 +54,9 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
     for _ in range(TRIES):
         try:
             error, found_, rounded = at(h)
-        except AnalysisError:
+        except AnalysisError as error_:
+            if type(error_) is AnalysisError:  # what is asked for is not there aside: no smaller step makes it so
+                raise AnalysisError(f"a little to the side of {name!r} = {value:g}, {error_}") from None
             if way > 1.0:
                 break
             h *= way
@@ -67,6 +69,12 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
             break
         h *= way
     return at(h)[1] if best is None else best[1]
+
+
+def aside(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> tuple[float, np.ndarray, str]:
+    """The step with which differences begin, what is found that far aside, and the parameter's name."""
+    h = STEP * _whole(model, parameters, name)
+    return h, found({**parameters, name: model.environment(parameters)[name] + h}), name
 
 
 def check(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> np.ndarray:

@@ -1,11 +1,13 @@
 """How eigenvalues change with a matrix: dw = y^H dA x / y^H x (Lancaster 1964), groups of equal ones together.
 
 Where an eigenvalue is repeated with as many eigenvectors, its first changes are the eigenvalues of dA within them.
-Where it has too few, it has no derivative, unless dA leaves these alone: a mechanism that can move away as a whole has
-two zeros and keeps them.
+Where it has too few, it has no derivative, unless all stay zero: a mechanism that can move away as a whole has two
+zeros and keeps them. Whether they stay is looked up a finite step aside.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -14,10 +16,12 @@ from ...errors import SingularityError
 EQUAL = 1e-9  # difference of eigenvalues, of the matrix' size, below which they are one
 ROUNDED = 100.0 * np.finfo(float).eps  # of the matrix' size: what is uncertain of it
 PLAIN = 1e-6  # part of the matrix' size by which a group of equal eigenvalues differs from a multiple of the identity
-ALONE = 1e-7  # of its own size: changes of a group without all its eigenvectors below this are none
+STAYED = 1e-3  # of what dA would do to a group in a finite step: eigenvalues that moved less have stayed
+
+Aside = Callable[[int], tuple[float, np.ndarray, str]]
 
 
-def changes(A: np.ndarray, dA: np.ndarray, names: tuple[str, ...]) -> tuple[np.ndarray, np.ndarray]:
+def changes(A: np.ndarray, dA: np.ndarray, aside: Aside | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues and their derivatives.
 
     Parameters
@@ -25,8 +29,8 @@ def changes(A: np.ndarray, dA: np.ndarray, names: tuple[str, ...]) -> tuple[np.n
     A : ndarray (n, n)
     dA : ndarray (k, n, n)
         Derivatives of A by k parameters.
-    names : tuple of str
-        Of these.
+    aside : callable
+        Gives for the k-th parameter a finite step, A that far aside, and the parameter's name.
 
     Returns
     -------
@@ -55,7 +59,7 @@ def changes(A: np.ndarray, dA: np.ndarray, names: tuple[str, ...]) -> tuple[np.n
             y, x = left[:, group[0]], right[:, group[0]]
             out[group[0]] = np.array([y.conj() @ d @ x for d in dB]) / (y.conj() @ x)
         else:
-            out[group] = _together(B, dB, w, group, size, names)
+            out[group] = _together(B, dB, w, group, size, scale, aside)
     return w.astype(complex), out
 
 
@@ -75,7 +79,7 @@ def _groups(w: np.ndarray, angle: np.ndarray, size: float) -> list[list[int]]:
 
 
 def _together(
-    B: np.ndarray, dB: np.ndarray, w: np.ndarray, group: list[int], size: float, names: tuple[str, ...]
+    B: np.ndarray, dB: np.ndarray, w: np.ndarray, group: list[int], size: float, scale: np.ndarray, aside: Aside | None
 ) -> np.ndarray:
     """Derivatives of equal eigenvalues, (group, k)."""
     V, W = (_subspace(X, v, len(group)) for X, v in ((B, w[group]), (B.conj().T, w[group].conj())))
@@ -88,11 +92,17 @@ def _together(
         if plain:
             found = np.linalg.eigvals(inside)
             out[:, k] = found[np.lexsort((found.imag, found.real))]
-        elif np.abs(inside).max() > ALONE * np.abs(d).max() * np.abs(inner).max():
-            value = complex(np.mean(w[group]))
+        elif aside is not None:
+            h, other, name = aside(k)
+            value, spread = complex(np.mean(w[group])), float(np.abs(w[group]).max())
+            then = np.abs(np.linalg.eigvals(other / scale[:, None] * scale))
+            moved = np.sort(then)[: len(group)].max()  # as many as are zero now, if they are
+            stayed = moved <= max(STAYED * h * np.abs(inside).max(), 10.0 * spread, np.sqrt(ROUNDED) * size)
+            if abs(value) <= np.sqrt(ROUNDED) * size and stayed:
+                continue
             raise SingularityError(
                 f"the eigenvalue {value.real:.4g}{value.imag:+.4g}j 1/s is {len(group)}-fold and has fewer "
-                f"eigenvectors: it has no derivative by {names[k]!r}. Ask a little to the side of this value"
+                f"eigenvectors: it has no derivative by {name!r}. Ask a little to the side of this value"
             )
     return out
 
