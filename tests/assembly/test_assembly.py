@@ -380,3 +380,13 @@ def test_a_rate_at_every_hinge_of_a_long_chain():
     assert v[:, 2] == pytest.approx(turning, rel=1e-7)
     assert v[:, 1] == pytest.approx(np.cumsum(turning) - 0.5 * turning, rel=1e-7)
     assert np.abs(v[:, 0]).max() < 1e-7 * v[:, 1].max()
+
+
+def test_a_law_without_a_value_at_the_start_is_named():
+    m = fb.Mechanism("p", planar=True)
+    m.add(fb.Body("rod", mass=1, inertia=1, position=(0, -0.5)))
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Driver("motor", "A.angle", "sqrt(t - 0.5)"))
+    with pytest.raises(fb.AssemblyError, match="the law of Driver 'motor' has no finite value there"):
+        m.assemble()
+    assert m.assemble(t=0.75).q[2] == pytest.approx(0.5)
