@@ -13,6 +13,7 @@ from ..model.model import Model
 from ..system.coordinates import BodyState, positions, turned_angles, velocities
 from ..system.forest import steps
 from ..system.motion import NONE
+from ..system.names import velocity_names
 from ..system.records import load
 from ..system.structure import Structure, structure
 from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
@@ -55,6 +56,11 @@ class Compiled:
         if np.isfinite(z).all():
             self.z = z
         return out
+
+    @property
+    def sizes(self) -> np.ndarray:
+        """What a large step is along every velocity: the mechanism's length [m], or a radian, (nv,)."""
+        return np.array([self.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.structure)])
 
     @property
     def hints(self) -> dict[str, float]:

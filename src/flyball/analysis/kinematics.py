@@ -21,7 +21,6 @@ from .assemble import Assembly, assemble
 from .compiled import compiled
 from .dynamics import moved
 from .entry import FOLLOW, INTEGRATE
-from .freedom.freedoms import told
 from .freedom.geometry import positions_nearby
 from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
 from .motion.options import Options, output_times
@@ -208,7 +207,7 @@ def _singular_start(found: Mobility) -> SingularityError | None:
         return None
     free = c.structure.model.snapshot()
     free.drivers = []
-    loose = compiled(free, parameters=told(c))
+    loose = compiled(free, parameters=c.values.told)
     loose.follow(c.hints)
     there = mobility(free, Assembly(loose, a.t, a.q, a.v))
     ranks = []

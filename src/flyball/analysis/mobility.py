@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import AssemblyError, ModelError
 from ..model.model import Model
-from ..system.tables import NV, SEMIDEFINITE, V0
+from ..system.tables import SEMIDEFINITE
 from .assemble import Assembly, assemble
 from .compiled import Compiled
 
@@ -236,12 +236,7 @@ def scaled_jacobian(c: Compiled) -> tuple[Any, np.ndarray, np.ndarray]:
 
 def lengths(c: Compiled) -> np.ndarray:
     """1 for velocities that are metres a second, 1 / length of the mechanism for those that are radians."""
-    scale = np.ones(c.structure.nv)
-    body_i = c.values.system.body_i
-    for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True):
-        k = {3: 2, 6: 3}.get(int(n), 0)
-        scale[v0 + k : v0 + n] = 1.0 / c.values.length
-    return scale
+    return c.sizes / c.values.length
 
 
 def rank_of(c: Compiled) -> int:

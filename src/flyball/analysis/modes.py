@@ -79,7 +79,7 @@ def modes(
 
 def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray, fastest: float) -> Modes:
     names = velocity_names(x.c.structure)
-    length = np.array([1.0 if n.unit == "m" else x.c.values.length for n in names])
+    length = x.c.values.length / x.c.sizes
     sign = np.array([n.sign for n in names])
     for k in range(shapes.shape[1]):
         size = length * np.abs(shapes[:, k])

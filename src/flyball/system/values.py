@@ -69,6 +69,12 @@ class Values:
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
 
+    @property
+    def told(self) -> dict[str, float]:
+        """Values of the parameters that it was made with."""
+        names = list(self.structure.model.parameters)
+        return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
 
 def values(
     s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None

@@ -26,7 +26,6 @@ from ...model.model import Model
 from ...model.sensor import Sensor
 from ..compiled import compiled
 from ..mobility import TOLERANCE, scaled_jacobian
-from .freedoms import told
 
 if TYPE_CHECKING:
     from ..mobility import Found
@@ -184,7 +183,7 @@ def _options(there: Found, names: list[str], positions: Sequence[np.ndarray]) ->
     """What could stand in the place of each element, as it is first; all rows come from one compilation."""
     a = there.assembly
     model = a.compiled.structure.model
-    env = told(a.compiled)
+    env = a.compiled.values.told
     probe = model.snapshot()
     candidates: dict[str, list[Joint]] = {}
     directions = _directions(model, names, env)

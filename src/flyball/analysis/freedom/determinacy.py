@@ -10,7 +10,6 @@ from ...results.result import Result
 from ..assemble import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import CHANGED, DENSE, TOLERANCE, _null_space, lengths, self_stresses
-from .freedoms import told
 
 LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
 
@@ -42,8 +41,8 @@ def determinacy(result: Result) -> Determinacy:
     """The self-stresses at every output time of a motion."""
     n = len(result.t)
     out = Determinacy(n)
-    own = compiled(result.model, parameters=told_by(result), tree=result.values.structure.tree)
-    base = own if not own.structure.tree else compiled(result.model, parameters=told(own))
+    own = compiled(result.model, parameters=result.values.told, tree=result.values.structure.tree)
+    base = own if not own.structure.tree else compiled(result.model, parameters=own.values.told)
     if not len(base.structure.rows):
         return out
     found: list[tuple[int, dict[str, np.ndarray]]] = []
@@ -62,12 +61,6 @@ def determinacy(result: Result) -> Determinacy:
         for name, w in wrenches.items():
             out.wrenches.setdefault(name, np.zeros((n, 6, width)))[k, :, : w.shape[1]] = w
     return out
-
-
-def told_by(result: Result) -> dict[str, float]:
-    """Values of the parameters that a result was computed with."""
-    names = list(result.model.parameters)
-    return dict(zip(names, result.values.system.const[: len(names)].tolist(), strict=True))
 
 
 def _dependencies(c: Compiled) -> tuple[np.ndarray, float]:

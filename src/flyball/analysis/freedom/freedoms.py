@@ -97,17 +97,11 @@ def _coordinates(a: Assembly) -> tuple[list[str], Any]:
     measuring = model.snapshot()
     measuring.initial = [Initial(name=name, value=0.0) for name in names]
     held = dict.fromkeys(names, 0.0)
-    probe = compiled(measuring, parameters=told(own), holds=measuring.initial, held=held)
+    probe = compiled(measuring, parameters=own.values.told, holds=measuring.initial, held=held)
     probe.follow(own.hints)
     probe.at(a.t, a.q, a.v)
     G = probe.sparse_jacobian()
     return names, G[[probe.structure.slices[name].start for name in names]]
-
-
-def told(c: Compiled) -> dict[str, float]:
-    """Values of the parameters that a mechanism was compiled with."""
-    names = list(c.structure.model.parameters)
-    return dict(zip(names, c.values.system.const[: len(names)].real.tolist(), strict=True))
 
 
 def _depths(model: Any) -> dict[str, int]:

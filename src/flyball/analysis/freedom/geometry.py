@@ -20,7 +20,6 @@ from ...system.values import work
 from ..assemble import Assembly, closed_near
 from ..compiled import Compiled, compiled
 from ..mobility import lengths, motions_of, rank_of
-from .freedoms import told
 
 if TYPE_CHECKING:
     from ..mobility import Mobility
@@ -131,7 +130,7 @@ def positions_nearby(a: Assembly, motions: np.ndarray) -> list[np.ndarray]:
     model = c.structure.model
     near = c
     if not all(r.holonomic for r in c.structure.rows):
-        near = compiled(model, parameters=told(c), positions=True)
+        near = compiled(model, parameters=c.values.told, positions=True)
         near.follow(c.hints)
     scale = lengths(c)
     random = np.random.default_rng(1)
@@ -162,7 +161,7 @@ def _way(c: Compiled, q: np.ndarray, start: np.ndarray) -> float:
 
 def _shaken_rank(a: Assembly) -> int:
     """Rank where the frames of all joints are somewhere else, by a little and at random."""
-    c = compiled(a.compiled.structure.model, parameters=told(a.compiled))
+    c = compiled(a.compiled.structure.model, parameters=a.compiled.values.told)
     s, S = c.structure, c.values.system
     random = np.random.default_rng(2)
     for k in range(len(S.frame_x)):

@@ -7,17 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...system.names import velocity_names
 from .derivatives import Equations
 
 ROUNDING = 3e-15  # of positions: what stiffness makes of it is no force
 NOTHING = 1e-9  # acceleration [m/s^2] that is none
-
-
-def sizes(e: Equations) -> np.ndarray:
-    """The mechanism's length, or a radian, for every velocity, (nv,)."""
-    c = e.state.c
-    return np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(c.structure)])
 
 
 def acting(e: Equations) -> np.ndarray:
@@ -31,7 +24,7 @@ def acting(e: Equations) -> np.ndarray:
 
 def allowed(e: Equations, part: float) -> np.ndarray:
     """What may be left of every equation of motion: a part of what acts in it, and rounding, (nv,)."""
-    at, size = e.at, sizes(e)
+    at, size = e.at, e.state.c.sizes
     stiff = abs(e.by_position[at["r"]]) @ size
     inertia = e.by_acceleration[at["r"]].diagonal() * size / e.state.c.values.length
     return part * acting(e) + ROUNDING * stiff + NOTHING * inertia

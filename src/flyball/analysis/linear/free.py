@@ -79,7 +79,7 @@ def free(e: Equations, like: Free | None = None) -> Free:
     c = e.state.c
     s = c.structure
     names = velocity_names(s)
-    scale = np.array([1.0 if n.unit == "m" else 1.0 / c.values.length for n in names])
+    scale = c.sizes / c.values.length
     G = e.by_velocity[e.at["n"]].toarray()
     which = np.array([r.holonomic for r in s.rows], bool)
     given = prescribed(c)

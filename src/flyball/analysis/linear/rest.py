@@ -10,7 +10,6 @@ from functools import cached_property
 
 import numpy as np
 
-from ...system.names import velocity_names
 from ...system.tree import retract
 from ..compiled import Compiled
 from .balance import acting, allowed
@@ -53,7 +52,7 @@ class Rest:
     @cached_property
     def scale(self) -> np.ndarray:
         """Size of a step of one along every velocity: the mechanism's length, or a radian."""
-        return np.array([self.c.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.c.structure)])
+        return self.c.sizes
 
     @cached_property
     def G(self):

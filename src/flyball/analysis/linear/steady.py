@@ -17,7 +17,7 @@ from ...system.names import velocity_names
 from ...system.opcodes import INPUT
 from ...system.tables import FORCE_LAW, TREE, V0, System
 from ...system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
-from .balance import allowed, sizes
+from .balance import allowed
 from .derivatives import Equations, State
 from .free import Free
 from .reduced import Frame, reduced
@@ -129,7 +129,7 @@ def balanced(x: State, e: Equations) -> None:
     may = allowed(e, BALANCED)
     if not (left > may).any():
         return
-    d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * sizes(e), 0.0)))
+    d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)))
     raise AnalysisError(
         f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
         f"{names[d].sign * x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "

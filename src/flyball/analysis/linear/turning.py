@@ -110,7 +110,7 @@ def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float]:
     c, s = x.c, x.c.structure
     given = prescribed(c)
     moving = np.array([d for d in range(s.nv) if d not in at and not given[:, d].any()], int)
-    scale = np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(s)])
+    scale = c.sizes
     e = Equations(x)
     A, left, size = _equations(e, moving, np.array(free, int), given, scale)
     by_row = 1.0 / np.maximum(np.abs(A).max(axis=1), 1e-300)

@@ -22,7 +22,7 @@ def choose(model: Model, start: Start) -> None:
     a = start.assembly
     c = a.compiled
     c.at(a.t, a.q, a.v)
-    size = sizes(start)
+    size = start.assembly.compiled.sizes
     body_i = c.structure.tables["body_i"]
     given = body_i[body_i[:, BODY_LAW] >= 0, V0]
     size[given] = 0.0
@@ -33,12 +33,6 @@ def choose(model: Model, start: Start) -> None:
     dependent = order[: len(size) - len(given) - mobility(model, start.base).freedoms]
     c.work.vel[PARTITION] = -size
     c.work.vel[PARTITION, dependent] *= -1.0
-
-
-def sizes(start: Start) -> np.ndarray:
-    """What a change of each coordinate is measured by: the mechanism's length, or a radian."""
-    c = start.assembly.compiled
-    return np.array([c.values.length if n.unit == "m" else 1.0 for n in velocity_names(c.structure)])
 
 
 def independent(start: Start) -> tuple[str, ...]:

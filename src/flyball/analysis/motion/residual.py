@@ -24,15 +24,10 @@ def acceleration_violation(result: Result) -> float:
     n = len(result.t)
     if not n or not len(result.values.structure.rows):
         return 0.0
-    c = compiled(result.model, parameters=_parameters(result), tree=result.values.structure.tree)
+    c = compiled(result.model, parameters=result.values.told, tree=result.values.structure.tree)
     R = c.inverse_mass_root(np.ones(c.structure.nv)) if not c.structure.tree else None
     picked = np.unique(np.linspace(0, n - 1, min(n, MOST)).astype(int)).tolist()
     return max(_at(result, c, R, k) for k in picked)
-
-
-def _parameters(result: Result) -> dict[str, float]:
-    names = list(result.model.parameters)
-    return dict(zip(names, result.values.system.const[: len(names)].tolist(), strict=True))
 
 
 def _at(result: Result, c: Compiled, R, k: int) -> float:

@@ -53,9 +53,7 @@ class Closure:
         s = c.structure
         self.c, self.rows, self.drive = c, rows, drive
         length = c.values.length
-        self.scale = np.ones(s.nv)
-        for v0, n in zip(s.tables["body_i"][:, V0], s.tables["body_i"][:, 5], strict=True):
-            self.scale[v0 : v0 + {3: 2, 6: 3}.get(int(n), 0)] = length
+        self.scale = c.sizes
         units = {t.row: t.formula.measure for t in s.terms if not t.measured}
         self.row_scale = np.array([1.0 / length if units[k] == "m" else 1.0 for k in range(len(s.rows))])
         self.used = np.r_[np.arange(rows), drive]
