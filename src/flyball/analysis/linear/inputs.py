@@ -52,9 +52,8 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
             inputs.append(Input(name, name, "SI"))
             continue
         if name not in known:
-            raise ModelError(
-                f"{model.name!r} has no input {name!r}{suggest(name, list(known))}; {listing(list(known))}"
-            )
+            there = [*known, *model.parameters]
+            raise ModelError(f"{model.name!r} has no input {name!r}{suggest(name, there)}; {listing(there)}")
         e, field, at, of = known[name]
         parameter = f"input_{k}_of_{''.join(c if c.isalnum() else '_' for c in name)}"
         while parameter in out.parameters:  # a preload's
