@@ -16,7 +16,8 @@ from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
 from ..system.names import velocity_names
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .linear.balance import acting
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State

@@ -17,7 +17,8 @@ from ..model.body import Driver
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.result import Result
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .compiled import compiled
 from .entry import FOLLOW, INTEGRATE
 from .freedom.geometry import positions_nearby

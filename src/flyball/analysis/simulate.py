@@ -15,7 +15,7 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.result import Result
 from ..system.functions import forget, interrupts_kept
 from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
-from .assemble import Assembly
+from .assembly.start import Assembly
 from .entry import FOLLOW, INTEGRATE, motion_kernel
 from .motion import partition
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works

@@ -20,7 +20,8 @@ def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
     """Mass properties, pose and velocities of a body."""
     mass_properties(e, n, env, model.planar)
     vector(n.position, model.planar, f"position of {e.title}")
-    vector(n.velocity, model.planar, f"velocity of {e.title}")
+    if n.velocity is not None:
+        vector(n.velocity, model.planar, f"velocity of {e.title}")
     if model.planar and n.orientation is not None:
         raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
     if not model.planar and n.angle != 0.0:

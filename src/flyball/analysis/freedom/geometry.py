@@ -17,7 +17,8 @@ from ...model.geometry import orientation_matrix
 from ...system.tables import NQ, Q0
 from ...system.tree import retract
 from ...system.values import work
-from ..assemble import Assembly, closed_near
+from ..assembly.positions import closed_near
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import lengths, motions_of, rank_of
 

@@ -15,7 +15,7 @@ from ...results.result import Result
 from ...system.tables import G_VALUE, NU, V0
 from ...system.tree import retract
 from ...system.values import Values
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import Mobility, mobility
 from .derivatives import STEP, State

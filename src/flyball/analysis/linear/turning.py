@@ -19,7 +19,7 @@ from ...system.names import velocity_names
 from ...system.structure import Structure
 from ...system.tables import BODY_LAW, V0
 from ...system.tree import retract
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..motion.layer import in_coordinates
 from .balance import acting, allowed
 from .derivatives import Equations, State

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...numerics.integrators import explicit as ex
 from ...numerics.integrators.tableaux import tableau
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..entry import FOLLOW, motion_kernel
 from ..mobility import mobility
 from .start import Start

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ...errors import ModelError
 from ...system.cost import cost
 from ...system.spanning import spanning
 from ...system.tables import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..entry import MOTION
 
@@ -51,7 +52,7 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
     else:
         why = "as asked for"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
-    return Assembly(c, a.t, q, v, a.moved, a.iterations, a.sped), f"joint: {why}{_cuts(c)}"
+    return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cuts(c)}"
 
 
 def known(wish: str) -> None:

@@ -35,7 +35,7 @@ from ...system.tables import (
     VALUE,
 )
 from ...system.tree import REVOLUTE
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..entry import MOTION
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
