@@ -15,7 +15,7 @@ from flyball.errors import ModelError
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
 from flyball.model.model import CATEGORIES
-from flyball.tables.structure import Structure
+from flyball.tables.specs import Structure
 from flyball.tables.system import (
     BODY_P,
     BODY_R,

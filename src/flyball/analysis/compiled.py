@@ -18,7 +18,8 @@ from ..model.model import Model
 from ..tables.coordinates import BodyState, positions
 from ..tables.forest import steps
 from ..tables.names import velocity_names
-from ..tables.structure import Structure, structure
+from ..tables.specs import Structure
+from ..tables.structure import structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..tables.values import Values, values
 

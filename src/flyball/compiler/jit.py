@@ -26,7 +26,7 @@ COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "n
 KERNELS: list[Kernel] = []
 _pending: list[Callable[[], None]] = []
 _started = False
-_lock = threading.RLock()
+LOCK = threading.RLock()
 
 
 def on_numba(callback: Callable[[], None]) -> Callable[[], None]:
@@ -84,7 +84,7 @@ class Kernel:
         from .link import optimise_once
 
         def compile_once(*args: Any, **options: Any) -> Any:
-            with _lock, optimise_once(self.function.__qualname__):
+            with LOCK, optimise_once(self.function.__qualname__):
                 return compile_for(*args, **options)
 
         return compile_once
@@ -105,7 +105,7 @@ class Kernel:
 def start_numba() -> None:
     """Import Numba and register every formula defined so far."""
     global _started
-    with _lock:
+    with LOCK:
         if _started:
             return
         import numba  # noqa: F401

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..laws.call import STACK_RESERVE
-from ..tables.structure import Structure
+from ..tables.specs import Structure
 from ..tables.system import INVERSE_JACOBIAN, System, Work
 from .kinematics import ground_frames
 

@@ -20,7 +20,7 @@ from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 
-from ..compiler.jit import PACKAGE, _lock, start_numba
+from ..compiler.jit import LOCK, PACKAGE, start_numba
 from ..errors import PerformanceNotice
 from ..model.expressions import Expression
 from ..model.function import MOST, function_name
@@ -65,7 +65,7 @@ class Native:
 def native(expression: Expression, count: int) -> Native:
     """The code of a law that is a Python function of ``count`` numbers."""
     plain: Any = getattr(expression.function, "py_func", expression.function)  # the Python under Numba's decorators
-    with _lock:
+    with LOCK:
         if not isinstance(plain, FunctionType):
             made = Native(plain, count)
         else:

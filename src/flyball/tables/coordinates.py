@@ -16,7 +16,7 @@ from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
 from .forest import TreeJoint
-from .structure import FrameSpec
+from .specs import FrameSpec
 from .system import Q0, V0
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .structure import Structure
+from .specs import Structure
 from .system import ARTICULATED, PLANAR, SCHUR, SOLVER, TREE
 
 BODY, LINK, TERM, ENTRY, ARTICULATE = 315.0, 112.0, 40.0, 28.0, 12.0

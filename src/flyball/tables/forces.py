@@ -8,7 +8,7 @@ from ..constraints.blocks import DISTANCE, turning
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
-from .structure import Structure, frame
+from .specs import Structure, frame
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 

@@ -18,7 +18,7 @@ from ..model.model import Model
 from .system import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD
 
 if TYPE_CHECKING:
-    from .structure import Structure
+    from .specs import Structure
 
 KINDS = {"R": REVOLUTE, "P": PRISMATIC, "S": SPHERICAL}
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from .forest import steps
-from .structure import Structure
+from .specs import Structure
 from .system import NV, V0
 
 AXES = ("x", "y", "z")

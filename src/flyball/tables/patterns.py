@@ -6,7 +6,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..numerics.ldl import analyse
-from .structure import Structure, ints
+from .specs import Structure, ints
 from .system import BODY_LAW, COUPLED, SCHUR, SOLVER
 
 

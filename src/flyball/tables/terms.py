@@ -14,7 +14,7 @@ from ..model.element import Element, LawOf
 from ..model.expressions import Expression
 from ..model.joint import Coordinate, Joint
 from .forest import step_of
-from .structure import RowSpec, Structure, TermSpec, frame, ints
+from .specs import RowSpec, Structure, TermSpec, frame, ints
 from .system import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
 
 

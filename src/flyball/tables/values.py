@@ -27,7 +27,7 @@ from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .coordinates import BodyState, free_velocities, positions
 from .inertia import inverse_inertia
-from .structure import FrameSpec, Structure, TermSpec
+from .specs import FrameSpec, Structure, TermSpec
 from .system import (
     BODY_P,
     BODY_R,

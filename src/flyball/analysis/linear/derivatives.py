@@ -20,7 +20,7 @@ from ...equations.scratch import work
 from ...errors import ModelError, PerformanceNotice
 from ...laws.evaluation import evaluate_jet
 from ...laws.opcodes import BY_TIME
-from ...tables.structure import Structure
+from ...tables.specs import Structure
 from ...tables.system import (
     BODY_LAW,
     EFFORT,

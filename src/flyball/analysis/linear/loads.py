@@ -13,7 +13,7 @@ import numpy as np
 from ...equations.entry import residual_kernel
 from ...equations.scratch import work
 from ...errors import ModelError
-from ...tables.structure import Structure
+from ...tables.specs import Structure
 from ...tables.system import TERM_ROW, System, Work
 from ..compiled import Compiled
 

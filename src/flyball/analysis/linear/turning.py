@@ -17,7 +17,7 @@ from ...errors import ModelError, NotConverged
 from ...model.joint import Joint
 from ...tables.forest import step_of
 from ...tables.names import velocity_names
-from ...tables.structure import Structure
+from ...tables.specs import Structure
 from ...tables.system import BODY_LAW, V0
 from ..assemble import Assembly
 from ..motion.layer import in_coordinates
