@@ -9,7 +9,7 @@ import numpy as np
 
 from ..math.vec import dot, load9, mtv, mv
 from ..model.quantities import ENERGY, Quantity, quantities
-from ..system.tables import INERTIA, MASS
+from ..tables.system import INERTIA, MASS
 from .views.base import Named
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import ENERGY, components, quantities
-from ..system.values import Values
+from ..tables.values import Values
 from .energy import Energy
 from .health import Health
 from .measured import Measured
