@@ -14,7 +14,7 @@ from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
 from ..results.departure import Departure, changed_velocities, not_allowed, summary
-from ..system.values import Values
+from ..tables.values import Values
 from .assemble import assemble
 from .assembly.start import Assembly
 from .mass import MassProperties, directions, letters, report

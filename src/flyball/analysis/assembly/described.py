@@ -13,8 +13,8 @@ import numpy as np
 
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...results.departure import Departure
-from ...system.tables import NV, Q0, V0
-from ...system.values import Values
+from ...tables.system import NV, Q0, V0
+from ...tables.values import Values
 from ..compiled import Compiled
 
 KEPT = 1e-6  # part of a velocity by which it may differ from the given one, near singular positions, and is still kept

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...system.tables import G_VALUE
+from ...tables.system import G_VALUE
 from ..compiled import Compiled
 
 CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
@@ -79,7 +79,7 @@ def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
-    from ...system.tree import retract
+    from ...equations.tree import retract
 
     new = q.copy()
     retract(c.values.system, new, d)

@@ -10,7 +10,7 @@ import numpy as np
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...model.model import Model
 from ...results.departure import Departure
-from ...system.tables import NQ, Q0
+from ...tables.system import NQ, Q0
 from ..compiled import Compiled, compiled
 from .described import not_kept
 from .gaps import contradictory_velocities, disagreement, no_rate

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...model.model import Model
-from ...system.tables import NU
+from ...tables.system import NU
 from ..compiled import Compiled, compiled
 from .described import Given, described, deviation, given, gradient
 from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
@@ -66,7 +66,7 @@ class Wanted:
         """Whether these rows leave no velocity free."""
         A = np.vstack([x.toarray() for x in self._whitened()])
         free = (abs(self.root).sum(axis=0) > 0.0).sum()
-        return bool(np.linalg.matrix_rank(A, tol=BLOCKED * np.linalg.norm(A, 2)) == free) if A.size else free == 0
+        return bool(np.linalg.matrix_rank(A, tol=BLOCKED * _norm(A)) == free) if A.size else free == 0
 
     def _whitened(self, soft: bool = True) -> tuple[Any, Any]:
         """Both kinds of rows, by velocities whose squares are twice the kinetic energy."""
@@ -125,9 +125,9 @@ def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
     used = np.unique(sp.vstack([A, C]).indices)
     n = A.shape[1]
     A, C = A[:, used].toarray(), C[:, used].toarray()
-    V, inverse = _pseudo_inverse(A, NO_PART * np.linalg.norm(A, 2) if A.size else 0.0)
+    V, inverse = _pseudo_inverse(A, NO_PART * _norm(A))
     left = C - (C @ V) @ V.T
-    inverse_left = _pseudo_inverse(left, BLOCKED * np.linalg.norm(C, 2) if C.size else 0.0)[1]
+    inverse_left = _pseudo_inverse(left, BLOCKED * _norm(C))[1]
 
     def solve(r: np.ndarray, s: np.ndarray) -> np.ndarray:
         x = np.zeros(n)
@@ -136,6 +136,11 @@ def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         return x
 
     return solve
+
+
+def _norm(A: np.ndarray) -> float:
+    """Largest singular value."""
+    return float(np.linalg.norm(A, 2)) if A.size else 0.0
 
 
 def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]:

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...equations.scratch import work
+from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
-from ...system.tables import NQ, Q0
-from ...system.tree import retract
-from ...system.values import work
+from ...tables.system import NQ, Q0
 from ..assembly.positions import closed_near
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled

@@ -11,9 +11,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...model.model import Model
-from ...system.tables import NU
-from ...system.tree import retract
+from ...tables.system import NU
 from ..assemble import assemble
 from ..assembly.described import described, deviation
 from ..assembly.positions import inverse_weights

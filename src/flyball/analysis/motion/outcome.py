@@ -14,7 +14,7 @@ from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Owed, Result
-from ...system.tables import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
 from .options import Options
 from .reasons import reason, remarks

@@ -11,7 +11,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
-from ...system.tables import G_VALUE, Q0, SEMIDEFINITE
+from ...tables.system import G_VALUE, Q0, SEMIDEFINITE
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
