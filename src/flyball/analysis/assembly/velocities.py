@@ -22,7 +22,7 @@ from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
 CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
 WRONG = 1e-9  # the same, above which rows contradict one another
 BLOCKED = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
-SOFT = 1e-4  # of large mechanisms: how much softer than the constraints given velocities are, in each iteration
+SOFT = 1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
 
 
 @dataclass
@@ -152,19 +152,36 @@ def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]
 
 
 def _sparse(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
-    """One step of the method of proximal points towards the same, soft rows being softer; iterations lead there.
+    """One step of the proximal method of multipliers towards the same; iterations lead there.
 
-    [1 B^T; B -D] with B of unit size: B B^T would square the spread of singular values.
+    Least e |x|^2 + |C x - s|^2 with A x = r, by [e 1, C^T, A^T; C, -1, 0; A, 0, -d], rows of unit size: the multipliers
+    that are kept from one step to the next take d out again (Rockafellar, Math. Oper. Res. 1, 1976).
     """
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    B = sp.vstack([A, C]).tocsr()
-    m, n = B.shape
-    size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
-    D = np.r_[np.full(A.shape[0], NO_PIVOT), np.full(C.shape[0], SOFT)]
-    K = splu(sp.bmat([[sp.identity(n), B.T / size], [B / size, -sp.diags(D)]], format="csc"))
-    return lambda r, s: K.solve(np.r_[np.zeros(n), np.r_[r, s] / size])[:n]
+    n, m, k = A.shape[1], A.shape[0], C.shape[0]
+    size_A, size_C = (np.sqrt(np.asarray(X.multiply(X).sum(axis=1)).max(initial=0.0)) or 1.0 for X in (A, C))
+    A, C = A / size_A, C / size_C
+    d = NO_PIVOT / SOFT
+    K = splu(
+        sp.bmat(
+            [
+                [SOFT * sp.identity(n), C.T, A.T],
+                [C, -sp.identity(k), None],
+                [A, None, -d * sp.identity(m)],
+            ],
+            format="csc",
+        )
+    )
+    multipliers = np.zeros(m)
+
+    def solve(r: np.ndarray, s: np.ndarray) -> np.ndarray:
+        x = K.solve(np.r_[np.zeros(n), s / size_C, r / size_A - d * multipliers])
+        multipliers[:] = x[n + k :]
+        return x[:n]
+
+    return solve
 
 
 def consistent(
