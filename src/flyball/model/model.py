@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import dataclasses
 import itertools
 import re
 from collections.abc import Iterator, Mapping
@@ -15,7 +16,7 @@ from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
 from .element import Element, LawOf, Number, _plain, fields_with, resolve
 from .examine import but_is, carriers, check_units, measured
-from .expressions import law_expression, number, resolve_parameters
+from .expressions import folded, law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
 from .function import function_name
 from .geometry import vector
@@ -338,12 +339,11 @@ class Model:
             )
         tables = {x.name: x for x in self.tables}
         try:
-            expression = law_expression(value, of.dimension, where, tables=tables)
+            expression = law_expression(value, of.dimension, where, tables, self.names_in_laws(of))
+            expression = dataclasses.replace(expression, where=where)
             sensors = {k: x for k in expression.names if isinstance(x := self._names.get(k), Sensor)}
-            known = {"t", *of.inputs, *sensors, *self.parameters}
-            if not expression.names <= known:  # for the message, all that there are
-                known |= {x.name for x in self.sensors if isinstance(x, Sensor)}
-            expression.require(known)
+            expression.require(self.names_in_laws(of))
+            folded(expression.tree, expression.text)
             refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
@@ -351,6 +351,10 @@ class Model:
         for name in sorted(sensors):
             self._check_sensed(sensors[name], where, driver)
         return expression
+
+    def names_in_laws(self, of: LawOf) -> set[str]:
+        """All names that such a law may use."""
+        return {"t", *of.inputs, *self.parameters, *(x.name for x in self.sensors if isinstance(x, Sensor))}
 
     def _check_sensed(self, e: Sensor, where: str, driver: bool) -> None:
         """Whether a law may use a sensor."""
