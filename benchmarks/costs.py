@@ -42,10 +42,10 @@ def cases() -> Iterator[tuple[str, Any]]:
 
 def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], Any]:
     """(microseconds a stage, counts, start) of one mechanism."""
-    from flyball.analysis.dynamics import clock_for, run_clock
     from flyball.analysis.entry import INTEGRATE
     from flyball.analysis.motion.options import Options
     from flyball.analysis.motion.start import begin
+    from flyball.analysis.simulate import clock_for, run_clock
     from flyball.numerics.integrators import explicit as ex
     from flyball.numerics.integrators.tableaux import tableau
     from flyball.system.cost import counts

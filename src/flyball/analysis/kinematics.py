@@ -19,12 +19,12 @@ from ..model.model import Model
 from ..results.result import Result
 from .assemble import Assembly, assemble
 from .compiled import compiled
-from .dynamics import moved
 from .entry import FOLLOW, INTEGRATE
 from .freedom.geometry import positions_nearby
 from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
 from .motion.options import Options, output_times
 from .motion.start import Start, begin_at
+from .simulate import moved
 
 TOLERANCES = {"rtol": 1e-10, "atol": 1e-12}
 NARROW = 1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position

@@ -14,7 +14,6 @@ from ..model.model import Model, listing, suggest
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
-from .dynamics import simulate
 from .equilibrium import equilibrium
 from .linear.begun import held, start_tangents
 from .linear.curves import curve, slopes, snapshot
@@ -29,6 +28,7 @@ from .linear.undetermined import refuse_undetermined
 from .linear.variation import Variation
 from .linearize import without_inputs
 from .motion.options import output_times
+from .simulate import simulate
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
