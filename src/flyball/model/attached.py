@@ -49,7 +49,9 @@ def _doubtful(unit: str, names: Collection[str], dimension: str | None) -> list[
     out = []
     for m in _SYMBOL.finditer(unit):
         called = unit[m.end() :].lstrip().startswith("(")
-        if called or (m[0] in names and not _customary(m[0], unit, dimension, alone=m.start() == 0)):
+        if called or (
+            m[0] in names and not _customary(m[0], unit, dimension, alone=not _head(unit, m.start()).strip("1"))
+        ):
             out.append(m)
         if called:
             break

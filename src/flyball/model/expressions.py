@@ -233,6 +233,10 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
 def folded(node: Node, text: str) -> Node:
     """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
     args = tuple(folded(arg, text) for arg in node.args)
+    if node.kind in ("step", "step5") and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
+        value = float(args[1].value)
+        wider = f"give x1 another value than x0 = {value:g}; a jump is where(x < {value:g}, y0, y1)"
+        refuse(text, node.start, node.stop, "this step has no width", wider)
     if node.kind in _UNFOLDED or any(arg.kind != "number" for arg in args):
         return replace(node, args=args)
     value = float(OPERATIONS[node.kind](*(float(arg.value) for arg in args)))

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
-from .element import Element, LawOf, Number, fields_with, plain, resolve
+from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
 from .expressions import folded, law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
@@ -23,7 +23,7 @@ from .geometry import vector
 from .joint import Joint
 from .sensor import IMU, Sensor
 from .table import Table
-from .validity import check_body, check_by_frames, check_joint, refuse_twins
+from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -235,7 +235,7 @@ class Model:
 
     def _check_path(self, e: CoordinateForce) -> None:
         """What it acts along exists, and can move."""
-        if e.coordinate_text():
+        if e.coordinate_text() or hasattr(e, "coordinate"):
             self.coordinate(e.coordinate_text(), e)
         carriers = [self.carrier(name, e) for name in e.ends().values()]
         for k, (a, b) in enumerate(itertools.pairwise(carriers)):
@@ -250,7 +250,10 @@ class Model:
         found = self._names.get(name)
         if not isinstance(found, Body):
             names = [b.name for b in self.bodies]
-            raise ModelError(f"{e.title}: there is no body named {name!r}{suggest(name, names)}; {listing(names)}")
+            raise ModelError(
+                f"{e.title}: {field_with(e, name)}there is no body named {name!r}{suggest(name, names)}; "
+                f"{listing(names)}"
+            )
         return found
 
     def carrier(self, name: str, e: Element) -> str:
@@ -261,7 +264,8 @@ class Model:
         if name != GROUND and not isinstance(found, Body):
             names = carriers(self)
             raise ModelError(
-                f"{e.title}: there is no body or frame named {name!r}{but_is(self, name, 'body or frame')}"
+                f"{e.title}: {field_with(e, name)}there is no body or frame named {name!r}"
+                f"{but_is(self, name, 'body or frame')}"
                 f"{suggest(name, names)}; {listing(names)}"
             )
         return name
@@ -272,14 +276,14 @@ class Model:
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
             raise ModelError(
-                f"{e.title}: there is no joint named {name!r}{but_is(self, name, 'joint')}{suggest(name, names)}; "
-                f"{listing(names)}"
+                f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}there is no joint named {name!r}"
+                f"{but_is(self, name, 'joint')}{suggest(name, names)}; {listing(names)}"
             )
         has = found.measured(self.planar)
         if coordinate not in has:
             raise ModelError(
-                f"{e.title}: {found.title} has no coordinate {coordinate!r}{suggest(coordinate, has)}; it has "
-                f"{', '.join(has) or 'none'}"
+                f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}{found.title} has no coordinate "
+                f"{coordinate!r}{suggest(coordinate, has)}; it has {', '.join(has) or 'none'}"
             )
         return found
 
@@ -290,10 +294,15 @@ class Model:
         if isinstance(found, (Body, Frame)):
             axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
             if what not in axes:
-                raise ModelError(f"{e.title}: {owner!r} has the coordinates {', '.join(axes)}, not {what!r}")
+                raise ModelError(
+                    f"{e.title}: {field_with(e, text)}{owner!r} has the coordinates {', '.join(axes)}, not {what!r}"
+                )
             return found, what
         if not what:
-            raise ModelError(f"{e.title}: {text!r} is no coordinate; write joint.coordinate, for instance 'A.angle'")
+            raise ModelError(
+                f"{e.title}: {field_with(e, text)}{text!r} is no coordinate; write joint.coordinate, for instance "
+                f"'A.angle'"
+            )
         return self.joint(owner, e, what), what
 
     def measured(self, e: Sensor) -> tuple[str, str, int] | None:
@@ -313,18 +322,24 @@ class Model:
         """Resolve the element's numbers and refuse those that make no sense."""
         n = resolve(e, env)
         e.check(n)
+        check_vectors(e, n, self.planar)
         self._check_laws(e)
         check_units(self, e, env)
         if isinstance(e, Body):
             check_body(self, e, n, env)
+        elif isinstance(e, Frame):
+            check_frame(self, e, n)
         elif isinstance(e, Joint):
             check_joint(self, e, n)
         elif isinstance(e, Force):
             e.placed(n, self.planar)
             if isinstance(e, TwoFrameForce) and n.at is None:
                 check_by_frames(self, e)
-        elif isinstance(e, (Driver, Initial)):
-            self._check_told(e, env)
+        elif isinstance(e, Initial):
+            unit = self.unit(e.name, e)
+            for name, value, wanted in (("value", e.value, unit), ("rate", e.rate, f"{unit}/s")):
+                if value is not None:
+                    si_numbers(value, env, wanted, f"{name} of {e.title}")
 
     def _check_laws(self, e: Element) -> None:
         for name, of in fields_with(e.__class__, LawOf).items():
@@ -360,6 +375,8 @@ class Model:
         try:
             expression = law_expression(value, of.dimension, where, tables, self.names_in_laws(of))
             expression = dataclasses.replace(expression, where=where)
+            if expression.tree.kind == "number":
+                limited(expression.tree.value, of.dimension, where)
             sensors = {k: x for k in expression.names if isinstance(x := self._names.get(k), Sensor)}
             expression.require(self.names_in_laws(of))
             folded(expression.tree, expression.text)
@@ -388,8 +405,3 @@ class Model:
                 f"{where}: sensor {e.name!r} measures {e.of!r}, a rate; a driver follows positions and angles only. "
                 f"For a controller use an Actuator or a Motor"
             )
-
-    def _check_told(self, e: Driver | Initial, env: Mapping[str, float]) -> None:
-        """An initial condition says something."""
-        if isinstance(e, Initial) and e.value is None and e.rate is None:
-            raise ModelError(f"{e.title}: it gives neither value nor rate; give value=, rate=, or both")

@@ -44,9 +44,8 @@ KINDS = {
     "Pa": ("a pressure", "2 MPa"),
 }
 
-SYMBOLS = tuple(
-    "m mm cm km g kg s ms min h N mN kN MN Nm rad deg rpm rev turn Hz kHz Pa kPa MPa GPa J kJ W kW in ft lbf K".split()
-)
+_SYMBOLS = "m mm cm km in ft g kg s ms min h deg rad rpm rev turn Hz kHz N mN kN MN Nm lbf Pa kPa MPa GPa J kJ W kW K"
+SYMBOLS = frozenset(_SYMBOLS.split())
 
 
 def split_quantity(text: str) -> tuple[str, str] | None:
@@ -135,7 +134,9 @@ def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tup
         raise UnitError(f"'{text}': '{unit}' is not a unit; write {_example(dimension)}")
     try:
         parsed = registry.parse_units(unit)
-        if any(name.endswith("_constant") or name in _NO_UNITS for name, _ in registry.Quantity(1.0, parsed).unit_items()):
+        if any(
+            name.endswith("_constant") or name in _NO_UNITS for name, _ in registry.Quantity(1.0, parsed).unit_items()
+        ):
             raise pint.UndefinedUnitError(unit)  # "2 k" is no multiple of Boltzmann's constant
         zero = registry.Quantity(0.0, parsed).to_base_units().magnitude
         base = registry.Quantity(1.0, parsed).to_base_units()

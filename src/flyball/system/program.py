@@ -102,7 +102,10 @@ def compile_law(
         args = tuple(arguments(tree, known))
         tree = Node("function", args, _function(expression, args, code, functions))
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
-    writer.write(folded(_expand(tree, writer.varying), expression.text))
+    try:
+        writer.write(folded(_expand(tree, writer.varying), expression.text))
+    except ExpressionError as error:
+        raise ExpressionError(f"{expression.where}: {error}" if expression.where else str(error)) from None
     at = len(code)
     code += [len(writer.program) // 2, writer.deepest, *writer.program]
     return at, writer.deepest
