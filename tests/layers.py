@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 import pytest
 
 import flyball as fb
-from flyball.analysis import dynamics
+from flyball.analysis import simulate
 from flyball.analysis.assemble import Assembly
 from flyball.analysis.motion.options import Options, options_from
 from flyball.analysis.motion.start import Start, begin
@@ -40,8 +40,8 @@ def take(layer: str, monkeypatch: pytest.MonkeyPatch) -> None:
             pytest.skip("no joint of it can be a tree joint")
         return start
 
-    monkeypatch.setattr(dynamics, "options_from", options)
-    monkeypatch.setattr(dynamics, "begin", begun)
+    monkeypatch.setattr(simulate, "options_from", options)
+    monkeypatch.setattr(simulate, "begin", begun)
     monkeypatch.setattr(f"{__name__}._chosen", [layer])
 
 
@@ -61,4 +61,4 @@ def cached(make: Callable) -> Callable:
 
 def started(model: fb.Mechanism) -> Assembly:
     """A mechanism where it starts, in the coordinates in force."""
-    return dynamics.begin(model, 0.0, None, None, in_force()).assembly
+    return simulate.begin(model, 0.0, None, None, in_force()).assembly

@@ -33,8 +33,8 @@ class Mechanism(Model):
     """
 
     def simulate(self, t_end: float, **options: Any) -> Result:
-        """Motion from ``t_start`` (0) to ``t_end``; see `flyball.analysis.dynamics.simulate` for the options."""
-        from .analysis.dynamics import simulate
+        """Motion from ``t_start`` (0) to ``t_end``; see `flyball.analysis.simulate.simulate` for the options."""
+        from .analysis.simulate import simulate
 
         return simulate(self, t_end, **options)
 

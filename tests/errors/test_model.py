@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.dynamics import output_times
-from flyball.system.structure import structure
+from flyball.analysis.simulate import output_times
+from flyball.tables.structure import structure
 
 
 def planar(**options: object) -> fb.Mechanism:

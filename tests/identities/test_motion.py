@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis import dynamics
+from flyball.analysis import simulate
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION, motion_kernel
+from flyball.equations import motion
+from flyball.equations.entry import MOTION, motion_kernel
 from flyball.numerics.integrators import explicit
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.system import motion
-from flyball.system.tables import PASS, STABILIZE, TOL_G, TOL_V
+from flyball.tables.system import PASS, STABILIZE, TOL_G, TOL_V
 from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
@@ -91,7 +91,7 @@ def exact():
 
 def fixed_steps(monkeypatch, h, method):
     """The motion with steps of one width."""
-    original = dynamics.clock_for
+    original = simulate.clock_for
 
     def clock(start, *args):
         made = original(start, *args)
@@ -100,7 +100,7 @@ def fixed_steps(monkeypatch, h, method):
         start.assembly.compiled.work.option[[TOL_G, TOL_V]] = 1e-13, 1e-12
         return made
 
-    monkeypatch.setattr(dynamics, "clock_for", clock)
+    monkeypatch.setattr(simulate, "clock_for", clock)
     r = swinging().simulate(0.48, method=method, outputs=17)
     assert (r.health.steps, r.health.rejected) == (round(0.48 / h), 0)
     return r
@@ -158,15 +158,15 @@ def test_restart_from_a_saved_result(tmp_path):
 
 
 def one_step_a_call(monkeypatch):
-    original = dynamics.clock_for
+    original = simulate.clock_for
 
     def clock(*args):
         made = original(*args)
         made.count[explicit.QUOTA] = 1
         return made
 
-    monkeypatch.setattr(dynamics, "clock_for", clock)
-    monkeypatch.setattr(dynamics, "SLICE", 1e-12)
+    monkeypatch.setattr(simulate, "clock_for", clock)
+    monkeypatch.setattr(simulate, "SLICE", 1e-12)
 
 
 @pytest.mark.parametrize("make", [actuated, bricard, lambda: example("n_four_bar.py", windows=2)])
@@ -182,8 +182,8 @@ def test_chunks_change_nothing(monkeypatch, make):
     assert all(a <= b for a, b in pairwise(calls))
     assert calls[-1] == 1.0
     assert equal(whole, stepwise)
-    original = dynamics.motion_kernel
-    monkeypatch.setattr(dynamics, "motion_kernel", lambda S, W, R, c, out, task: original(S, W, R, c, out[:3], task))
+    original = simulate.motion_kernel
+    monkeypatch.setattr(simulate, "motion_kernel", lambda S, W, R, c, out, task: original(S, W, R, c, out[:3], task))
     narrow = make().simulate(1.0, outputs=101)
     assert equal(whole, narrow)
     assert (narrow.health.violation, narrow.health.steps) == (whole.health.violation, whole.health.steps)
@@ -251,7 +251,7 @@ def test_singular_positions_at_other_horizons(t_end):
 
 def test_ways_to_stay_closed():
     """Projection keeps rounding, Baumgarte a little error, nothing the most; all of them the same motion at first."""
-    runs = {k: four_bar().simulate(5.0, rtol=1e-6, stabilization=k) for k in dynamics.STABILIZATION}
+    runs = {k: four_bar().simulate(5.0, rtol=1e-6, stabilization=k) for k in simulate.STABILIZATION}
     off = {k: r.health.violation for k, r in runs.items()}
     assert off["projection"] < 1e-12
     assert off["projection-steps"] < 1e-12

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..equations.entry import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..model.expressions import number
 from ..model.model import Model
@@ -17,15 +18,14 @@ from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result
-from ..system.tables import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
+from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
 from .assemble import Assembly
 from .compiled import Compiled, compiled
-from .dynamics import clock_for, run_clock
-from .entry import INTEGRATE
 from .motion import partition
 from .motion.options import Options, options_from, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin
+from .simulate import clock_for, run_clock
 
 FINE = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
 LIMIT = 20  # times the steps of the reference: what takes more is given up

@@ -44,6 +44,11 @@ class Health:
         return value
 
     @property
+    def status(self) -> str:
+        """How it ended: ``"done"``, or why not."""
+        return "done" if self.success and self._simulated else self.message
+
+    @property
     def freedoms(self) -> int:
         """Freedoms by rank, at the start."""
         return self._found("mobility").freedoms
@@ -86,7 +91,7 @@ class Health:
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
-            ("status", "done" if self.success and self._simulated else self.message),
+            ("status", self.status),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             ("freedoms", str(self.freedoms)),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),

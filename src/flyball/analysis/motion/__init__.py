@@ -1,1 +1,1 @@
-"""Pieces of ``dynamics``: the start, the choices, the coordinates, and what comes out."""
+"""Pieces of ``simulate``: the start, the choices, the coordinates, and what comes out."""

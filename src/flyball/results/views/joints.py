@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,16 +11,24 @@ from ...constraints.registry import FORMULAS
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
-from ...system.forest import step_of
-from ...system.tables import Q0
+from ...tables.forest import step_of
+from ...tables.system import Q0
 from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
-from .points import PointView
+
+if TYPE_CHECKING:
+    from ..result import Result
+
+ORDERS = ("", "_rate", "_acceleration")
 
 
 class JointView(View):
     """Coordinates and reaction of a joint."""
+
+    def __init__(self, result: Result, element: Any) -> None:
+        super().__init__(result, element)
+        self._known: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def _measure(self, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A coordinate, its rate and its acceleration, through the row that measures it."""
@@ -57,20 +65,15 @@ class JointView(View):
         R = self._x.system.frame_x[frame, 3:]
         return atan2(R[3].item(), R[0].item())
 
-    def __getattr__(self, name: str) -> np.ndarray:
+    def _found(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
-        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
-            raise AttributeError(name)
-        own = self.element.measured(self._result.planar)
-        for ending, k in (("_rate", 1), ("_acceleration", 2)):
-            if name.endswith(ending) and name.removesuffix(ending) in own:
-                return self._measure(name.removesuffix(ending))[k]
-            if name == ending[1:] and len(own) == 1:
-                return self._measure(next(iter(own)))[k]
-        if name in own:
-            return self._measure(name)[0]
-        has = ", ".join([*own, "force", "torque"])
-        raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
+        if name == "place":
+            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
+        k = next((k for k, ending in enumerate(ORDERS) if k and name.endswith(ending)), 0)
+        what = name.removesuffix(ORDERS[k])
+        if what not in self._known:
+            self._known[what] = self._measure(what)
+        return self._known[what][k]
 
     def _wrench(self) -> Wrench:
         """Force on body_j at M's origin and torque about it, world components."""
@@ -103,15 +106,20 @@ class JointView(View):
         sign = 1.0 if on == names[1] else -1.0
         return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
 
+    def rotation(self, axes: str) -> np.ndarray:
+        """Rotation matrices, world from the axes that `reaction` knows by this name, (n, 3, 3)."""
+        e = self.element
+        names = [self._x.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        full = [np.broadcast_to(x, len(self._result.t)) for x in self._axes(axes, names)]
+        return np.stack(full, axis=1).reshape(-1, 3, 3)
+
     def _axes(self, axes: str, names: list[str]) -> tuple:
         records, x = self._result.records, self._x
         if axes == "joint":
             return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
         if axes not in names:
             raise ValueError(f"axes must be 'world', 'joint', {names[0]!r} or {names[1]!r}, not {axes!r}")
-        return (
-            PointView(self._result, x.structure.model[axes])._record[1] if axes != GROUND else tuple(np.eye(3).ravel())
-        )
+        return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     @property
     def force(self) -> np.ndarray:
@@ -128,19 +136,3 @@ class JointView(View):
     def undetermined(self) -> tuple[str, ...]:
         """Reaction components that redundancy leaves undetermined; of those one choice is given."""
         return self._result.health.undetermined.get(self.element.name, ())
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Coordinates, their rates, reaction force and torque."""
-        out: dict[str, tuple[str, np.ndarray]] = {}
-        own = self.element.measured(self._result.planar)
-        for what, c in own.items():
-            value, rate, _ = self._measure(what)
-            out[what] = (c.unit, value)
-            out["rate" if len(own) == 1 else f"{what}_rate"] = (f"{c.unit}/s", rate)
-        if (place := f"{self.element.name}.place") in self._x.structure.state_at:
-            out["place"] = ("m", self._result.states[:, self._x.structure.state_at[place]])
-        axes = "xy" if self._result.planar else "xyz"
-        out |= {f"f{a}": ("N", self.force[:, i]) for i, a in enumerate(axes)}
-        torque = np.atleast_2d(self.torque.T)
-        names = ["torque"] if self._result.planar else [f"t{a}" for a in axes]
-        return out | {k: ("N*m", torque[i]) for i, k in enumerate(names)}

@@ -6,7 +6,6 @@ import numpy as np
 
 from ...math.vec import mtv, sub
 from .base import View
-from .points import PointView
 
 
 class SensorView(View):
@@ -20,19 +19,14 @@ class SensorView(View):
     @property
     def unit(self) -> str:
         """Unit of what it measures."""
-        return self._result.channel(self.element.of)[0]
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Its value."""
-        return {"value": self._result.channel(self.element.of)}
+        return self.names["value"].unit
 
 
 class IMUView(View):
     """What accelerometers and gyroscopes on a body show."""
 
     def _axes(self) -> tuple:
-        e, model = self.element, self._x.structure.model
-        return PointView(self._result, model[e.frame])._record
+        return self._result.records.named(self.element.frame)
 
     @property
     def specific_force(self) -> np.ndarray:
@@ -46,11 +40,3 @@ class IMUView(View):
         """Angular velocity along its own axes [rad/s], (n, 3)."""
         _, R, w, _, _, _ = self._axes()
         return np.stack(mtv(R, w), axis=1)
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Components of both."""
-        f, w = self.specific_force, self.angular_velocity
-        if self._result.planar:
-            return {"fx": ("m/s^2", f[:, 0]), "fy": ("m/s^2", f[:, 1]), "w": ("rad/s", w[:, 2])}
-        out = {f"f{a}": ("m/s^2", f[:, i]) for i, a in enumerate("xyz")}
-        return out | {f"w{a}": ("rad/s", w[:, i]) for i, a in enumerate("xyz")}
