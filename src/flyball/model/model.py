@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copy
 import dataclasses
-import itertools
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -17,10 +16,11 @@ from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
 from .expressions import folded, law_expression, number, resolve_parameters
-from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .force import Force, TwoFrameForce
 from .function import function_name
 from .geometry import vector
 from .joint import Joint
+from .references import check_references
 from .sensor import IMU, Sensor
 from .table import Table
 from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
@@ -167,7 +167,7 @@ class Model:
                     f"condition"
                 )
             self._check_name(e)
-            self._check_references(e)
+            check_references(self, e)
             self.validate(e, self.environment())
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
@@ -186,7 +186,7 @@ class Model:
         old = self[e.name]
         if old.category != e.category:
             raise ModelError(f"{e.title} cannot take the place of {old.title}")
-        self._check_references(e)
+        check_references(self, e)
         self.validate(e, self.environment())
         parts = getattr(self, e.category)
         parts[parts.index(old)] = e
@@ -206,44 +206,6 @@ class Model:
             raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
         if e.name in self._names:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
-
-    def _check_references(self, e: Element) -> None:
-        if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
-            carriers = [self.carrier(name, e) for name in (e.body_i, e.body_j)]
-            if carriers[0] == carriers[1]:
-                raise ModelError(f"{e.title}: both its ends are on {carriers[0]!r}; it must join two different bodies")
-        elif isinstance(e, Frame):
-            if e.body != GROUND:
-                self.body(e.body, e)
-        elif isinstance(e, BodyForce):
-            if self.carrier(e.body, e) == GROUND:
-                raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
-        elif isinstance(e, CoordinateForce):
-            e.examine(self)
-            self._check_path(e)
-        elif isinstance(e, Coupling):
-            for text in e.coupled():
-                self.coordinate(text, e)
-            e.examine(self)
-        elif isinstance(e, Sensor):
-            self.measured(e)
-        elif isinstance(e, IMU):
-            if self.carrier(e.frame, e) == GROUND:
-                raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
-        elif isinstance(e, (Driver, Initial)):
-            self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
-
-    def _check_path(self, e: CoordinateForce) -> None:
-        """What it acts along exists, and can move."""
-        if e.coordinate_text() or hasattr(e, "coordinate"):
-            self.coordinate(e.coordinate_text(), e)
-        carriers = [self.carrier(name, e) for name in e.ends().values()]
-        for k, (a, b) in enumerate(itertools.pairwise(carriers)):
-            if a == b:
-                raise ModelError(
-                    f"{e.title}: points {k + 1} and {k + 2} are both on {a!r}, so the rope between them never changes "
-                    f"its length; leave one out"
-                )
 
     def body(self, name: str, e: Element) -> Body:
         """The body of that name, as asked for by e."""
