@@ -14,8 +14,8 @@ from functools import partial
 
 import numpy as np
 
-from ...system.tables import Q0, V0
-from ...system.tree import lengths, retract
+from ...equations.tree import lengths, retract
+from ...tables.system import Q0, V0
 from .derivatives import Equations, State
 from .free import prescribed
 from .least import least

@@ -11,12 +11,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.tree import column, normalise, quaternion_at, rates
 from ...errors import AnalysisError
+from ...laws.opcodes import INPUT
 from ...results.records import Records
-from ...system.names import velocity_names
-from ...system.opcodes import INPUT
-from ...system.tables import FORCE_LAW, TREE, V0, System
-from ...system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
+from ...tables.names import velocity_names
+from ...tables.system import FORCE_LAW, FREE, PLANAR, TREE, V0, System
 from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
 from .free import Free
