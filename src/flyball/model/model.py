@@ -22,6 +22,7 @@ from .geometry import vector
 from .joint import Joint
 from .references import check_references
 from .sensor import IMU, Sensor
+from .summary import summary
 from .table import Table
 from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
 from .words import listing as listing
@@ -136,6 +137,9 @@ class Model:
         return all(getattr(self, k) == getattr(other, k) for k in same)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return summary(self)
 
     def find(self, name: str) -> Element | None:
         """The part with that name, if there is one."""
