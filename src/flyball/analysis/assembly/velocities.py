@@ -227,9 +227,9 @@ def consistent(
 
 
 def terms(w: Wanted, v: np.ndarray) -> float:
-    """The largest term of the hard rows."""
-    n = len(w.nu)
-    return max(float((abs(w.G) @ np.abs(v)).max(initial=0.0)), float(np.abs(w.nu[:n]).max(initial=0.0)))
+    """What terms of the hard rows may be: a body that spins fast about its own axis leaves rounding in them all."""
+    largest = float(abs(w.G).max()) if w.G.nnz else 0.0
+    return max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
 
 
 def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
