@@ -24,6 +24,8 @@ PACKAGE = pathlib.Path(__file__).parent.parent
 COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "numerics", "tables/system.py")
 """Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
 KERNELS: list[Kernel] = []
+TEXTS: dict[str, str] = {}
+"""Sources of formulas that were put together at import (`written`): module and name -> text."""
 _pending: list[Callable[[], None]] = []
 _started = False
 LOCK = threading.RLock()
