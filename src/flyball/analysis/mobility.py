@@ -313,7 +313,7 @@ def _null_space(A) -> tuple[int, np.ndarray]:
 
 
 def _factor_entry():
-    from ..equations.entry import factor_kernel
+    from ..numerics.ldl import factor_kernel
 
     return factor_kernel
 

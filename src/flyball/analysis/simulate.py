@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from ..equations.entry import FOLLOW, INTEGRATE, motion_kernel
+from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..laws.functions import forget, interrupts_kept
 from ..model.expressions import number
 from ..model.model import Model

@@ -11,7 +11,8 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from .jit import TEXTS, formula
+from .jit import formula
+from .stamp import TEXTS
 
 
 def written(home: str, name: str, arguments: str, lines: Sequence[str], names: Mapping[str, Any]) -> Any:
