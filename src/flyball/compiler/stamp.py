@@ -18,7 +18,7 @@ COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "n
 TEXTS: dict[str, str] = {}
 """Sources of formulas that were put together at import (`written`): module and name -> text."""
 
-_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\(?[\w ,\n]+)", re.MULTILINE)
+_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|[\w ,]+)", re.MULTILINE)
 _SEARCH = re.compile(r"^import pkgutil$", re.MULTILINE)
 
 
