@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from ..model.force import Force
 
@@ -33,3 +34,14 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
 INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench", "effort"))
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
+if TYPE_CHECKING:  # for editors; nothing else needs these lines
+    from .bushing import Bushing as Bushing
+    from .coordinate_spring import Actuator as Actuator
+    from .coordinate_spring import CoordinateSpring as CoordinateSpring
+    from .joint_friction import JointFriction as JointFriction
+    from .motor import Motor as Motor
+    from .point_force import PointForce as PointForce
+    from .point_torque import PointTorque as PointTorque
+    from .rope import Rope as Rope
+    from .spring_damper import SpringDamper as SpringDamper
+    from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper
