@@ -9,7 +9,6 @@ only, so that a call costs some nanoseconds.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import update_wrapper
 from typing import Any
 
 from .jit import KERNELS, LOCK, OPTIONS, on_numba, start_numba
@@ -26,7 +25,7 @@ class Door:
         self.function = function
         self._made: Any = None
         self._types: tuple[Any, ...] = ()
-        update_wrapper(self, function)
+        self.__doc__, self.__qualname__ = function.__doc__, function.__qualname__
         KERNELS.append(self)
 
     def address(self, *tuples: Any) -> int:
