@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...errors import AnalysisError, ModelError
 from ...results.doubts import open_loads
 from ...tables.cost import cost

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, NV, PER_COMPACT, PER_MASS, V0
 from ..compiled import Compiled, compiled
 
