@@ -18,11 +18,12 @@ from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
+from .linear.frames import kinematic
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.steady import kinematic, moved_on, seen_from
+from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none

@@ -15,13 +15,14 @@ Inputs that move the mechanism act through their rates too.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from .derivatives import Equations
 from .free import TOLERANCE, Free
 from .loads import refuse_undetermined
+from .rounding import Terms, uncertain
 
 
 @dataclass
@@ -66,6 +67,8 @@ class Reduced:
         Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
     M, D, K : ndarray (f, f) or None
         M a'' + D a' + K a = 0 where all constraints are on positions.
+    doubt : ndarray (n, n)
+        What rounding may have made of every entry of A; entries below it are 0.
     """
 
     rate: np.ndarray
@@ -76,6 +79,7 @@ class Reduced:
     M: np.ndarray | None = None
     D: np.ndarray | None = None
     K: np.ndarray | None = None
+    doubt: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def A(self) -> np.ndarray:
@@ -125,6 +129,11 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     left = M @ (acceleration - H @ u) + others
     multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
     out = Reduced(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers)
+    size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
+    n = len(out.rate)
+    terms = Terms(abs(f.left) @ (abs(u) + abs(N - H) @ abs(x))[:, :n], size[:, :n], Y, M)
+    out.doubt = uncertain(out.A, e, f, terms)
+    out.A[abs(out.A) <= out.doubt] = 0.0
     if f.Zv.shape == f.Z.shape:
         turned = (H - N) @ f.Z  # u = Z a' + turned a
         out.M = Y.T @ M @ f.Z

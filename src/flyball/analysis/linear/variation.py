@@ -19,7 +19,7 @@ from ...system.tree import normalise, retract
 from ..compiled import Compiled
 from ..entry import MOTION
 from .derivatives import State
-from .steady import kinematic
+from .frames import kinematic
 from .tangent import Direction, Linear, Tangent, closed
 
 CLOSED = 1e-12  # of the mechanism's length
