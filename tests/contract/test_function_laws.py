@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.errors import ExpressionError, PerformanceNotice
+from flyball.laws.call import STACK_RESERVE
+from flyball.laws.evaluation import evaluate
+from flyball.laws.functions import fault, forget, interrupts_kept
+from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression
-from flyball.system.call import STACK_RESERVE
-from flyball.system.functions import fault, forget, interrupts_kept
-from flyball.system.laws import evaluate
-from flyball.system.program import compile_law
 
 PARAMETERS = {"k": 3.0}
 INPUTS = ("t", "length", "rate")

@@ -19,7 +19,7 @@ from numba.core.errors import NumbaWarning
 warnings.simplefilter("error", NumbaWarning)
 
 def cache_counts():
-    from flyball._jit import KERNELS
+    from flyball.compiler.jit import KERNELS
     used = [k for k in KERNELS if k._dispatcher is not None]
     stats = [k.dispatcher.stats for k in used]
     return {

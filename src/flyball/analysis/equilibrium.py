@@ -15,7 +15,7 @@ from ..errors import ModelError, NotConverged
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
-from ..system.names import velocity_names
+from ..tables.names import velocity_names
 from .assemble import Assembly, assemble
 from .linear.balance import acting
 from .linear.curves import snapshot

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..math.vec import dot, load9, mtv, mv
-from ..system.tables import INERTIA, MASS
+from ..tables.system import INERTIA, MASS
 
 if TYPE_CHECKING:
     from .result import Result

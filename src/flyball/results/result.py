@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
-from ..system.values import Values
+from ..tables.values import Values
 from .energy import Energy
 from .health import Health
 from .measured import Measured

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...results.health import Health
 from ...results.result import Result
-from ...system.tables import G_VALUE, NU, V0
-from ...system.tree import retract
-from ...system.values import Values
+from ...tables.system import G_VALUE, NU, V0
+from ...tables.values import Values
 from ..assemble import Assembly
 from ..compiled import compiled
 from ..mobility import Mobility, mobility

@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.tree import quaternion_at, rates
 from ...results.records import Records
-from ...system.tables import NV, V0
-from ...system.tree import quaternion_at, rates
+from ...tables.system import NV, V0
 from .derivatives import State
 from .loads import STEP
 from .reduced import Frame

@@ -10,7 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...system.tree import retract
+from ...equations.tree import retract
 from ..compiled import Compiled
 from .balance import acting, allowed
 from .derivatives import Equations, State

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...system.tables import NV
+from ...tables.system import NV
 from .balance import acting
 from .derivatives import Equations
 from .free import Free

@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.tree import normalise, rates
 from ...errors import AnalysisError
-from ...system.names import velocity_names
-from ...system.opcodes import INPUT
-from ...system.tables import FORCE_LAW, System
-from ...system.tree import normalise, rates
+from ...laws.opcodes import INPUT
+from ...tables.names import velocity_names
+from ...tables.system import FORCE_LAW, System
 from .balance import allowed
 from .derivatives import Equations, State
 from .frames import frames, generator, kinematic

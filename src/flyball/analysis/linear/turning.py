@@ -12,13 +12,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...errors import ModelError, NotConverged
 from ...model.joint import Joint
-from ...system.forest import step_of
-from ...system.names import velocity_names
-from ...system.structure import Structure
-from ...system.tables import BODY_LAW, V0
-from ...system.tree import retract
+from ...tables.forest import step_of
+from ...tables.names import velocity_names
+from ...tables.specs import Structure
+from ...tables.system import BODY_LAW, V0
 from ..assemble import Assembly
 from ..motion.layer import in_coordinates
 from .balance import acting, allowed

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...equations import motion
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
-from ...system import motion
 from .layer import known as known_coordinates
 
 STABILIZATION = {

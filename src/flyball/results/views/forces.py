@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.loads import power, wide
 from ...errors import AnalysisError
+from ...laws.call import STACK_RESERVE
+from ...laws.evaluation import evaluate
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce, TwoPointForce
-from ...system.call import STACK_RESERVE
-from ...system.laws import evaluate
-from ...system.loads import power, wide
-from ...system.tables import FORCE_F, FORCE_M
+from ...tables.system import FORCE_F, FORCE_M
 from ..records import coordinate_frames, turned
 from .base import View
 

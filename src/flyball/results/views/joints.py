@@ -11,8 +11,8 @@ from ...constraints.registry import FORMULAS
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
-from ...system.forest import step_of
-from ...system.tables import Q0
+from ...tables.forest import step_of
+from ...tables.system import Q0
 from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
