@@ -18,11 +18,12 @@ from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import curve, slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
-from .linear.frames import kinematic
+from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
+from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 
@@ -89,7 +90,9 @@ def linearize(
     r = _reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or outputs):
         _refuse_turning(e, f, r, frame, named, outputs)
-    return _model(e, f, r, frame, named, outputs)
+    found = _model(e, f, r, frame, named, outputs)
+    found.seen_from = told(x, frame, frozen)
+    return found
 
 
 def _refuse_turning(
@@ -192,6 +195,11 @@ def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequen
     return [A, B + A @ shift, C, D + C @ shift]
 
 
+def _sorted(w: np.ndarray) -> np.ndarray:
+    """By imaginary, then real part; the upper one of a pair after the lower."""
+    return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
+
+
 def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
@@ -201,11 +209,11 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
     sign = np.array([n.sign for n in (*named, *rates)])
-    own = sign[: len(named)]
+    own, A = sign[: len(named)], sign[:, None] * A * sign
     second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
     return LinearModel(
         name=s.model.name,
-        A=sign[:, None] * A * sign,
+        A=A,
         B=sign[:, None] * B,
         C=C * sign,
         D=D,
@@ -220,6 +228,7 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
         damping=second[1],
         stiffness=second[2],
         turning=frame.turning,
+        eigenvalues=_sorted(spectrum(A, None if r.doubt is None else r.doubt.signed(sign)).values),
         t=x.t,
         motion=r.position[:, : len(sign)] * sign,
         point=shot,

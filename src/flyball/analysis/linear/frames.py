@@ -22,6 +22,7 @@ from .loads import STEP
 from .reduced import Frame
 
 UNDECIDED = 1e-9  # singular values below this part of the largest leave the frame's turning open
+IN_PLANE = (0, 1, 5)  # x, y and the angle about z, of a body's six
 ROUNDED = 1e-13  # of the largest: entries of H that are none
 
 
@@ -66,6 +67,17 @@ def frames(x: State) -> list[Frame]:
     return [Frame(turning, generator(x, turning), N) for turning in turns]
 
 
+def told(x: State, frame: Frame, frozen: bool) -> str:
+    """Where linear equations about a motion are seen from, for people; empty at rest."""
+    if not np.abs(x.v).max(initial=0.0) > 0.0:
+        return ""
+    if frozen:
+        return "the coordinates of this very instant"
+    if not frame.turning.any():
+        return "the ground"
+    return f"a frame that turns with ({', '.join(f'{w:.4g}' for w in frame.turning)}) rad/s"
+
+
 def generator(x: State, turning: np.ndarray) -> np.ndarray:
     """H of `Frame`: how changes of positions turn with a frame that turns with ``turning`` [rad/s], (nv, nv)."""
     s, S = x.c.structure, x.c.values.system
@@ -80,11 +92,8 @@ def generator(x: State, turning: np.ndarray) -> np.ndarray:
     return H
 
 
-IN_PLANE = (0, 1, 5)  # x, y and the angle about z
-
-
 def _of_body(R: np.ndarray, w: np.ndarray, turning: np.ndarray) -> np.ndarray:
-    """H_B of a body: its place turns with the frame; its rotation, along its own axes, by its spin against the frame."""
+    """H_B of a body: its place turns with the frame; its rotation, along its axes, by its spin against the frame."""
     H = np.zeros((6, 6))
     H[:3, :3] = _skew(turning)
     H[3:, 3:] = -_skew(R.T @ (w - turning))

@@ -23,55 +23,86 @@ SLOW = 1e-3  # of the speed that the terms would give if nothing cancelled: that
 
 
 class Terms(NamedTuple):
-    """Sizes of what the coefficients of A are sums of.
+    """Sizes of what the coefficients of linear equations are sums of; n coordinates and velocities, p columns.
 
     Attributes
     ----------
-    rates : ndarray (f, n)
+    mass : ndarray (fv, fv)
+        Mass matrix of the free velocities.
+    rates : ndarray (f, p)
         In the rates of the free coordinates.
-    forces : ndarray (nv, n)
+    forces : ndarray (nv, p)
         In the equations of motion.
     Y, M : ndarray (nv, fv), (nv, nv)
         Directions along which the multipliers drop out; mass matrix.
     """
 
+    mass: np.ndarray
     rates: np.ndarray
     forces: np.ndarray
     Y: np.ndarray
     M: np.ndarray
 
 
-def uncertain(A: np.ndarray, e: Equations, f: Free, terms: Terms) -> np.ndarray:
-    """What is uncertain of every entry of A, (n, n).
+class Doubt(NamedTuple):
+    """What is uncertain of a matrix: A + by X with any X no entry of which is larger than that of ``size``, (n, n)."""
 
-    A row's entries are compared in units of the coordinates' natural sizes, rates at the speed of the fastest motion:
-    the terms of one equation that cancel in one column are rounded as those that do not in another. What acts on a body
+    by: np.ndarray
+    size: np.ndarray
+
+    def signed(self, sign: np.ndarray) -> Doubt:
+        """The same of a matrix whose coordinates have other signs."""
+        return Doubt(sign[:, None] * self.by, self.size)
+
+
+def without_rounding(terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equations, f: Free) -> Doubt:
+    """Set coefficients that are rounding to 0, and say what is uncertain of the others.
+
+    The entries of an equation are compared in units of the coordinates' natural sizes, rates at the speed of the
+    fastest motion: the terms that cancel in one column are rounded as those that do not in another. What acts on a body
     along one axis shows along the others by the rounding of its directions.
+
+    Parameters
+    ----------
+    terms : Terms
+        Its mass matrix loses its rounding, too.
+    a_dot : ndarray (f, p)
+        Rates of the free coordinates.
+    forces : ndarray (fv, p)
+        What acts along the directions in which the multipliers drop out.
     """
-    a, n = f.Z.shape[1], len(A)
-    if n == a:
-        return np.zeros_like(A)
-    scale = np.r_[f.scale[f.chosen], f.scale[f.chosen_v]]
-    inverse = np.abs(np.linalg.inv(terms.Y.T @ terms.M @ f.Zv)) @ np.abs(terms.Y).T
-    unit = scale.copy()
+    (a, fv), nv = (len(a_dot), len(forces)), len(f.scale)
+    n = a + fv
+    scale, along = np.r_[f.scale[f.chosen], f.scale[f.chosen_v]], np.abs(terms.Y).T
+    inertia = np.sqrt(np.maximum(np.abs(np.diag(terms.mass)), 1e-300))
+    terms.mass[np.abs(terms.mass) <= EXACT * np.outer(inertia, inertia)] = 0.0
+    inverse = np.linalg.inv(terms.mass) if fv else terms.mass
     turned = _spread(acting(e), terms.M, e, f.scale)  # by a radian, or a length
-    most = np.hstack([inverse @ terms.forces * scale, (inverse @ turned)[:, None]]) / scale[a:, None]
-    unit[a:] *= _fastest(np.abs(A) / scale[:, None] * scale, most, a)
-    rows = (terms.forces * unit).max(axis=1, initial=0.0)
-    first = EXACT * (terms.rates * unit).max(axis=1, initial=0.0)
-    second = inverse @ (EXACT * rows + LEAK * (_spread(rows, terms.M, e, f.scale) + turned))
-    return np.r_[first, second][:, None] / unit
+    unit = scale.copy()
+    if fv:
+        A = np.abs(inverse @ forces[:, :n]) / scale[a:, None] * scale
+        most = np.hstack([along @ terms.forces[:, :n] * scale, (along @ turned)[:, None]])
+        unit[a:] *= _fastest(A, most / inertia[:, None] ** 2 / scale[a:, None], a)
+    rows = (terms.forces[:, :n] * unit).max(axis=1, initial=0.0) if n else np.zeros(nv)
+    first = EXACT * (terms.rates[:, :n] * unit).max(axis=1, initial=0.0)
+    second = along @ (EXACT * rows + LEAK * (_spread(rows, terms.M, e, f.scale) + turned))
+    size = np.r_[first, second][:, None] / unit
+    for own, least in ((a_dot[:, :n], size[:a]), (forces[:, :n], size[a:])):
+        own[np.abs(own) <= least] = 0.0
+    by = np.eye(n)
+    by[a:, a:] = inverse
+    return Doubt(by, size)
 
 
 def _fastest(A: np.ndarray, uncancelled: np.ndarray, a: int) -> float:
-    """Rate [1/s] of the fastest motion, from coefficients and what cancels in them, in natural units."""
+    """Rate [1/s] of the fastest motion, from accelerations and what cancels in them, (fv, n), in natural units."""
 
     def rate(by_position: np.ndarray, by_velocity: np.ndarray) -> float:
         return max(float(np.sqrt(by_position.max(initial=0.0))), float(by_velocity.max(initial=0.0)))
 
-    n = len(A)
+    n = A.shape[1]
     static = np.hstack([uncancelled[:, :a], uncancelled[:, n:]])
-    return max(rate(A[a:, :a], A[a:, a:]), SLOW * rate(static, uncancelled[:, a:n])) or 1.0
+    return max(rate(A[:, :a], A[:, a:]), SLOW * rate(static, uncancelled[:, a:n])) or 1.0
 
 
 def _spread(rows: np.ndarray, M: np.ndarray, e: Equations, scale: np.ndarray) -> np.ndarray:

@@ -9,11 +9,13 @@ subspace that belongs to them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import AnalysisError
+from .rounding import Doubt
 
 ROUNDED = 4.0 * np.finfo(float).eps  # of every entry: what is uncertain of it at least
 EQUAL = 1e-9  # difference of eigenvalues, of their own size, below which they are one
@@ -52,14 +54,14 @@ class Spectrum:
     residual: float
 
 
-def spectrum(A: np.ndarray, doubt: np.ndarray | None = None) -> Spectrum:
+def spectrum(A: np.ndarray, doubt: Doubt | None = None) -> Spectrum:
     """Solve the eigenvalue problem of a real matrix.
 
     Parameters
     ----------
     A : ndarray (n, n)
-    doubt : ndarray (n, n), optional
-        What rounding may have made of every entry; of its own size if not given.
+    doubt : Doubt, optional
+        What is uncertain of it, besides the last digits of its entries.
 
     Raises
     ------
@@ -71,11 +73,13 @@ def spectrum(A: np.ndarray, doubt: np.ndarray | None = None) -> Spectrum:
         none = np.zeros(0, complex)
         return Spectrum(none, none, np.zeros((0, 0), complex), [], np.zeros(0, int), np.zeros(0, int), 0.0)
     B, scale, w, left, right, residual = _pairs(A)
-    E = ROUNDED * np.abs(B) + (0.0 if doubt is None else doubt / scale[:, None] * scale)
+    E = [(np.eye(n), ROUNDED * np.abs(B))]
+    if doubt is not None:
+        E.append((doubt.by / scale[:, None], doubt.size * scale))
     size = float(np.linalg.norm(B, 2))
     angle = np.abs((left.conj() * right).sum(axis=0))
-    blur = (np.abs(left) * (E @ np.abs(right))).sum(axis=0) / np.maximum(angle, 1e-300)
-    blur = np.minimum(blur, WIDEST * size)
+    blur = sum((np.abs(left.conj().T @ L) * (X @ np.abs(right)).T).sum(axis=1) for L, X in E)
+    blur = np.minimum(blur / np.maximum(angle, 1e-300), WIDEST * size)
     out = Spectrum(w, w.copy(), right.copy(), equal(w, blur), np.ones(n, int), np.ones(n, int), residual)
     for group in out.groups:
         if len(group) > 1:
@@ -133,12 +137,14 @@ def equal(w: np.ndarray, blur: np.ndarray) -> list[list[int]]:
     return out
 
 
-def _together(B: np.ndarray, E: np.ndarray, w: np.ndarray) -> tuple[complex, float, np.ndarray]:
+def _together(
+    B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], w: np.ndarray
+) -> tuple[complex, float, np.ndarray]:
     """Of eigenvalues that are one: their mean, what it is uncertain by, and the eigenvectors that they have."""
     V, W = subspace(B, w), subspace(B.conj().T, w.conj())
     inner = np.linalg.inv(W.conj().T @ V) @ W.conj().T
     mean = complex(w.mean())
-    doubt = np.abs(inner) @ E @ np.abs(V)
+    doubt = sum(np.abs(inner @ L) @ X @ np.abs(V) for L, X in E)
     blur = float(np.trace(doubt)) / len(w)
     if abs(mean.imag) <= blur:
         mean = complex(mean.real)
