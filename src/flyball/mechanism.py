@@ -150,3 +150,8 @@ class Mechanism(Model):
         from .model.io import save
 
         save(self, path)
+
+    def _repr_html_(self) -> str:
+        from .view.described import described
+
+        return described(self)

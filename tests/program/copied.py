@@ -77,7 +77,7 @@ class Copy:
             "PYTHONDONTWRITEBYTECODE": "1",
         }
         ended = subprocess.run(
-            [sys.executable, "-c", COUNT + script], env=env, cwd=self.root, capture_output=True, text=True, timeout=300
+            [sys.executable, "-c", COUNT + script], env=env, cwd=self.root, capture_output=True, text=True, timeout=1800
         )
         assert ended.returncode == 0, ended.stderr
         return json.loads(ended.stdout.splitlines()[-1])

@@ -49,7 +49,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "__main__": {"cli"},
 }
 LATER = {  # imports inside functions, beyond those: the methods that lead from a thing to what is done with it
-    "mechanism": {"analysis"},
+    "mechanism": {"analysis", "view"},
     "files": {"model", "results"},
     "results": {"view"},
     "cli": {"analysis", "compiler", "equations", "files", "mechanism", "model", "results", "view"},

@@ -16,7 +16,7 @@ from ..errors import ModelError
 from ..model.model import Model
 from ..results.linear import LinearModel
 from .compiled import compiled
-from .linear.curves import curve, slopes, snapshot
+from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
 from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
@@ -203,7 +203,7 @@ def _sorted(w: np.ndarray) -> np.ndarray:
 def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
-    curves = [curve(shot, name) for name in outputs]
+    curves = [shot.curve(name) for name in outputs]
     refuse_undetermined(x, outputs)
     A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]

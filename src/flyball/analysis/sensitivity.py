@@ -16,7 +16,7 @@ from ..results.sensitivity import Sensitivity
 from .assemble import assemble
 from .equilibrium import equilibrium
 from .linear.begun import held, start_tangents
-from .linear.curves import curve, slopes, snapshot
+from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State
 from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
@@ -135,12 +135,12 @@ def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, p
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
     """Values of curves at one state."""
     shot = snapshot(x)
-    return np.array([float(curve(shot, name)[1][0]) for name in names])
+    return np.array([float(shot.curve(name)[1][0]) for name in names])
 
 
 def _units(x: State, names: Sequence[str]) -> tuple[str, ...]:
     shot = snapshot(x)
-    return tuple(curve(shot, name)[0] for name in names)
+    return tuple(shot.curve(name)[0] for name in names)
 
 
 def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: Sequence[Tangent]) -> np.ndarray:
@@ -207,7 +207,7 @@ def _at_motion(a: Question) -> Found:
         r = simulate(
             a.model, a.times[-1], t_start=a.t, outputs=list(a.times), parameters=parameters, rtol=1e-12, atol=1e-13
         )
-        return np.stack([curve(r, name)[1] for name in a.of], axis=1)
+        return np.stack([r.curve(name)[1] for name in a.of], axis=1)
 
     return found
 

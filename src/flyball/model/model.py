@@ -21,6 +21,7 @@ from .function import function_name
 from .geometry import vector
 from .joint import Joint
 from .sensor import IMU, Sensor
+from .summary import summary
 from .table import Table
 from .validity import check_body, check_by_frames, check_joint, refuse_twins
 from .words import listing as listing
@@ -135,6 +136,9 @@ class Model:
         return all(getattr(self, k) == getattr(other, k) for k in same)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def __repr__(self) -> str:
+        return summary(self)
 
     def find(self, name: str) -> Element | None:
         """The part with that name, if there is one."""

@@ -17,7 +17,7 @@ from ...errors import AnalysisError
 from ...laws.opcodes import INPUT
 from ...tables.names import velocity_names
 from ...tables.system import FORCE_LAW, System
-from .balance import allowed
+from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
 from .frames import frames, generator, kinematic
 from .free import Free
@@ -26,6 +26,7 @@ from .reduced import Frame, reduced
 SWING = 0.1  # angle [rad] or part of the mechanism's length that it moves by between the instants compared
 STEPS = 16
 BALANCED = 1e-6  # unbalanced forces of an equilibrium, of those that act
+NEAR = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
 SAME = 1e-5  # relative difference of linear equations that are the same
 STILL = 1e-9  # speed below which nothing moves, of what gravity or the fastest body gives
 
@@ -86,9 +87,10 @@ def balanced(x: State, e: Equations) -> None:
         Naming what is accelerated most.
     """
     names = velocity_names(x.c.structure)
-    left = np.abs(e.by_acceleration[e.at["r"]] @ x.vdot)
-    may = allowed(e, BALANCED)
-    if not (left > may).any():
+    rest = at_rest(e)
+    left = np.abs(rest.block("r"))
+    may = BALANCED * acting(rest) + NEAR * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
+    if (left <= may).all() or (left <= may + rounding(rest)).all():
         return
     d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)))
     raise AnalysisError(
