@@ -15,6 +15,7 @@ from .inputs import with_inputs
 from .rest import Rest
 
 BALANCED = 1e-9  # forces left, of those that act
+ROUNDED = 1e-13  # part of a force along the free motions that is none
 
 
 def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]]:
@@ -41,7 +42,9 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     e = x.equations
     Z = free(e).Z
     by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
-    w = np.linalg.lstsq(Z.T @ by, -Z.T @ e.block("r"), rcond=1e-10)[0]
+    along = Z.T @ by
+    along[np.abs(along) <= ROUNDED * (np.abs(Z).T @ np.abs(by))] = 0.0  # what the constraints carry balances nothing
+    w = np.linalg.lstsq(along, -Z.T @ e.block("r"), rcond=1e-10)[0]
     changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
     loaded = compiled(model, parameters=changed)
     loaded.follow(c.hints)
