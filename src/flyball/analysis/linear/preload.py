@@ -40,10 +40,12 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     c.follow(a.compiled.hints)
     x = Rest.at(c, a.t, a.q)
     e = x.equations
-    Z = free(e).Z
+    own = free(e)
+    Z = own.Z
     by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
     along = Z.T @ by
-    along[np.abs(along) <= ROUNDED * (np.abs(Z).T @ np.abs(by))] = 0.0  # what the constraints carry balances nothing
+    most = (np.abs(by) * own.scale[:, None]).sum(axis=0) / own.scale[own.chosen, None]
+    along[np.abs(along) <= ROUNDED * most] = 0.0  # what the constraints carry balances nothing
     w = np.linalg.lstsq(along, -Z.T @ e.block("r"), rcond=1e-10)[0]
     changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
     loaded = compiled(model, parameters=changed)
