@@ -90,9 +90,7 @@ def linearize(
     r = _reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or outputs):
         _refuse_turning(e, f, r, frame, named, outputs)
-    found = _model(e, f, r, frame, named, outputs)
-    found.seen_from = told(x, frame, frozen)
-    return found
+    return _model(e, f, r, frame, named, outputs)
 
 
 def _refuse_turning(
@@ -128,7 +126,9 @@ def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations,
     f = free(e, like)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
-    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame.told = told(x, frame, frozen)
+    return e, f, frame
 
 
 def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
@@ -232,4 +232,5 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
         t=x.t,
         motion=r.position[:, : len(sign)] * sign,
         point=shot,
+        seen_from=frame.told,
     )

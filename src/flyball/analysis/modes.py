@@ -17,7 +17,6 @@ from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
-from .linear.frames import told
 from .linear.instant import instant
 from .linear.spectrum import EQUAL, spectrum
 from .linear.steady import balanced
@@ -77,7 +76,7 @@ def modes(
     one = one[:count]
     shapes = r.position[:, : len(r.A)] @ own.vectors[:, one]
     found = _made(x, w[one], shapes, float(np.abs(w).max(initial=0.0)))
-    found.turning, found.seen_from = frame.turning, told(x, frame, frozen)
+    found.turning, found.seen_from = frame.turning, frame.told
     found.multiplicity, found.geometric_multiplicity = own.multiplicity[one], own.geometric[one]
     found.residual = own.residual
     found.growing = bool((w[rest].real > GROWS * np.abs(w[rest])).any())

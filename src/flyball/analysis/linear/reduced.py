@@ -37,11 +37,14 @@ class Frame:
         Rate at which co-moving changes of positions and velocities turn.
     N : ndarray (nv, nv) [1/s]
         (rate of a change of position) = (change of velocity) + N (change of position).
+    told : str
+        What it is, for people; empty at rest.
     """
 
     turning: np.ndarray
     H: np.ndarray
     N: np.ndarray
+    told: str = ""
 
 
 @dataclass
