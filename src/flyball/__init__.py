@@ -94,7 +94,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
-    from .results.locus import RootLocus as RootLocus
+    from .results.root_locus import RootLocus as RootLocus
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
     from .results.result import Result as Result
@@ -140,7 +140,7 @@ _HOME = {
     "LinearModel": "results.linear",
     "Modes": "results.modes",
     "Optimum": "results.optimum",
-    "RootLocus": "results.locus",
+    "RootLocus": "results.root_locus",
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
 }
