@@ -94,10 +94,10 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
-    from .results.root_locus import RootLocus as RootLocus
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
     from .results.result import Result as Result
+    from .results.root_locus import RootLocus as RootLocus
     from .results.sensitivity import Sensitivity as Sensitivity
     from .results.series import EquilibriumSeries as EquilibriumSeries
     from .results.singularities import Singularities as Singularities
