@@ -60,7 +60,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
-    from .analysis.assemble import Assembly as Assembly
+    from .analysis.assembly.start import Assembly as Assembly
     from .analysis.check import Report as Report
     from .analysis.mass import MassReport as MassReport
     from .analysis.mobility import Mobility as Mobility
