@@ -22,6 +22,7 @@ from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
+from .linear.kinks import refuse_kinks
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.undetermined import refuse_undetermined
@@ -96,7 +97,7 @@ def sensitivity(
     ModelError
         If a name does not exist, a reaction is left undetermined by redundancy, or a law jumps during a motion.
     SingularityError
-        If what is asked has no derivative there.
+        If what is asked has no derivative there: at a kink of a force, for instance.
     """
     _refuse(model, of, to, analysis, parameters)
     env, start = model.environment(parameters), number(t, {}, "s", "t")
@@ -154,8 +155,17 @@ def _instant(a: Question) -> Sensitivity:
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    found = _columns(a, x, directions, start_tangents(a.model, a.parameters, base, x, directions))
+    tangents = start_tangents(a.model, a.parameters, base, x, directions)
+    _refuse_kinks(a, e, tangents)
+    found = _columns(a, x, directions, tangents)
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
+
+
+def _refuse_kinks(a: Question, e: Equations, tangents: Sequence[Tangent]) -> None:
+    """Refuse forces that have no slope along the changes with the parameters, or by one of these."""
+    none = np.zeros((len(e.state.v), 1))
+    dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
+    refuse_kinks(e, dq, dv, a.to)
 
 
 def _at_instant(a: Question) -> Found:
@@ -176,6 +186,7 @@ def _motion(a: Question) -> Sensitivity:
         way = _driven(a, x, directions, times)
     else:
         refuse_jumps(a.model, a.to)
+        _refuse_kinks(a, e, ())
         way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
             times, a.rtol, a.atol
         )
@@ -231,6 +242,7 @@ def _equilibrium(a: Question) -> Sensitivity:
         left = d.along(x, still, still)
         q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
         tangents.append(Tangent(q, still, still, lam))
+    _refuse_kinks(a, rest.equations, tangents)
     column = _columns(a, x, directions, tangents)
     return Sensitivity(
         "equilibrium", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], column[None]
@@ -249,7 +261,9 @@ def _at_rest(a: Question) -> Found:
 
 def _modes(a: Question) -> Sensitivity:
     state = _states(a)
-    f, _, base = without_inputs(state(a.parameters))
+    begin = state(a.parameters)
+    f, _, base = without_inputs(begin)
+    _refuse_kinks(a, Equations(begin), ())
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         return without_inputs(state(parameters), like=f)[2].A
