@@ -36,7 +36,7 @@ from ...tables.system import (
     TREE,
     VALUE,
 )
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
