@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
@@ -80,6 +81,8 @@ def linearize(
     """
     if isinstance(inputs, str) or isinstance(outputs, str):
         raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    for name in outputs:
+        one(model, name)
     x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
