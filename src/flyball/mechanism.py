@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .model.model import Model
 
 if TYPE_CHECKING:
-    from .analysis.assemble import Assembly
+    from .analysis.assembly.start import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .analysis.mobility import Mobility
