@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
@@ -81,8 +82,7 @@ def linearize(
     ModelError
         If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
     """
-    if isinstance(inputs, str) or isinstance(outputs, str):
-        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    _refuse_names(model, inputs, outputs)
     x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
@@ -92,6 +92,14 @@ def linearize(
     if frame.turning.any() and (named or outputs):
         _refuse_turning(e, f, r, frame, named, outputs)
     return _model(e, f, r, frame, named, outputs)
+
+
+def _refuse_names(model: Model, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    """Refuse outputs that do not exist; inputs are looked up where they are added."""
+    if isinstance(inputs, str) or isinstance(outputs, str):
+        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    for name in outputs:
+        one(model, name)
 
 
 def _refuse_turning(

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
+from ..model.quantities import one
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
@@ -127,10 +128,17 @@ def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, p
         raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
     if analysis not in ANALYSES:
         raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, list(ANALYSES))}; {listing(list(ANALYSES))}")
+    for name in of if analysis != "modes" else ():
+        one(model, name)
     known = list(model.environment(parameters))
     for name in to:
         if name not in known:
             raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+
+
+def _what(value: Any) -> str:
+    """A value in a message: a text as it is, else what kind of thing it is."""
+    return repr(value) if isinstance(value, (str, float, int)) else f"a {type(value).__name__}"
 
 
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
@@ -279,7 +287,7 @@ def _modes(a: Question) -> Sensitivity:
 def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
     """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
     if a.about not in (None, "equilibrium"):
-        raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
+        raise ModelError(f"about must be 'equilibrium' or nothing, got {_what(a.about)}")
     begin: list[Any] = []
 
     def state(parameters: Mapping[str, float]) -> State:

@@ -66,7 +66,9 @@ class Equilibrium:
     def __getitem__(self, name: str) -> Any:
         """A curve's value there, or a part of the result."""
         found = self.result[name]
-        return float(found[0]) if isinstance(found, np.ndarray) else found
+        if not isinstance(found, np.ndarray):
+            return found
+        return float(found[0]) if found.ndim == 1 else found[0]
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
