@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
@@ -22,6 +23,7 @@ from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
+from .linear.kinks import refuse_kinks
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
@@ -76,21 +78,28 @@ def linearize(
     AnalysisError
         If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
     SingularityError
-        At a singular position.
+        At a singular position, or where a force has a kink or jumps.
     ModelError
         If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
     """
-    if isinstance(inputs, str) or isinstance(outputs, str):
-        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    _refuse_names(model, inputs, outputs)
     x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
         x = _in_copy(model, x)
-    e, f, frame = _about(x, frozen)
+    e, f, frame = _about(x, frozen, to=[i.name for i in named if i.name == i.parameter])
     r = _reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or outputs):
         _refuse_turning(e, f, r, frame, named, outputs)
     return _model(e, f, r, frame, named, outputs)
+
+
+def _refuse_names(model: Model, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    """Refuse outputs that do not exist; inputs are looked up where they are added."""
+    if isinstance(inputs, str) or isinstance(outputs, str):
+        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    for name in outputs:
+        one(model, name)
 
 
 def _refuse_turning(
@@ -121,10 +130,12 @@ def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> 
     return f, frame, _reduced(e, f, frame, None)
 
 
-def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations, Free, Frame]:
+def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = ()) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e, like)
     refuse_singular(e, f)
+    both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
+    refuse_kinks(e, *both, to)
     still = np.zeros((len(x.v),) * 2)
     frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
     frame.told = told(x, frame, frozen)
