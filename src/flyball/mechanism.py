@@ -12,12 +12,12 @@ if TYPE_CHECKING:
     from .analysis.assemble import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
-    from .analysis.mobility import Mobility
     from .results.comparison import Comparison
     from .results.equilibrium import Equilibrium
     from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
     from .results.locus import RootLocus
+    from .results.mobility import Mobility
     from .results.modes import Modes
     from .results.optimum import Optimum
     from .results.result import Result

@@ -17,11 +17,13 @@ from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, 
 from ..model.body import Driver
 from ..model.expressions import number
 from ..model.model import Model
+from ..results.mobility import Mobility
 from ..results.result import Result
 from .assemble import Assembly, assemble
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
-from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
+from .freedom.jacobian import DENSE, rank_of, scaled_jacobian
+from .mobility import mobility
 from .motion.options import Options, output_times
 from .motion.start import Start, begin_at
 from .simulate import moved
@@ -201,7 +203,7 @@ def _contradiction(model: Model, t: float, error: AssemblyError) -> MobilityErro
 
 def _singular_start(found: Mobility) -> SingularityError | None:
     """The error for a start where drivers do not decide the motion, though next to it they do."""
-    a = found.found.assembly  # type: ignore[union-attr]
+    a = found.there.assembly
     c = a.compiled
     if not c.structure.model.drivers or not found.redundancy or not found.freedoms:
         return None
@@ -209,9 +211,9 @@ def _singular_start(found: Mobility) -> SingularityError | None:
     free.drivers = []
     loose = compiled(free, parameters=c.values.told)
     loose.follow(c.hints)
-    there = mobility(free, Assembly(loose, a.t, a.q, a.v))
+    released = mobility(free, Assembly(loose, a.t, a.q, a.v))
     ranks = []
-    for q in positions_nearby(there.found.assembly, motions_of(there.found)):  # type: ignore[union-attr, arg-type]
+    for q in positions_nearby(released.there.assembly, released.there.velocities):
         c.at(a.t, q, a.v)
         ranks.append(rank_of(c))
     c.at(a.t, a.q, a.v)
