@@ -12,14 +12,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ..equations.entry import FOLLOW, INTEGRATE
+from ..equations.engine import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.mobility import Mobility
 from ..results.result import Result
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
 from .freedom.jacobian import DENSE, rank_of, scaled_jacobian

@@ -16,7 +16,7 @@ from ..model.model import Model
 from ..results.freedoms import FreeMotion, Geometry, RedundantSet
 from ..results.mobility import Mobility
 from ..tables.system import SEMIDEFINITE
-from .assemble import Assembly, assemble
+from .assembly.start import Assembly, assembled
 from .freedom.freedoms import free_motions
 from .freedom.geometry import geometry
 from .freedom.inertia import check_inertia, massless
@@ -85,7 +85,7 @@ def mobility(
     gap = ""
     if a is None:
         try:
-            a = assemble(model, t=t, parameters=parameters)
+            a = assembled(model, t=t, parameters=parameters)
         except AssemblyError as error:
             if error.best is None:
                 raise

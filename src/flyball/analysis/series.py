@@ -19,9 +19,10 @@ from ..model.model import Model, listing, suggest
 from ..results.equilibrium import UNSTABLE, Equilibrium
 from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
-from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, _stability
+from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed
 from .equilibrium import equilibrium as single
 from .linear.rest import Rest
+from .linear.stability import stability
 
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
@@ -153,7 +154,7 @@ class _Way:
 
     def settled(self, x: Rest, value: float) -> Rest:
         """The place itself, or where it leads where it must be stable and is not."""
-        if self.stable and _stability(x)[0] == UNSTABLE:
+        if self.stable and stability(x).kind == UNSTABLE:
             return self.jump(x, value, lambda: _pushed(x))
         return x
 
@@ -181,7 +182,7 @@ def _over(x: Rest, y: Rest) -> Rest:
 
     Just beyond a limit point forces are too small to lead out of its neighbourhood.
     """
-    _, _, _, direction, _ = _stability(x)
+    direction = stability(x).direction
     y = y.closed()
     side = -1.0 if float(direction @ y.r) > 0.0 else 1.0
     return y.moved(PUSH * side * direction / np.abs(direction).max(), 0.0 * y.lam).closed()

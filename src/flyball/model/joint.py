@@ -72,6 +72,7 @@ class Joint(Element):
     spatial: ClassVar[bool] = True
     in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
     needs_axis: ClassVar[bool] = False
+    axisless: ClassVar[bool] = False  # no axis of that name is its own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
     replaceable: ClassVar[bool] = False  # whether a joint that holds less may take its place where rows are too many
     stand_in: ClassVar[float] = 0.0  # what it costs to put it in such a place; 0: it is never proposed

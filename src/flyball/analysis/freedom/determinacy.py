@@ -8,7 +8,7 @@ from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...numerics.rank import parts
 from ...results.result import Result
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .jacobian import DENSE, lengths, scaled_jacobian, sparse_null_space
 from .stresses import CHANGED, self_stresses

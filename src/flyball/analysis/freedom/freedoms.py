@@ -10,7 +10,7 @@ from ...model.body import Body, Initial
 from ...model.joint import Joint
 from ...results.freedoms import FreeMotion
 from ...tables.system import NV, V0
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .jacobian import lengths
 from .supports import irreducible

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ...model.model import Model
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from .jacobian import sparse_null_space
 
 

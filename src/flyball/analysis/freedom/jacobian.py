@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...numerics.ldl import analyse
+from ...numerics.ldl import analyse, factor_kernel
 from ...numerics.rank import parts, rank
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled
 
 DENSE = 1500  # velocities up to which the rank comes from a singular value decomposition
@@ -89,8 +89,6 @@ def sparse_null_space(A: Any) -> tuple[int, np.ndarray]:
     """
     import scipy.sparse as sp
     from scipy.sparse.linalg import spsolve_triangular
-
-    from ...equations.entry import factor_kernel
 
     n = A.shape[0]
     size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...constraints.registry import FORMULAS
+from ...constraints.registry import KINDS
 from ...equations.records import load
 from ...equations.rows import parameters
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 
 CHANGED = 1e-6  # part of the largest that a self-stress does to a component, below which it leaves it alone
 COMPONENTS = ("force x", "force y", "force z", "torque x", "torque y", "torque z")
@@ -26,7 +26,7 @@ def self_stresses(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, n
             t = s.terms[k]
             par = parameters(S.term_x, k)
             hint = c.z[t.hint] if t.hint >= 0 else 0.0
-            _, f, tM, tF, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
+            _, f, tM, tF, _ = KINDS[t.formula.kind].row(par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
             force, torque = np.array(f), np.array(tM)
             if s.frames[t.M].role != "M":  # measured from M to F
                 force, torque = -force, np.array(tF)

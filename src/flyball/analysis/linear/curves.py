@@ -16,7 +16,7 @@ from ...results.mobility import Mobility
 from ...results.result import Result
 from ...tables.system import G_VALUE, NU, V0
 from ...tables.values import Values
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import mobility
 from .derivatives import STEP, State

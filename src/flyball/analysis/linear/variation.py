@@ -13,13 +13,13 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...equations.tree import normalise, retract
 from ...errors import SimulationError
 from ...tables.system import EFFORT, G_VALUE, LAM, NU, X_SOLVED
 from ..compiled import Compiled
 from .derivatives import State
-from .steady import kinematic
+from .frames import kinematic
 from .tangent import Direction, Linear, Tangent, closed
 
 CLOSED = 1e-12  # of the mechanism's length

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...equations import motion
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...equations.loads import wide
 from ...equations.records import load
 from ...laws.evaluation import evaluate, evaluate_jet
@@ -36,7 +36,7 @@ from ...tables.system import (
     TREE,
     VALUE,
 )
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
