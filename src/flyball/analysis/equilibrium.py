@@ -8,11 +8,11 @@ it comes to rest (Kelley and Keyes 1998). It goes the way that the forces push, 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError, NotConverged
-from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
 from ..system.names import velocity_names
@@ -26,6 +26,7 @@ from .linear.rest import Rest
 from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
+from .options import Options
 
 NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
@@ -38,61 +39,41 @@ NEUTRAL = 1e-8  # stiffness below this part of what acts is none
 SHOWN = 6
 
 
-def equilibrium(
-    model: Model,
-    *,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    start: Equilibrium | None = None,
-    stable: bool = False,
-    preload: Sequence[str] = (),
-    turning: Sequence[str] = (),
-) -> Equilibrium:
-    """A static equilibrium near the mechanism as described, or a steady motion.
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumOptions(Options):
+    """What `Mechanism.equilibrium` is asked."""
 
-    Drivers hold their coordinates where they are at ``t``; velocities, dampers and inertia play no part at rest.
+    t: float
+    parameters: Mapping[str, float] | None
+    start: Equilibrium | None
+    stable: bool
+    preload: tuple[str, ...]
+    turning: tuple[str, ...]
 
-    Parameters
-    ----------
-    t : float [s]
-        Time at which laws of forces and drivers are taken.
-    parameters : mapping, optional
-        Values in SI units in place of the model's.
-    start : Equilibrium, optional
-        Guess in place of the described positions: an equilibrium of the same mechanism.
-    stable : bool
-        Go on from an unstable equilibrium to a stable one.
-    preload : sequence of str
-        Forces, by the names that `linearize` takes for inputs: find what has to be added to them for the mechanism to
-        be in equilibrium where it is drawn.
-    turning : sequence of str
-        Joints' coordinates that turn evenly while all others stand still, such as the spindle of a governor: a steady
-        motion is found. Speeds stay as described where nothing else decides them.
 
-    Returns
-    -------
-    Equilibrium
+def resting(
+    t: float, parameters: Mapping[str, float] | None, start: Equilibrium | None = None, stable: bool = False
+) -> EquilibriumOptions:
+    """What other analyses ask: where it rests."""
+    return EquilibriumOptions(t=t, parameters=parameters, start=start, stable=stable, preload=(), turning=())
 
-    Raises
-    ------
-    AssemblyError
-        If the mechanism cannot be assembled.
-    NotConverged
-        If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
-    """
-    a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
-    if start is not None:
-        if not isinstance(start, Equilibrium) or list(start.assembly.compiled.structure.place) != list(
+
+def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
+    """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    a = assemble(model, t=o.t, parameters=o.parameters)
+    if o.start is not None:
+        if not isinstance(o.start, Equilibrium) or list(o.start.assembly.compiled.structure.place) != list(
             a.compiled.structure.place
         ):
             raise ModelError(f"start must be an equilibrium of {model.name!r}, or of one with the same bodies")
-        q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
+        start = o.start.assembly
+        q, _ = a.compiled.take(start.compiled, start.t, start.q, start.v)
         a = Assembly(a.compiled, a.t, q, np.zeros(a.compiled.structure.nv))
-    if turning:
-        return _steady(a, turning)
-    if preload:
-        return _finished(*preloaded(a, preload), "preload")
-    return _searched(Rest.at(a.compiled, a.t, a.q), stable)
+    if o.turning:
+        return _steady(a, o.turning)
+    if o.preload:
+        return _finished(*preloaded(a, o.preload), "preload")
+    return _searched(Rest.at(a.compiled, a.t, a.q), o.stable)
 
 
 def _searched(x: Rest, stable: bool) -> Equilibrium:
