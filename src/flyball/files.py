@@ -33,6 +33,6 @@ def load_result(path: str | os.PathLike) -> Result:
     ModelError
         If there is no such file, or it is no result of flyball.
     """
-    from .results.files import load_result
+    from .results.reading import load_result
 
     return load_result(path, Mechanism)

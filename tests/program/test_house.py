@@ -92,6 +92,94 @@ def test_imports_point_one_way(path):
         assert target in allowed, f"{path.name}, line {line}: {own} must not import {target}"
 
 
+MODULES = {".".join(p.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): p for p in FILES}
+OWED = (  # circles of today; this list only ever gets shorter
+    {"system.force_table", "system.patterns", "system.structure", "system.term_table"},
+    {"results.modes", "view.modes"},
+    {"analysis.mobility", *(f"analysis.freedom.{x}" for x in ("cures", "freedoms", "geometry", "redundancy"))},
+)
+
+
+def named_imports(module: str):
+    """(file, name or None) of every import of the house, those inside functions too, those for type checkers not."""
+    path = MODULES[module]
+    package = path.relative_to(PACKAGE).parts[:-1]
+    hints = [n for n in ast.walk(TREES[path]) if isinstance(n, ast.If) and "TYPE_CHECKING" in ast.unparse(n.test)]
+    skipped = {id(n) for h in hints for branch in h.body for n in ast.walk(branch)}
+    for node in ast.walk(TREES[path]):
+        if isinstance(node, ast.ImportFrom) and node.level and id(node) not in skipped:
+            base = ".".join([*package[: len(package) - node.level + 1], *(node.module or "").split(".")]).strip(".")
+            for alias in node.names:
+                inner = f"{base}.{alias.name}".strip(".")
+                if inner in MODULES:
+                    yield inner, None
+                elif base in MODULES:
+                    yield base, alias.name
+
+
+def circles(arrows: dict[str, set[str]]) -> list[set[str]]:
+    """Sets of files that lead to one another."""
+    reached: dict[str, set[str]] = {}
+    for start in arrows:
+        seen, left = set(), [start]
+        while left:
+            new = arrows[left.pop()] - seen
+            seen |= new
+            left += new
+        reached[start] = seen
+    found = [{b for b in reached[a] if a in reached[b]} for a in arrows if a in reached[a]]
+    return [c for k, c in enumerate(found) if c not in found[:k]]
+
+
+def test_imports_make_no_circle():
+    """Those inside functions count as well: a circle hides that two files are one."""
+    arrows = {m: {target for target, _ in named_imports(m)} - {m, ""} for m in MODULES}
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == [{"b", "c"}]
+    assert [c for c in circles(arrows) if not any(c <= owed for owed in OWED)] == []
+
+
+OWED_NAMES = {
+    ("system.native", "_lock"),
+    *(("analysis.series", f"_{x}") for x in ("descent", "failure", "finished", "newton", "pushed", "stability")),
+    ("analysis.freedom.determinacy", "_null_space"),
+}
+
+
+def test_private_names_stay_in_their_file():
+    taken = {(m, name) for m in MODULES for _, name in named_imports(m) if (name or "").startswith("_")}
+    assert {x for x in taken if not x[1].startswith("__")} - OWED_NAMES == set()
+
+
+def test_private_members_stay_in_their_file():
+    """What a class of another file keeps to itself is not reached through its objects."""
+
+    def private(name: str) -> bool:
+        return name.startswith("_") and not name.startswith("__")
+
+    def made(tree: ast.AST) -> set[str]:
+        """Private names that a file gives: functions, and attributes set on objects of its own."""
+        functions = {n.name for n in ast.walk(tree) if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
+        own = {
+            n.attr for n in ast.walk(tree) if isinstance(n, ast.Attribute) and ast.unparse(n.value) in ("self", "cls")
+        }
+        fields = {
+            n.target.id for n in ast.walk(tree) if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)
+        }
+        return {x for x in functions | own | fields if private(x)}
+
+    made_in = {p: made(TREES[p]) for p in FILES}
+    ours = set().union(*made_in.values()) - {"_replace", "_asdict"}  # those of named tuples are public
+    for path in FILES:
+        for node in ast.walk(TREES[path]):
+            if (
+                isinstance(node, ast.Attribute)
+                and private(node.attr)
+                and ast.unparse(node.value) not in ("self", "cls")
+            ):
+                foreign = node.attr in ours - made_in[path]
+                assert not foreign, f"{path.name}, line {node.lineno}: {ast.unparse(node)} is private to another file"
+
+
 @pytest.mark.parametrize("own", ["math", "numerics", "constraints", "rotations"])
 def test_formulas_and_solvers_stand_on_numpy_alone(own):
     """What they import at once is the standard library and NumPy; SciPy and Numba come when something asks for them."""

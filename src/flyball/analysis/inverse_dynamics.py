@@ -71,7 +71,7 @@ def _coordinate(model: Model, label: str) -> str:
     """The coordinate that a name of the motion means."""
     if "." in label:
         return label
-    if label not in model._names or not isinstance(e := model[label], Sensor):
+    if not isinstance(e := model.find(label), Sensor):
         known = [x.name for x in model.sensors if isinstance(x, Sensor)]
         raise ModelError(
             f"motion of {label!r}: there is no sensor of that name{suggest(label, known)}; {listing(known)}. Name a "

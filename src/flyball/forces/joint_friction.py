@@ -109,7 +109,7 @@ class JointFriction(CoordinateForce):
 
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""
-        found = model._names.get(self.joint)
+        found = model.find(self.joint)
         if isinstance(found, Joint) and self.radius is None and self.coordinate is None:
             has = found.measured(model.planar)
             if "angle" in has and "displacement" not in has:

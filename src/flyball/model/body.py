@@ -22,25 +22,14 @@ from .element import (
     Point,
     Unit,
     Velocity,
-    _plain,
     element,
+    plain,
 )
-from .geometry import matrix_to_quaternion, orientation_matrix, rotation_about
+from .geometry import orientation_matrix, rotation_about
+from .orientation import Orientation
 from .shapes import Solid
 
 GROUND = "ground"
-
-
-def _orientation(value: Any) -> Any:
-    """A rotation object (with ``as_quat`` or ``as_matrix``) becomes a quaternion, scalar first."""
-    if hasattr(value, "as_matrix"):
-        value = matrix_to_quaternion(np.asarray(value.as_matrix()))
-    value = _plain(value)
-    if not isinstance(value, (tuple, list)):
-        raise ValueError("give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")
-    if len(value) == 3 and all(isinstance(row, (tuple, list)) and len(row) == 3 for row in value):
-        value = matrix_to_quaternion(orientation_matrix(value, "orientation")).tolist()
-    return tuple(value)
 
 
 def _solids(value: Any) -> Any:
@@ -59,10 +48,9 @@ def _solids(value: Any) -> Any:
     return value
 
 
-Orientation = Annotated[tuple[float | str, ...], BeforeValidator(_orientation), Unit("rad")]
 Inertia = Annotated[
     float | str | tuple[float | str, ...] | tuple[tuple[float | str, ...], ...],
-    BeforeValidator(_plain),
+    BeforeValidator(plain),
     Unit("kg*m^2"),
 ]
 Shapes = Annotated[Solid | tuple[Solid, ...] | None, BeforeValidator(_solids)]

@@ -38,24 +38,24 @@ class LawOf:
     inputs: tuple[str, ...] = ()
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """NumPy scalars and arrays become Python numbers and lists; a bool is no number."""
     if isinstance(value, bool):
         raise ValueError("a truth value is not a number")
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
-        return tuple(_plain(v) for v in value)
+        return tuple(plain(v) for v in value)
     return value
 
 
-Number = Annotated[float | str, BeforeValidator(_plain)]
+Number = Annotated[float | str, BeforeValidator(plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
-Numbers = Annotated[tuple[float | str, ...], BeforeValidator(_plain)]
+Numbers = Annotated[tuple[float | str, ...], BeforeValidator(plain)]
 Function = Callable[..., Any]
-Law = Annotated[float | str | Function, BeforeValidator(_plain)]
+Law = Annotated[float | str | Function, BeforeValidator(plain)]
 """A number, a unit string, an expression of time, inputs, sensors and parameters, or a Python function of these."""
-Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(_plain)]
+Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(plain)]
 
 Length = Annotated[Number, Unit("m")]
 Angle = Annotated[Number, Unit("rad")]
@@ -68,7 +68,7 @@ PointPair = Annotated[tuple[Numbers, Numbers], Unit("m")]
 Direction = Annotated[Numbers, Unit("")]
 Directions = Annotated[tuple[Numbers, Numbers], Unit("")]
 Velocity = Annotated[Numbers, Unit("m/s")]
-AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(_plain), Unit("rad/s")]
+AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plain), Unit("rad/s")]
 
 
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))

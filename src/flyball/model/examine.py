@@ -57,9 +57,9 @@ def _of_joint(e: Joint, axes: str) -> list[str]:
 def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
     """What a sensor measures; see `Model.measured`."""
     owner, _, what = e.of.partition(".")
-    found = model._names.get(owner)
+    found = model.find(owner)
     if found is None and owner != "energy":
-        known = list(model._names)
+        known = model.names()
         raise ModelError(
             f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
             f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
@@ -104,7 +104,7 @@ def carriers(model: Model) -> list[str]:
 
 def but_is(model: Model, name: str, wanted: str) -> str:
     """'; 'A' is a Revolute' where a name means something else than was wanted."""
-    found = model._names.get(name)
+    found = model.find(name)
     return "" if found is None else f" ({name!r} is a {type(found).__name__}, no {wanted})"
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
-from .element import Element, LawOf, Number, _plain, fields_with, resolve
+from .element import Element, LawOf, Number, fields_with, plain, resolve
 from .examine import but_is, carriers, check_units, measured
 from .expressions import law_expression, number, resolve_parameters
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
@@ -58,8 +58,8 @@ class Model:
         self.planar = bool(planar)
         self._resolved: tuple[dict, dict[str, float]] | None = None
         try:
-            self.parameters = {k: _plain(v) for k, v in (parameters or {}).items()}
-            g = _plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)
+            self.parameters = {k: plain(v) for k, v in (parameters or {}).items()}
+            g = plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)
         except (ValueError, TypeError, AttributeError) as error:
             raise ModelError(f"parameters or gravity of {name!r}: {error}") from None
         self.environment()
@@ -105,6 +105,17 @@ class Model:
             setattr(out, name, copy.copy(getattr(self, name)))
         return out
 
+    def changed(self, parts: Mapping[str, Element | None]) -> Any:
+        """A copy with other parts under these names, or (None) without them; nothing is checked."""
+        out = self.snapshot()
+        for category in CATEGORIES:
+            if category != Initial.category:  # these bear the names of what they are about
+                kept = [parts.get(e.name, e) for e in getattr(self, category)]
+                setattr(out, category, [e for e in kept if e is not None])
+        left = {name: parts.get(name, e) for name, e in self._names.items()}
+        out._names = {name: e for name, e in left.items() if e is not None}
+        return out
+
     def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:
         """Acceleration of gravity [m/s^2], three components."""
         env = self.environment() if env is None else env
@@ -124,6 +135,14 @@ class Model:
         return all(getattr(self, k) == getattr(other, k) for k in same)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def find(self, name: str) -> Element | None:
+        """The part with that name, if there is one."""
+        return self._names.get(name)
+
+    def names(self) -> list[str]:
+        """Names of all parts, in the order they were added."""
+        return list(self._names)
 
     def __getitem__(self, name: str) -> Any:
         """The part with that name."""

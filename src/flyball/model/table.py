@@ -12,11 +12,11 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
 from ..math.spline import packed, spline, symbolic
-from .element import Element, _plain, element
+from .element import Element, element, plain
 from .grammar import CONSTANTS, FUNCTIONS
 from .units import to_si
 
-Column = Annotated[tuple[float, ...], BeforeValidator(_plain)]
+Column = Annotated[tuple[float, ...], BeforeValidator(plain)]
 
 
 @element

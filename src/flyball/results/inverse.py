@@ -120,14 +120,12 @@ class InverseDynamics:
         ModelError
             If there is no such joint.
         """
-        e = self._joint(joint)
+        self._joint(joint)
         view = self.result[joint]
         one = np.hstack(view.reaction(axes=axes))
         stress = self._stress(joint)
         if axes != "world" and stress is not None:
-            names = [self.result.model.carrier(x, e) for x in (e.body_i, e.body_j)]
-            full = [np.broadcast_to(x, len(self.t)) for x in view._axes(axes, names)]
-            R = np.stack(full, axis=1).reshape(-1, 3, 3)
+            R = view.rotation(axes)
             stress = np.concatenate([np.einsum("nji,njk->nik", R, stress[:, i : i + 3]) for i in (0, 3)], axis=1)
         return self._told(one, stress)
 

@@ -91,7 +91,7 @@ class LinearModel:
         """
         from scipy.linalg import eigvals
 
-        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        i, k = self.input_index(input), self.output_index(output)
         n = len(self.A)
         b, c, d = self.B[:, [i]], self.C[[k]], self.D[[k]][:, [i]]
         poles = np.linalg.eigvals(self.A)
@@ -111,7 +111,7 @@ class LinearModel:
 
         At an undamped pole it is infinite.
         """
-        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        i, k = self.input_index(input), self.output_index(output)
         one = np.eye(len(self.A))
         b, c, d = self.B[:, i], self.C[k], self.D[k, i]
 
@@ -125,7 +125,7 @@ class LinearModel:
 
     def root_locus(self, gains: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
         """Eigenvalues of the closed loop u = -k y for every gain k, (gains, n)."""
-        i, k = self._place("input", self.inputs, input), self._place("output", self.outputs, output)
+        i, k = self.input_index(input), self.output_index(output)
         b, c, d = self.B[:, [i]], self.C[[k]], self.D[k, i]
         found = [np.linalg.eigvals(self.A - b @ c * (g / (1.0 + g * d))) for g in gains]
         return follow(np.array(found))
@@ -186,8 +186,13 @@ class LinearModel:
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())
 
-    def _place(self, what: str, names: tuple[str, ...], name: str | None) -> int:
-        return names.index(self._named(what, names, name))
+    def input_index(self, name: str | None) -> int:
+        """Which input that is; the only one if not named."""
+        return self.inputs.index(self._named("input", self.inputs, name))
+
+    def output_index(self, name: str | None) -> int:
+        """Which output that is; the only one if not named."""
+        return self.outputs.index(self._named("output", self.outputs, name))
 
     def _named(self, what: str, names: tuple[str, ...], name: str | None) -> str:
         if name is None and len(names) == 1:

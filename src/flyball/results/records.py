@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
+from ..model.body import Frame
 from ..model.joint import Coordinate, Joint
 from ..system.coordinates import turned_angles
 from ..system.records import at_rest, carried, load
@@ -94,6 +95,19 @@ class Records:
         zero = self.zeros()
         p, R, *rest = at_rest(offset, turn, zero)
         return (tuple(x + zero for x in p), tuple(x + zero for x in R), *rest)
+
+    def placed(self, name: str) -> tuple[int, tuple, tuple]:
+        """Body (-1: ground) that carries a named frame, or a body's own; its origin and axes on that body."""
+        p, R = self.x.poses.named(name)
+        e = self.x.structure.model[name]
+        body = e.body if isinstance(e, Frame) else name
+        b = self.x.bodies[body]
+        offset, turn = b.R.T @ (p - b.c), b.R.T @ R
+        return self.x.structure.place[body], tuple(offset.tolist()), tuple(turn.ravel().tolist())
+
+    def named(self, name: str) -> Record:
+        """Record of a named frame, or of a body's own frame."""
+        return self.carried(*self.placed(name))
 
     def angle(self, b: int) -> np.ndarray:
         """Turned angle [rad] of body b (-1: ground) of a planar mechanism, whole turns counted; (n,).

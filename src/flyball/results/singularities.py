@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-PASSAGE, LOCK_UP, BIFURCATION, SELF_MOTION = "regular passage", "lock-up", "bifurcation", "self-motion"
+from .kinds import SELF_MOTION
+
 SMALL = 1e-7  # numbers below this part of the largest are printed as zero
 SHOWN = 6  # coordinates of a vector that are printed
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plots import DASHES, PALETTE, _drawing, _figure, _handed_out, _headed
+from .drawing import DASHES, PALETTE, handed_out, headed, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,8 +35,8 @@ def comparison_plot(comparison: Comparison, path: str | os.PathLike | None = Non
     ModelError
         If the file cannot be written.
     """
-    with _drawing():
-        drawing = _figure(8.4, 11.0)
+    with styled():
+        drawing = new_figure(8.4, 11.0)
         axes = drawing.subplots(2, 2)
         _over_time(axes[0, 0], comparison, "g", "|g| [m, rad]")
         _over_time(axes[0, 1], comparison, "gv", "|G v - ν| [m/s, rad/s]")
@@ -44,8 +44,8 @@ def comparison_plot(comparison: Comparison, path: str | os.PathLike | None = Non
         _costs(axes[1, 1], comparison)
         handles, labels = axes[0, 0].get_legend_handles_labels()
         drawing.legend(handles, labels, loc="outside lower center", ncols=5)
-        _headed(drawing, f"{comparison.model}: formulations compared")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{comparison.model}: formulations compared")
+        return handed_out(drawing, path)
 
 
 def _style(k: int) -> dict[str, Any]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from .drawing import handed_out, headed, stacked, styled
 from .figures import MOST, panels
-from .plots import _drawing, _handed_out, _headed, _stacked
 from .recording import Channel, Panel
 
 if TYPE_CHECKING:
@@ -53,12 +53,12 @@ def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) 
         raise ModelError(
             f"{found.result.model.name!r}: there is no drive, and the motion determines no reaction to draw"
         )
-    with _drawing():
-        drawing = _stacked(found.result, parts)
+    with styled():
+        drawing = stacked(found.result, parts)
         if note := _undrawn(rest):
             drawing.supxlabel(note, fontsize=8, x=0.012, ha="left")
-        _headed(drawing, f"{found.result.model.name}: inverse dynamics")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{found.result.model.name}: inverse dynamics")
+        return handed_out(drawing, path)
 
 
 def _undrawn(curves: dict[str, tuple[str, np.ndarray]]) -> str:

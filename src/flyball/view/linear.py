@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .drawing import BESIDE, DASHES, PALETTE, PRETTY, handed_out, headed, new_figure, styled
 from .figures import hidden
 from .frequencies import frequencies, phase
-from .plots import BESIDE, DASHES, PALETTE, PRETTY, _drawing, _figure, _handed_out, _headed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -54,9 +54,9 @@ def bode(
     ModelError
         If there is no such input or output, or the file cannot be written.
     """
-    i = model._place("input", model.inputs, input)
+    i = model.input_index(input)
     several = output is None and len(model.outputs) > 1
-    chosen = list(range(len(model.outputs))) if several else [model._place("output", model.outputs, output)]
+    chosen = list(range(len(model.outputs))) if several else [model.output_index(output)]
     pair = [(model.inputs[i], model.outputs[k]) for k in chosen]
     w = frequencies(model, pair) if omega is None else np.asarray(omega, float)
     responses = [model.response(w.tolist(), *names) for names in pair]
@@ -64,8 +64,8 @@ def bode(
         size = [np.where(np.abs(G) > 0.0, 20.0 * np.log10(np.abs(G)), np.nan) for G in responses]
     angle = [np.degrees(phase(model, *names, w, G)) for names, G in zip(pair, responses, strict=True)]
     units = [_ratio(model.output_units[k], model.input_units[i]) for k in chosen]
-    with _drawing():
-        drawing = _figure(5.6)
+    with styled():
+        drawing = new_figure(5.6)
         upper, lower = drawing.subplots(2, 1, sharex=True)
         for ax, curves in ((upper, size), (lower, angle)):
             for n, (values, under) in enumerate(zip(curves, hidden(curves), strict=True)):
@@ -77,8 +77,8 @@ def bode(
         upper.set_ylabel("magnitude [dB]" if several else f"magnitude [dB of {units[0]}]")
         drawing.align_ylabels((upper, lower))
         what = "all outputs" if several else pair[0][1]
-        _headed(drawing, f"{model.name}: {what} by {model.inputs[i]}")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{model.name}: {what} by {model.inputs[i]}")
+        return handed_out(drawing, path)
 
 
 def _over_frequency(upper: Axes, lower: Axes, w: np.ndarray, angles: Sequence[np.ndarray]) -> None:
@@ -141,8 +141,8 @@ def root_locus(
         The crossings, where they need not be interpolated.
     """
     roots, values = np.asarray(roots), np.asarray(gains, float)
-    with _drawing():
-        drawing = _figure(5.4)
+    with styled():
+        drawing = new_figure(5.4)
         ax = drawing.subplots()
         for k, branch in enumerate(roots.T):
             color = PALETTE[k % len(PALETTE)]
@@ -159,8 +159,8 @@ def root_locus(
                 ax.plot([], [], mark, color="#555555", label=f"{parameter_name} = {g:.4g}")
         ax.legend(**BESIDE)
         _plane(ax)
-        _headed(drawing, title)
-        return _handed_out(drawing, path)
+        headed(drawing, title)
+        return handed_out(drawing, path)
 
 
 def _line(branch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -247,8 +247,8 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
         "unstable": ("^", BAD, "full"),
         "rigid": ("s", PALETTE[6], "none"),
     }
-    with _drawing():
-        drawing = _figure(5.4)
+    with styled():
+        drawing = new_figure(5.4)
         ax = drawing.subplots()
         near = _telling(w, kinds)
         _framed(ax, w[near])
@@ -264,8 +264,8 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
         if len(w):
             ax.legend(**BESIDE)
         _plane(ax)
-        _headed(drawing, f"{modes.point.model.name}: eigenvalues")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{modes.point.model.name}: eigenvalues")
+        return handed_out(drawing, path)
 
 
 def _telling(w: np.ndarray, kinds: np.ndarray) -> np.ndarray:

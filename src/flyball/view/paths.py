@@ -10,10 +10,9 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.body import GROUND, Body, Frame
-from ..results.views.points import PointView
+from .drawing import BESIDE, PALETTE, handed_out, headed, new_figure, styled
 from .looks import Looks
 from .places import Places
-from .plots import BESIDE, PALETTE, _drawing, _figure, _handed_out, _headed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -68,10 +67,10 @@ def plot_path(
         raise ModelError(f"the result of {result.model.name!r} has no times: there is nothing to draw")
     tracks = {name: record for p in points or _usual(result) for name, record in [_track(result, p)]}
     links = _links(result, points, positions)
-    with _drawing():
+    with styled():
         drawing = _laid_out(result, tracks, links, arrows, number)
-        _headed(drawing, f"{result.model.name}: {f'paths and {PLURAL[arrows]}' if arrows else 'paths'}")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{result.model.name}: {f'paths and {PLURAL[arrows]}' if arrows else 'paths'}")
+        return handed_out(drawing, path)
 
 
 def _laid_out(result: Result, tracks: dict, links: list, arrows: str | None, number: int) -> Any:
@@ -79,12 +78,12 @@ def _laid_out(result: Result, tracks: dict, links: list, arrows: str | None, num
     if result.planar:
         every = np.concatenate([t[0] for t in tracks.values()] + [x for _, shapes in links for x in shapes])
         extent = np.ptp(every[np.isfinite(every).all(axis=1)], axis=0)
-        drawing = _figure(1.0 + 6.0 * min(max(extent[1] / max(extent[0], 1e-12), 0.4), 1.1))
+        drawing = new_figure(1.0 + 6.0 * min(max(extent[1] / max(extent[0], 1e-12), 0.4), 1.1))
         ax = drawing.subplots()
         _seen(ax, "xy", tracks, links, arrows, number)
         ax.legend(**BESIDE, **_key(tracks, arrows))
         return drawing
-    drawing = _figure(7.2)
+    drawing = new_figure(7.2)
     axes = drawing.subplots(2, 2)
     for ax, (view, across) in zip(axes.flat, (("front", "xz"), ("side", "yz"), ("top", "xy")), strict=False):
         _seen(ax, across, tracks, links, arrows, number)
@@ -109,7 +108,7 @@ def _track(result: Result, point: Point) -> tuple[str, tuple[np.ndarray, np.ndar
             raise ModelError(f"{e.title} has no path; name a body, a frame, or a body and a point in it")
         if isinstance(e, Frame) and e.body == GROUND:
             raise ModelError(f"{e.title} is fixed on ground and has no path")
-        record, name = PointView(result, e)._record, point
+        record, name = result.records.named(point), point
     else:
         body, local = point
         e = result.model[body]

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .plots import BESIDE, PALETTE, PRETTY, _drawing, _figure, _handed_out
+from .drawing import BESIDE, PALETTE, PRETTY, handed_out, new_figure, styled
 
 if TYPE_CHECKING:
     from ..results.sensitivity import Sensitivity
@@ -19,12 +19,12 @@ def sensitivity(s: Sensitivity, path: str | os.PathLike | None = None) -> Any:
     Parameters that are zero count by their unit.
     """
     percent = np.array([0.01 * abs(s.parameters[p]) or 1.0 for p in s.to])
-    with _drawing():
-        drawing = _figure(0.8 + 2.2 * len(s.of))
+    with styled():
+        drawing = new_figure(0.8 + 2.2 * len(s.of))
         for k, axis in enumerate(drawing.subplots(len(s.of), 1, squeeze=False, sharex=True)[:, 0]):
             _panel(axis, s, k, percent)
             axis.label_outer()
-        return _handed_out(drawing, path)
+        return handed_out(drawing, path)
 
 
 def _panel(axis: Any, s: Sensitivity, k: int, percent: np.ndarray) -> None:

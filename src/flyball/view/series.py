@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..results.equilibrium import UNSTABLE
+from .drawing import BESIDE, PALETTE, PRETTY, handed_out, headed, new_figure, styled
 from .figures import LABELS
-from .plots import BESIDE, PALETTE, PRETTY, _drawing, _figure, _handed_out, _headed
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,8 +30,8 @@ def series(found: EquilibriumSeries, *names: str, path: str | os.PathLike | None
     units: dict[str, list[str]] = {}
     for name in chosen:
         units.setdefault(found.channel(name)[0], []).append(name)
-    with _drawing():
-        drawing = _figure(0.9 + 2.9 * max(len(units), 1))
+    with styled():
+        drawing = new_figure(0.9 + 2.9 * max(len(units), 1))
         axes = drawing.subplots(max(len(units), 1), 1, sharex=True, squeeze=False)[:, 0]
         for ax, (unit, group) in zip(axes, units.items(), strict=False):
             for k, name in enumerate(group):
@@ -43,8 +43,8 @@ def series(found: EquilibriumSeries, *names: str, path: str | os.PathLike | None
                 ax.legend(**BESIDE)
         axes[-1].set_xlabel("time [s]" if found.parameter == "t" else found.parameter)
         drawing.align_ylabels(axes)
-        _headed(drawing, f"{found.name}: equilibria over {found.parameter}")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{found.name}: equilibria over {found.parameter}")
+        return handed_out(drawing, path)
 
 
 def stretches(found: EquilibriumSeries) -> list[Stretch]:

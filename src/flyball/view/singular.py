@@ -10,8 +10,8 @@ import numpy as np
 from ..errors import ModelError
 from ..model.body import GROUND
 from ..model.words import listing, suggest
-from ..results.singularities import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
-from .plots import PALETTE, PRETTY, _drawing, _figure, _handed_out, _headed
+from ..results.kinds import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
+from .drawing import PALETTE, PRETTY, handed_out, headed, new_figure, styled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -56,8 +56,8 @@ def singular_plot(result: Singularities, path: str | os.PathLike | None = None, 
         )
     shown = result.points[:MOST]
     rows = -(-len(shown) // ACROSS)
-    with _drawing():
-        drawing = _figure(3.4 + 2.1 * rows, 9.0)
+    with styled():
+        drawing = new_figure(3.4 + 2.1 * rows, 9.0)
         grid = drawing.add_gridspec(rows + 1, 2 * ACROSS, height_ratios=[1.0] * rows + [1.5])
         for k, p in enumerate(shown):
             ax = drawing.add_subplot(grid[k // ACROSS, 2 * (k % ACROSS) : 2 * (k % ACROSS) + 2])
@@ -66,8 +66,8 @@ def singular_plot(result: Singularities, path: str | os.PathLike | None = None, 
         _over_driver(drawing.add_subplot(grid[rows, :ACROSS]), result, name)
         _distance(drawing.add_subplot(grid[rows, ACROSS:]), result)
         more = f" (first {MOST} of {len(result.points)})" if len(result.points) > MOST else ""
-        _headed(drawing, f"{result.model}: singular positions over {result.coordinate}{more}")
-        return _handed_out(drawing, path)
+        headed(drawing, f"{result.model}: singular positions over {result.coordinate}{more}")
+        return handed_out(drawing, path)
 
 
 def sketch(ax: Axes, p: Singularity, planar: bool = True) -> None:

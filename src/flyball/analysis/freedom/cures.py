@@ -83,13 +83,7 @@ class Cure:
 
     def applied(self, model: Model) -> Any:
         """A copy of the mechanism with the changes made."""
-        new = {c.name: c.by for c in self.changes}
-        out = model.snapshot()
-        for category in ("joints", "couplings", "drivers"):
-            kept = [new.get(e.name, e) if e.name in new else e for e in getattr(model, category)]
-            setattr(out, category, [e for e in kept if e is not None])
-        out._names = {k: new.get(k, e) for k, e in model._names.items() if new.get(k, e) is not None}
-        return out
+        return model.changed({c.name: c.by for c in self.changes})
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""

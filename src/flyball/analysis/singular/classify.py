@@ -5,11 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import NotConverged
+from ...results.kinds import BIFURCATION, LOCK_UP, PASSAGE, SELF_MOTION
 from ...results.singularities import (
-    BIFURCATION,
-    LOCK_UP,
-    PASSAGE,
-    SELF_MOTION,
     Branch,
     Motion,
     Singularity,

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
-from typing import Annotated, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from pydantic import BeforeValidator
 
 from ...errors import ModelError
-from ..element import Density, Element, Mass, Point, Unit, positive
+from ..element import Density, Element, Mass, Point, positive
 from ..geometry import orientation_matrix, vector
+from ..orientation import Orientation
 
-
-def _oriented(value: Any) -> Any:
-    """As for bodies, whose file imports this one."""
-    from ..body import _orientation
-
-    return _orientation(value)
-
-
-Orientation = Annotated[tuple[float | str, ...], BeforeValidator(_oriented), Unit("rad")]
 FINE = 32  # corners of a circle in a picture
 
 

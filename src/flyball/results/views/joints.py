@@ -16,7 +16,6 @@ from ...system.tables import Q0
 from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
-from .points import PointView
 
 
 class JointView(View):
@@ -103,15 +102,20 @@ class JointView(View):
         sign = 1.0 if on == names[1] else -1.0
         return sign * np.stack(force, axis=1), sign * np.stack(torque, axis=1)
 
+    def rotation(self, axes: str) -> np.ndarray:
+        """Rotation matrices, world from the axes that `reaction` knows by this name, (n, 3, 3)."""
+        e = self.element
+        names = [self._x.structure.model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        full = [np.broadcast_to(x, len(self._result.t)) for x in self._axes(axes, names)]
+        return np.stack(full, axis=1).reshape(-1, 3, 3)
+
     def _axes(self, axes: str, names: list[str]) -> tuple:
         records, x = self._result.records, self._x
         if axes == "joint":
             return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
         if axes not in names:
             raise ValueError(f"axes must be 'world', 'joint', {names[0]!r} or {names[1]!r}, not {axes!r}")
-        return (
-            PointView(self._result, x.structure.model[axes])._record[1] if axes != GROUND else tuple(np.eye(3).ravel())
-        )
+        return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     @property
     def force(self) -> np.ndarray:

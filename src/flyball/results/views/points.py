@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...math.scalar import atan2
-from ...model.body import GROUND, Body, Frame
+from ...model.body import Body, Frame
 from ...model.geometry import matrix_to_quaternion
 from .base import View, stacked
 
@@ -20,14 +20,8 @@ class PointView(View):
 
     def __init__(self, result: Result, element: Body | Frame) -> None:
         super().__init__(result, element)
-        body = element.name if isinstance(element, Body) else element.body
-        pose = self._x.poses
-        p, R = pose.named(element.name)
-        b = self._x.bodies[body]
-        local, turn = b.R.T @ (p - b.c), b.R.T @ R
-        self._body = -1 if body == GROUND else self._x.structure.place[body]
-        self._record = result.records.carried(self._body, tuple(local), tuple(turn.ravel()))
-        self._turn = turn
+        self._body, offset, self._turn = result.records.placed(element.name)
+        self._record = result.records.carried(self._body, offset, self._turn)
 
     @property
     def position(self) -> np.ndarray:
@@ -61,7 +55,7 @@ class PointView(View):
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
             raise AttributeError(f"{self.element.title} moves in space and has no single angle; use rotation")
-        return self._result.records.angle(self._body) + atan2(self._turn[1, 0].item(), self._turn[0, 0].item())
+        return self._result.records.angle(self._body) + atan2(self._turn[3], self._turn[0])
 
     @property
     def angular_velocity(self) -> np.ndarray:

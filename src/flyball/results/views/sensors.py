@@ -6,7 +6,6 @@ import numpy as np
 
 from ...math.vec import mtv, sub
 from .base import View
-from .points import PointView
 
 
 class SensorView(View):
@@ -31,8 +30,7 @@ class IMUView(View):
     """What accelerometers and gyroscopes on a body show."""
 
     def _axes(self) -> tuple:
-        e, model = self.element, self._x.structure.model
-        return PointView(self._result, model[e.frame])._record
+        return self._result.records.named(self.element.frame)
 
     @property
     def specific_force(self) -> np.ndarray:

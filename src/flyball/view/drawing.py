@@ -1,0 +1,151 @@
+"""How figures look and how they are handed out: our style, their size and title, panels over time, files."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from .figures import hidden
+from .recording import Panel
+from .writing import cannot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure as Drawing
+
+    from ..results.result import Result
+
+# Okabe and Ito's palette, which people with any colour vision can tell apart, darkest first.
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#4D4D4D", "#B8A800")
+DASHES: tuple[Any, ...] = ("-", (0, (4, 4)), (0, (1.5, 3)), (0, (6, 2, 1.5, 2)))
+STYLE: dict[str, Any] = {
+    "figure.dpi": 100,
+    "savefig.dpi": 150,
+    "figure.facecolor": "white",
+    "font.size": 10,
+    "axes.titlesize": 9,
+    "axes.titlelocation": "left",
+    "axes.titlecolor": "#555555",
+    "axes.labelcolor": "#333333",
+    "axes.edgecolor": "#8a8a8a",
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e4e4e4",
+    "grid.linewidth": 0.7,
+    "xtick.color": "#555555",
+    "ytick.color": "#555555",
+    "lines.linewidth": 1.6,
+    "lines.solid_joinstyle": "round",
+    "legend.frameon": False,
+    "legend.fontsize": 9,
+    "legend.handlelength": 2.0,
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-3, 5),
+    "axes.formatter.use_mathtext": True,
+    "svg.hashsalt": "flyball",
+}
+SUFFIXES = (".png", ".svg", ".pdf")
+PRETTY = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
+BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
+
+
+@contextmanager
+def styled() -> Iterator[None]:
+    """Our style, for the time of drawing only."""
+    import matplotlib
+    from cycler import cycler
+
+    style: Any = STYLE | {"axes.prop_cycle": cycler(color=PALETTE)}
+    with matplotlib.rc_context(style):
+        yield
+
+
+def new_figure(height: float, width: float = 8.0) -> Drawing:
+    """A figure that belongs to no window; notebooks show it all the same."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure as Drawing
+
+    drawing = Drawing(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(drawing)
+    drawing._repr_png_ = partial(_png, drawing)  # type: ignore[attr-defined]
+    return drawing
+
+
+def _png(drawing: Drawing) -> bytes:
+    """The picture as notebooks ask for it."""
+    from io import BytesIO
+
+    data = BytesIO()
+    drawing.savefig(data, format="png", dpi=100)
+    return data.getvalue()
+
+
+def headed(drawing: Drawing, title: str) -> None:
+    """Put the title above a figure, at its left."""
+    drawing.suptitle(title, x=0.012, ha="left", fontsize=12, fontweight="bold")
+
+
+def handed_out(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | None:
+    """The figure, or None once it is written to ``path``, which must end in .png, .svg or .pdf."""
+    if path is None:
+        return drawing
+    path = Path(path)
+    if path.suffix.lower() not in SUFFIXES:
+        raise ModelError(f"cannot write a plot to {os.fspath(path)!r}: its suffix must be {', '.join(SUFFIXES)}")
+    dated = {".png": {}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    try:
+        drawing.savefig(path, metadata=dated[path.suffix.lower()])
+    except OSError as error:
+        raise cannot(path, error) from None
+    return None
+
+
+def stacked(result: Result, parts: Sequence[Panel], ratios: Sequence[float] = ()) -> Drawing:
+    """Panels one below the other; high enough for their legends."""
+    each = [max(2.3, 0.5 + 0.19 * len(p.curves)) for p in parts]
+    heights = [h * r for h, r in zip(each, ratios or [1.0] * len(each), strict=False)]
+    drawing = new_figure(0.9 + sum(heights))
+    axes = drawing.subplots(len(parts), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    for ax, panel in zip(axes, parts, strict=True):
+        _over_time(ax, result.t, panel)
+    axes[-1].set_xlabel("time [s]")
+    drawing.align_ylabels(axes)
+    return drawing
+
+
+def _over_time(ax: Axes, t: np.ndarray, panel: Panel) -> None:
+    """Curves of one unit, with a legend beside them; a curve that lies on another one is dashed."""
+    values = [c.values for c in panel.curves]
+    for k, (c, under) in enumerate(zip(panel.curves, hidden(values), strict=True)):
+        style = DASHES[max(under, k // len(PALETTE)) % len(DASHES)]
+        single = "o" if len(t) == 1 else None
+        ax.plot(t, c.values, label=c.name, linestyle=style, marker=single)
+    _zoomed_out(ax, values)
+    ax.set_ylabel(f"{panel.label} [{PRETTY.get(panel.unit, panel.unit)}]".strip())
+    if panel.note:
+        ax.set_title(panel.note)
+    if len(t) > 1:
+        ax.margins(x=0.0)
+    ax.legend(**BESIDE)
+
+
+def _zoomed_out(ax: Axes, values: Iterable[np.ndarray]) -> None:
+    """Do not blow the rounding errors of a constant up to the height of the axis."""
+    finite = np.concatenate([v[np.isfinite(v)] for v in values] or [np.zeros(0)])
+    if not len(finite):
+        return
+    low, high = finite.min(), finite.max()
+    middle = (low + high) / 2
+    if high - low < 1e-9 * abs(middle) or high == low:
+        room = max(abs(middle) * 0.1, 1e-3)
+        ax.set_ylim(middle - room, middle + room)
