@@ -108,5 +108,7 @@ def count(value: Any, name: str, least: int = 1) -> None:
     ModelError
         If it is none.
     """
-    if isinstance(value, bool) or not hasattr(value, "__index__") or value < least:
-        raise ModelError(f"{name} must be a whole number, {least} or greater, got {value!r}")
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise ModelError(f"{name} must be a whole number, not {value!r}")
+    if value < least:
+        raise ModelError(f"{name} must be at least {least}, got {value!r}")

@@ -122,6 +122,7 @@ def run_clock(a: Assembly, clock: ex.Clock, method: object, tell: Tell, task: in
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
+    span = clock.real[ex.T_END] - first or 1.0
     forget(W.stack)
     try:
         while True:
@@ -130,7 +131,7 @@ def run_clock(a: Assembly, clock: ex.Clock, method: object, tell: Tell, task: in
             with interrupts_kept(s.functions):
                 used = motion_kernel(S, W, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
-            tell((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))
+            tell((clock.real[ex.T] - first) / span)
             if clock.count[ex.STATUS] != ex.RUNNING:
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin

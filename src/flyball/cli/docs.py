@@ -37,7 +37,7 @@ def described(method: Callable) -> dict[str, Described]:
             raise ValueError(f"{method.__qualname__}: the docstring line {head!r} is not 'name : type'")
         unit = UNIT.search(match["type"])
         choices = tuple(CHOICE.findall(match["type"])) if match["type"].startswith("{") else ()
-        told = plain(" ".join(line.strip() for line in body))
+        told = plain(" ".join(line.strip() for line in body)).strip()
         for name in match["names"].split(", "):
             found[name] = Described(unit[1] if unit else "", choices, told)
     return found
