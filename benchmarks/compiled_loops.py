@@ -11,11 +11,12 @@ from typing import Any
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
-from flyball._jit import start_numba
-from flyball._link import optimise_once
-from flyball.system.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
-from flyball.system.solve import REFINEMENTS, factor, solve
-from flyball.system.tables import (
+from flyball.compiler.jit import start_numba
+from flyball.compiler.link import optimise_once
+from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
+from flyball.equations.solve import REFINEMENTS, factor, solve
+from flyball.equations.tree import retract
+from flyball.tables.system import (
     COORDINATES,
     F_APPLIED,
     GAMMA,
@@ -28,7 +29,6 @@ from flyball.system.tables import (
     V3,
     X_SOLVED,
 )
-from flyball.system.tree import retract
 
 RIGHT_HAND_SIDE, KINEMATICS, REACTIONS = range(3)
 

@@ -1,4 +1,4 @@
-"""The weights of ``flyball.system.cost``: fitted to the time of a stage of the integration in both coordinate layers.
+"""The weights of ``flyball.tables.cost``: fitted to the time of a stage of the integration in both coordinate layers.
 
 Prints measured and estimated microseconds a stage, which layer is faster, which one the estimate takes, and the fitted
 weights. Usage: ``python costs.py [--fit]``.
@@ -42,14 +42,14 @@ def cases() -> Iterator[tuple[str, Any]]:
 
 def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], Any]:
     """(microseconds a stage, counts, start) of one mechanism."""
-    from flyball.analysis.entry import INTEGRATE
     from flyball.analysis.motion.options import projected
     from flyball.analysis.motion.start import begin
     from flyball.analysis.progress import unwatched
     from flyball.analysis.simulate import clock_for, run_clock
+    from flyball.equations.entry import INTEGRATE
     from flyball.numerics.integrators import explicit as ex
     from flyball.numerics.integrators.tableaux import tableau
-    from flyball.system.cost import counts
+    from flyball.tables.cost import counts
 
     model = model.snapshot()
     start = begin(model, 0.0, None, None, coordinates)
@@ -120,7 +120,7 @@ def main() -> None:
         print({k: round(v, 1) for k, v in weights.items()})
         compare(rows, lambda n: sum(weights[k] * n[k] for k in n))
     else:
-        from flyball.system.cost import estimate
+        from flyball.tables.cost import estimate
 
         compare(rows, estimate)
 

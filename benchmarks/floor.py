@@ -117,7 +117,7 @@ def objects(a: np.ndarray) -> np.ndarray:
 
 def scope() -> dict[str, Any]:
     """The formulas that the parts call, by name."""
-    from flyball.system import dispatch, kinematics, loads, motion, solve
+    from flyball.equations import dispatch, kinematics, loads, motion, solve
 
     names = {}
     for module in (dispatch, kinematics, loads, motion, solve):
@@ -166,8 +166,8 @@ def compiled_loop(part: str) -> Callable:
     if part not in _loops:
         import numba
 
-        from flyball._jit import start_numba
-        from flyball._link import optimise_once
+        from flyball.compiler.jit import start_numba
+        from flyball.compiler.link import optimise_once
 
         start_numba()
         names = scope()
@@ -223,10 +223,10 @@ def mechanisms() -> dict[str, Any]:
 
 
 def main() -> None:
-    from flyball.analysis.entry import MOTION
     from flyball.analysis.motion.start import begin
-    from flyball.system.motion import STAGES
-    from flyball.system.tables import STABILIZE, TOL_G, TOL_V
+    from flyball.equations.entry import MOTION
+    from flyball.equations.motion import STAGES
+    from flyball.tables.system import STABILIZE, TOL_G, TOL_V
 
     per_ns = rate()
     print(f"compiled scalar code at its best: {per_ns:.1f} operations a nanosecond\n")

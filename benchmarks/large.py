@@ -16,8 +16,8 @@ import timing
 
 import flyball as fb
 from flyball.model.io import dumps, loads
-from flyball.system.structure import structure
-from flyball.system.values import values
+from flyball.tables.structure import structure
+from flyball.tables.values import values
 
 PARTS = ("build", "write", "read", "structure", "values", "assemble", "check")
 COLUMNS = {

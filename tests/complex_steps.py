@@ -15,8 +15,8 @@ from flyball.errors import ModelError
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
 from flyball.model.model import CATEGORIES
-from flyball.system.structure import Structure
-from flyball.system.tables import (
+from flyball.tables.specs import Structure
+from flyball.tables.system import (
     BODY_P,
     BODY_R,
     EXCESS,
@@ -26,12 +26,12 @@ from flyball.system.tables import (
     OFFSET,
     PER_COMPACT,
     PER_MASS,
+    REVOLUTE,
     TREE,
     TREE_P,
     TREE_R,
 )
-from flyball.system.tree import REVOLUTE
-from flyball.system.values import Values, values
+from flyball.tables.values import Values, values
 
 STEP = 1e-30
 STEPS = (1e-3, 1e-4, 1e-5, 1e-6)  # of the differences, one after the other where they do not agree

@@ -14,12 +14,12 @@ import flyball as fb
 from flyball.analysis import compare as comparing
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION
 from flyball.analysis.motion import partition
 from flyball.cli import app
-from flyball.system import motion
-from flyball.system.names import velocity_names
-from flyball.system.tables import (
+from flyball.equations import motion
+from flyball.equations.entry import MOTION
+from flyball.tables.names import velocity_names
+from flyball.tables.system import (
     COUPLED,
     EXCHANGES,
     G_VALUE,

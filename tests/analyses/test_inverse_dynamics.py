@@ -277,3 +277,18 @@ def test_a_singular_instant_is_told():
     assert found.near_singular[-1]
     assert not found.near_singular[:-1].any()
     assert "singular position" in dict(found.lines())["warning"]
+
+
+@pytest.mark.parametrize("coordinates", BOTH)
+def test_joints_together_on_either_body(coordinates):
+    """Two links held still: what both joints do to the upper one carries its weight, whichever side of it they have."""
+    m = arm()
+    m.add(fb.Driver("one", "shoulder.angle", "0*t"), fb.Driver("two", "elbow.angle", "0*t"))
+    found = m.inverse_dynamics(3, t_end=1.0, coordinates=coordinates)
+    upper = found.together("shoulder", "elbow", on="upper")
+    assert upper.force == pytest.approx(np.tile([0, 2.0 * G, 0], (3, 1)), abs=1e-9)
+    assert found.together("elbow", on="upper").force == pytest.approx(np.tile([0, -1.0 * G, 0], (3, 1)), abs=1e-9)
+    assert found.together("elbow", on="lower").force == pytest.approx(np.tile([0, 1.0 * G, 0], (3, 1)), abs=1e-9)
+    # about the middle of the upper link: 3 kg hang on its left end, 1 kg on its right
+    arm_of_forces = -0.5 * 3.0 * G - 0.5 * 1.0 * G
+    assert upper.torque[:, 2] == pytest.approx(arm_of_forces, abs=1e-9)

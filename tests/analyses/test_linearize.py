@@ -210,7 +210,7 @@ def test_what_does_not_exist_is_named():
         m.linearize(["pusch"])
     with pytest.raises(fb.ModelError, match="'tild'"):
         m.linearize(outputs=["tild"])
-    with pytest.raises(fb.ModelError, match="'pin' has no curve 'angel'"):
+    with pytest.raises(fb.ModelError, match="Revolute 'pin' has no curve 'angel'"):
         m.linearize(outputs=["pin.angel"])
     with pytest.raises(fb.ModelError, match="no parameter 'mass'"):
         m.linearize(parameters={"mass": 2.0})

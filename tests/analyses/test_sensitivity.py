@@ -124,7 +124,7 @@ def test_what_does_not_exist_is_named():
     m = slider_crank()
     with pytest.raises(fb.ModelError, match="no parameter 'R'"):
         m.sensitivity(["slider.x"], ["R"])
-    with pytest.raises(fb.ModelError, match="'slider' has no curve 'xx'"):
+    with pytest.raises(fb.ModelError, match="Body 'slider' has no curve 'xx'"):
         m.sensitivity(["slider.xx"], ["r"])
     with pytest.raises(fb.ModelError, match="unknown analysis 'motions'"):
         m.sensitivity(["slider.x"], ["r"], analysis="motions")

@@ -57,6 +57,27 @@ def test_an_orientation_that_is_a_parameter():
     assert found.derivatives[0] == pytest.approx(np.array([[-c, 0], [-s, 0], [-2 * s, c]]), abs=1e-9)
 
 
+@pytest.mark.parametrize("axis", ["first", "second", "third"])
+def test_an_orientation_about_three_axes(axis):
+    """Turned about x, y and z by angles of its own: where a point of the body goes with each of them."""
+    angles = {"first": 0.4, "second": -0.7, "third": 1.1}
+    m = fb.Mechanism("turned", parameters=angles)
+    m.add(fb.Body("b", mass=1, inertia=(1, 2, 3), orientation=tuple(angles)))
+    m.add(fb.Frame("tip", "b", position=(0.3, -0.5, 1.2)))
+    found = m.sensitivity(["tip.x", "tip.y", "tip.z"], [axis])
+
+    def tip(step):
+        turned = [a + step * (name == axis) for name, a in angles.items()]
+        (cx, cy, cz), (sx, sy, sz) = np.cos(turned), np.sin(turned)
+        X = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        Y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        Z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+        return X @ Y @ Z @ [0.3, -0.5, 1.2]  # Bryant angles
+
+    assert found.values[0] == pytest.approx(tip(0.0), abs=1e-12)
+    assert found.derivatives[0, :, 0] == pytest.approx(tip(1e-30j).imag / 1e-30, abs=1e-12)
+
+
 def test_velocities_that_assembly_makes_consistent():
     """A rod on a hinge, drawn with a velocity of its centre that the hinge does not allow altogether."""
     m = fb.Mechanism("rod", planar=True, parameters={"v": 1.0, "mass": 2.0, "x": 0.5})

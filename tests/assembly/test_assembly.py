@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.system.records import load
-from flyball.system.tables import G_VALUE, NU
+from flyball.equations.records import load
+from flyball.tables.system import G_VALUE, NU
 from tests.mechanisms import bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated
 

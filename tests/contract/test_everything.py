@@ -7,11 +7,11 @@ import pytest
 
 import flyball as fb
 from flyball import forces
-from flyball.analysis.entry import MOTION
+from flyball.equations.entry import MOTION
+from flyball.equations.motion import derivative
 from flyball.model.coupling import Coupling
 from flyball.model.io import dumps, loads
 from flyball.model.sensor import IMU, Sensor
-from flyball.system.motion import derivative
 from tests.layers import both_layers, started
 
 pytestmark = both_layers

@@ -198,7 +198,7 @@ def test_rotation_vector_says_nothing_at_half_a_turn():
 @pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
 def test_kind_stands_in_dispatch(kind):
     """A force that dispatch does not list would be described and never act."""
-    from flyball.system import dispatch
+    from flyball.equations import dispatch
 
     formula = kind.effort if kind in ALONG else kind.wrench
     module = formula.__module__.rsplit(".", 1)[1]

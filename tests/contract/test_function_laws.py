@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.errors import ExpressionError, PerformanceNotice
+from flyball.laws.call import STACK_RESERVE
+from flyball.laws.evaluation import evaluate
+from flyball.laws.functions import fault, forget, interrupts_kept
+from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression
-from flyball.system.call import STACK_RESERVE
-from flyball.system.functions import fault, forget, interrupts_kept
-from flyball.system.laws import evaluate
-from flyball.system.program import compile_law
 
 PARAMETERS = {"k": 3.0}
 INPUTS = ("t", "length", "rate")
@@ -345,12 +345,16 @@ def test_an_interrupt_waits_for_compiled_code():
             os.kill(os.getpid(), signal.SIGINT)
         return t
 
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # the shell of a background job ignores it
     law, value = Law(in_python(stop)), None
-    with pytest.raises(KeyboardInterrupt), interrupts_kept(law.functions):
-        value = compiled_sum(law.code, law.const, law.at, law.stack, (0.0, 0.0, 0.0), np.zeros((3, 2)), 11)
+    try:
+        with pytest.raises(KeyboardInterrupt), interrupts_kept(law.functions):
+            value = compiled_sum(law.code, law.const, law.at, law.stack, (0.0, 0.0, 0.0), np.zeros((3, 2)), 11)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert value == 55.0
     assert law.fault() is None
-    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     with interrupts_kept(law.functions):
         law.value()
 

@@ -5,10 +5,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.analysis.entry import MOTION
+from flyball.equations.entry import MOTION
+from flyball.equations.motion import derivative
 from flyball.model.io import dumps, loads
-from flyball.system.motion import derivative
-from flyball.system.tables import GAMMA
+from flyball.tables.system import GAMMA
 from tests.contract.zoo import (
     CASES,
     GRAVITY,

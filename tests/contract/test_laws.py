@@ -8,11 +8,11 @@ import sympy
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
+from flyball.laws.evaluation import entire, evaluate, evaluate_jet
+from flyball.laws.opcodes import BY_MOTION
+from flyball.laws.program import compile_law
 from flyball.model.expressions import FUNCTIONS, Expression
-from flyball.system.laws import entire, evaluate, evaluate_jet
-from flyball.system.opcodes import BY_MOTION
-from flyball.system.program import compile_law
 
 PARAMETERS = {"a": 0.7, "b": 1.3, "zero": 0.0, "n": 3.0}
 H = 1e-30

@@ -215,3 +215,14 @@ def test_a_spring_about_an_axis_is_wound_up_over_turns():
     assert r["J"].angle == pytest.approx(6.0 * np.pi * np.cos(np.sqrt(0.1 / 0.04) * r.t), abs=1e-5)
     assert r["s"].wrench[1] == pytest.approx(np.outer(-0.1 * r["J"].angle, (0, 0, 1)), abs=1e-12)
     assert r.health.energy_drift < 1e-6
+
+
+def test_a_damped_rope_does_not_push():
+    """Stretched, but shortening faster than stiffness / damping: it carries nothing, its load goes on evenly."""
+    m = fb.Mechanism("rebound")
+    m.add(fb.Body("load", mass=2.0, inertia=(1, 1, 1), position=(1.2, 0, 0), velocity=(-10, 0, 0)))
+    m.add(fb.Prismatic("slide", "ground", "load", at=(0, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.Rope("rope", ["ground", "load"], at=[(0, 0, 0), (1.2, 0, 0)], stiffness=100, damping=30, length=1.0))
+    r = m.simulate(0.1, outputs=11)
+    assert r["load"].position[:, 0] == pytest.approx(1.2 - 10 * r.t, abs=1e-12)
+    assert r["rope"].tension == pytest.approx(0.0, abs=1e-12)

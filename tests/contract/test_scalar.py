@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.math import scalar
 from flyball.math.scalar import (
     absolute,

@@ -3,15 +3,15 @@
 import numpy as np
 import pytest
 
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.errors import ExpressionError
+from flyball.laws.call import STACK_RESERVE
+from flyball.laws.evaluation import evaluate, evaluate_jet
+from flyball.laws.opcodes import BY_MOTION, BY_TIME, FREEZE
+from flyball.laws.program import compile_law
 from flyball.math import scalar
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table
-from flyball.system.call import STACK_RESERVE
-from flyball.system.laws import evaluate, evaluate_jet
-from flyball.system.opcodes import BY_MOTION, BY_TIME, FREEZE
-from flyball.system.program import compile_law
 
 PARAMETERS = {"a": 0.7, "b": 1.3}
 SENSORS = {"speed": 2, "height": 0}  # column 1 is another law's

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import CubicSpline, PchipInterpolator
 
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.math.spline import spline
 from flyball.model.table import Table
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flyball.errors import ExpressionError, FlyballError, ModelError, UnitError
+from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression, number, resolve_parameters
 from flyball.model.units import to_si
-from flyball.system.program import compile_law
 
 WHERE = "mass of body 'crank'"
 ENV = {"length": 2.0, "k": 3.0, "x": 1.0}

@@ -7,9 +7,9 @@ import pytest
 
 import flyball as fb
 from flyball.errors import ExpressionError, ModelError, UnitError
+from flyball.laws.program import compile_law
 from flyball.model.expressions import Expression, law_expression
 from flyball.model.table import Table
-from flyball.system.program import compile_law
 
 
 def any_number(*args):

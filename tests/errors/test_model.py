@@ -9,7 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.simulate import output_times
-from flyball.system.structure import structure
+from flyball.tables.structure import structure
 
 
 def planar(**options: object) -> fb.Mechanism:

@@ -331,7 +331,7 @@ def test_fields_given_by_place_that_go_by_name():
 
 def test_sensors_name_curves_that_results_have():
     """What a sensor may name is what the result shows, part by part."""
-    from flyball.model.examine import curves
+    from flyball.model.quantities import quantities
 
     m = plane()
     m.add(fb.GearPair("G", "A", "W", teeth=(1, 2)), fb.Driver("D", "S.displacement", "0.1*t"), fb.IMU("imu", "eye"))
@@ -340,10 +340,10 @@ def test_sensors_name_curves_that_results_have():
     m.joints.remove(m["C"])
     r = m.simulate(0.1, outputs=3)
     for e in m.elements():
-        assert list(r[e.name].channels()) == curves(m, e.name), e.name
-    assert list(r.energy.channels()) == curves(m, "energy")
+        assert list(r[e.name].channels()) == [k for k, x in quantities(m, e.name).items() if x.curve], e.name
+    assert list(r.energy.channels()) == [k for k, x in quantities(m, "energy").items() if x.curve]
     m = space()
     m.add(fb.Cylindrical("cyl", "a", "d", at=(0, 0, 0), axis=Z), fb.IMU("imu", "b"))
     r = m.simulate(0.1, outputs=3)
     for e in m.elements():
-        assert list(r[e.name].channels()) == curves(m, e.name), e.name
+        assert list(r[e.name].channels()) == [k for k, x in quantities(m, e.name).items() if x.curve], e.name

@@ -11,14 +11,29 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION
+from flyball.equations import tree as joints
+from flyball.equations.articulated import articulate, articulated_solve
+from flyball.equations.entry import MOTION
+from flyball.equations.mass import mass_entries
+from flyball.equations.tree import column
 from flyball.math.vec import quaternion_matrix
 from flyball.results.records import Records
-from flyball.system import tree as joints
-from flyball.system.articulated import articulate, articulated_solve
-from flyball.system.mass import mass_entries
-from flyball.system.tables import BODY_LAW, BODY_WIDTH, F_APPLIED, INERTIA, MASS, NV, PARENT, V0
-from flyball.system.tree import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, WELD, column
+from flyball.tables.system import (
+    BODY_LAW,
+    BODY_WIDTH,
+    F_APPLIED,
+    FREE,
+    INERTIA,
+    MASS,
+    NV,
+    PARENT,
+    PLANAR,
+    PRISMATIC,
+    REVOLUTE,
+    SPHERICAL,
+    V0,
+    WELD,
+)
 from tests.mechanisms import planar_rod
 
 SIZES = range(12)

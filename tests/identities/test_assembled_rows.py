@@ -8,8 +8,8 @@ import pytest
 
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.system.tables import G_VALUE, GAMMA, NU
-from flyball.system.tree import retract
+from flyball.equations.tree import retract
+from flyball.tables.system import G_VALUE, GAMMA, NU
 from tests.contract.zoo import CASES
 from tests.identities.test_joint_layer import HINGES, PARTS, coupled, with_joint
 

@@ -9,17 +9,18 @@ import flyball as fb
 from flyball import forces, joints
 from flyball.analysis.compiled import compiled
 from flyball.analysis.linear.derivatives import Equations, State
+from flyball.equations.scratch import work
+from flyball.equations.velocities import least_squares
 from flyball.errors import ExpressionError, ModelError
 from flyball.model.coupling import Coupling
 from flyball.model.expressions import Expression, number
 from flyball.model.geometry import triad
 from flyball.model.grammar import FUNCTIONS
 from flyball.model.shapes import ALL as SHAPES
-from flyball.system.coordinates import _least_squares
-from flyball.system.inverse import inverse_inertia
-from flyball.system.spanning import spanning
-from flyball.system.structure import structure
-from flyball.system.values import values, work
+from flyball.tables.inertia import inverse_inertia
+from flyball.tables.spanning import spanning
+from flyball.tables.structure import structure
+from flyball.tables.values import values
 from tests import mechanisms
 from tests.complex_steps import STEP, errors_of, tables, with_parameters
 from tests.contract import zoo
@@ -249,7 +250,7 @@ def test_least_squares_carry_the_derivative():
     A, dA, b, db = (g.standard_normal(n) for n in ((6, 3), (6, 3), 6, 6))
 
     def at(e):
-        return _least_squares(A + e * dA, b + e * db)
+        return least_squares(A + e * dA, b + e * db)
 
     h = 1e-3
     difference = (8.0 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12.0 * h)

@@ -9,11 +9,11 @@ import pytest
 import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION
+from flyball.equations.entry import MOTION
+from flyball.equations.mass import mass_entries
+from flyball.equations.records import load
 from flyball.results.records import Records
-from flyball.system.mass import mass_entries
-from flyball.system.records import load
-from flyball.system.tables import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
+from flyball.tables.system import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
 

@@ -9,11 +9,11 @@ import flyball as fb
 from flyball.analysis import simulate
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.analysis.entry import MOTION, motion_kernel
+from flyball.equations import motion
+from flyball.equations.entry import MOTION, motion_kernel
 from flyball.numerics.integrators import explicit
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.system import motion
-from flyball.system.tables import PASS, STABILIZE, TOL_G, TOL_V
+from flyball.tables.system import PASS, STABILIZE, TOL_G, TOL_V
 from tests.layers import both_layers, cached
 from tests.mechanisms import G, bricard, door, example, four_bar, spatial_four_bar
 from tests.verification.test_reactions import actuated

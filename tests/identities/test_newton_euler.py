@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.equations.tree import column
 from flyball.math.vec import dot
-from flyball.system.spanning import spanning
-from flyball.system.structure import structure
-from flyball.system.tables import FRAMES, GROUND_FRAMES, NV
-from flyball.system.tree import column
+from flyball.tables.spanning import spanning
+from flyball.tables.structure import structure
+from flyball.tables.system import FRAMES, GROUND_FRAMES, NV
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
 from tests.identities.test_joint_layer import PARTS, coupled, with_joint

@@ -63,7 +63,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import ClassVar
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..math.vec import scale
 from ..model.element import Damping, element
 from ..model.force import BodyForce
@@ -105,9 +105,9 @@ def runs(tmp_path_factory):
     first = copy.run(FALL + PRINT)
     second = copy.run(FALL + PRINT)
     # a callee in another file than the kernel's: gravity pulls the other way
-    copy.edit("system/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
+    copy.edit("equations/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
     copy.add("joints/sheet.py", JOINT)
     copy.append("joints/__init__.py", "from .sheet import Sheet as Sheet\n")
     copy.add("forces/drag.py", FORCE)
-    copy.edit("system/dispatch.py", LAST_FORCE, DRAG + LAST_FORCE)
+    copy.edit("equations/dispatch.py", LAST_FORCE, DRAG + LAST_FORCE)
     return copy, first, second, copy.run(FALL + SLIDE + PRINT)

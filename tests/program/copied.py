@@ -19,7 +19,7 @@ from numba.core.errors import NumbaWarning
 warnings.simplefilter("error", NumbaWarning)
 
 def cache_counts():
-    from flyball._jit import KERNELS
+    from flyball.compiler.jit import KERNELS
     used = [k for k in KERNELS if k._dispatcher is not None]
     stats = [k.dispatcher.stats for k in used]
     return {
@@ -77,7 +77,7 @@ class Copy:
             "PYTHONDONTWRITEBYTECODE": "1",
         }
         ended = subprocess.run(
-            [sys.executable, "-c", COUNT + script], env=env, cwd=self.root, capture_output=True, text=True, timeout=300
+            [sys.executable, "-c", COUNT + script], env=env, cwd=self.root, capture_output=True, text=True, timeout=1800
         )
         assert ended.returncode == 0, ended.stderr
         return json.loads(ended.stdout.splitlines()[-1])

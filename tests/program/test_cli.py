@@ -253,10 +253,10 @@ def test_the_program_starts_quickly_and_by_itself() -> None:
         "except SystemExit as end: assert not end.code\n"
         "print([k for k in ('numba', 'matplotlib', 'xarray', 'numpy', 'pint') if k in sys.modules])"
     )
-    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, check=True)
+    ended = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=600, check=True)
     assert ended.stdout == f"flyball {fb.__version__}\n[]\n"
     module = subprocess.run(
-        [sys.executable, "-m", "flyball", "check", "no.toml"], capture_output=True, text=True, timeout=60
+        [sys.executable, "-m", "flyball", "check", "no.toml"], capture_output=True, text=True, timeout=600
     )
     assert module.returncode == 2
     assert module.stderr == "error: there is no file 'no.toml'\n"

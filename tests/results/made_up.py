@@ -9,8 +9,8 @@ import numpy as np
 import flyball as fb
 from flyball.results.health import Health
 from flyball.results.result import Result
-from flyball.system.structure import structure
-from flyball.system.values import values
+from flyball.tables.structure import structure
+from flyball.tables.values import values
 
 R, L = 0.3, 0.6
 

@@ -51,8 +51,8 @@ def test_parameters_are_those_of_the_run(result: Result, tmp_path: Path) -> None
 
 
 def test_a_free_body_has_no_rows(tmp_path: Path) -> None:
-    from flyball.system.structure import structure
-    from flyball.system.values import values
+    from flyball.tables.structure import structure
+    from flyball.tables.values import values
 
     m = fb.Mechanism("ball")
     m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import sympy
 
-from flyball._jit import kernel
+from flyball.compiler.jit import kernel
 from flyball.math import turns
 from flyball.math.vec import mm
 

@@ -41,7 +41,7 @@ class Opened:
         if script:
             self.tab.add_init_script(script)
         self.tab.goto(address)
-        self.tab.wait_for_selector("body[data-ready]", timeout=20_000)
+        self.tab.wait_for_selector("body[data-ready]", timeout=300_000)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.tab, name)

@@ -9,8 +9,8 @@ import pytest
 
 import flyball as fb
 from flyball.results.result import Result
-from flyball.system.structure import structure
-from flyball.system.values import values
+from flyball.tables.structure import structure
+from flyball.tables.values import values
 from flyball.view.animate import animation, kept, record
 from flyball.view.payload import check
 from flyball.view.plots import plot, standard_plots

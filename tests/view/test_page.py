@@ -153,7 +153,7 @@ def test_a_notebook_frame_runs_the_page(browser: Any, tmp_path: Path) -> None:
     tab = browser.new_page(offline=True)
     tab.goto(path.as_uri())
     frame = tab.frame_locator("iframe")
-    frame.locator("body[data-ready]").wait_for(timeout=20_000)
+    frame.locator("body[data-ready]").wait_for(timeout=300_000)
     assert tab.locator("iframe").bounding_box()["height"] == 500
     assert frame.locator("h1").inner_text() == "swing"
     assert frame.locator("button[name=play]").get_attribute("aria-label") == "Play"  # frames do not start by themselves

@@ -17,7 +17,7 @@ from ..model.body import Body, Driver, Frame
 from ..model.element import LawOf
 from ..model.expressions import number
 from ..model.model import Model
-from ..system.tables import G_VALUE, NU
+from ..tables.system import G_VALUE, NU
 from .compiled import Compiled, compiled
 
 CLOSED = 1e-10
@@ -194,7 +194,7 @@ def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
 
 
 def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
-    from ..system.tree import retract
+    from ..equations.tree import retract
 
     new = q.copy()
     retract(c.values.system, new, d)

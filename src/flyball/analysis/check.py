@@ -13,7 +13,7 @@ from ..model.body import GROUND
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
-from ..system.values import Values
+from ..tables.values import Values
 from .assemble import Assembly, assemble
 from .mass import MassProperties, directions, letters, report
 from .mobility import mobility

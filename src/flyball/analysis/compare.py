@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..equations.entry import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..model.model import Model
 from ..model.words import listing, suggest
@@ -16,10 +17,9 @@ from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result
-from ..system.tables import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
+from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
 from .assemble import Assembly
 from .compiled import Compiled, compiled
-from .entry import INTEGRATE
 from .motion import partition
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome

@@ -8,17 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from ..equations.entry import POSITION, evaluate
+from ..equations.motion import NONE
+from ..equations.records import load
+from ..equations.scratch import work
+from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
-from ..system.coordinates import BodyState, positions, turned_angles, velocities
-from ..system.forest import steps
-from ..system.motion import NONE
-from ..system.names import velocity_names
-from ..system.records import load
-from ..system.structure import Structure, structure
-from ..system.tables import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
-from ..system.values import Values, values, work
-from .entry import POSITION, evaluate
+from ..tables.coordinates import BodyState, positions
+from ..tables.forest import steps
+from ..tables.names import velocity_names
+from ..tables.specs import Structure
+from ..tables.structure import structure
+from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
+from ..tables.values import Values, values
 
 
 @dataclass

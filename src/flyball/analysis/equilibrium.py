@@ -14,15 +14,14 @@ import numpy as np
 
 from ..errors import ModelError, NotConverged
 from ..model.model import Model
-from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
-from ..system.names import velocity_names
+from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
+from ..tables.names import velocity_names
 from .assemble import Assembly, assemble
-from .linear.balance import acting
 from .linear.curves import snapshot
-from .linear.derivatives import Equations, State
-from .linear.free import Free, free
+from .linear.derivatives import State
 from .linear.preload import preloaded
 from .linear.rest import Rest
+from .linear.stability import GROWTH, stability
 from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
@@ -35,7 +34,6 @@ LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
 SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
-NEUTRAL = 1e-8  # stiffness below this part of what acts is none
 SHOWN = 6
 
 
@@ -50,6 +48,23 @@ class EquilibriumOptions(Options):
     preload: tuple[str, ...]
     turning: tuple[str, ...]
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.stable and self.turning:
+            raise ModelError(
+                "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
+                "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
+            )
+        if self.stable and self.preload:
+            raise ModelError(
+                "preload= holds the mechanism where it is drawn, stable=True moves it elsewhere; give one of the two"
+            )
+        if self.preload and self.turning:
+            raise ModelError(
+                "preload= holds a mechanism at rest, turning= asks for a motion; give one of the two. The effort of a "
+                "driver tells what a steady motion needs along its coordinate"
+            )
+
 
 def resting(
     t: float, parameters: Mapping[str, float] | None, start: Equilibrium | None = None, stable: bool = False
@@ -61,30 +76,34 @@ def resting(
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
     a = assemble(model, t=o.t, parameters=o.parameters)
-    if o.start is not None:
-        if not isinstance(o.start, Equilibrium) or list(o.start.assembly.compiled.structure.place) != list(
-            a.compiled.structure.place
-        ):
-            raise ModelError(f"start must be an equilibrium of {model.name!r}, or of one with the same bodies")
-        start = o.start.assembly
-        q, _ = a.compiled.take(start.compiled, start.t, start.q, start.v)
-        a = Assembly(a.compiled, a.t, q, np.zeros(a.compiled.structure.nv))
+    begin = _begun(a, o.start)
     if o.turning:
-        return _steady(a, o.turning)
+        return _steady(begin, a, o.turning)
     if o.preload:
-        return _finished(*preloaded(a, o.preload), "preload")
-    return _searched(Rest.at(a.compiled, a.t, a.q), o.stable)
+        return _finished(*preloaded(begin, o.preload), "preload")
+    return _searched(Rest.at(a.compiled, a.t, begin.q), o.stable)
+
+
+def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:
+    """Where the search begins: as assembled, or at another equilibrium."""
+    if start is None:
+        return a
+    s = a.compiled.structure
+    if not isinstance(start, Equilibrium) or list(start.assembly.compiled.structure.place) != list(s.place):
+        raise ModelError(f"start must be an equilibrium of {s.model.name!r}, or of one with the same bodies")
+    q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
+    return Assembly(a.compiled, a.t, q, np.zeros(s.nv))
 
 
 def _searched(x: Rest, stable: bool) -> Equilibrium:
     """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
     way = "Newton's method"
     arrived = _newton(x)
-    unstable = arrived is not None and _stability(arrived)[0] == UNSTABLE
+    unstable = arrived is not None and stability(arrived).kind == UNSTABLE
     if arrived is not None and unstable and not stable and _far(x, arrived):
         downhill = _descent(x)  # Newton has led up a hill that the guess is not on
         below = None if downhill is None else _newton(downhill)
-        if below is not None and _stability(below)[0] != UNSTABLE:
+        if below is not None and stability(below).kind != UNSTABLE:
             return _finished(below, {}, "descent")
     if arrived is None or (stable and unstable):
         way = "descent"
@@ -100,10 +119,10 @@ def _far(x: Rest, y: Rest) -> bool:
     return bool(np.abs(tangent_step(x.c, x.q, y.q) / x.scale).max(initial=0.0) > LONGEST)
 
 
-def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
+def _steady(a: Assembly, described: Assembly, names: Sequence[str]) -> Equilibrium:
     """A steady motion; its stability by its eigenvalues, of which those of the turning itself are zero."""
     c = a.compiled
-    found = turn(a, names, c.parameters)
+    found = turn(a, described, names, c.parameters)
     x = found.state
     f, _, r = without_inputs(x)
     w = np.linalg.eigvals(r.A)
@@ -111,7 +130,7 @@ def _steady(a: Assembly, names: Sequence[str]) -> Equilibrium:
     q, v = c.take(x.c, x.t, x.q, x.v)
     return Equilibrium(
         t=x.t,
-        stability=UNSTABLE if grows > NEUTRAL**0.5 else STABLE,
+        stability=UNSTABLE if grows > GROWTH else STABLE,
         freedoms=tuple(f.labels),
         stiffness=r.K if r.K is not None else np.zeros((0, 0)),
         weakest={},
@@ -142,7 +161,7 @@ def _newton(x: Rest) -> Rest | None:
 
 def _pushed(x: Rest) -> Rest:
     """A little way along the direction of least stiffness."""
-    _, _, _, direction, _ = _stability(x)
+    direction = stability(x).direction
     return x.moved(1e-2 * direction / np.abs(direction).max(), 0.0 * x.lam).closed()
 
 
@@ -170,54 +189,18 @@ def _descent(x: Rest) -> Rest | None:
     return None
 
 
-def _stability(x: Rest) -> tuple[str, Free, np.ndarray, np.ndarray, float]:
-    """(kind, freedoms, their stiffness, direction of least stiffness in scaled velocities, that stiffness).
-
-    The stiffness along a direction is a part of what springs, weights and reactions do along it by themselves.
-    """
-    e = Equations(State.resting(x.c, x.t, x.q, x.lam))
-    f = free(e)
-    if not f.Zv.shape[1]:
-        return STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf
-    K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
-    Z, _ = np.linalg.qr(f.Zv / x.scale[:, None])
-    own = Z.T @ x.K @ Z
-    w, V = np.linalg.eigh(0.5 * (own + own.T))
-    along = np.abs(Z @ V)
-    acts = np.einsum("ik,ik->k", along, abs(x.K) @ along) + (x.scale * acting(e)) @ along**2
-    parts = w / np.where(acts > 0.0, acts, 1.0)
-    k = int(np.argmin(parts))
-    kind = UNSTABLE if parts[k] < -NEUTRAL else MARGINAL if parts[k] <= NEUTRAL else STABLE
-    if np.abs(own - own.T).max() > NEUTRAL * np.abs(own).max():  # no potential: flutter shows in the motion
-        kind = _by_motion(e, f)
-    return kind, f, K, Z @ V[:, k], float(parts[k])
-
-
-def _by_motion(e: Equations, f: Free) -> str:
-    """Stability by the eigenvalues, damping included."""
-    from scipy.linalg import eigvals
-
-    r = e.at["r"]
-    M, D, K = (f.Zv.T @ X[r] @ f.Zv for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    one, none = np.eye(len(M)), np.zeros_like(M)
-    w = eigvals(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
-    w = w[np.isfinite(w)]
-    growth = (w.real / np.maximum(np.abs(w), 1e-300)).max(initial=-1.0)
-    return UNSTABLE if growth > NEUTRAL**0.5 else MARGINAL if growth > -(NEUTRAL**0.5) else STABLE
-
-
 def _finished(x: Rest, preload: dict[str, float], way: str) -> Equilibrium:
-    kind, f, K, direction, least = _stability(x)
+    s = stability(x)
     names = velocity_names(x.c.structure)
-    large = np.argsort(-np.abs(direction))[:SHOWN]
+    large = np.argsort(-np.abs(s.direction))[:SHOWN]
     x.c.at(x.t, x.q, np.zeros(len(x.scale)))
     return Equilibrium(
         t=x.t,
-        stability=kind,
-        freedoms=tuple(f.labels),
-        stiffness=K,
-        weakest={names[d].name: float(direction[d]) for d in large if abs(direction[d]) > 1e-3},
-        least=least,
+        stability=s.kind,
+        freedoms=tuple(s.free.labels),
+        stiffness=s.stiffness,
+        weakest={names[d].name: float(s.direction[d]) for d in large if abs(s.direction[d]) > 1e-3},
+        least=s.least,
         unbalanced=x.unbalanced(),
         method=way,
         parameters=dict(x.c.parameters),

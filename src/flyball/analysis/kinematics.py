@@ -1,7 +1,7 @@
 """Kinematics of driven mechanisms: where everything is, and how fast, when drivers say what moves.
 
 Positions are found at every time by Newton's method from a prediction, velocities and accelerations from the same
-rows (``system/follow.py``), so nothing drifts and no step leads to another branch. Masses and forces have no say in it;
+rows (``equations/follow.py``), so nothing drifts and no step leads to another branch. Masses and forces have no say:
 the reactions and efforts that belong to them come along.
 """
 
@@ -13,13 +13,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..equations.entry import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
 from ..model.model import Model
 from ..results.result import Result
 from .assemble import Assembly, assemble
 from .compiled import compiled
-from .entry import FOLLOW, INTEGRATE
 from .freedom.geometry import positions_nearby
 from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
 from .motion.options import output_times, projected

@@ -18,7 +18,7 @@ from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel
 from ..results.result import Result
 from .compiled import compiled
-from .linear.curves import curve, slopes, snapshot
+from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
@@ -178,7 +178,7 @@ def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequen
 def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
-    curves = [curve(shot, name) for name in outputs]
+    curves = [shot.curve(name) for name in outputs]
     refuse_undetermined(x, outputs)
     A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]

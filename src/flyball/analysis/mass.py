@@ -11,8 +11,8 @@ import numpy as np
 from ..model.inertia import principal, shifted
 from ..model.model import Model
 from ..results.records import Records
-from ..system.structure import structure
-from ..system.values import Values, values
+from ..tables.structure import structure
+from ..tables.values import Values, values
 from .assemble import assemble
 from .options import Options
 

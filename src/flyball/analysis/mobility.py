@@ -16,7 +16,7 @@ import numpy as np
 
 from ..errors import AssemblyError, ModelError
 from ..model.model import Model
-from ..system.tables import SEMIDEFINITE
+from ..tables.system import SEMIDEFINITE
 from .assemble import Assembly, assemble
 from .compiled import Compiled
 
@@ -313,7 +313,7 @@ def _null_space(A) -> tuple[int, np.ndarray]:
 
 
 def _factor_entry():
-    from .entry import factor_kernel
+    from ..equations.entry import factor_kernel
 
     return factor_kernel
 
@@ -354,8 +354,8 @@ def self_stresses(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, n
     World axes, torques divided by the mechanism's length. The mechanism has been evaluated at the position.
     """
     from ..constraints.registry import FORMULAS
-    from ..system.records import load
-    from ..system.rows import parameters
+    from ..equations.records import load
+    from ..equations.rows import parameters
 
     c = a.compiled
     s, S, W = c.structure, c.values.system, c.work

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import AnalysisError
 from ..model.model import Model
 from ..results.modes import GROWS, Modes
-from ..system.names import velocity_names
+from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
 from .linear.steady import balanced

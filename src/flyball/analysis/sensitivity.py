@@ -16,7 +16,7 @@ from ..results.sensitivity import Sensitivity
 from .assemble import assemble
 from .equilibrium import equilibrium, resting
 from .linear.begun import held, start_tangents
-from .linear.curves import curve, slopes, snapshot
+from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State
 from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
@@ -129,12 +129,12 @@ def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
     """Values of curves at one state."""
     shot = snapshot(x)
-    return np.array([float(curve(shot, name)[1][0]) for name in names])
+    return np.array([float(shot.curve(name)[1][0]) for name in names])
 
 
 def _units(x: State, names: Sequence[str]) -> tuple[str, ...]:
     shot = snapshot(x)
-    return tuple(curve(shot, name)[0] for name in names)
+    return tuple(shot.curve(name)[0] for name in names)
 
 
 def _columns(a: Question, x: State, directions: Sequence[Direction], tangents: Sequence[Tangent]) -> np.ndarray:
@@ -215,7 +215,7 @@ def _simulated(
 def _at_motion(a: Question) -> Found:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         r = _simulated(a, a.times, parameters, "auto", 1e-12, 1e-13)
-        return np.stack([curve(r, name)[1] for name in a.of], axis=1)
+        return np.stack([r.curve(name)[1] for name in a.of], axis=1)
 
     return found
 

@@ -18,21 +18,10 @@ from ..model.model import Model, listing, suggest
 from ..results.equilibrium import UNSTABLE, Equilibrium
 from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
-from .equilibrium import (
-    BALANCED,
-    CLOSED,
-    LONGEST,
-    NEWTON,
-    _descent,
-    _failure,
-    _finished,
-    _newton,
-    _pushed,
-    _stability,
-    resting,
-)
+from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, resting
 from .equilibrium import equilibrium as single
 from .linear.rest import Rest
+from .linear.stability import stability
 from .options import Options
 from .progress import shown
 
@@ -144,7 +133,7 @@ class _Way:
 
     def settled(self, x: Rest, value: float) -> Rest:
         """The place itself, or where it leads where it must be stable and is not."""
-        if self.stable and _stability(x)[0] == UNSTABLE:
+        if self.stable and stability(x).kind == UNSTABLE:
             return self.jump(x, value, lambda: _pushed(x))
         return x
 
@@ -172,7 +161,7 @@ def _over(x: Rest, y: Rest) -> Rest:
 
     Just beyond a limit point forces are too small to lead out of its neighbourhood.
     """
-    _, _, _, direction, _ = _stability(x)
+    direction = stability(x).direction
     y = y.closed()
     side = -1.0 if float(direction @ y.r) > 0.0 else 1.0
     return y.moved(PUSH * side * direction / np.abs(direction).max(), 0.0 * y.lam).closed()

@@ -9,14 +9,14 @@ from functools import partial
 
 import numpy as np
 
+from ..equations.entry import FOLLOW, INTEGRATE, motion_kernel
+from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.result import Result
-from ..system.functions import forget, interrupts_kept
-from ..system.tables import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
+from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assemble import Assembly
-from .entry import FOLLOW, INTEGRATE, motion_kernel
 from .motion import partition
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.options import STABILIZATION, Integration, output_times

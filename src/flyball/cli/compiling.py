@@ -9,7 +9,7 @@ import typer
 
 from ..errors import PerformanceNotice
 
-KERNELS = {  # of analysis/entry.py: what to say before they are compiled
+KERNELS = {  # of equations/entry.py: what to say before they are compiled
     "motion_kernel": "compiling for this machine, once: about half a minute",
     "residual_kernel": "compiling the derivatives of the equations for this machine, once: about a quarter of a minute",
 }
@@ -27,6 +27,6 @@ def announce_compiling(talk: bool, *kernels: str) -> None:
 
 
 def _will_compile(name: str) -> bool:
-    from ..analysis import entry
+    from ..equations import entry
 
     return getattr(entry, name).cold

@@ -11,7 +11,7 @@ offset curves.
 
 from __future__ import annotations
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..math.scalar import maximum, sqrt
 from ..math.spline import spline
 from ..math.vec import cross, dot, mtv, mv, scale, sub

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..math.vec import dot, norm, scale, sub
 
 KIND = 3

@@ -1,4 +1,4 @@
-"""Force elements: one file each. A new force is a new file here and one line in ``system/dispatch.py``."""
+"""Force elements: one file each. A new force is a new file here and one line in ``equations/dispatch.py``."""
 
 import importlib
 import pkgutil

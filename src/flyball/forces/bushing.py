@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..errors import ModelError
 from ..math.rotation import log_gradient, rotation_vector
 from ..math.vec import add, cross, mm, mtv, mv, neg, sub, transpose

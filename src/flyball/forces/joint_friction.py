@@ -6,7 +6,7 @@ from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..errors import ModelError
 from ..math.scalar import absolute, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub

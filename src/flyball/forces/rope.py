@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 from pydantic import BeforeValidator
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..constraints.blocks import DISTANCE, Row
 from ..errors import ModelError
 from ..math.scalar import choose, maximum

@@ -5,7 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
-from .._jit import formula
+from ..compiler.jit import formula
 from ..math.vec import dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce

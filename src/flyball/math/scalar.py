@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from .._jit import formula, on_numba
+from ..compiler.jit import formula, on_numba
 
 Function = Callable[..., Any]
 

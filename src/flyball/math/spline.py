@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from .._jit import formula, on_numba
+from ..compiler.jit import formula, on_numba
 
 BREAKS = 2  # place of the first break
 PIECE = 4  # numbers a piece

@@ -41,12 +41,12 @@ class Statics(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         start : Equilibrium, optional
-            Guess in place of the drawn positions: an equilibrium of the same mechanism.
+            Guess in place of the drawn positions: an equilibrium of the same mechanism. Described speeds stay.
         stable : bool
-            Go on from an unstable equilibrium to a stable one.
+            Go on from an unstable equilibrium to a stable one. Not with ``preload`` or ``turning``.
         preload : sequence of str
             Forces, by the names that `linearize` takes for inputs: find what has to be added to them for the mechanism
-            to be in equilibrium where it is drawn.
+            to be in equilibrium where it is drawn. Not with ``turning``.
         turning : sequence of str
             Joints' coordinates that turn evenly while all others stand still, such as the spindle of a governor: a
             steady motion is found. Speeds stay as described where nothing else decides them.
@@ -59,6 +59,8 @@ class Statics(Model):
         ------
         AssemblyError
             If the mechanism cannot be assembled.
+        ModelError
+            If a name does not exist, or options say nothing beside each other.
         NotConverged
             If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
         """

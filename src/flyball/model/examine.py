@@ -9,92 +9,67 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ModelError, UnitError
-from .body import GROUND, Body, Driver, Frame
+from .body import GROUND, Body, Frame
 from .coupling import Coupling
 from .element import Element, LawOf, Unit, fields_with
 from .expressions import law_expression, number
-from .force import CoordinateForce, Force, TwoPointForce
+from .force import CoordinateForce, TwoPointForce
 from .joint import Joint
-from .sensor import IMU, Sensor
+from .quantities import ENERGY, components, quantities
+from .sensor import Sensor
 from .words import listing, suggest
 
 if TYPE_CHECKING:
     from .model import Model
-
-ENERGIES = ("kinetic", "potential", "total", "balance")
-
-
-def curves(model: Model, name: str) -> list[str]:
-    """Names of the curves that a result has of a part (or of ``"energy"``)."""
-    if name == "energy":
-        return list(ENERGIES)
-    e, axes = model[name], "xy" if model.planar else "xyz"
-    if isinstance(e, (Body, Frame)):
-        turning = ["omega"] if model.planar else [f"omega_{a}" for a in axes]
-        return [*axes, *(["angle"] if model.planar else []), *(k + a for k in "va" for a in axes), *turning]
-    if isinstance(e, Joint):
-        return _of_joint(e, axes)
-    if isinstance(e, (TwoPointForce, CoordinateForce)):
-        return list(e.outputs)
-    if isinstance(e, Force):
-        return [k + a for k in "ft" for a in "xyz"]
-    if isinstance(e, Coupling):
-        return [f"effort_{k}" for k in range(1, 1 + len(e.coupled()))]
-    if isinstance(e, Driver):
-        return ["effort", "work"]
-    if isinstance(e, IMU):
-        return ["fx", "fy", "w"] if model.planar else [k + a for k in "fw" for a in axes]
-    return ["value"] if isinstance(e, Sensor) else []
-
-
-def _of_joint(e: Joint, axes: str) -> list[str]:
-    own = list(e.measured(len(axes) == 2))
-    out = [x for what in own for x in (what, "rate" if len(own) == 1 else f"{what}_rate")]
-    out += ["place"] if hasattr(e, "nearest") else []
-    return [*out, *(f"f{a}" for a in axes), *(["torque"] if len(axes) == 2 else (f"t{a}" for a in axes))]
 
 
 def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
     """What a sensor measures; see `Model.measured`."""
     owner, _, what = e.of.partition(".")
     found = model.find(owner)
-    if found is None and owner != "energy":
+    if found is None and owner != ENERGY:
         known = model.names()
         raise ModelError(
             f"{e.title}: {e.of!r} is no curve of a part; write part.curve, for instance 'A.angle'. There is no "
             f"part named {owner!r}{suggest(owner, known)}; {listing(known)}"
         )
-    has = curves(model, owner)
-    only = isinstance(found, Joint) and "rate" in has and what.endswith("_rate") and what.removesuffix("_rate") in has
-    if what not in has and not only:
-        whose = "energy" if found is None else found.title
+    table = quantities(model, owner)
+    if what not in table:
+        has = [k for k, x in table.items() if x.curve]
+        whose = ENERGY if found is None else found.title
         raise ModelError(
             f"{e.title}: {e.of!r} is no curve; {whose} has {', '.join(f'{owner}.{c}' for c in has) or 'none'}"
-            f"{suggest(what, has)}"
+            f"{suggest(what, table)}"
+        )
+    x = table[what]
+    if x.width:
+        parts = " or ".join(f"{owner}.{k}" for k in components(table, what))
+        raise ModelError(
+            f"{e.title}: {e.of!r} has {x.width} numbers, and a sensor measures one"
+            + (f"; measure {parts}" if parts else "")
         )
     if isinstance(found, (Body, Frame)):
-        return _of_point(owner, what, "xy" if model.planar else "xyz")
+        return _of_point(owner, x.of or what, x.component, model.planar)
     if isinstance(found, Joint):
-        own = found.measured(model.planar)
-        if what in own:
-            return "coordinate", f"{owner}.{what}", 0
-        name = next(iter(own)) if what == "rate" and len(own) == 1 else what.removesuffix("_rate")
+        own, name = found.measured(model.planar), x.of or what
+        if name in own:
+            return "coordinate", f"{owner}.{name}", 0
+        name = name.removesuffix("_rate")
         return ("coordinate", f"{owner}.{name}", 1) if name in own else None
-    if isinstance(found, (TwoPointForce, CoordinateForce)):
+    if isinstance(found, (TwoPointForce, CoordinateForce)) and what in found.outputs:
         order = list(found.outputs).index(what)
         return ("force", owner, order) if order < 2 else None
     return None
 
 
-def _of_point(owner: str, what: str, axes: str) -> tuple[str, str, int] | None:
-    planar = len(axes) == 2
-    if what in tuple(axes) or (planar and what == "angle"):
-        return "coordinate", f"{owner}.{what}", 0
-    if len(what) == 2 and what[0] == "v":
-        return "coordinate", f"{owner}.{what[1]}", 1
-    if planar and what == "omega":
-        return "coordinate", f"{owner}.angle", 1
-    return ("spin", f"{owner}.{what[-1]}", 1) if what.startswith("omega_") else None
+def _of_point(owner: str, whole: str, component: int | None, planar: bool) -> tuple[str, str, int] | None:
+    """What laws may use of a body or frame: places, angles, and their rates."""
+    if whole in ("position", "velocity") and component is not None:
+        return "coordinate", f"{owner}.{'xyz'[component]}", int(whole == "velocity")
+    if planar and whole in ("angle", "angular_velocity"):
+        return "coordinate", f"{owner}.angle", int(whole == "angular_velocity")
+    spin = whole == "angular_velocity" and component is not None
+    return ("spin", f"{owner}.{'xyz'[component or 0]}", 1) if spin else None
 
 
 def carriers(model: Model) -> list[str]:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import formula
+from ..compiler.jit import formula
 
 
 class Pattern(NamedTuple):

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..system.loads import wide
-from ..system.tables import FORCE_F, MASS
+from ..equations.loads import wide
+from ..tables.system import FORCE_F, MASS
 
 if TYPE_CHECKING:
     from .result import Result

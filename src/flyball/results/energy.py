@@ -3,22 +3,36 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from ..math.vec import dot, load9, mtv, mv
-from ..system.tables import INERTIA, MASS
+from ..model.quantities import ENERGY, Quantity, quantities
+from ..tables.system import INERTIA, MASS
+from .views.base import Named
 
 if TYPE_CHECKING:
     from .result import Result
 
 
-class Energy:
+class Energy(Named):
     """Energies of a motion [J]: kinetic, potential (gravity and springs), and the work done from outside."""
+
+    instead: ClassVar = {"work": "the work of each part is part.work; all of them are in result.energy.work"}
 
     def __init__(self, result: Result) -> None:
         self._result = result
+
+    @property
+    def title(self) -> str:
+        """What it is called."""
+        return ENERGY
+
+    @property
+    def names(self) -> dict[str, Quantity]:
+        """Everything that it has, by name."""
+        return quantities(self._result.model, ENERGY)
 
     @cached_property
     def kinetic(self) -> np.ndarray:
@@ -83,7 +97,3 @@ class Energy:
     def drift(self) -> float:
         """Largest deviation from the balance [J]."""
         return float(np.abs(self.balance).max(initial=0.0))
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Named curves."""
-        return {k: ("J", getattr(self, k)) for k in ("kinetic", "potential", "total", "balance")}

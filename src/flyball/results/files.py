@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from .labels import ENERGIES, TIME, coordinates, labelled
+from ..model.quantities import ENERGY
+from .labels import TIME, coordinates, labelled
 
 if TYPE_CHECKING:
     import pandas
@@ -114,7 +115,7 @@ def _write(result: Result, path: Path) -> None:
             file.dimensions[name] = len(labels)
             file.create_variable(name, (name,), dtype=_text_type(), data=np.array(labels, object))
         shown = list(labelled(result, MOST))
-        if len(shown) == len(ENERGIES):
+        if all(x.name.startswith(f"{ENERGY}.") for x in shown):
             file.attrs["comment"] = "too many parts to list: read this file with flyball.load_result"
         for x in shown:
             made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))

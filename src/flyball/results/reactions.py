@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..equations.loads import act, euler
+from ..laws.call import STACK_RESERVE
+from ..laws.evaluation import evaluate_jet
 from ..math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..model.force import CoordinateForce
-from ..system.call import STACK_RESERVE
-from ..system.laws import evaluate_jet
-from ..system.loads import act, euler
-from ..system.tables import INERTIA, MASS, PARENT
+from ..tables.system import INERTIA, MASS, PARENT
 from .terms import Wrench, along, coefficient, nothing, term
 
 if TYPE_CHECKING:

@@ -63,8 +63,8 @@ def _read(variable: Any) -> Any:
 def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     from ..model.io import loads
     from ..model.shapes.mesh import paths_from
-    from ..system.structure import structure
-    from ..system.values import values
+    from ..tables.structure import structure
+    from ..tables.values import values
 
     try:
         with paths_from(Path(where).parent):

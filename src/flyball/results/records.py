@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from ..equations.records import at_rest, carried, load
+from ..equations.tree import column, motion, pose
+from ..equations.velocities import turned_angles
 from ..math.vec import add, cross, load3, load9, mm, put3, scale, sub
 from ..model.body import Frame
 from ..model.joint import Coordinate, Joint
-from ..system.coordinates import turned_angles
-from ..system.records import at_rest, carried, load
-from ..system.tables import NV, PARENT, V0
-from ..system.tree import column, motion, pose
-from ..system.values import Values
+from ..tables.system import NV, PARENT, V0
+from ..tables.values import Values
 
 Record = tuple
 TURN = 2.0 * np.pi

@@ -10,14 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
-from ..model.model import Model, suggest
-from ..system.values import Values
+from ..model.model import Model
+from ..model.quantities import ENERGY, components, quantities
+from ..tables.values import Values
 from .energy import Energy
 from .health import Health
 from .measured import Measured
 from .reactions import Reactions
 from .records import Records
-from .views import View, view
+from .views import view
 
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
@@ -111,42 +112,73 @@ class Result:
         return Reactions(self)
 
     def __getitem__(self, name: str) -> Any:
-        """A part by its name, or one of its curves by ``"part.curve"``."""
-        if "." in name:
-            return self.channel(name)[1]
-        if name == "energy":
-            return self.energy
-        return self._view(name)
-
-    def _view(self, name: str) -> View:
-        views = self.__dict__.setdefault("_views", {})
-        if name not in views:
-            views[name] = view(self, self.model[name])
-        return views[name]
-
-    def channel(self, name: str) -> tuple[str, np.ndarray]:
-        """(unit, values) of a curve such as ``"slider.x"``.
+        """A part by its name, or anything of it by ``"part.quantity"``.
 
         Raises
         ------
         ModelError
-            If there is no such part or curve; the message lists what there is.
+            If there is no such part or quantity; the message lists what there is.
+        """
+        if not isinstance(name, str):
+            raise ModelError(
+                f"a result is read by name, for instance result['crank'] or result['crank.x'], not {name!r}"
+            )
+        return self.channel(name)[1] if "." in name else self._view(name)
+
+    def __contains__(self, name: object) -> bool:
+        """Whether there is a part, or a quantity, of that name."""
+        owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
+        return owner in self.parts() and (not dot or what in quantities(self.model, owner))
+
+    def _view(self, name: str) -> Any:
+        views = self.__dict__.setdefault("_views", {})
+        if name not in views:
+            views[name] = self.energy if name == ENERGY else view(self, self.model[name])
+        return views[name]
+
+    def parts(self) -> list[str]:
+        """Names of all that the result says something of."""
+        parts = [e.name for e in self.model.elements() if e.category not in ("initial", "tables")]
+        return [*parts, ENERGY]
+
+    def names(self) -> list[str]:
+        """Every name that ``result[name]`` knows: parts, and ``"part.quantity"``."""
+        owners = self.parts()
+        return [*owners, *(f"{name}.{k}" for name in owners for k in quantities(self.model, name))]
+
+    def _ipython_key_completions_(self) -> list[str]:
+        return self.names()
+
+    def channel(self, name: str) -> tuple[str, np.ndarray]:
+        """(unit, values) of anything that a part has: a curve such as ``"slider.x"``, (n,), or ``"A.force"``, (n, k).
+
+        Raises
+        ------
+        ModelError
+            If there is no such part or quantity; the message lists what there is.
         """
         owner, _, what = name.partition(".")
-        curves = self[owner].channels()
-        if what not in curves and what.endswith("_rate") and what.removesuffix("_rate") in curves and "rate" in curves:
-            what = "rate"  # a joint's only coordinate
-        if what not in curves:
-            raise ModelError(f"{owner!r} has no curve {what!r}{suggest(what, curves)}; it has {', '.join(curves)}")
-        return curves[what]
+        return self._view(owner).quantity(what)
+
+    def curve(self, name: str) -> tuple[str, np.ndarray]:
+        """(unit, values) of one number over time: a curve such as ``"slider.x"``, or a sensor by its name.
+
+        Raises
+        ------
+        ModelError
+            If there is none of that name, or it has several components.
+        """
+        owner, dot, what = name.partition(".")
+        unit, values = self._view(owner).quantity(what if dot else "value")
+        if values.ndim > 1:
+            own = components(quantities(self.model, owner), what)
+            parts = "; name one: " + ", ".join(f"{owner}.{k}" for k in own) if own else ""
+            raise ModelError(f"{name!r} has {values[0].size} components{parts}")
+        return unit, values
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""
-        out: dict[str, tuple[str, np.ndarray]] = {}
-        for e in self.model.elements():
-            if e.category not in ("initial", "tables"):
-                out |= {f"{e.name}.{k}": c for k, c in self[e.name].channels().items()}
-        return out | {f"energy.{k}": c for k, c in self.energy.channels().items()}
+        return {f"{name}.{k}": c for name in self.parts() for k, c in self._view(name).channels().items()}
 
     def state_at_end(self, compiled: Any) -> np.ndarray:
         """State vector to go on from.

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..system.tree import retract
+from ..equations.tree import retract
 from .health import Health
 from .result import Result
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..constraints.registry import FORMULAS
+from ..equations.rows import COEFFICIENT, parameters
 from ..math.vec import neg, scale
 from ..model.joint import Joint
-from ..system.rows import COEFFICIENT, parameters
 from .records import Record, Records, coordinate_frames, turned
 
 if TYPE_CHECKING:

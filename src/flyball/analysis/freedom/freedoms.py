@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model.body import Body, Initial
 from ...model.joint import Joint
-from ...system.tables import NV, V0
+from ...tables.system import NV, V0
 from ..assemble import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import lengths

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...equations.scratch import work
+from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
-from ...system.tables import NQ, Q0
-from ...system.tree import retract
-from ...system.values import work
+from ...tables.system import NQ, Q0
 from ..assemble import Assembly, closed_near
 from ..compiled import Compiled, compiled
 from ..mobility import lengths, motions_of, rank_of

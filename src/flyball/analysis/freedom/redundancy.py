@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...model.body import Driver
-from ...system.tables import G_VALUE, NU
+from ...tables.system import G_VALUE, NU
 from ..mobility import SHOWN as MANY
 from ..mobility import TOLERANCE, scaled_jacobian, undetermined
 from .cures import Cure, cures

@@ -10,11 +10,11 @@ from functools import partial
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...results.health import Health
 from ...results.result import Result
-from ...system.tables import G_VALUE, NU, V0
-from ...system.tree import retract
-from ...system.values import Values
+from ...tables.system import G_VALUE, NU, V0
+from ...tables.values import Values
 from ..assemble import Assembly
 from ..compiled import compiled
 from ..mobility import Mobility, mobility
@@ -55,18 +55,7 @@ def slopes(x: State, names: Sequence[str], d: Sequence[np.ndarray], values: Valu
         The mechanism's numbers, already a complex step along a parameter (for one direction).
     """
     result = _result(x, values or x.c.values, *(1j * STEP * np.asarray(part) for part in d))
-    return np.array([curve(result, name)[1].imag / STEP for name in names]).T.reshape(len(d[0]), len(names))
-
-
-def curve(result: Result, name: str) -> tuple[str, np.ndarray]:
-    """(unit, values) of a sensor or of a curve of the result.
-
-    Raises
-    ------
-    ModelError
-        If there is none of that name.
-    """
-    return result.channel(name if "." in name else f"{name}.value")
+    return np.array([result.curve(name)[1].imag / STEP for name in names]).T.reshape(len(d[0]), len(names))
 
 
 def _sizes(x: State) -> tuple[int, int, int, int]:

@@ -1,7 +1,7 @@
 """Exact derivatives of the equations at a state, by complex steps through the compiled formulas.
 
 With a step i h along one direction the imaginary part of the result is h times the derivative, to rounding: nothing is
-subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of ``system/residual.py``:
+subtracted (Lyness and Moler 1967; Squire and Trapp 1998). The equations are the residuals of ``equations/residual.py``:
 nothing in them is solved. Directions that no equation sees together are taken in one step (Curtis, Powell and Reid
 1974), so that a chain of a thousand bodies needs as many steps as one of three.
 """
@@ -15,11 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from ...equations.entry import MOTION, residual_kernel
+from ...equations.scratch import work
 from ...errors import ModelError, PerformanceNotice
-from ...system.laws import evaluate_jet
-from ...system.opcodes import BY_TIME
-from ...system.structure import Structure
-from ...system.tables import (
+from ...laws.evaluation import evaluate_jet
+from ...laws.opcodes import BY_TIME
+from ...tables.specs import Structure
+from ...tables.system import (
     BODY_LAW,
     EFFORT,
     FORCE_ALONG,
@@ -33,9 +35,8 @@ from ...system.tables import (
     System,
     Work,
 )
-from ...system.values import Values, values, work
+from ...tables.values import Values, values
 from ..compiled import Compiled
-from ..entry import MOTION, residual_kernel
 from .loads import STEP, as_complex, by_reactions, complex_tables
 
 NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...errors import AnalysisError
 from ...model.model import Model
-from ...system.names import velocity_names
-from ...system.values import values
+from ...tables.names import velocity_names
+from ...tables.values import values
 from ..compiled import compiled
 from .loads import STEP as COMPLEX
 

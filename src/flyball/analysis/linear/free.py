@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...errors import SingularityError
-from ...system.names import Named, velocity_names
-from ...system.tables import BODY_LAW, G_VALUE, V0
-from ...system.tree import retract
+from ...tables.names import Named, velocity_names
+from ...tables.system import BODY_LAW, G_VALUE, V0
 from ..compiled import Compiled
 from .derivatives import Equations
 

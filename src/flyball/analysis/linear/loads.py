@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...equations.entry import residual_kernel
+from ...equations.scratch import work
 from ...errors import ModelError
-from ...system.structure import Structure
-from ...system.tables import TERM_ROW, System, Work
-from ...system.values import work
+from ...tables.specs import Structure
+from ...tables.system import TERM_ROW, System, Work
 from ..compiled import Compiled
-from ..entry import residual_kernel
 
 if TYPE_CHECKING:
     from .derivatives import State

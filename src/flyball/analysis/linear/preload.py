@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import ModelError, NotConverged
-from ...system.names import velocity_names
+from ...tables.names import velocity_names
 from ..assemble import Assembly
 from ..compiled import compiled
 from .free import free

@@ -10,15 +10,12 @@ from functools import cached_property
 
 import numpy as np
 
-from ...system.tree import retract
+from ...equations.tree import retract
 from ..compiled import Compiled
-from .balance import acting, allowed
+from .balance import acting, settled, unbalanced
 from .derivatives import Equations, State
 from .free import free
-
-DENSE = 1200  # unknowns up to which a step is one of least squares
-LEAST = 1e-11  # singular values of the equations below this part of the largest are none
-WEAK = 1e-10  # what is added to the sparse equations' diagonal, of their entries
+from .least import least
 
 
 @dataclass
@@ -95,14 +92,11 @@ class Rest:
 
     def settled(self, part: float) -> bool:
         """Whether every equation is balanced, but for a part of what acts in it."""
-        return bool((np.abs(self.equations.block("r")) <= allowed(self.equations, part)).all())
+        return settled(self.equations, part)
 
     def unbalanced(self) -> float:
         """The largest force that the best multipliers leave, of those that act in its equation."""
-        best = Rest(self.c, self.t, self.q, self.balancing())
-        left, rounding = np.abs(best.equations.block("r")), allowed(best.equations, 0.0)
-        acts = acting(best.equations)
-        return float(np.where(left > rounding, left / np.where(acts > 0.0, acts, 1.0), 0.0).max(initial=0.0))
+        return unbalanced(Rest(self.c, self.t, self.q, self.balancing()).equations)
 
     def pushed(self) -> str:
         """The largest force that is left along a free coordinate, in words."""
@@ -123,7 +117,7 @@ class Rest:
         """Multipliers that leave the least of the forces."""
         if not len(self.g):
             return self.lam
-        return self.lam + self.per_row * _least(self.G.T, self.r)
+        return self.lam + self.per_row * least(self.G.T, self.r)
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Newton's step, scaled, and the change of multipliers; damped by so many times the identity."""
@@ -145,12 +139,12 @@ class Rest:
         own = 1.0 / np.sqrt(np.where(stiff > weakest, stiff, stiff.max(initial=1e-300) or 1.0))
         D = sp.diags(own)
         if not len(g):
-            return own * _least(D @ K @ D, -own * r), np.zeros(0)
+            return own * least(D @ K @ D, -own * r), np.zeros(0)
         G = self.G @ D
         rows = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
         rows = 1.0 / np.where(rows > 0.0, rows, 1.0)
         G = sp.diags(rows) @ G
-        x = _least(sp.bmat([[D @ K @ D, -G.T], [G, None]]), np.r_[-own * r, -rows * g])
+        x = least(sp.bmat([[D @ K @ D, -G.T], [G, None]]), np.r_[-own * r, -rows * g])
         return own * x[:n], rows * x[n:] * self.per_row
 
     def moved(self, step: np.ndarray, lam: np.ndarray) -> Rest:
@@ -165,20 +159,5 @@ class Rest:
         for _ in range(8):
             if not len(now.g) or np.abs(now.g).max() < 1e-12 * self.c.values.length:
                 break
-            now = now.moved(_least(now.G, -now.g), 0.0 * now.lam)
+            now = now.moved(least(now.G, -now.g), 0.0 * now.lam)
         return Rest.at(now.c, now.t, now.q)
-
-
-def _least(A, b: np.ndarray) -> np.ndarray:
-    """The smallest x that leaves the least of A x = b."""
-    import scipy.sparse as sp
-    from scipy.sparse.linalg import spsolve
-
-    if max(A.shape) <= DENSE:
-        return np.linalg.lstsq(A.toarray(), b, rcond=LEAST)[0]
-    # large: the normal form [-e I, A; A^T, e I], refined once for what the e leave
-    m, n = A.shape
-    e = WEAK * np.abs(A.data).max()
-    N = sp.bmat([[-e * sp.identity(m), A], [A.T, e * sp.identity(n)]]).tocsc()
-    x = spsolve(N, np.r_[b, np.zeros(n)])
-    return x[m:] + spsolve(N, np.r_[b - A @ x[m:], np.zeros(n)])[m:]

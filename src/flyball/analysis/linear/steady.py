@@ -11,13 +11,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.tree import column, normalise, quaternion_at, rates
 from ...errors import AnalysisError
+from ...laws.opcodes import INPUT
 from ...results.records import Records
-from ...system.names import velocity_names
-from ...system.opcodes import INPUT
-from ...system.tables import FORCE_LAW, TREE, V0, System
-from ...system.tree import FREE, PLANAR, column, normalise, quaternion_at, rates
-from .balance import allowed
+from ...tables.names import velocity_names
+from ...tables.system import FORCE_LAW, FREE, PLANAR, TREE, V0, System
+from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
 from .free import Free
 from .reduced import Frame, reduced
@@ -25,6 +25,7 @@ from .reduced import Frame, reduced
 SWING = 0.1  # angle [rad] or part of the mechanism's length that it moves by between the instants compared
 STEPS = 16
 BALANCED = 1e-6  # unbalanced forces of an equilibrium, of those that act
+NEAR = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
 SAME = 1e-5  # relative difference of linear equations that are the same
 STILL = 1e-9  # speed below which nothing moves, of what gravity or the fastest body gives
 UNDECIDED = 1e-9  # singular values below this part of the largest leave the frame's turning open
@@ -125,9 +126,10 @@ def balanced(x: State, e: Equations) -> None:
         Naming what is accelerated most.
     """
     names = velocity_names(x.c.structure)
-    left = np.abs(e.by_acceleration[e.at["r"]] @ x.vdot)
-    may = allowed(e, BALANCED)
-    if not (left > may).any():
+    rest = at_rest(e)
+    left = np.abs(rest.block("r"))
+    may = BALANCED * acting(rest) + NEAR * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
+    if (left <= may).all() or (left <= may + rounding(rest)).all():
         return
     d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)))
     raise AnalysisError(

@@ -15,12 +15,13 @@ from functools import cached_property
 
 import numpy as np
 
-from ...system.names import velocity_names
-from ...system.tables import Q0, V0
-from ...system.tree import lengths, quaternion_at
-from ...system.values import Values, work
+from ...equations.entry import residual_kernel
+from ...equations.scratch import work
+from ...equations.tree import lengths, quaternion_at
+from ...tables.names import velocity_names
+from ...tables.system import Q0, V0
+from ...tables.values import Values
 from ..compiled import Compiled
-from ..entry import residual_kernel
 from .derivatives import Equations, State
 from .free import TOLERANCE
 from .loads import STEP, as_complex, by_reactions, complex_tables, refuse_undetermined

@@ -12,16 +12,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...errors import ModelError, NotConverged
 from ...model.joint import Joint
-from ...system.forest import step_of
-from ...system.names import velocity_names
-from ...system.structure import Structure
-from ...system.tables import BODY_LAW, V0
-from ...system.tree import retract
+from ...tables.forest import step_of
+from ...tables.names import velocity_names
+from ...tables.specs import Structure
+from ...tables.system import BODY_LAW, V0
 from ..assemble import Assembly
 from ..motion.layer import in_coordinates
-from .balance import acting, allowed
+from .balance import settled, unbalanced
 from .derivatives import Equations, State
 from .free import prescribed
 
@@ -41,8 +41,8 @@ class Turning:
     unbalanced: float  # the largest force left, of those that act in its equation
 
 
-def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None) -> Turning:
-    """Find the steady motion near an assembly in absolute coordinates.
+def turning(a: Assembly, described: Assembly, names: Sequence[str], parameters: Mapping[str, float] | None) -> Turning:
+    """Find the steady motion near an assembly in absolute coordinates, with the speeds of the described one at first.
 
     Raises
     ------
@@ -56,7 +56,7 @@ def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] |
     at = [_place(b, name) for name in names]
     c, s = b.compiled, b.compiled.structure
     v = np.zeros(c.structure.nv)
-    v[at] = b.v[at]
+    v[at] = in_coordinates(described, "joint", parameters)[0].v[at]
     start = State(c, b.t, b.q, v, c.z.copy(), 0.0 * v, np.zeros(len(c.structure.rows)), 0.0 * v)
     found, _ = _search(start, at, [])  # with the speeds as they are, if anything balances at these
     if found is None:
@@ -67,10 +67,7 @@ def turning(a: Assembly, names: Sequence[str], parameters: Mapping[str, float] |
     c.at(x.t, x.q, x.v)
     known = velocity_names(s)
     speeds = {name: float(known[d].sign * x.v[d]) for name, d in zip(names, at, strict=True)}
-    e = Equations(x)
-    left, acts = np.abs(e.block("r")), acting(e)
-    left = np.where(left > allowed(e, 0.0), left / np.where(acts > 0.0, acts, 1.0), 0.0)
-    return Turning(State.moving(c, x.t, x.q, x.v), speeds, float(left.max(initial=0.0)))
+    return Turning(State.moving(c, x.t, x.q, x.v), speeds, unbalanced(Equations(x)))
 
 
 def _search(x: State, at: list[int], free: list[int]) -> tuple[State | None, State]:
@@ -86,7 +83,7 @@ def _settled(x: State) -> bool:
     """Whether positions, speeds and multipliers fulfil the equations with all accelerations zero."""
     e = Equations(x)
     gaps = np.abs(e.block("g")).max(initial=0.0) / x.c.values.length + np.abs(e.block("n")).max(initial=0.0)
-    return bool(gaps < 1e-9 and (np.abs(e.block("r")) <= allowed(e, SETTLED)).all())
+    return bool(gaps < 1e-9 and settled(e, SETTLED))
 
 
 def _place(b: Assembly, name: str) -> int:

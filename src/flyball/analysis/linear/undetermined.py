@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ..mobility import CHANGED, TOLERANCE, lengths
-from .curves import curve, slopes, snapshot
+from .curves import slopes, snapshot
 from .derivatives import State
 from .free import prescribed
 
@@ -41,7 +41,7 @@ def refuse_undetermined(x: State, names: Sequence[str]) -> None:
     by = np.abs(slopes(x, names, (still, still, still, free))).max(axis=0)
     shot = snapshot(x)
     for name, effect in zip(names, by, strict=True):
-        arm = x.c.values.length if "m" in curve(shot, name)[0] else 1.0
+        arm = x.c.values.length if "m" in shot.curve(name)[0] else 1.0
         if effect > CHANGED * arm:
             part = np.abs(free * size).max(axis=0) > CHANGED
             of = [r.element.name for r in s.rows] + list(s.prescribed)

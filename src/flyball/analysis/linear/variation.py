@@ -13,11 +13,11 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from ...equations.entry import MOTION
+from ...equations.tree import normalise, retract
 from ...errors import SimulationError
-from ...system.tables import EFFORT, G_VALUE, LAM, NU, X_SOLVED
-from ...system.tree import normalise, retract
+from ...tables.system import EFFORT, G_VALUE, LAM, NU, X_SOLVED
 from ..compiled import Compiled
-from ..entry import MOTION
 from .derivatives import State
 from .steady import kinematic
 from .tangent import Direction, Linear, Tangent, closed

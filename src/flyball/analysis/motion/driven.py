@@ -1,6 +1,6 @@
 """Mechanisms whose drivers leave no freedom: their motion is kinematics, and works are integrals of what it takes.
 
-The compiled loop (``system/follow.py``) gives positions, velocities, accelerations and powers at every time that it
+The compiled loop (``equations/follow.py``) gives positions, velocities, accelerations and powers at every time that it
 stops at. The powers are integrated by the polynomial through eight neighbouring times; where six say something else,
 times are added, first where they differ most.
 """
@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.entry import FOLLOW, motion_kernel
 from ...numerics.integrators import explicit as ex
 from ...numerics.integrators.tableaux import tableau
 from ..assemble import Assembly
-from ..entry import FOLLOW, motion_kernel
 from ..mobility import mobility
 from .start import Start
 

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...equations.entry import MOTION
 from ...errors import ModelError
-from ...system.cost import cost
-from ...system.spanning import spanning
-from ...system.tables import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
+from ...tables.cost import cost
+from ...tables.spanning import spanning
+from ...tables.system import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
 from ..assemble import Assembly
 from ..compiled import Compiled, compiled
-from ..entry import MOTION
 
 COORDINATES = ("auto", "absolute", "joint")
 THIN = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ...equations import motion
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
-from ...system import motion
 from ..options import Options, count, positive, seconds
 from .layer import known as known_coordinates
 

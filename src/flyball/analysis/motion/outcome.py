@@ -13,7 +13,7 @@ from ...numerics.integrators import explicit as ex
 from ...results import doubts
 from ...results.health import Health
 from ...results.result import Owed, Result
-from ...system.tables import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
 from .options import Integration
 from .reasons import reason, remarks

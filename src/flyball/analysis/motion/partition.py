@@ -1,12 +1,12 @@
-"""The first choice of independent coordinates, for coordinate partitioning; ``system/partition.py`` changes it."""
+"""The first choice of independent coordinates, for coordinate partitioning; ``equations/partition.py`` changes it."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...model.model import Model
-from ...system.names import velocity_names
-from ...system.tables import BODY_LAW, PARTITION, V0
+from ...tables.names import velocity_names
+from ...tables.system import BODY_LAW, PARTITION, V0
 from ..mobility import mobility
 from .start import Start
 

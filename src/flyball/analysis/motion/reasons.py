@@ -7,16 +7,17 @@ from typing import Any
 
 import numpy as np
 
+from ...equations import motion
+from ...equations.entry import MOTION
+from ...equations.loads import wide
+from ...equations.records import load
+from ...laws.evaluation import evaluate, evaluate_jet
+from ...laws.functions import fault
+from ...laws.opcodes import BY_TIME
 from ...model.body import Driver
 from ...model.force import CoordinateForce
 from ...numerics.integrators import explicit as ex
-from ...system import motion
-from ...system.functions import fault
-from ...system.laws import evaluate, evaluate_jet
-from ...system.loads import wide
-from ...system.opcodes import BY_TIME
-from ...system.records import load
-from ...system.tables import (
+from ...tables.system import (
     BODY_LAW,
     FORCE_F,
     FORCE_LAW,
@@ -28,15 +29,14 @@ from ...system.tables import (
     NU,
     NU_DOT,
     RATE,
+    REVOLUTE,
     ROW_LAW,
     ROW_WRAP,
     STATUS,
     TREE,
     VALUE,
 )
-from ...system.tree import REVOLUTE
 from ..assemble import Assembly
-from ..entry import MOTION
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...system.tables import G_VALUE, GAMMA, NU
+from ...tables.system import G_VALUE, GAMMA, NU
 from ..compiled import Compiled, compiled
 
 if TYPE_CHECKING:

@@ -11,7 +11,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
-from ...system.tables import G_VALUE, Q0, SEMIDEFINITE
+from ...tables.system import G_VALUE, Q0, SEMIDEFINITE
 from ..assemble import Assembly, assemble
 from ..compiled import compiled
 from ..mobility import mobility

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...system.tables import G_VALUE, GAMMA, Q0, V0
-from ...system.tree import quaternion_at, retract
+from ...equations.tree import quaternion_at, retract
+from ...tables.system import G_VALUE, GAMMA, Q0, V0
 from ..compiled import Compiled
 
 CLOSED = 1e-11  # what Newton's method may leave of F

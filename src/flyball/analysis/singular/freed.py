@@ -17,7 +17,7 @@ from ...model.body import Driver, Initial
 from ...model.element import LawOf
 from ...model.joint import Joint
 from ...model.model import Model, listing, suggest
-from ...system.tables import G_VALUE, GAMMA, NV, V0
+from ...tables.system import G_VALUE, GAMMA, NV, V0
 from ..assemble import Assembly, assemble
 from ..compiled import compiled
 from .closure import Closure, Place

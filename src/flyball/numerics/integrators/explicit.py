@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..._jit import formula
+from ...compiler.jit import formula
 from ...math.scalar import sqrt
 
 # entries of Clock.real

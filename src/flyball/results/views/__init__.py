@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from ...errors import ModelError
 from ...model.body import Body, Driver, Frame
 from ...model.coupling import Coupling
 from ...model.force import Force
@@ -19,7 +20,7 @@ from .sensors import IMUView, SensorView
 if TYPE_CHECKING:
     from ..result import Result
 
-VIEWS = (
+VIEWS: tuple[tuple[type, type[View]], ...] = (
     (Body, PointView),
     (Frame, PointView),
     (Joint, JointView),
@@ -32,5 +33,14 @@ VIEWS = (
 
 
 def view(result: Result, element: Any) -> View:
-    """The view of a part."""
-    return next(cls for kind, cls in VIEWS if isinstance(element, kind))(result, element)
+    """The view of a part.
+
+    Raises
+    ------
+    ModelError
+        If a result says nothing of parts of its kind.
+    """
+    for kind, cls in VIEWS:
+        if isinstance(element, kind):
+            return cls(result, element)
+    raise ModelError(f"a result says nothing of {element.title}: it is part of the description only")

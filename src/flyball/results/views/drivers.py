@@ -21,11 +21,6 @@ class DriverView(View):
         """Work given to the mechanism since the start [J]."""
         return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.work"]]
 
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Effort and work."""
-        unit = self._x.structure.model.unit(self.element.coordinate, self.element)
-        return {"effort": ("N*m" if unit == "rad" else "N", self.effort), "work": ("J", self.work)}
-
 
 class CouplingView(View):
     """What a coupling passes on."""
@@ -40,11 +35,6 @@ class CouplingView(View):
         has = ", ".join(self.element.coupled())
         raise ModelError(f"{self.element.title} does not couple {coordinate!r}; it couples {has}")
 
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
+    def _found(self, name: str) -> np.ndarray:
         """``effort_1``, ``effort_2`` ... on its coordinates, in order."""
-        model = self._x.structure.model
-        out = {}
-        for k, text in enumerate(self.element.coupled(), 1):
-            unit = "N*m" if model.unit(text, self.element) == "rad" else "N"
-            out[f"effort_{k}"] = (unit, self.effort(text))
-        return out
+        return self.effort(list(self.element.coupled())[int(name.removeprefix("effort_")) - 1])

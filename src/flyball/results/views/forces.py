@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...equations.loads import power, wide
 from ...errors import AnalysisError
+from ...laws.call import STACK_RESERVE
+from ...laws.evaluation import evaluate
 from ...math.vec import dot, sub
-from ...model.force import CoordinateForce, JointForce, TwoPointForce
-from ...system.call import STACK_RESERVE
-from ...system.laws import evaluate
-from ...system.loads import power, wide
-from ...system.tables import FORCE_F, FORCE_M
+from ...model.force import CoordinateForce, JointForce
+from ...tables.system import FORCE_F, FORCE_M
 from ..records import coordinate_frames, turned
-from .base import View
+from .base import Curves, View
 
 
 class ForceView(View):
@@ -91,7 +91,7 @@ class ForceView(View):
             axis = turned(self._result.records.frame(k), turn)[1]
             return np.zeros((n, 3)), np.stack([a * self._along()[2] for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
-            raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self._names())}")
+            raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self.names)}")
         _, force, torque = self._between()
         return tuple(np.stack([np.broadcast_to(c, (n,)) for c in w], axis=1) for w in (force, torque))  # type: ignore[return-value]
 
@@ -139,17 +139,21 @@ class ForceView(View):
             return self._result.states[:, states[name]]
         return self.energy[0] - self.energy
 
-    def _names(self) -> list[str]:
-        return [*self.element.outputs, "energy", "power", "work"]
+    @property
+    def _whole(self) -> tuple[np.ndarray, np.ndarray]:
+        """Force and torque of a force between frames: (n, 2) and (n,) in the plane."""
+        force, torque = self.wrench
+        return (force[:, :2], torque[:, 2]) if self._result.planar else (force, torque)
 
-    def __getattr__(self, name: str) -> np.ndarray:
-        """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint."""
-        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
-            raise AttributeError(name)
-        if name not in self.element.outputs:
-            has = ", ".join([*self._names(), *(() if isinstance(self.element, CoordinateForce) else ("wrench",))])
-            raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
-        k = list(self.element.outputs).index(name)
+    def _found(self, name: str) -> np.ndarray:
+        """One of its outputs: length, rate and tension of a two-point force; angle, rate and torque about a joint.
+
+        Of a force on a body, or between two frames, force and torque there.
+        """
+        outputs = list(self.element.outputs)
+        if name not in outputs:
+            return self._whole[name == "torque"]
+        k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
             value = self._along()[k]
             return self.element.sign * value if k == 2 else value
@@ -159,19 +163,7 @@ class ForceView(View):
         F, M, _ = self._frames
         return -dot(force, sub(M[0], F[0])) / inputs[0]
 
-    def unit(self, name: str) -> str:
-        """Unit of one of its outputs."""
-        unit = self.element.outputs[name]
-        if unit not in ("", "/s", "effort"):
-            return unit
-        base = self._x.structure.model.unit(self.element.coordinate_text(), self.element)
-        return {"": base, "/s": f"{base}/s", "effort": "N*m" if base == "rad" else "N"}[unit]
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Its outputs; for others, the components of force and torque."""
-        if not isinstance(self.element, (TwoPointForce, CoordinateForce)):
-            force, torque = self.wrench
-            out = {f"f{a}": ("N", force[:, i]) for i, a in enumerate("xyz")}
-            out |= {f"t{a}": ("N*m", torque[:, i]) for i, a in enumerate("xyz")}
-            return {k: v for k, v in out.items() if v[1].any()}
-        return {k: (self.unit(k), getattr(self, k)) for k in self.element.outputs}
+    def channels(self) -> Curves:
+        """Its outputs; for others, the components of force and torque that are not zero all the time."""
+        out = super().channels()
+        return out if self.element.outputs else {k: v for k, v in out.items() if v[1].any()}

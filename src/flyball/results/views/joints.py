@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -11,15 +11,24 @@ from ...constraints.registry import FORMULAS
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
-from ...system.forest import step_of
-from ...system.tables import Q0
+from ...tables.forest import step_of
+from ...tables.system import Q0
 from ..records import TURN, coordinate_frames, turned
 from ..terms import Wrench
 from .base import View, stacked
 
+if TYPE_CHECKING:
+    from ..result import Result
+
+ORDERS = ("", "_rate", "_acceleration")
+
 
 class JointView(View):
     """Coordinates and reaction of a joint."""
+
+    def __init__(self, result: Result, element: Any) -> None:
+        super().__init__(result, element)
+        self._known: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
 
     def _measure(self, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A coordinate, its rate and its acceleration, through the row that measures it."""
@@ -56,20 +65,15 @@ class JointView(View):
         R = self._x.system.frame_x[frame, 3:]
         return atan2(R[3].item(), R[0].item())
 
-    def __getattr__(self, name: str) -> np.ndarray:
+    def _found(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""
-        if name.startswith("_") or name == "element":  # asked for while it is being unpickled
-            raise AttributeError(name)
-        own = self.element.measured(self._result.planar)
-        for ending, k in (("_rate", 1), ("_acceleration", 2)):
-            if name.endswith(ending) and name.removesuffix(ending) in own:
-                return self._measure(name.removesuffix(ending))[k]
-            if name == ending[1:] and len(own) == 1:
-                return self._measure(next(iter(own)))[k]
-        if name in own:
-            return self._measure(name)[0]
-        has = ", ".join([*own, "force", "torque"])
-        raise AttributeError(f"{self.element.title} has no {name!r}; it has {has}")
+        if name == "place":
+            return self._result.states[:, self._x.structure.state_at[f"{self.element.name}.place"]]
+        k = next((k for k, ending in enumerate(ORDERS) if k and name.endswith(ending)), 0)
+        what = name.removesuffix(ORDERS[k])
+        if what not in self._known:
+            self._known[what] = self._measure(what)
+        return self._known[what][k]
 
     def _wrench(self) -> Wrench:
         """Force on body_j at M's origin and torque about it, world components."""
@@ -132,19 +136,3 @@ class JointView(View):
     def undetermined(self) -> tuple[str, ...]:
         """Reaction components that redundancy leaves undetermined; of those one choice is given."""
         return self._result.health.undetermined.get(self.element.name, ())
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Coordinates, their rates, reaction force and torque."""
-        out: dict[str, tuple[str, np.ndarray]] = {}
-        own = self.element.measured(self._result.planar)
-        for what, c in own.items():
-            value, rate, _ = self._measure(what)
-            out[what] = (c.unit, value)
-            out["rate" if len(own) == 1 else f"{what}_rate"] = (f"{c.unit}/s", rate)
-        if (place := f"{self.element.name}.place") in self._x.structure.state_at:
-            out["place"] = ("m", self._result.states[:, self._x.structure.state_at[place]])
-        axes = "xy" if self._result.planar else "xyz"
-        out |= {f"f{a}": ("N", self.force[:, i]) for i, a in enumerate(axes)}
-        torque = np.atleast_2d(self.torque.T)
-        names = ["torque"] if self._result.planar else [f"t{a}" for a in axes]
-        return out | {k: ("N*m", torque[i]) for i, k in enumerate(names)}

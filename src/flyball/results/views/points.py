@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 class PointView(View):
     """Motion of a frame: a body's reference frame or a named one."""
+
+    instead: ClassVar = {"angle": "what moves in space has no single angle: use rotation or quaternion"}
 
     def __init__(self, result: Result, element: Body | Frame) -> None:
         super().__init__(result, element)
@@ -54,7 +56,7 @@ class PointView(View):
     def angle(self) -> np.ndarray:
         """Planar: orientation [rad], whole turns counted."""
         if not self._result.planar:
-            raise AttributeError(f"{self.element.title} moves in space and has no single angle; use rotation")
+            raise AttributeError(self._unknown("angle"))
         return self._result.records.angle(self._body) + atan2(self._turn[3], self._turn[0])
 
     @property
@@ -66,15 +68,3 @@ class PointView(View):
     def angular_acceleration(self) -> np.ndarray:
         """Angular acceleration, world axes [rad/s^2]; planar: one number a time."""
         return self._record[4][2] if self._result.planar else np.stack(self._record[4], axis=1)
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """x, y, z, their derivatives, and the orientation."""
-        axes = "xy" if self._result.planar else "xyz"
-        out = {a: ("m", self.position[:, i]) for i, a in enumerate(axes)}
-        if self._result.planar:
-            out["angle"] = ("rad", self.angle)
-        out |= {f"v{a}": ("m/s", self.velocity[:, i]) for i, a in enumerate(axes)}
-        out |= {f"a{a}": ("m/s^2", self.acceleration[:, i]) for i, a in enumerate(axes)}
-        if self._result.planar:
-            return out | {"omega": ("rad/s", self.angular_velocity)}
-        return out | {f"omega_{a}": ("rad/s", self.angular_velocity[:, i]) for i, a in enumerate(axes)}

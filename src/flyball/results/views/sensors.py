@@ -19,11 +19,7 @@ class SensorView(View):
     @property
     def unit(self) -> str:
         """Unit of what it measures."""
-        return self._result.channel(self.element.of)[0]
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Its value."""
-        return {"value": self._result.channel(self.element.of)}
+        return self.names["value"].unit
 
 
 class IMUView(View):
@@ -44,11 +40,3 @@ class IMUView(View):
         """Angular velocity along its own axes [rad/s], (n, 3)."""
         _, R, w, _, _, _ = self._axes()
         return np.stack(mtv(R, w), axis=1)
-
-    def channels(self) -> dict[str, tuple[str, np.ndarray]]:
-        """Components of both."""
-        f, w = self.specific_force, self.angular_velocity
-        if self._result.planar:
-            return {"fx": ("m/s^2", f[:, 0]), "fy": ("m/s^2", f[:, 1]), "w": ("rad/s", w[:, 2])}
-        out = {f"f{a}": ("m/s^2", f[:, i]) for i, a in enumerate("xyz")}
-        return out | {f"w{a}": ("rad/s", w[:, i]) for i, a in enumerate("xyz")}

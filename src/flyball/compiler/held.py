@@ -1,0 +1,78 @@
+"""Tuples of arrays handed from formula to formula by address.
+
+Numba passes a tuple of arrays as its parts, some two hundred numbers for a mechanism, which every callee puts together
+again: half of all the code a kernel is made of, before the optimiser throws it away. ``held(S)`` leaves the tuple where
+it is and passes its address; ``S.field`` then reads the field there. Nothing writes to the tuple itself, so that the
+optimiser may read each part once and keep it (`invariant.load`). In plain Python ``held(S)`` is ``S``.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from typing import Any
+
+from .jit import on_numba
+
+
+def held(fields):  # type: ignore[no-untyped-def]
+    """The named tuple by its address, in compiled code; the tuple itself in plain Python."""
+    return fields
+
+
+@on_numba
+def _register() -> None:
+    from llvmlite import ir
+    from numba import types
+    from numba.core import cgutils
+    from numba.core.datamodel import models
+    from numba.core.extending import lower_builtin, register_model, type_callable
+    from numba.core.imputils import lower_getattr_generic
+    from numba.core.typing.templates import AttributeTemplate, infer_getattr
+
+    class Held(types.Type):
+        def __init__(self, whole: Any) -> None:
+            self.whole = whole
+            digest = hashlib.sha1(whole.name.encode(), usedforsecurity=False).hexdigest()[:8]
+            super().__init__(name=f"{whole.instance_class.__name__}_{digest}")
+
+    @register_model(Held)
+    class HeldModel(models.OpaqueModel):
+        """An address."""
+
+    @infer_getattr
+    class Fields(AttributeTemplate):  # type: ignore[misc]
+        key = Held
+
+        def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
+            return typ.whole[typ.whole.fields.index(attr)] if attr in typ.whole.fields else None
+
+    @lower_getattr_generic(Held)
+    def read(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
+        address = builder.bitcast(value, context.get_value_type(typ.whole).as_pointer())
+        k = typ.whole.fields.index(name)
+        skipped = 2 if isinstance(typ.whole[k], types.Array) else 0  # owners: nobody counts references here
+        return parts(builder, cgutils.gep_inbounds(builder, address, 0, k), skipped)
+
+    def parts(builder: Any, address: Any, skipped: int = 0) -> Any:
+        """Read what stands at an address number by number: the optimiser splits no larger reads."""
+        of = address.type.pointee
+        if not isinstance(of, ir.Aggregate):
+            number = builder.load(address)
+            number.set_metadata("invariant.load", builder.module.add_metadata([]))
+            return number
+        whole = ir.Constant(of, None)
+        for k in range(skipped, len(of)):
+            whole = builder.insert_value(whole, parts(builder, cgutils.gep_inbounds(builder, address, 0, k)), k)
+        return whole
+
+    @type_callable(held)
+    def of(context):  # type: ignore[no-untyped-def]
+        return lambda fields: Held(fields)
+
+    # not an overload: that would be a function of its own, and its memory gone when it returns
+    @lower_builtin(held, types.BaseNamedTuple)
+    def put(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        address = builder.bitcast(cgutils.alloca_once_value(builder, args[0]), cgutils.voidptr_t)
+        # an empty piece of assembly: no read through its result may be moved to before the tuple was written
+        through = ir.FunctionType(address.type, [address.type])
+        return builder.asm(through, "", "=r,0,~{memory}", [address], True)

@@ -1,0 +1,193 @@
+"""The motion of a mechanism whose drivers leave no freedom: from one time to the next by prediction and Newton.
+
+Nothing is integrated, so nothing drifts. Positions are predicted by the cubic through the last two velocities and
+accelerations; where the prediction is far from the mechanism the way is halved, so that no step leads to another
+branch. Rows are written for all times that were stepped on, with the powers of what does work in place of the works.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..laws.evaluation import entire, evaluate_jet
+from ..math.scalar import atan2, cos, sin
+from ..numerics.integrators.explicit import (
+    ACCEPTED,
+    DONE,
+    GROW,
+    H_MAX,
+    LARGEST,
+    LIMIT,
+    NEXT,
+    QUOTA,
+    REJECTED,
+    RUNNING,
+    STARTED,
+    STATUS,
+    STUCK,
+    T_END,
+    TOO_MANY,
+    H,
+    T,
+)
+from ..tables.system import BODY_LAW, COORDINATES, LENGTH, NV, REVOLUTE, ROW_LAW, ROW_WRAP, TREE, V0
+from .motion import arrive, write_row
+from .rows import BY_TIME
+from .solve import magnitude
+from .tree import retract
+
+SHARE = GROW  # entry of the clock's: part of the way to the next output time that a step is
+ALL_BUT = 1.0 - 1e-6
+EVEN = 1e-6  # part of its change by which the change of a law may differ from that of its derivatives
+NEAR, SHARP = 1e-10, 10.0  # a law that leaps changes over this part of the time span by more than this times its slope
+TINY, SLOW = 1e-12, 1e-9  # changes of laws that are nothing: of the mechanism's size, of that in the time span
+FAR_OFF = 1e-2  # a prediction that misses positions or velocities by this part of them was for too long a step
+
+
+@formula
+def follow(S, W, c, out):
+    """Go on until the end, or until the buffer ``out`` is full or the quota is used. Returns rows written.
+
+    ``c`` is the clock of the integrators; rows 0 and 1 of ``c.K`` hold derivatives now and at the step before.
+    """
+    used = 0
+    c.count[STATUS] = RUNNING
+    if c.count[STARTED] == 0:
+        status, _ = arrive(c.real[T], c.y[0], c.K[0], S, W)
+        if status != 0:
+            c.count[STATUS] = STUCK
+            return used
+        write(c, out[used], S, W)
+        used += 1
+        c.count[STARTED] = 1
+        c.real[H] = 0.0
+        c.real[SHARE] = 1.0
+        while c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T]:
+            c.count[NEXT] += 1
+    steps = 0
+    while c.real[T] < c.real[T_END]:
+        if used == out.shape[0] or steps >= c.count[QUOTA]:
+            return used
+        if c.count[ACCEPTED] + c.count[REJECTED] >= c.count[LIMIT]:
+            c.count[STATUS] = TOO_MANY
+            return used
+        goal = c.times[c.count[NEXT]] if c.count[NEXT] < c.times.shape[0] else c.real[T_END]
+        left = goal - c.real[T]
+        h = c.real[SHARE] * min(left, c.real[H_MAX])
+        lands = h > ALL_BUT * left  # no sliver is left over for the next step
+        if lands:
+            h = left
+        if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]):
+            c.count[STATUS] = STUCK
+            return used
+        t = goal if lands else c.real[T] + h
+        predict(S, c, h)
+        status, found = arrive(t, c.y[1], c.K[2], S, W)
+        steps += 1
+        if status != 0 or not found <= FAR_OFF or broken(S, W, c.real[T], h, c.real[LARGEST]):
+            c.count[REJECTED] += 1
+            c.real[SHARE] *= 0.5
+            continue
+        accept(c, t, h)
+        write(c, out[used], S, W)
+        used += 1
+        if t >= goal:
+            c.count[NEXT] += 1
+        c.real[SHARE] = min(1.0, 2.0 * c.real[SHARE])
+    c.count[STATUS] = DONE
+    return used
+
+
+@formula
+def broken(S, W, t, h, span):
+    """Whether a driver's law does more over a step than its derivatives say: it may jump there, or have a kink."""
+    for b in range(S.body_i.shape[0]):
+        law = S.body_i[b, BODY_LAW]
+        if law >= 0 and leaps(S, W, law, t, h, span, S.body_i[b, TREE] == REVOLUTE):
+            return True
+    for k in range(S.row_i.shape[0]):
+        law = S.row_i[k, ROW_LAW]
+        if law >= 0 and leaps(S, W, law, t, h, span, S.row_i[k, ROW_WRAP] == 1):
+            return True
+    return False
+
+
+@formula
+def leaps(S, W, law, t, h, span, turns):
+    """Whether value and rate of a law change over a step by something else than what their derivatives add up to.
+
+    By Hermite's and Simpson's rule, to EVEN; over a step that cannot be much shorter, by more than they can add up to.
+    """
+    if entire(S.code, law):
+        return False
+    f0, v0, a0 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+    _, vm, am = evaluate_jet(S.code, S.const, law, W.stack, t + 0.5 * h, W.sensed, BY_TIME)
+    f1, v1, a1 = evaluate_jet(S.code, S.const, law, W.stack, t + h, W.sensed, BY_TIME)
+    way = f1 - f0 - h / 30.0 * (7.0 * v0 + 16.0 * vm + 7.0 * v1) - h * h / 60.0 * (a0 - a1)
+    size = S.glob[LENGTH]
+    if turns:
+        way = atan2(sin(way), cos(way))
+        size = 0.0 * size + 1.0
+    rate = v1 - v0 - h / 6.0 * (a0 + 4.0 * am + a1)
+    v = max(magnitude(v0), magnitude(vm), magnitude(v1))
+    a = max(magnitude(a0), magnitude(am), magnitude(a1))
+    part = EVEN if h > NEAR * span else SHARP
+    as_told = magnitude(way) <= part * h * (v + h * a) + TINY * (magnitude(f0) + magnitude(f1) + size)
+    return not (as_told and magnitude(rate) <= EVEN * v + part * h * a + SLOW * size / span)
+
+
+@formula
+def predict(S, c, h):
+    """State after h into c.y[1]: velocities by the cubic that fits the last two, positions by its integral."""
+    nq = S.kinds[COORDINATES]
+    y, new, now, before = c.y[0], c.y[1], c.K[0], c.K[1]
+    last = c.real[H]
+    way = c.y[2]
+    for i in range(y.shape[0]):
+        new[i] = y[i]
+    nv = S.body_i[-1, V0] + S.body_i[-1, NV]
+    u = 1.0 + h / last if last > 0.0 else 1.0
+    a, b, d = u * u, u * u * u, u * u * u * u
+    for i in range(nv):
+        v, vdot = y[nq + i], now[nq + i]
+        if last > 0.0:
+            # Hermite's cubic in u = (t - t0) / last through (v, vdot) at u = 0 and u = 1, and its integral from u = 1
+            v0, vdot0 = c.K[3, nq + i], before[nq + i]
+            new[nq + i] = (
+                (2.0 * b - 3.0 * a + 1.0) * v0
+                + (b - 2.0 * a + u) * last * vdot0
+                + (3.0 * a - 2.0 * b) * v
+                + (b - a) * last * vdot
+            )
+            way[i] = last * (
+                (0.5 * d - b + u - 0.5) * v0
+                + (0.25 * d - 2.0 / 3.0 * b + 0.5 * a - 1.0 / 12.0) * last * vdot0
+                + (b - 0.5 * d - 0.5) * v
+                + (0.25 * d - b / 3.0 + 1.0 / 12.0) * last * vdot
+            )
+        else:
+            new[nq + i] = v + h * vdot
+            way[i] = h * v + 0.5 * h * h * vdot
+    retract(S, new[:nq], way)
+    for i in range(nq + nv, y.shape[0]):
+        new[i] = y[i] + h * now[i]
+
+
+@formula
+def write(c, out, S, W):
+    """A row of the output at the present state, with powers for works."""
+    write_row(c.real[T], c.y[0], out, S, W)
+    for k in range(c.accounts.shape[0]):
+        out[1 + c.accounts[k]] = c.K[0, c.accounts[k]]
+
+
+@formula
+def accept(c, t, h):
+    """Make the state in the making the present one."""
+    for i in range(c.y.shape[1]):
+        c.K[1, i] = c.K[0, i]
+        c.K[3, i] = c.y[0, i]
+        c.K[0, i] = c.K[2, i]
+        c.y[0, i] = c.y[1, i]
+    c.real[H] = h
+    c.real[T] = t
+    c.count[ACCEPTED] += 1

@@ -1,0 +1,158 @@
+"""Loads of joints with friction: what presses their surfaces together is their own reaction, which friction changes.
+
+For given loads the reactions follow from one more solve with the same factor. The loads that return themselves are
+found by Newton's method. What a joint's friction returns to its own load is a sum of norms of affine functions, so it
+is convex: Newton from below leads to the smallest solution, which is the one that holds. Where the slope reaches one
+before that there is none: friction outweighs what causes it and the joint jams.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..forces.joint_friction import load as pressed
+from ..math.vec import add, load3, scale
+from ..tables.system import (
+    DIAGONAL,
+    F_APPLIED,
+    FORCE_LOAD,
+    FORCE_M,
+    GAMMA,
+    GAP_BEFORE,
+    GUILTY,
+    INVERSE_JACOBIAN,
+    LAM,
+    LEARNT,
+    LOAD,
+    LOAD_BEFORE,
+    MOVED,
+    RETURNED,
+    TERM_ROW,
+    TOLD,
+)
+from .loads import wide
+from .records import load
+from .rows import COEFFICIENT, measured
+
+SUBSTITUTIONS = 80
+AGAIN = 40  # after as many, once more from no load at all
+CONVERGED = 1e-12  # relative
+NOTHING = 0.1  # times the largest force and CONVERGED: changes of loads below this are none
+TRIAL = 0.05  # part of the way to the returned load that tells the slope
+FLAT = 1e-6  # a step that changes the gap by less than this part of what was expected teaches nothing
+FORGOTTEN = -1
+BLURRED = 1e-6  # where redundancy leaves a reaction open, rounding over the regularisation blurs it: good enough
+
+
+@formula
+def reaction_loads(S, W):
+    """Loads that follow from the reactions now in W, into row RETURNED."""
+    for k in range(S.force_i.shape[0]):
+        n = S.force_i[k, FORCE_LOAD]
+        if n < 0:
+            continue
+        o = 0.0 * W.row[LAM, 0]
+        force = (o, o, o)
+        torque = (o, o, o)
+        for x in range(S.load_i.shape[0]):
+            if S.load_i[x, 0] == n:
+                term = S.load_i[x, 1]
+                c = W.row[LAM, S.term_i[term, TERM_ROW]] * S.term_x[term, COEFFICIENT]
+                force = add(force, scale(c, load3(W.T, term, 0)))
+                torque = add(torque, scale(c, load3(W.T, term, 3)))
+        W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
+
+
+@formula
+def returned(S, W):
+    """Loads that follow from the reactions now in W, into row RETURNED; the largest relative change."""
+    reaction_loads(S, W)
+    worst = 0.0
+    small = NOTHING * force_scale(S, W)
+    for k in range(S.force_i.shape[0]):
+        n = S.force_i[k, FORCE_LOAD]
+        if n < 0:
+            continue
+        new = W.sensed[RETURNED, n]
+        change = abs(new - W.sensed[LOAD, n]) / (small + abs(new) + abs(W.sensed[LOAD, n]))
+        if not change <= worst:
+            worst = change
+            W.info[GUILTY] = k
+    return worst
+
+
+@formula
+def force_scale(S, W):
+    """The largest force that moves anything, or that would keep a constraint: loads far below it are rounding."""
+    size = 1e-300
+    for d in range(W.vel.shape[1]):
+        size = max(size, abs(W.vel[F_APPLIED, d]))
+    for k in range(S.row_i.shape[0]):
+        if W.row[DIAGONAL, k] > 0.0:
+            size = max(size, abs(W.row[GAMMA, k]) / W.row[DIAGONAL, k])
+    return size
+
+
+@formula
+def improve(S, W, attempt):
+    """Next loads. ``attempt`` counts from 0 within one evaluation.
+
+    Newton's method on load - returned load = 0 with Broyden's inverse Jacobian, which is learnt from a small step of
+    each load by itself and kept from one evaluation to the next.
+    """
+    first, last = 2 * measured(S), W.sensed.shape[1]
+    if attempt == AGAIN:
+        W.info[LEARNT] = FORGOTTEN
+        for n in range(first, last):
+            W.sensed[LOAD, n] = 0.0
+        return
+    if W.info[LEARNT] == FORGOTTEN or (attempt == 0 and W.info[LEARNT] == 0):
+        W.info[LEARNT] = 0
+        for n in range(first, last):
+            for k in range(first, last):
+                W.sensed[INVERSE_JACOBIAN + n - first, k] = 1.0 if n == k else 0.0
+    elif attempt > 0:
+        learn(W, first, last)
+    for n in range(first, last):
+        W.sensed[LOAD_BEFORE, n] = W.sensed[LOAD, n]
+        W.sensed[GAP_BEFORE, n] = W.sensed[LOAD, n] - W.sensed[RETURNED, n]
+    if W.info[LEARNT] < last - first:
+        n = first + W.info[LEARNT]
+        W.sensed[LOAD, n] -= TRIAL * W.sensed[GAP_BEFORE, n]
+        W.info[LEARNT] += 1
+        return
+    for n in range(first, last):
+        new = W.sensed[LOAD, n]
+        for k in range(first, last):
+            new -= W.sensed[INVERSE_JACOBIAN + n - first, k] * W.sensed[GAP_BEFORE, k]
+        W.sensed[LOAD, n] = new if new > 0.0 else 0.0
+
+
+@formula
+def learnt(S, W):
+    """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
+    return W.info[LEARNT] >= W.sensed.shape[1] - 2 * measured(S)
+
+
+@formula
+def learn(W, first, last):
+    """Broyden's update B += (dx - B dr) (dx^T B) / (dx^T B dr), r = load - returned load (Broyden, 1965)."""
+    moved = 0.0
+    along = 0.0
+    for n in range(first, last):
+        W.sensed[MOVED, n] = 0.0
+        W.sensed[TOLD, n] = 0.0
+    for n in range(first, last):
+        dx = W.sensed[LOAD, n] - W.sensed[LOAD_BEFORE, n]
+        for k in range(first, last):
+            b = W.sensed[INVERSE_JACOBIAN + n - first, k]
+            gap = W.sensed[LOAD, k] - W.sensed[RETURNED, k]
+            W.sensed[MOVED, n] += b * (gap - W.sensed[GAP_BEFORE, k])
+            W.sensed[TOLD, k] += dx * b
+        moved += dx * dx
+        along += dx * W.sensed[MOVED, n]
+    if not abs(along) > FLAT * moved:
+        return
+    for n in range(first, last):
+        dx = W.sensed[LOAD, n] - W.sensed[LOAD_BEFORE, n]
+        for k in range(first, last):
+            W.sensed[INVERSE_JACOBIAN + n - first, k] += (dx - W.sensed[MOVED, n]) * W.sensed[TOLD, k] / along

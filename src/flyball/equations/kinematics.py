@@ -1,0 +1,38 @@
+"""q -> poses, v -> velocities and bias accelerations, of bodies and frames."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.vec import load3, load9
+from ..tables.system import FRAMES, GROUND_FRAMES
+from .records import at_rest, carried, load, store_motion, store_pose
+from .tree import motion, pose
+
+
+@formula
+def poses(S, W, q):
+    """Positions and rotations of all bodies, parents first, and of the frames on them."""
+    for b in range(S.body_i.shape[0]):
+        pose(S, W, b, q)
+    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+        p, R, _, _, _, _ = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        store_pose(W.FK, k, p, R)
+
+
+@formula
+def motions(S, W, v):
+    """Velocities and bias accelerations at these poses."""
+    for b in range(S.body_i.shape[0]):
+        motion(S, W, b, v)
+    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+        _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        store_motion(W.FK, k, w, u, alpha, a)
+
+
+@formula
+def ground_frames(S, W):
+    """Records of the frames on ground, written once."""
+    for k in range(S.kinds[GROUND_FRAMES]):
+        p, R, w, v, alpha, a = at_rest(load3(S.frame_x, k, 0), load9(S.frame_x, k, 3), 0.0 * S.frame_x[k, 0])
+        store_pose(W.FK, k, p, R)
+        store_motion(W.FK, k, w, v, alpha, a)

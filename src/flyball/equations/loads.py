@@ -1,0 +1,160 @@
+"""Forces: wrenches gathered on bodies, then along the velocities; and the power of each element that needs accounting.
+
+A force element says what it does to frame M; the same wrench, turned round, acts on frame F's body at the same point.
+Gravity and gyroscopic terms are the inertial wrench of the bias accelerations.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..laws.evaluation import evaluate
+from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
+from ..tables.system import (
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_KIND,
+    FORCE_LAW,
+    FORCE_LOAD,
+    FORCE_M,
+    FORCE_WORK,
+    INERTIA,
+    LOAD,
+    MASS,
+    NV,
+    PARENT,
+    RATE,
+    V0,
+    VALUE,
+)
+from .dispatch import effort, inputs, wrench
+from .records import load
+from .tree import project
+
+
+@formula
+def inertial(S, W):
+    """Gravity less the inertial wrench at vdot = 0: f = m (g - a), t = -(I alpha + w x I w), about the mass centre."""
+    gravity = (S.glob[0], S.glob[1], S.glob[2])
+    for b in range(S.body_i.shape[0]):
+        put3(W.FB, b, 0, scale(S.body_x[b, MASS], sub(gravity, load3(W.BK, b, 21))))
+        R = load9(W.BK, b, 3)
+        t = euler(load9(S.body_x, b, INERTIA), mtv(R, load3(W.BK, b, 12)), mtv(R, load3(W.BK, b, 18)))
+        put3(W.FB, b, 3, neg(mv(R, t)))
+
+
+@formula
+def euler(I, w, alpha):
+    """I alpha + w x I w in body axes; by Euler's equations where these are principal axes."""
+    if I[1] != 0.0 or I[2] != 0.0 or I[5] != 0.0:
+        return add(mv(I, alpha), cross(w, mv(I, w)))
+    return (
+        I[0] * alpha[0] + (I[8] - I[4]) * w[1] * w[2],
+        I[4] * alpha[1] + (I[0] - I[8]) * w[2] * w[0],
+        I[8] * alpha[2] + (I[4] - I[0]) * w[0] * w[1],
+    )
+
+
+@formula
+def act(W, b, sign, force, torque, point):
+    """Add ``sign`` times a wrench about ``point`` to body b."""
+    t = add(torque, cross(sub(point, load3(W.BK, b, 0)), force))
+    for i in range(3):
+        W.FB[b, i] += sign * force[i]
+        W.FB[b, 3 + i] += sign * t[i]
+
+
+@formula
+def law(S, W, k, slot, x):
+    """Value of one of the element's laws for the inputs x = (t, a, b); zero where there is none."""
+    at = S.force_i[k, FORCE_LAW + slot]
+    if at < 0:
+        return 0.0 * x[0]
+    return evaluate(S.code, S.const, at, W.stack, x, W.sensed)
+
+
+@formula
+def wide(T, k):
+    """The sixteen parameters of row k of the force table."""
+    return (
+        T[k, 0],
+        T[k, 1],
+        T[k, 2],
+        T[k, 3],
+        T[k, 4],
+        T[k, 5],
+        T[k, 6],
+        T[k, 7],
+        T[k, 8],
+        T[k, 9],
+        T[k, 10],
+        T[k, 11],
+        T[k, 12],
+        T[k, 13],
+        T[k, 14],
+        T[k, 15],
+    )
+
+
+@formula
+def forces(S, W, t, work):
+    """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 1:
+            continue
+        kind = S.force_i[k, FORCE_KIND]
+        i = S.force_i[k, FORCE_F]
+        j = S.force_i[k, FORCE_M]
+        F = load(W.FK, i)
+        M = load(W.FK, j)
+        par = wide(S.force_x, k)
+        a, b = inputs(kind, par, F, M)
+        x = (t + 0.0 * a, a, b)
+        force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
+        if S.frame_i[j] >= 0:
+            act(W, S.frame_i[j], 1.0, force, torque, M[0])
+        if S.frame_i[i] >= 0:
+            act(W, S.frame_i[i], -1.0, force, torque, M[0])
+        if S.force_i[k, FORCE_WORK] >= 0:
+            work[S.force_i[k, FORCE_WORK]] = power(F, M, force, torque)
+
+
+@formula
+def power(F, M, force, torque):
+    """Power [W] of a wrench on M at M's origin, and of its reverse on F's body at the same point."""
+    u = sub(sub(M[3], F[3]), cross(F[2], sub(M[0], F[0])))
+    return dot(force, u) + dot(torque, sub(M[2], F[2]))
+
+
+@formula
+def efforts(S, W, t, work, f):
+    """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
+    for k in range(S.force_i.shape[0]):
+        if S.force_i[k, FORCE_ALONG] == 0:
+            continue
+        m = S.force_i[k, FORCE_F]
+        x = W.sensed[VALUE, m]
+        rate = W.sensed[RATE, m]
+        o = 0.0 * x
+        pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
+        laws = (law(S, W, k, 0, (t + o, x, rate)), o, o)
+        s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed)
+        r = S.row_i.shape[0] + m
+        for e in range(S.row_p[r], S.row_p[r + 1]):
+            f[S.col_i[e]] += s * W.G[e]
+        if S.force_i[k, FORCE_WORK] >= 0:
+            work[S.force_i[k, FORCE_WORK]] = s * rate
+
+
+@formula
+def gather(S, W, f):
+    """Generalised forces: the backward sweep of body wrenches, children to parents."""
+    for d in range(f.shape[0]):
+        f[d] = 0.0
+    for b in range(S.body_i.shape[0] - 1, -1, -1):
+        force = load3(W.FB, b, 0)
+        torque = load3(W.FB, b, 3)
+        point = load3(W.BK, b, 0)
+        if S.body_i[b, NV] > 0:
+            project(S, W, b, f, S.body_i[b, V0], 1.0, force, torque, point)
+        if S.body_i[b, PARENT] >= 0:
+            act(W, S.body_i[b, PARENT], 1.0, force, torque, point)

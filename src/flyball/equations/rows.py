@@ -1,0 +1,207 @@
+"""Constraint rows and measured quantities: sums of unit wrenches on frames, rows less a law of time.
+
+    g = sum c_k value_k - f(t),  G v = nu = f',  G vdot = gamma = f'' - sum c_k bias_k
+
+and G[row, d] is the power of the row's wrench along twist column d, whatever the coordinates below. A measured
+quantity is the same without a law: value, gradient, rate, bias. Where a driver's law names sensors s, g = sum c_k
+value_k - f(t, s): the sensors' gradients times df/ds are taken from the row.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..laws.evaluation import evaluate_jet
+from ..math.scalar import atan2, cos, sin
+from ..math.vec import neg, put3
+from ..tables.system import (
+    BIAS,
+    G_VALUE,
+    GAMMA,
+    MIX_COUNT,
+    MIX_FROM,
+    MIX_ROW,
+    MIX_SLOT,
+    MIX_TO,
+    NU,
+    NU_DOT,
+    RATE,
+    ROW_LAW,
+    ROW_WRAP,
+    TERM_F,
+    TERM_HINT,
+    TERM_M,
+    TERM_ROW,
+    TERM_SEG,
+    TERM_SEG_END,
+    VALUE,
+)
+from .records import load
+from .tree import project
+
+COEFFICIENT = 7
+WHOLE, BY_TIME = -1, -2  # what evaluate_jet differentiates by, if not by a sensor
+
+
+@formula
+def parameters(T, k):
+    """The eight parameters of row k of an element table."""
+    return (T[k, 0], T[k, 1], T[k, 2], T[k, 3], T[k, 4], T[k, 5], T[k, 6], T[k, 7])
+
+
+@formula
+def measured(S):
+    """Number of measured quantities."""
+    return S.row_p.shape[0] - 1 - S.row_i.shape[0]
+
+
+@formula
+def begin(S, W):
+    """Start every row and measured quantity from nothing."""
+    for k in range(W.row.shape[1]):
+        W.row[G_VALUE, k] = 0.0
+    for m in range(measured(S)):
+        W.sensed[VALUE, m] = 0.0
+    for e in range(W.G.shape[0]):
+        W.G[e] = 0.0
+
+
+@formula
+def hint_of(S, z, k, o):
+    """The state that term k leans on to tell whole turns, or its place on a curve; zero if it needs none."""
+    h = S.term_i[k, TERM_HINT]
+    return z[h] if h >= 0 else o
+
+
+@formula
+def add_value(S, W, k, g, force, torque_M, torque_F, from_F, from_M):
+    """Add term k, of which F and M are at the given points, to its row or measured quantity."""
+    c = S.term_x[k, COEFFICIENT]
+    r = S.term_i[k, TERM_ROW]
+    nr = S.row_i.shape[0]
+    if r < nr:
+        W.row[G_VALUE, r] += c * g
+    else:
+        W.sensed[VALUE, r - nr] += c * g
+    if W.T.shape[0] > 0:
+        put3(W.T, k, 0, force)
+        put3(W.T, k, 3, torque_M)
+    for s in range(S.term_i[k, TERM_SEG], S.term_i[k, TERM_SEG_END]):
+        if S.seg_i[s, 1] > 0:
+            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, force, torque_M, from_M)
+        else:
+            project(S, W, S.seg_i[s, 0], W.G, S.seg_i[s, 2], c, neg(force), torque_F, from_F)
+
+
+@formula
+def add_bias(S, W, k, bias):
+    """Take term k's acceleration bias from its row's gamma, or add it to its measured quantity."""
+    r = S.term_i[k, TERM_ROW]
+    nr = S.row_i.shape[0]
+    if r < nr:
+        W.row[GAMMA, r] -= S.term_x[k, COEFFICIENT] * bias
+    else:
+        W.sensed[BIAS, r - nr] += S.term_x[k, COEFFICIENT] * bias
+
+
+@formula
+def each_value(S, W, z, kind, row):
+    """Add every term of one kind to its row: value and Jacobian entries, from the poses."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+        g, force, torque_M, torque_F, _ = row(parameters(S.term_x, k), F, M, hint, S.const)
+        add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
+
+
+@formula
+def each_bias(S, W, z, kind, row):
+    """Take every term's acceleration bias of one kind from its row's gamma; add it to its measured quantity."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+        _, _, _, _, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
+        add_bias(S, W, k, bias)
+
+
+@formula
+def rare_values(S, W, z, first, last, row):
+    """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
+    for kind in range(first, last):
+        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+            F = load(W.FK, S.term_i[k, TERM_F])
+            M = load(W.FK, S.term_i[k, TERM_M])
+            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+            g, force, torque_M, torque_F, _ = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
+
+
+@formula
+def rare_biases(S, W, z, first, last, row):
+    """``each_bias`` for kinds that share one loop."""
+    for kind in range(first, last):
+        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+            F = load(W.FK, S.term_i[k, TERM_F])
+            M = load(W.FK, S.term_i[k, TERM_M])
+            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+            _, _, _, _, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            add_bias(S, W, k, bias)
+
+
+@formula
+def end(S, W, t):
+    """Take the laws of time from the rows; angles that follow a law are compared modulo a whole turn."""
+    for k in range(S.row_i.shape[0]):
+        law = S.row_i[k, ROW_LAW]
+        if law >= 0:
+            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
+            g = W.row[G_VALUE, k] - f
+            W.row[G_VALUE, k] = atan2(sin(g), cos(g)) if S.row_i[k, ROW_WRAP] == 1 else g
+            W.row[NU, k] = f1
+            W.row[NU_DOT, k] = f2
+        else:
+            W.row[NU, k] = 0.0
+            W.row[NU_DOT, k] = 0.0
+    for x in range(S.mix_i.shape[0]):
+        law = S.row_i[S.mix_i[x, MIX_ROW], ROW_LAW]
+        _, slope, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, S.mix_i[x, MIX_SLOT])
+        for i in range(S.mix_i[x, MIX_COUNT]):
+            W.G[S.mix_i[x, MIX_TO] + i] -= slope * W.G[S.mix_i[x, MIX_FROM] + i]
+
+
+@formula
+def begin_biases(S, W, v):
+    """Rates of the measured quantities; gamma of the laws as far as they follow time."""
+    nr = S.row_i.shape[0]
+    nm = measured(S)
+    for m in range(nm):
+        s = 0.0 * W.sensed[VALUE, m]
+        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
+            s += W.G[e] * v[S.col_i[e]]
+        W.sensed[RATE, m] = s
+        W.sensed[VALUE, nm + m] = s
+        W.sensed[BIAS, m] = 0.0
+    for k in range(nr):
+        W.row[GAMMA, k] = W.row[NU_DOT, k]
+
+
+@formula
+def end_biases(S, W, t):
+    """Gamma of laws that follow sensors: f'' along the motion in place of its second derivative by time."""
+    last = -1
+    for x in range(S.mix_i.shape[0]):
+        k = S.mix_i[x, MIX_ROW]
+        if k != last:
+            _, _, f2 = evaluate_jet(S.code, S.const, S.row_i[k, ROW_LAW], W.stack, t, W.sensed, WHOLE)
+            W.row[GAMMA, k] += f2 - W.row[NU_DOT, k]
+        last = k
+
+
+@formula
+def row_times(S, W, k, x):
+    """G[k] . x."""
+    s = 0.0 * W.row[G_VALUE, k]
+    for e in range(S.row_p[k], S.row_p[k + 1]):
+        s += W.G[e] * x[S.col_i[e]]
+    return s

@@ -1,0 +1,364 @@
+"""The one solve: [M G^T; G 0] [x; -lam] = [f; gamma], redundant and singular rows included.
+
+Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
+quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are
+regularised by a small part of each row's natural size D, and refined against the true equations until the residual of
+G x = gamma passes or stops falling (a proximal-point iteration: redundant rows cost nothing, and of all multipliers it
+finds those with least sum of D_k lam_k^2).
+
+The regularisation is not small beyond need. Near a singular position a row combination with singular value s answers
+a rounding error e with e / s; refinement takes the regularisation out of everything that is well determined within a
+few passes, while what is left undetermined grows by no more than passes * s / delta.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.vec import load9, mv
+from ..numerics.ldl import ldl_factor, ldl_solve
+from ..tables.system import (
+    BODY_LAW,
+    COUPLED,
+    DIAGONAL,
+    EFFORT,
+    EXCESS,
+    FACTORISATIONS,
+    GIVEN,
+    INVERSE,
+    LENGTH,
+    MASS,
+    NV,
+    PARTED,
+    PARTITION,
+    PASS,
+    PER_COMPACT,
+    PER_MASS,
+    R1,
+    REGULARISE,
+    SCHUR,
+    SEMIDEFINITE,
+    SOLVER,
+    SOLVES,
+    V0,
+    V1,
+    V2,
+)
+from .articulated import articulate, articulated_solve
+from .mass import mass_entries
+from .rows import row_times
+
+REFINEMENTS = 20
+ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
+RIGID = 1e30  # times its own mass: what an independent coordinate weighs where only dependent ones may move
+STALLED = 0.7  # a refinement that leaves more than this of the residual is the last
+
+
+@formula
+def inverse_mass(S, b, x, at, out, to):
+    """out[to:] = M_b^-1 x[at:] for a body with constant mass block."""
+    m = S.body_x[b, PER_MASS]
+    if S.body_i[b, NV] == 3:
+        out[to] = m * x[at]
+        out[to + 1] = m * x[at + 1]
+        out[to + 2] = S.body_x[b, INVERSE + 8] * x[at + 2]
+    else:
+        r = mv(load9(S.body_x, b, INVERSE), (x[at + 3], x[at + 4], x[at + 5]))
+        for i in range(3):
+            out[to + i] = m * x[at + i]
+            out[to + 3 + i] = r[i]
+
+
+@formula
+def factor(S, W):
+    """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
+    W.info[FACTORISATIONS] += 1
+    if S.kinds[SOLVER] == SCHUR:
+        return factor_schur(S, W)
+    if S.kinds[SOLVER] == COUPLED:
+        return factor_coupled(S, W)
+    return articulate(S, W)
+
+
+@formula
+def turn_rows(S, W):
+    """H = M^-1 G^T for the rows now in W."""
+    for e in range(S.block_i.shape[0]):
+        at = S.block_i[e, 1]
+        if W.option[PARTED] > 0.0:
+            turn_dependent(S, W, S.block_i[e, 0], at)
+        else:
+            inverse_mass(S, S.block_i[e, 0], W.G, at, W.H, at)
+
+
+@formula
+def turn_dependent(S, W, b, at):
+    """A block of H with masses of the dependent coordinates alone: the independent ones do not move."""
+    n = S.body_i[b, NV]
+    for k in range(n):
+        per = S.body_x[b, PER_MASS] if k <= n // 3 else S.body_x[b, PER_COMPACT]
+        W.H[at + k] = per * W.G[at + k] if W.vel[PARTITION, S.body_i[b, V0] + k].real > 0.0 else 0.0
+
+
+@formula
+def natural_size(S, W):
+    """Each row's diagonal entry of G M^-1 G^T as it would be if every body were compact: what "small" is measured by.
+
+    A slender body makes entries a million times larger along its own axis, which say nothing about the others.
+    """
+    for k in range(S.row_i.shape[0]):
+        W.row[DIAGONAL, k] = 0.0
+    for e in range(S.block_i.shape[0]):
+        b, at, k = S.block_i[e, 0], S.block_i[e, 1], S.block_i[e, 2]
+        if S.body_i[b, NV] == 3:
+            shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1]
+            turn = W.G[at + 2] * W.G[at + 2]
+        else:
+            shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1] + W.G[at + 2] * W.G[at + 2]
+            turn = W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
+        W.row[DIAGONAL, k] += shift * S.body_x[b, PER_MASS] + turn * S.body_x[b, PER_COMPACT]
+
+
+@formula
+def reuse(S, W):
+    """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
+    if S.kinds[SOLVER] == SCHUR:
+        turn_rows(S, W)
+
+
+@formula
+def factor_schur(S, W):
+    """S = G M^-1 G^T, block by block."""
+    turn_rows(S, W)
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
+    for e in range(S.pair_i.shape[0]):
+        i, j, length, place = S.pair_i[e, 0], S.pair_i[e, 1], S.pair_i[e, 2], S.pair_i[e, 3]
+        s = W.G[i] * W.H[j]
+        for k in range(1, length):
+            s += W.G[i + k] * W.H[j + k]
+        W.A[place] += s
+    natural_size(S, W)
+    for k in range(S.row_i.shape[0]):
+        place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
+        W.A[place] += S.glob[REGULARISE] * W.row[DIAGONAL, k] + ROUNDING * W.A[place]
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def factor_coupled(S, W):
+    """[M G^T; G -delta diag(G M^-1 G^T)], with the diagonal of M standing for M in delta.
+
+    To the entries of G a lever is added, 1 or the mechanism's length: the size of a row along which the forest cannot
+    move just now, or never, must not vanish with them.
+    """
+    nv = W.vel.shape[1]
+    per = W.vel[V1]
+    lever = min(1.0, S.glob[LENGTH]) ** 2
+    mass_entries(S, W)
+    for e in range(S.mass_i.shape[0]):
+        d = S.mass_i[e, 0]
+        own = d == S.mass_i[e, 1]
+        if own:
+            per[d] = 1.0 / W.M[e]
+        if W.option[PARTED] > 0.0:  # masses of the dependent coordinates alone
+            W.M[e] *= (RIGID if W.vel[PARTITION, d].real < 0.0 else 1.0) if own else 0.0
+        W.A[S.mass_i[e, 2]] = W.M[e]
+    for k in range(S.row_i.shape[0]):
+        s = 0.0 * W.row[DIAGONAL, k]
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            W.A[S.pair_i[e, 3]] = W.G[e]
+            if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
+                s += (W.G[e] * W.G[e] + lever) * per[S.col_i[e]]
+        s = s if s.real > 0.0 else s + 1.0
+        W.row[DIAGONAL, k] = s
+        W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def solve(S, W, f, gamma, x, lam, loaded, refinements):
+    """Solve for x and lam with the factor in W; ``f`` (taken as zero unless ``loaded``) and ``gamma`` are kept.
+
+    Prescribed velocities have the accelerations in W.vel[GIVEN] if loaded, else they stay. Where M is semidefinite,
+    M + E is factored in its place and the refinement takes E out again. Returns the residual left, relative to the size
+    of its terms.
+    """
+    W.info[SOLVES] += 1
+    for d in range(x.shape[0]):
+        x[d] = W.vel[GIVEN, d] if loaded else 0.0
+    for k in range(lam.shape[0]):
+        lam[k] = 0.0
+        W.row[R1, k] = gamma[k]
+    if S.kinds[SOLVER] == SCHUR:
+        return solve_schur(S, W, f, gamma, x, lam, loaded, refinements)
+    if S.kinds[SOLVER] == COUPLED:
+        return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
+    articulated_solve(S, W, f, x, W.vel[EFFORT])
+    return 0.0
+
+
+@formula
+def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
+    """Through S = G M^-1 G^T: one pass, then as many for what is left as it takes."""
+    rhs = W.vel[V2]
+    semidefinite = S.glob[SEMIDEFINITE] > 0.0 and not W.option[PARTED] > 0.0
+    for d in range(x.shape[0]):
+        rhs[d] = f[d] if loaded else 0.0
+    pass_schur(S, W, rhs, x, lam, loaded)
+    worst = 0.0
+    last = 1e300
+    for _ in range(refinements):
+        if lam.shape[0] > 0:
+            worst = residual(S, W, gamma, x)
+        if semidefinite:
+            worst = max(worst, excess(S, W.vel[V1], rhs, x))
+        if not worst > W.option[PASS] or worst > STALLED * last:
+            break
+        last = worst
+        pass_schur(S, W, rhs, x, lam, semidefinite)
+    return worst
+
+
+@formula
+def pass_schur(S, W, rhs, x, lam, loaded):
+    """Add to x and lam one solve for the residual in W.row[R1] and, if ``loaded``, for rhs, which is cleared.
+
+    The step is left in W.vel[V1].
+    """
+    dx = W.vel[V1]
+    r = W.row[R1]
+    z = W.D[2]
+    for d in range(x.shape[0]):
+        dx[d] = 0.0
+    if loaded:
+        for b in range(S.body_i.shape[0]):
+            inverse_mass(S, b, rhs, S.body_i[b, V0], dx, S.body_i[b, V0])
+    for k in range(r.shape[0]):
+        z[S.ldl.perm[k]] = r[k] - row_times(S, W, k, dx) if loaded else r[k]
+    ldl_solve(S.ldl, W.L, W.D[0], z)
+    for k in range(r.shape[0]):
+        mu = z[S.ldl.perm[k]]
+        lam[k] += mu
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            dx[S.col_i[e]] += W.H[e] * mu
+    for d in range(x.shape[0]):
+        x[d] += dx[d]
+        rhs[d] = 0.0
+
+
+@formula
+def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
+    """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
+    rhs = W.vel[V2]
+    z = W.D[2]
+    nv = x.shape[0]
+    worst = 1.0
+    last = 1e300
+    for d in range(nv):
+        rhs[d] = 0.0
+    if loaded:
+        remainder(S, W, f, gamma, x, lam, rhs, loaded)
+    for attempt in range(refinements):
+        for d in range(nv):
+            z[S.ldl.perm[d]] = rhs[d]
+        for k in range(lam.shape[0]):
+            z[S.ldl.perm[nv + k]] = W.row[R1, k]
+        ldl_solve(S.ldl, W.L, W.D[0], z)
+        for d in range(nv):
+            x[d] += z[S.ldl.perm[d]]
+        for k in range(lam.shape[0]):
+            lam[k] -= z[S.ldl.perm[nv + k]]
+        worst = remainder(S, W, f, gamma, x, lam, rhs, loaded)
+        if not worst > W.option[PASS] or (attempt > 0 and worst > STALLED * last):
+            break
+        last = worst
+    return worst
+
+
+@formula
+def residual(S, W, gamma, x):
+    """R = gamma - G x into W.row[R1]; returns its largest entry relative to what was subtracted."""
+    worst = 0.0
+    size = 1e-300
+    for k in range(gamma.shape[0]):
+        s = gamma[k]
+        a = magnitude(gamma[k])
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            p = W.G[e] * x[S.col_i[e]]
+            s -= p
+            a += magnitude(p)
+        W.row[R1, k] = s
+        worst = max(worst, magnitude(s))
+        size = max(size, a)
+    return worst / size
+
+
+@formula
+def remainder(S, W, f, gamma, x, lam, rhs, loaded):
+    """Both lines of the coupled equations: gamma - G x into W.row[R1], f - M x + G^T lam into rhs.
+
+    Returns the largest entry of either relative to its terms. What is left in the lines of prescribed velocities is
+    what their drivers have to do: it goes to W.vel[EFFORT].
+    """
+    size = 1e-300
+    for d in range(x.shape[0]):
+        rhs[d] = f[d] if loaded else 0.0
+        size = max(size, magnitude(rhs[d]))
+    for e in range(S.mass_i.shape[0]):
+        i, j = S.mass_i[e, 0], S.mass_i[e, 1]
+        p = W.M[e] * x[j]
+        rhs[i] -= p
+        size = max(size, magnitude(p))
+        if i != j:
+            rhs[j] -= W.M[e] * x[i]
+    wide = 1e-300
+    off = 0.0
+    for k in range(lam.shape[0]):
+        s = gamma[k]
+        a = magnitude(s)
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            d = S.col_i[e]
+            p = W.G[e] * lam[k]
+            rhs[d] += p
+            size = max(size, magnitude(p))
+            p = W.G[e] * x[d]
+            s -= p
+            a += magnitude(p)
+        W.row[R1, k] = s
+        off = max(off, magnitude(s))
+        wide = max(wide, a)
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:
+            d = S.body_i[b, V0]
+            W.vel[EFFORT, d] = -rhs[d]
+            rhs[d] = 0.0
+    worst = 0.0
+    for d in range(x.shape[0]):
+        worst = max(worst, magnitude(rhs[d]))
+    return max(worst / size, off / wide)
+
+
+@formula
+def excess(S, dx, rhs, x):
+    """Rhs = E dx: what the regularised mass of the last step has to give back. Returns its size relative to M x."""
+    worst = 0.0
+    size = 1e-300
+    for b in range(S.body_i.shape[0]):
+        v0 = S.body_i[b, V0]
+        if S.body_i[b, NV] == 3:
+            rhs[v0 + 2] = S.body_x[b, EXCESS + 8] * dx[v0 + 2]
+            worst = max(worst, magnitude(rhs[v0 + 2]))
+        else:
+            t = mv(load9(S.body_x, b, EXCESS), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
+            for i in range(3):
+                rhs[v0 + 3 + i] = t[i]
+                worst = max(worst, magnitude(t[i]))
+        for i in range(2):
+            size = max(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
+    return worst / size
+
+
+@formula
+def magnitude(a):
+    """|Re a|: sizes decide when to stop, they carry no derivative."""
+    return a.real if a.real > 0.0 else -a.real

@@ -1,0 +1,278 @@
+"""Tree joints: how a body hangs on its parent. The coordinate layer is nothing but numbers that choose among these.
+
+Absolute coordinates are a forest in which every body hangs on ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v). The
+others act between a frame on the parent and one on the body: REVOLUTE turns about its z axis, PRISMATIC slides along
+it, SPHERICAL (quaternion; velocities: angular velocity in the moved axes) turns about its origin, WELD does not move.
+
+A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``column``), what a wrench does along them
+(``project``), the rates of its coordinates (``rates``) and a finite step along its velocities (``retract``).
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.scalar import cos, sin, sqrt
+from ..math.vec import (
+    add,
+    col,
+    cross,
+    dot,
+    load3,
+    load9,
+    mm,
+    mtv,
+    mv,
+    put3,
+    quaternion_matrix,
+    quaternion_product,
+    scale,
+    sub,
+)
+from ..tables.system import (
+    BODY_P,
+    BODY_R,
+    BODY_TURNS,
+    FREE,
+    PARENT,
+    PLANAR,
+    PRISMATIC,
+    Q0,
+    REVOLUTE,
+    SPHERICAL,
+    TREE,
+    TREE_P,
+    TREE_R,
+    TREE_TURNS,
+    V0,
+    WELD,
+)
+from .records import load, store_motion, store_pose
+
+
+@formula
+def pose(S, W, b, q):
+    """Position and rotation of body b, its reference point and what its twist columns need, from its parent's pose."""
+    kind = S.body_i[b, TREE]
+    q0 = S.body_i[b, Q0]
+    o = 0.0 * S.body_x[b, 0]
+    if kind == PLANAR:
+        c = cos(q[q0 + 2])
+        s = sin(q[q0 + 2])
+        o = 0.0 * c
+        p = (q[q0], q[q0 + 1], o)
+        store_pose(W.BK, b, p, (c, -s, o, s, c, o, o, o, o + 1.0))
+        put3(W.O, b, 0, p)
+    elif kind == FREE:
+        p = (q[q0], q[q0 + 1], q[q0 + 2])
+        store_pose(W.BK, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
+        put3(W.O, b, 0, p)
+    else:
+        hinge(S, W, b, kind, q, q0)
+
+
+@formula
+def hinge(S, W, b, kind, q, q0):
+    """The other kinds: move the tree joint's frame on the parent, then go over to the body."""
+    parent = S.body_i[b, PARENT]
+    p = load3(S.body_x, b, TREE_P)
+    R = load9(S.body_x, b, TREE_R)
+    if parent >= 0:
+        A = load9(W.BK, parent, 3)
+        p = add(load3(W.BK, parent, 0), mv(A, p))
+        R = mm(A, R) if S.body_x[b, TREE_TURNS] != 0.0 else A
+    v0 = S.body_i[b, V0]
+    axis = col(R, 2)
+    if kind == REVOLUTE:
+        put3(W.X, v0, 0, axis)
+        R = turned(R, cos(q[q0]), sin(q[q0]))
+    elif kind == PRISMATIC:
+        put3(W.X, v0, 3, axis)
+        p = add(p, scale(q[q0], axis))
+    elif kind == SPHERICAL:
+        R = mm(R, quaternion_matrix(q[q0], q[q0 + 1], q[q0 + 2], q[q0 + 3]))
+        for i in range(3):
+            put3(W.X, v0 + i, 0, (R[i], R[3 + i], R[6 + i]))
+    put3(W.O, b, 0, p)
+    p = add(p, mv(R, load3(S.body_x, b, BODY_P)))
+    if S.body_x[b, BODY_TURNS] != 0.0:
+        R = mm(R, load9(S.body_x, b, BODY_R))
+    store_pose(W.BK, b, p, R)
+
+
+@formula
+def turned(R, c, s):
+    """R turned about its own z axis."""
+    return (
+        c * R[0] + s * R[1],
+        c * R[1] - s * R[0],
+        R[2],
+        c * R[3] + s * R[4],
+        c * R[4] - s * R[3],
+        R[5],
+        c * R[6] + s * R[7],
+        c * R[7] - s * R[6],
+        R[8],
+    )
+
+
+@formula
+def motion(S, W, b, v):
+    """Velocities and bias accelerations of body b at its pose, from its parent's."""
+    kind = S.body_i[b, TREE]
+    v0 = S.body_i[b, V0]
+    if kind == PLANAR:
+        o = 0.0 * v[v0]
+        zero = (o, o, o)
+        store_motion(W.BK, b, (o, o, v[v0 + 2]), (v[v0], v[v0 + 1], o), zero, zero)
+    elif kind == FREE:
+        o = 0.0 * v[v0]
+        zero = (o, o, o)
+        w = mv(load9(W.BK, b, 3), (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
+        store_motion(W.BK, b, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero)
+    else:
+        hinge_motion(S, W, b, kind, v, v0)
+
+
+@formula
+def hinge_motion(S, W, b, kind, v, v0):
+    """The other kinds: the parent's motion at the reference point, then what the joint adds, then to the body."""
+    parent = S.body_i[b, PARENT]
+    o = 0.0 * W.BK[b, 0]
+    w = (o, o, o)
+    u = w
+    alpha = w
+    a = w
+    P = load3(W.O, b, 0)
+    if parent >= 0:
+        p, _, w, u, alpha, a = load(W.BK, parent)
+        r = sub(P, p)
+        wr = cross(w, r)
+        u = add(u, wr)
+        a = add(a, add(cross(alpha, r), cross(w, wr)))
+    if kind == PRISMATIC:
+        slide = scale(v[v0], load3(W.X, v0, 3))
+        u = add(u, slide)
+        a = add(a, scale(2.0, cross(w, slide)))
+    elif kind != WELD:
+        spin = scale(v[v0], load3(W.X, v0, 0))
+        if kind == SPHERICAL:
+            spin = add(spin, add(scale(v[v0 + 1], load3(W.X, v0 + 1, 0)), scale(v[v0 + 2], load3(W.X, v0 + 2, 0))))
+        alpha = add(alpha, cross(w, spin))
+        w = add(w, spin)
+    r = sub(load3(W.BK, b, 0), P)
+    wr = cross(w, r)
+    store_motion(W.BK, b, w, add(u, wr), alpha, add(a, add(cross(alpha, r), cross(w, wr))))
+
+
+@formula
+def column(S, W, b, k):
+    """World twist of body b per unit of its k-th own velocity: (angular velocity, velocity of the reference point)."""
+    kind = S.body_i[b, TREE]
+    o = 0.0 * W.BK[b, 0]
+    l = o + 1.0
+    zero = (o, o, o)
+    if kind == REVOLUTE or kind == SPHERICAL:
+        return load3(W.X, S.body_i[b, V0] + k, 0), zero
+    if kind == PRISMATIC:
+        return zero, load3(W.X, S.body_i[b, V0], 3)
+    if kind == PLANAR and k == 2:
+        return (o, o, l), zero
+    if kind == FREE and k >= 3:
+        return (W.BK[b, k], W.BK[b, 3 + k], W.BK[b, 6 + k]), zero
+    if k == 0:
+        return zero, (l, o, o)
+    if k == 1:
+        return zero, (o, l, o)
+    return zero, (o, o, l)
+
+
+@formula
+def project(S, W, b, out, at, sign, force, torque, point):
+    """Add ``sign`` times the power of a wrench (force and torque about ``point``) along body b's twist columns.
+
+    The twist columns times the wrench, with the zeros and ones left out.
+    """
+    kind = S.body_i[b, TREE]
+    if kind == PRISMATIC:
+        out[at] += sign * dot(load3(W.X, S.body_i[b, V0], 3), force)
+        return
+    t = add(torque, cross(sub(point, load3(W.O, b, 0)), force))
+    if kind == PLANAR:
+        out[at] += sign * force[0]
+        out[at + 1] += sign * force[1]
+        out[at + 2] += sign * t[2]
+    elif kind == FREE:
+        m = mtv(load9(W.BK, b, 3), t)
+        out[at] += sign * force[0]
+        out[at + 1] += sign * force[1]
+        out[at + 2] += sign * force[2]
+        out[at + 3] += sign * m[0]
+        out[at + 4] += sign * m[1]
+        out[at + 5] += sign * m[2]
+    elif kind == REVOLUTE:
+        out[at] += sign * dot(load3(W.X, S.body_i[b, V0], 0), t)
+    elif kind == SPHERICAL:
+        for i in range(3):
+            out[at + i] += sign * dot(load3(W.X, S.body_i[b, V0] + i, 0), t)
+
+
+@formula
+def quaternion_at(S, b):
+    """Where body b's quaternion begins in q, and its angular velocity in v; (-1, -1) if it has none."""
+    kind = S.body_i[b, TREE]
+    if kind == FREE:
+        return S.body_i[b, Q0] + 3, S.body_i[b, V0] + 3
+    if kind == SPHERICAL:
+        return S.body_i[b, Q0], S.body_i[b, V0]
+    return -1, -1
+
+
+@formula
+def lengths(S, b):
+    """How many of body b's coordinates, its first, are plain: their rates are velocities."""
+    kind = S.body_i[b, TREE]
+    return 0 if kind == SPHERICAL or kind == WELD else 1 if kind >= REVOLUTE else 3
+
+
+@formula
+def rates(S, q, v, dq):
+    """Qdot of every body from its velocities."""
+    for b in range(S.body_i.shape[0]):
+        q0 = S.body_i[b, Q0]
+        v0 = S.body_i[b, V0]
+        for i in range(lengths(S, b)):
+            dq[q0 + i] = v[v0 + i]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            o = 0.0 * v[w]
+            d = quaternion_product((q[k], q[k + 1], q[k + 2], q[k + 3]), (o, v[w], v[w + 1], v[w + 2]))
+            for i in range(4):
+                dq[k + i] = 0.5 * d[i]
+
+
+@formula
+def retract(S, q, d):
+    """Q (+) d: move every body by the finite step d along its velocities, in place."""
+    for b in range(S.body_i.shape[0]):
+        q0 = S.body_i[b, Q0]
+        v0 = S.body_i[b, V0]
+        for i in range(lengths(S, b)):
+            q[q0 + i] += d[v0 + i]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            x = (0.5 * d[w], 0.5 * d[w + 1], 0.5 * d[w + 2])
+            r = 1.0 / sqrt(1.0 + dot(x, x))  # the Cayley step: a unit quaternion for any d
+            e = quaternion_product((q[k], q[k + 1], q[k + 2], q[k + 3]), (r, r * x[0], r * x[1], r * x[2]))
+            for i in range(4):
+                q[k + i] = e[i]
+
+
+@formula
+def normalise(S, q):
+    """Give every quaternion unit length again, in place."""
+    for b in range(S.body_i.shape[0]):
+        k, _ = quaternion_at(S, b)
+        if k >= 0:
+            s = 1.0 / sqrt(q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3])
+            for i in range(4):
+                q[k + i] *= s

@@ -1,0 +1,1 @@
+"""Laws: expressions as bytecode, one instruction set and its readers, and calls of Python functions from it."""

@@ -1,0 +1,229 @@
+"""Python functions of users made into code that compiled laws can call.
+
+A function of numbers is compiled by Numba where Numba can; otherwise it is called back in Python, and a notice says so.
+The code is kept as long as the function lives. It is made again when something that the function takes from outside (a
+global name, an enclosing function) has changed: compiled code would go on with what was there before.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from inspect import CO_VARARGS
+from pathlib import Path
+from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
+from typing import Any
+from weakref import WeakKeyDictionary, WeakValueDictionary
+
+import numpy as np
+
+from ..compiler.jit import LOCK, PACKAGE, start_numba
+from ..errors import PerformanceNotice
+from ..model.expressions import Expression
+from ..model.function import MOST, function_name
+from .call import NATIVE
+
+_made: WeakKeyDictionary[FunctionType, dict[int, Native]] = WeakKeyDictionary()
+_told: WeakValueDictionary[int, Any] = WeakValueDictionary()
+
+
+class Native:
+    """Machine code for a Python function of ``count`` numbers, at ``address`` as long as this object lives.
+
+    ``python`` is the function itself, ``reason`` says why it is called back instead of compiled ("" if compiled).
+    """
+
+    def __init__(self, python: Callable[..., Any], count: int) -> None:
+        self.python, self.count = python, count
+        self.outside: tuple[Any, ...] = ()
+        self.reason = ""
+        self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
+        if isinstance(python, FunctionType):
+            self.outside = _outside(python, set())
+            try:
+                self._code = _compiled(python, count)
+            except Exception as error:  # Numba gives up in many ways
+                self.reason = _short(error)
+        else:
+            self.reason = f"it is no plain function but a {type(python).__name__}"
+        if self.reason:
+            self._code = _callback(python, count, self.raised)
+        code = self._code
+        self.address = code.address if hasattr(code, "address") else ctypes.cast(code, ctypes.c_void_p).value or 0
+        NATIVE[self.address] = self
+
+    def __reduce__(self) -> Any:
+        raise TypeError(
+            f"the code of the Python function '{function_name(self.python)}' stands at an address of this process and "
+            f"cannot be sent to another; send the mechanism, or use threads"
+        )
+
+
+def native(expression: Expression, count: int) -> Native:
+    """The code of a law that is a Python function of ``count`` numbers."""
+    plain: Any = getattr(expression.function, "py_func", expression.function)  # the Python under Numba's decorators
+    with LOCK:
+        if not isinstance(plain, FunctionType):
+            made = Native(plain, count)
+        else:
+            codes = _made.setdefault(plain, {})
+            if count not in codes or not _same(codes[count].outside, _outside(plain, set())):
+                # the key must not be kept by what it leads to
+                codes[count] = Native(_twin(plain, plain.__globals__, plain.__closure__), count)
+            made = codes[count]
+    if made.reason:
+        _tell(expression, plain, made.reason)
+    return made
+
+
+def _compiled(function: FunctionType, count: int) -> Any:
+    """The function compiled by Numba, behind the calling convention of `call`; a failure leaves nan."""
+    start_numba()
+    from numba import carray, cfunc, config, types
+    from numba.core.errors import NumbaWarning
+
+    if getattr(config, "DISABLE_JIT", False):
+        return _callback(function, count, [])
+    if MOST != 6:
+        raise RuntimeError("the arguments below are six")
+    f = _translatable(function, {})
+    rows, last = max(count, 1), max(count - 1, 0)
+
+    def law(p):
+        x = carray(p, (rows, 3))[:, 0]
+        args = (x[0], x[min(1, last)], x[min(2, last)], x[min(3, last)], x[min(4, last)], x[min(5, last)])
+        try:
+            p[1] = f(*args[:count])
+        except Exception:  # `fault` runs the function again and finds it
+            p[1] = np.nan
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NumbaWarning)  # hints for those who write for Numba
+        return cfunc(types.void(types.CPointer(types.float64)))(law)
+
+
+def _callback(function: Callable[..., Any], count: int, raised: list[Exception]) -> Any:
+    """A way from compiled code back into Python; what the function raises last is kept in a list."""
+    places = [3 * k for k in range(count)]
+
+    def law(p: Any) -> None:
+        try:
+            p[1] = function(*[p[k] for k in places])
+        except BaseException as error:  # nothing may escape into compiled code; `fault` runs the function again
+            raised[:] = [error] if isinstance(error, Exception) else raised
+            p[1] = np.nan
+
+    return ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_double))(law)
+
+
+def _translatable(function: FunctionType, done: dict[FunctionType, Any]) -> Any:
+    """The function for Numba, plain Python functions that it calls included."""
+    from numba import njit
+
+    if function in done:
+        return done[function]
+    scope: dict[str, Any] = {"__builtins__": __builtins__, "__name__": function.__module__}
+    closure = tuple(CellType() for _ in function.__closure__ or ())
+    made = done[function] = njit(boundscheck=True)(_by_place(_twin(function, scope, closure)))
+
+    def known(name: str, value: Any) -> Any:
+        if isinstance(value, list | set | dict):  # Numba would take a copy, for good
+            raise TypeError(f"'{name}' is a {type(value).__name__}, which may change; an array or a tuple would do")
+        if isinstance(value, FunctionType) and str(value.__module__).partition(".")[0] not in ("numpy", "flyball"):
+            return _translatable(value, done)
+        return value
+
+    names = _names(function.__code__)
+    scope.update({k: known(k, v) for k, v in function.__globals__.items() if k in names})
+    for name, cell, original in zip(function.__code__.co_freevars, closure, function.__closure__ or (), strict=True):
+        cell.cell_contents = known(name, original.cell_contents)
+    return made
+
+
+def _twin(function: FunctionType, scope: dict[str, Any], closure: tuple | None) -> FunctionType:
+    """The same function as another object."""
+    twin = FunctionType(function.__code__, scope, function.__name__, function.__defaults__, closure or None)
+    twin.__kwdefaults__ = function.__kwdefaults__
+    twin.__module__, twin.__qualname__ = function.__module__, function.__qualname__
+    return twin
+
+
+def _by_place(function: FunctionType) -> FunctionType:
+    """The function with arguments by keyword only made ordinary ones, as Numba wants them for a call by place."""
+    code, by_keyword = function.__code__, function.__kwdefaults__ or {}
+    count = code.co_kwonlyargcount
+    names = code.co_varnames[code.co_argcount : code.co_argcount + count]
+    if count and len(by_keyword) == count and not code.co_flags & CO_VARARGS:
+        function.__code__ = code.replace(co_argcount=code.co_argcount + count, co_kwonlyargcount=0)
+        function.__defaults__ = (*(function.__defaults__ or ()), *(by_keyword[name] for name in names))
+        function.__kwdefaults__ = None
+    return function
+
+
+def _names(code: CodeType) -> set[str]:
+    """Global names and attributes that code uses, functions inside it included."""
+    return set(code.co_names).union(*(_names(c) for c in code.co_consts if isinstance(c, CodeType)))
+
+
+def _outside(function: FunctionType, done: set[int]) -> tuple[Any, ...]:
+    """What a function takes from outside, in a form that can be compared later."""
+    if id(function) in done:
+        return ()
+    done.add(id(function))
+    names = _names(function.__code__)
+    found = [(k, v) for k, v in function.__globals__.items() if k in names]
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        with suppress(ValueError):  # not filled yet
+            found.append((name, cell.cell_contents))
+    out: list[Any] = [function.__code__, function.__defaults__]
+    for name, value in found:
+        if isinstance(value, FunctionType):
+            out.append((name, _outside(value, done)))
+        elif isinstance(value, ModuleType):
+            inside = [(k, value.__dict__[k]) for k in sorted(names) if k in value.__dict__]
+            out += [(name, k, _frozen(v)) for k, v in inside if isinstance(v, bool | int | float | tuple | np.ndarray)]
+        elif not isinstance(value, BuiltinFunctionType):
+            out.append((name, type(value), _frozen(value)))
+    return tuple(out)
+
+
+def _frozen(value: Any) -> Any:
+    """A value as it is now: of an array a copy of its numbers."""
+    return (value.dtype, value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
+
+
+def _same(a: Any, b: Any) -> bool:
+    try:
+        return bool(a == b)
+    except Exception:  # things that do not compare
+        return False
+
+
+def _short(error: Exception) -> str:
+    """The line of an error of Numba that says what is wrong."""
+    lines = [line.strip() for line in str(error).splitlines() if line.strip()]
+    lines = [line for line in lines if not line.startswith(("Failed in", "During:"))] or [type(error).__name__]
+    return lines[0][:200]
+
+
+def _tell(expression: Expression, function: Any, reason: str) -> None:
+    """Say once for each function that it is called back in Python."""
+    owner = getattr(function, "__func__", function)
+    if _told.get(id(owner)) is owner:
+        return
+    with suppress(TypeError):  # of what cannot be referred to weakly it is told again
+        _told[id(owner)] = owner
+    depth, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
+        depth, frame = depth + 1, frame.f_back
+    warnings.warn(
+        f"{expression.where + ': ' if expression.where else ''}the Python function '{function_name(function)}' cannot "
+        f"be compiled ({reason}). It is called back in Python: each call takes about a microsecond where compiled code "
+        f"takes ten nanoseconds, and simulations on several threads wait for each other there. Use only numbers, "
+        f"arrays, math and NumPy in it, or give an expression or a Table",
+        PerformanceNotice,
+        stacklevel=depth,
+    )

@@ -1,1 +1,0 @@
-"""The compiled mechanism: tables, the loops over them, and the only list of kinds."""

@@ -1,0 +1,165 @@
+"""Coordinates of the forest, read from where the bodies are: the drawn state, and the way between coordinate layers.
+
+Goes for every chain of tree joints. Velocities are in ``equations/velocities.py``: they need the twist columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..math.scalar import atan2
+from ..math.vec import cross
+from ..model.body import GROUND
+from ..model.geometry import matrix_to_quaternion
+from .forest import TreeJoint
+from .specs import FrameSpec
+from .system import Q0, V0
+
+if TYPE_CHECKING:
+    from .values import Values
+
+AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
+
+NEXT = {"x": "y", "y": "z", "z": "x"}
+
+
+@dataclass(frozen=True)
+class BodyState:
+    """A body as it is: centre of mass, rotation, velocity, angular velocity, all in the world; in the plane its turned
+    angle.
+    """
+
+    p: np.ndarray
+    R: np.ndarray
+    v: np.ndarray
+    w: np.ndarray
+    angle: Any = 0.0
+
+
+REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None) -> np.ndarray:
+    """Coordinates (nq,) of the forest for bodies that are there; where these do not fit the tree joints, the nearest.
+
+    ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
+    """
+    s = x.structure
+    q = np.zeros(s.nq, x.system.body_x.dtype)
+    hung = {t.child: t for t in s.tree_joints.values()}
+    for name, b in s.place.items():
+        if b in hung:
+            _read(x, hung[b], bodies, hints or {}, q)
+        elif b >= 0:
+            d, q0 = bodies[name], s.tables["body_i"][b, Q0]
+            if s.model.planar:
+                q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
+            else:
+                q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
+    return q
+
+
+def free_velocities(x: Values, bodies: Mapping[str, BodyState]) -> np.ndarray:
+    """Velocities (nv,) of the bodies that hang on ground by FREE or PLANAR; zero along all tree joints."""
+    s, body_i = x.structure, x.structure.tables["body_i"]
+    v = np.zeros(s.nv, x.system.body_x.dtype)
+    hung = {t.child for t in s.tree_joints.values()}
+    for name, b in s.place.items():
+        if b >= 0 and b not in hung:
+            d, v0 = bodies[name], body_i[b, V0]
+            if s.model.planar:
+                v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
+            else:
+                v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
+    return v
+
+
+def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
+    """Bodies that carry frames F and M."""
+    model = x.structure.model
+    return model.carrier(t.joint.body_i, t.joint), model.carrier(t.joint.body_j, t.joint)
+
+
+def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mapping[str, float], q: np.ndarray) -> None:
+    """Coordinates of one tree joint from the pose of M in F: slides first, then what turns."""
+    body_i = x.structure.tables["body_i"]
+    (pF, RF), (pM, RM) = _frames(x, t, bodies)
+    rest = np.array(t.joint.rest or np.eye(3))
+    shift, turn = RF.T @ (pM - pF), RF.T @ RM @ rest.T
+    way = list(zip(t.links, t.primitives, strict=False))
+    for link, step in way[::-1] if t.reversed else way:
+        at = body_i[link, Q0]
+        a = AXES[step.axis]
+        if step.kind == "P":
+            q[at] = a @ shift
+        elif step.kind == "S":
+            q[at : at + 4] = matrix_to_quaternion(turn.T if t.reversed else turn)
+        else:
+            b = AXES[NEXT[step.axis]]  # turned by the angle; a further turn is about an axis that this one has turned
+            crossing = [o for o in t.primitives if o.kind == "R" and o is not step]
+            if crossing and crossing[0].axis != step.axis:
+                b = AXES[crossing[0].axis]
+            c = np.array(cross(a, b))
+            turned = turn @ b
+            angle = atan2(c @ turned, b @ turned)
+            turn = _about(a, -angle) @ turn
+            q[at] = _with_turns(x, t, step.coordinate, angle, bodies, hints)
+
+
+def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tuple[np.ndarray, np.ndarray]]:
+    """World poses of a joint's frames F and M on those bodies."""
+    out = []
+    for role, name in zip("FM", _ends(x, t), strict=True):
+        p, R = x.poses.local(FrameSpec(0, t.joint, role))
+        d = bodies.get(name, REST)
+        out.append((d.p + d.R @ p, d.R @ R))
+    return out
+
+
+def _about(a: np.ndarray, angle: float) -> np.ndarray:
+    """Rotation about one of the three axes."""
+    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+
+
+def _with_turns(
+    x: Values, t: TreeJoint, what: str, angle: Any, bodies: Mapping[str, BodyState], hints: Mapping[str, Any]
+) -> Any:
+    """The angle with the whole turns that somebody told, or (in the plane) that the bodies' own angles say."""
+    name = f"{t.joint.name}.{what}"
+    if name in hints:
+        near = t.joint.coordinates[what].sign * hints[name]
+    elif x.structure.model.planar:
+        i, j = _ends(x, t)
+        sign = np.sign(_normal(x, t))
+        now = [bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
+        drawn = [x.bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
+        now_by, drawn_by = (sign * (a[1] - a[0]) for a in (now, drawn))
+        F, M = (x.poses.world(FrameSpec(0, t.joint, role))[1] for role in "FM")
+        at = _planar_angle(F.T @ M, t)
+        near = at + now_by - drawn_by
+    else:
+        return angle
+    return angle + whole_turns(near, angle)
+
+
+def whole_turns(near: Any, angle: Any) -> Any:
+    """Whole turns [rad] that bring an angle next to another one."""
+    return 2.0 * np.pi * np.round((near - angle).real / (2.0 * np.pi))
+
+
+def _normal(x: Values, t: TreeJoint) -> float:
+    """Component along the plane's normal of the axis that a joint in the plane turns about."""
+    R = x.poses.world(FrameSpec(0, t.joint, "F"))[1]
+    return float((R @ AXES[t.joint.planar_normal])[2].real)
+
+
+def _planar_angle(turn: np.ndarray, t: TreeJoint) -> Any:
+    """Angle of a turn about a planar joint's normal."""
+    b = AXES[NEXT[t.joint.planar_normal]]
+    c = np.array(cross(AXES[t.joint.planar_normal], b))
+    return atan2(c @ turn @ b, b @ turn @ b)

@@ -1,0 +1,111 @@
+"""The force table: frames or measured quantities, laws, states of work, loads of joints."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..constraints.blocks import DISTANCE, turning
+from ..model.element import LawOf, fields_with
+from ..model.force import CoordinateForce, Force
+from ..model.sensor import Sensor
+from .specs import Structure, frame
+from .terms import coordinate_frames, coordinate_term, measured_term
+
+
+def measured_quantities(s: Structure) -> None:
+    """Number every quantity that a force acts along or that a law names; the slots in which laws find them."""
+    for e in s.model.forces:
+        if isinstance(e, CoordinateForce):
+            _along(s, e)
+    sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
+    if not sensors:
+        return
+    named = _names(s)
+    found = {}
+    for sensor in sensors:
+        if sensor.name in named and (what := s.model.measured(sensor)) is not None:
+            found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
+    values = len(s.measured)
+    s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
+
+
+def _names(s: Structure) -> set[str]:
+    """Names that some law uses."""
+    out: set[str] = set()
+    for e in [*s.model.forces, *s.model.drivers]:
+        for field, of in _laws(e).items():
+            value = getattr(e, field)
+            for law in value if isinstance(value, tuple) else (value,):
+                if law is not None and not isinstance(law, float):
+                    out |= s.model.law(law, of, f"{field} of {e.title}").names
+    return out
+
+
+def _laws(e) -> dict[str, LawOf]:
+    return {"law": LawOf(None)} if e.category == "drivers" else fields_with(e.__class__, LawOf)
+
+
+def _along(s: Structure, e: CoordinateForce) -> int:
+    """The quantity that a force acts along."""
+    text = e.coordinate_text() or f"{e.name}:length"
+    if text in s.measured:
+        return s.measured[text]
+    m = s.measured[text] = len(s.measured)
+    if e.coordinate_text():
+        coordinate_term(s, text, e, m, measured=True)
+    for a, b, formula in e.path():
+        measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
+    return m
+
+
+def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
+    """The quantity that a sensor measures."""
+    force = s.model[text] if kind == "force" else None
+    if isinstance(force, CoordinateForce):
+        return _along(s, force)
+    key = f"{text}:length" if force is not None else f"{text}:{kind}" if kind == "spin" else text
+    if key in s.measured:
+        return s.measured[key]
+    m = s.measured[key] = len(s.measured)
+    if force is not None:
+        measured_term(s, m, frame(s, force, "F"), frame(s, force, "M"), DISTANCE, 1.0, force)
+    elif kind == "spin":
+        # about an axis of the world: that of ground seen from the body, reversed
+        owner, _, axis = text.partition(".")
+        measured_term(s, m, frame(s, s.model[owner], "M"), 0, turning(axis), -1.0, e)
+    else:
+        coordinate_term(s, text, e, m, measured=True)
+    return m
+
+
+def forces(s: Structure) -> None:
+    """Force table, sorted by kind."""
+    s.forces = sorted(s.model.forces, key=lambda f: f.kind)
+    table = np.full((len(s.forces), 9), -1, np.int64)
+    for k, e in enumerate(s.forces):
+        table[k, 7:] = e.kind, isinstance(e, CoordinateForce)
+        if isinstance(e, CoordinateForce):
+            table[k, 0] = _along(s, e)
+            if hasattr(e, "load"):
+                table[k, 1] = _axis_frame(s, e)
+                table[k, 6] = 2 * len(s.measured) + len(s.loads)
+                s.loads.append(e)
+        else:
+            table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
+        _compile_laws(s, e, table[k])
+        if not e.conservative():
+            table[k, 5] = s.state(f"{e.name}.work")
+    s.tables["force_i"] = table
+
+
+def _axis_frame(s: Structure, e: CoordinateForce) -> int:
+    """The frame whose z is the axis of the coordinate that a force acts along."""
+    joint, what = s.model.coordinate(e.coordinate_text(), e)
+    return coordinate_frames(s, joint, what)[0]
+
+
+def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:
+    for name, of in fields_with(e.__class__, LawOf).items():
+        for slot, law in enumerate(e.laws()):
+            if law is not None:
+                row[2 + slot] = s.law(s.model.law(law, of, f"{name} of {e.title}"), of.inputs)

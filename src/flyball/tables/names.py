@@ -1,0 +1,45 @@
+"""What every velocity of the mechanism is called: ``"rod.x"``, ``"A.angle"``."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from .forest import steps
+from .specs import Structure
+from .system import NV, V0
+
+AXES = ("x", "y", "z")
+
+
+class Named(NamedTuple):
+    """A velocity by the name of what it is the rate of."""
+
+    name: str
+    unit: str  # of that: "m" or "rad"
+    sign: float = 1.0  # of the named quantity, seen from the velocity
+
+
+def velocity_names(s: Structure) -> list[Named]:
+    """What each velocity is the rate of, (nv,).
+
+    Bodies that hang on ground freely: ``x``, ``y``, ``z`` of the centre of mass along the world's axes; ``angle`` in
+    the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes. Tree joints: the joint's
+    coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
+    """
+    body_i = s.tables["body_i"]
+    out = [Named("", "m")] * s.nv
+    hung = set()
+    for t, row, step in steps(s):
+        hung.add(row)
+        v0, n = int(body_i[row, V0]), int(body_i[row, NV])
+        c = t.joint.coordinates.get(step.coordinate)
+        for k in range(n):
+            what = step.coordinate or f"{'shift' if step.kind == 'P' else 'turn'} {AXES[k] if n > 1 else step.axis}"
+            unit = "m" if step.kind == "P" else "rad"
+            out[v0 + k] = Named(f"{t.joint.name}.{what}", unit, c.sign if c is not None else 1.0)
+    own = ["x", "y", "angle"] if s.model.planar else [*AXES, *(f"turn {a}" for a in AXES)]
+    for name, b in s.place.items():
+        if b >= 0 and b not in hung and int(body_i[b, NV]) == len(own):
+            for k, what in enumerate(own):
+                out[int(body_i[b, V0]) + k] = Named(f"{name}.{what}", "m" if what in AXES else "rad")
+    return out

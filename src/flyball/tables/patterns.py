@@ -1,0 +1,140 @@
+"""Which entries G has, which the matrix that is factored, and who adds to them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import ModelError
+from ..numerics.ldl import analyse
+from .specs import Structure, ints
+from .system import BODY_LAW, COUPLED, SCHUR, SOLVER
+
+
+def patterns(s: Structure) -> None:
+    """Entries of G, of the matrix that is factored, and who adds to them."""
+    body_i = s.tables["body_i"]
+    chains = _chains(body_i)
+    touched = _touched(s, chains)
+    at, row_p, col_i, block_i = _entries(body_i, touched, len(s.rows))
+    term_i: list[tuple] = []
+    seg_i: list[tuple] = []
+    for t in s.terms:
+        on_F, on_M = chains[s.frames[t.F].body], chains[s.frames[t.M].body]
+        first = len(seg_i)
+        seg_i += [(b, 1, at[t.row, b]) for b in sorted(on_M - on_F)]
+        seg_i += [(b, -1, at[t.row, b]) for b in sorted(on_F - on_M)]
+        term_i.append((t.row, t.F, t.M, first, len(seg_i), t.hint))
+    mix_i = [
+        (k, m, at[k, b], at[len(s.rows) + m, b], body_i[b, 5])
+        for k, r in enumerate(s.rows)
+        for m in r.sensors
+        for b in sorted(touched[len(s.rows) + m])
+    ]
+    load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in s.terms_of.get(e.joint, ())]  # type: ignore[attr-defined]
+    s.tables |= {
+        "term_i": ints(term_i, 6),
+        "seg_i": ints(seg_i, 3),
+        "row_p": np.array(row_p, np.int64),
+        "col_i": np.array(col_i, np.int64),
+        "block_i": ints(block_i, 3),
+        "mix_i": ints(mix_i, 5),
+        "load_i": ints(load_i, 2),
+    }
+    solver = s.tables["kinds"][SOLVER]
+    if solver == SCHUR:
+        _schur(s)
+    elif solver == COUPLED:
+        _coupled(s, chains)
+    else:
+        _nothing(s)
+
+
+def _touched(s: Structure, chains: dict[int, frozenset[int]]) -> list[set[int]]:
+    """Bodies that each row, then each measured quantity, depends on."""
+    touched: list[set[int]] = [set() for _ in range(len(s.rows) + len(s.measured))]
+    for t in s.terms:
+        F, M = s.frames[t.F].body, s.frames[t.M].body
+        touched[t.row] |= chains[F] ^ chains[M]
+    for k, r in enumerate(s.rows):
+        for m in r.sensors:
+            touched[k] |= touched[len(s.rows) + m]
+        if not touched[k] and not s.tree_joints:  # where a forest is rigid between two bodies, the row is redundant
+            raise ModelError(f"{r.element.title} restrains nothing that can move")
+    return touched
+
+
+def _entries(
+    body_i: np.ndarray, touched: list[set[int]], rows: int
+) -> tuple[dict[tuple[int, int], int], list[int], list[int], list[tuple]]:
+    """Where each (row, body) begins in G; first entries of rows; velocities of entries; blocks of the rows."""
+    block_i: list[tuple] = []
+    row_p, at = [0], {}
+    col_i: list[int] = []
+    for k, bodies in enumerate(touched):
+        for b in sorted(bodies):
+            at[k, b] = len(col_i)
+            if k < rows:
+                block_i.append((b, len(col_i), k))
+            col_i.extend(range(body_i[b, 3], body_i[b, 3] + body_i[b, 5]))
+        row_p.append(len(col_i))
+    return at, row_p, col_i, block_i
+
+
+def _chains(body_i: np.ndarray) -> dict[int, frozenset[int]]:
+    """Each body and all it hangs on."""
+    chains: dict[int, frozenset[int]] = {-1: frozenset()}
+    for b, parent in enumerate(body_i[:, 0].tolist()):
+        chains[b] = chains[parent] | {b}
+    return chains
+
+
+def _schur(s: Structure) -> None:
+    """S = G M^-1 G^T: for each body, every pair of its rows."""
+    body_i = s.tables["body_i"]
+    of_body: dict[int, list[tuple[int, int]]] = {}
+    for b, at, row in s.tables["block_i"].tolist():
+        of_body.setdefault(b, []).append((row, at))
+    pairs = [
+        (i, j, int(body_i[b, 5]), at, to)
+        for b, blocks in of_body.items()
+        for k, (i, at) in enumerate(blocks)
+        for j, to in blocks[: k + 1]
+    ]
+    table = ints(pairs, 5)
+    s.ldl, place = analyse(len(s.rows), table[:, 0], table[:, 1])
+    table = np.column_stack([table[:, 3], table[:, 4], table[:, 2], place[: len(table)]])
+    s.tables["pair_i"] = np.ascontiguousarray(table[np.argsort(table[:, 3], kind="stable")])
+    s.tables["mass_i"] = np.zeros((0, 3), np.int64)
+
+
+def _coupled(s: Structure, chains: dict[int, frozenset[int]]) -> None:
+    """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G.
+
+    What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
+    """
+    body_i = s.tables["body_i"]
+    entries = []
+    for b in range(len(body_i)):
+        for k in range(body_i[b, 3], body_i[b, 3] + body_i[b, 5]):
+            for a in sorted(chains[b], reverse=True):
+                entries += [(k, i) for i in range(body_i[a, 3], body_i[a, 3] + body_i[a, 5]) if i <= k]
+    row_p, nv = s.tables["row_p"][: len(s.rows) + 1], s.nv
+    col_i = s.tables["col_i"][: row_p[-1]]
+    rows = np.repeat(np.arange(len(s.rows)), np.diff(row_p)) + nv
+    M = ints(entries, 2)
+    i, j = np.r_[M[:, 0], rows], np.r_[M[:, 1], col_i]
+    unknown = np.ones(nv + len(s.rows), bool)
+    unknown[body_i[body_i[:, BODY_LAW] >= 0, 3]] = False
+    counted = (unknown[i] & unknown[j]) | (i == j)
+    s.ldl, found = analyse(nv + len(s.rows), i[counted], j[counted])
+    place = np.full(len(i), len(s.ldl.Ai))
+    place[counted] = found[: counted.sum()]
+    s.tables["mass_i"] = np.ascontiguousarray(np.column_stack([M, place[: len(M)]]))
+    e = np.arange(len(col_i))
+    s.tables["pair_i"] = np.ascontiguousarray(np.column_stack([e, e, 0 * e + 1, place[len(M) :]]))
+
+
+def _nothing(s: Structure) -> None:
+    """No rows on a forest of tree joints: sweeps over articulated bodies need no matrix."""
+    s.ldl, _ = analyse(0, np.zeros(0, int), np.zeros(0, int))
+    s.tables["pair_i"], s.tables["mass_i"] = np.zeros((0, 4), np.int64), np.zeros((0, 3), np.int64)

@@ -1,0 +1,69 @@
+"""Mechanism -> integers: who touches whom, which row, which entry goes where. Numbers come later (``values``).
+
+Everything that a change of a parameter leaves alone is decided here, once: bodies here, rows and measured quantities
+in ``terms``, forces in ``forces``, patterns of matrices in ``patterns``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.body import Initial
+from ..model.model import Model
+from . import forces, patterns, terms
+from .forest import body_table
+from .specs import FrameSpec, Structure
+
+
+def structure(
+    model: Model,
+    *,
+    far: bool = False,
+    positions: bool = False,
+    holds: Sequence[Initial] = (),
+    tree: Sequence[str] = (),
+    coupled: bool = False,
+) -> Structure:
+    """Decide the tables of a mechanism.
+
+    Parameters
+    ----------
+    model : Model
+    far : bool
+        Use the rows that lead from a far start (assembly) in place of those of motion.
+    positions : bool
+        Leave out rows that restrain velocities only, which have no say in assembly.
+    holds : sequence of Initial
+        Coordinates to be held at a value, as further rows.
+    tree : sequence of str
+        Names of joints that become tree joints instead of rows.
+    coupled : bool
+        Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
+
+    Raises
+    ------
+    ModelError
+        If there are no bodies.
+    """
+    if not model.bodies:
+        raise ModelError(f"{model.name!r} has no bodies; add at least one")
+    s = Structure(model, far, tuple(tree), positions or far, coupled)
+    s.const = [0.0] * len(model.parameters)
+    for table in model.tables:
+        s.table_at[table.name] = len(s.const)
+        s.const += table.data()
+    body_table(s)
+    s.frames.append(FrameSpec(-1, None, "world"))
+    forces.measured_quantities(s)
+    terms.rows(s, holds)
+    forces.forces(s)
+    for e in s.loads:
+        if (joint := getattr(e, "joint", "")) in s.tree_joints:
+            raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
+    terms.sort(s)
+    patterns.patterns(s)
+    s.tables["code"] = np.array(s.code or [0], np.int64)
+    return s

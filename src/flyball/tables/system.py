@@ -1,0 +1,113 @@
+"""The compiled mechanism: a few constant arrays, and the scratch arrays of one run.
+
+Uniform tables, one row per element, sorted by kind; every loop of the house runs over these. Integers hold structure
+(who touches whom, where an entry goes), floats hold values: changing a parameter changes floats only.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..constraints.registry import FORMULAS
+from ..numerics.ldl import Pattern
+
+# columns of System.body_i
+# (law and work state: of the driver that prescribes the body's one coordinate, or -1)
+PARENT, TREE, Q0, V0, NQ, NV, BODY_LAW, BODY_WORK = range(8)
+# kinds of tree joints, and how many coordinates and velocities each has
+FREE, PLANAR, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(6)
+TREE_NQ, TREE_NV = (7, 3, 1, 1, 4, 0), (6, 3, 1, 1, 3, 0)
+# columns of System.body_x
+MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
+# (whether TREE_R and BODY_R differ from the identity: what does not need not be multiplied)
+PER_MASS, PER_COMPACT, OFFSET, TREE_TURNS, BODY_TURNS, BODY_WIDTH = 52, 53, 54, 55, 56, 57
+# columns of System.term_i
+TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END, TERM_HINT = range(6)
+# columns of System.row_i
+ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
+# columns of System.mix_i
+MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
+# columns of System.force_i; forces along a measured quantity have its slot in place of frame F
+FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG = 0, 1, 2, 5, 6, 7, 8
+# rows of Work.row, each (nr,)
+G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
+# rows of Work.vel, each (nv,)
+# (in the last: of each coordinate the size, > 0 if it depends on the others, < 0 if not, 0 if it is prescribed)
+F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
+# rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
+VALUE, RATE, BIAS = range(3)
+# in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
+# scratch; and the inverse Jacobian of the gaps
+LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
+# entries of Work.option
+STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED = range(9)
+# entries of Work.info
+STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT, EXCHANGES = range(8)
+
+# entries of System.kinds from its end, and what may stand in the first: how the equations are solved
+SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
+SCHUR, COUPLED, ARTICULATED = range(3)
+# entries of System.glob after the three of gravity
+REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
+
+TERM_KINDS = len(FORMULAS)
+
+
+class System(NamedTuple):
+    """A mechanism in arrays. Nothing in it changes during an analysis."""
+
+    body_i: np.ndarray  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
+    body_x: np.ndarray  # (nb, 57): mass properties, their inverses and stand-ins; frames of tree joints, their offset
+    frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
+    frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
+    term_i: np.ndarray  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on
+    term_x: np.ndarray  # (nt, 8): parameters of the formula, the last one the coefficient in the row
+    seg_i: np.ndarray  # (ns, 3): body, side (+1 M, -1 F), first entry in Work.G
+    row_i: np.ndarray  # (nr, 3): law or -1, wrapped angle or not, work state or -1
+    row_p: np.ndarray  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
+    col_i: np.ndarray  # (nG,): velocity of each entry of Work.G
+    mix_i: np.ndarray  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
+    force_i: np.ndarray  # (nk, 9): F, M, three laws or -1, state of its work or -1, its load or -1, kind, family
+    force_x: np.ndarray  # (nk, 16): parameters of the formula
+    angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
+    load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
+    kinds: (
+        np.ndarray
+    )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
+    code: np.ndarray  # bytecode of the laws
+    const: np.ndarray  # parameters, literals of the laws, splines
+    glob: np.ndarray  # (6,): gravity, relative regularisation, semidefinite mass or not, length of the mechanism
+    mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
+    pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
+    block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row
+    ldl: Pattern  # the sparse factor
+
+
+class Work(NamedTuple):
+    """Scratch of one run on one thread: nothing is allocated inside the loops."""
+
+    BK: np.ndarray  # (nb, 24): kinematics of the bodies
+    FK: np.ndarray  # (nf, 24): kinematics of the frames
+    X: np.ndarray  # (nv, 14): world twist column of each velocity, at its body's reference point; then its factor
+    O: np.ndarray  # (nb, 3): that reference point
+    FB: np.ndarray  # (nb, 6): force on each body, torque about its centre of mass
+    IC: np.ndarray  # (nb, 30): composite inertias; articulated inertias, and what solves with them pass on
+    M: np.ndarray  # (nM,): mass matrix entries
+    G: np.ndarray  # (nG,): constraint Jacobian, then gradients of the measured quantities
+    H: np.ndarray  # (nG,): M^-1 G^T
+    T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
+    row: np.ndarray  # (9, nr)
+    vel: np.ndarray  # (8, nv)
+    sensed: np.ndarray  # (6 + nl, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
+    A: np.ndarray  # matrix to be factored
+    L: np.ndarray  # its factor
+    D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
+    stack: np.ndarray  # law evaluation
+    y: np.ndarray  # (3, ny): states in the making
+    option: np.ndarray  # (9,): choices of the analysis, largest violations reported, what is solved for
+    info: np.ndarray  # (8,): status, guilty row, counters, how many loads' slopes are known, one more counter
+
+
+# kinematic record of a body or frame: p 0:3, R 3:12, w 12:15, v 15:18, alpha_bias 18:21, a_bias 21:24

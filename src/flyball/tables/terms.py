@@ -1,0 +1,187 @@
+"""The terms of every constraint row and measured quantity: joints, couplings, drivers, held coordinates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..constraints import angle, curve
+from ..constraints.blocks import ANGLE, Row, point_coordinate
+from ..model.body import Driver, Initial
+from ..model.element import Element, LawOf
+from ..model.expressions import Expression
+from ..model.joint import Coordinate, Joint
+from .forest import step_of
+from .specs import RowSpec, Structure, TermSpec, frame, ints
+from .system import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
+
+
+def rows(s: Structure, holds: Sequence[Initial]) -> None:
+    """Rows of joints, couplings, drivers and held coordinates; states that count the turns of angles."""
+    for joint in s.model.joints:
+        _joint_rows(s, joint)
+    for coupling in s.model.couplings:
+        first = len(s.rows)
+        for k, text in enumerate(coupling.coupled()):
+            term = coordinate_term(s, text, coupling, first, counted=True)
+            term.index = k
+        s.rows.append(RowSpec(coupling, "coupling"))
+        s.slices[coupling.name] = slice(first, first + 1)
+    for driver in s.model.drivers:
+        _driver_row(s, driver)
+    for hold in holds:
+        _told_row(s, hold, hold.name, s.law(Expression.parse("0"), ()))
+    _turning(s)
+
+
+def _joint_rows(s: Structure, joint: Joint) -> None:
+    F, M = frame(s, joint, "F"), frame(s, joint, "M")
+    first = len(s.rows)
+    tree = joint.name in s.tree_joints
+    for row in joint.loose(s.model.planar) if tree else joint.rows(s.model.planar):
+        if not (row.holonomic or not s.positions):
+            continue
+        used = row.far if s.far and row.far is not None else row
+        term = TermSpec(len(s.rows), F, M, used, 1.0, joint)
+        if used.kind == curve.KIND:
+            term.hint = s.state(f"{joint.name}.place")
+        s.terms.append(term)
+        for what in row.plus:
+            coordinate_term(s, f"{joint.name}.{what}", joint, len(s.rows), counted=True)
+        s.rows.append(RowSpec(joint, ("n" if row.world else "") + row.axes, holonomic=row.holonomic))
+    s.slices[joint.name] = slice(first, len(s.rows))
+
+
+def _driver_row(s: Structure, driver: Driver) -> None:
+    law = s.model.law(driver.law, LawOf(s.model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
+    at = s.law(law, (), derivatives=True)
+    sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
+    link = _prescribes(s, driver)
+    if link is not None and not sensors:
+        s.prescribed[driver.name] = link
+        s.tables["body_i"][link, BODY_LAW:] = at, s.state(f"{driver.name}.work")
+        return
+    row = _told_row(s, driver, driver.coordinate, at)
+    row.sensors = sensors
+    if not s.far:
+        row.work = s.state(f"{driver.name}.work")
+
+
+def _prescribes(s: Structure, driver: Driver) -> int | None:
+    """Row of the body table whose one coordinate a driver prescribes; none for coordinates that rows must drive."""
+    owner, what = s.model.coordinate(driver.coordinate, driver)
+    if not isinstance(owner, Joint) or sum(d.coordinate == driver.coordinate for d in s.model.drivers) > 1:
+        return None
+    return step_of(s, owner.name, what)
+
+
+def _told_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec:
+    """The row of a coordinate that follows a law."""
+    first = len(s.rows)
+    term = coordinate_term(s, text, e, first)
+    s.rows.append(RowSpec(e, text, law, wrap=term.formula.kind == angle.KIND))
+    s.slices[e.name] = slice(first, first + 1)
+    return s.rows[-1]
+
+
+def coordinate_frames(s: Structure, owner: Joint, what: str) -> tuple[int, int, Coordinate]:
+    """Frames that a joint's coordinate is measured between."""
+    c = owner.coordinates[what]
+    first, second = (frame(s, owner, role, what if len(getattr(c, f"turn_{role}")) else "") for role in c.frames)
+    return first, second, c
+
+
+def coordinate_term(
+    s: Structure, text: str, e: Element, row: int, *, counted: bool = False, measured: bool = False
+) -> TermSpec:
+    """Add a coordinate to a row or to a measured quantity; ``counted``: with the whole turns of angles."""
+    owner, what = s.model.coordinate(text, e)
+    if isinstance(owner, Joint):
+        F, M, c = coordinate_frames(s, owner, what)
+        formula, sign = c.row, c.sign
+    else:
+        F, M, sign = 0, frame(s, owner, "M"), 1.0
+        formula = ANGLE if what == "angle" else point_coordinate(what)
+    term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
+    if formula.kind == angle.KIND and (counted or measured):
+        term.hint = count(s, owner, what, F, M)
+    s.terms.append(term)
+    return term
+
+
+def count(s: Structure, owner: Any, what: str, F: int, M: int) -> int:
+    """The state that counts the turns of an angle."""
+    name = f"{owner.name}.{what}"
+    known = name in s.state_at
+    at = s.state(name)
+    if not known:
+        s.angles.append((F, M, at))
+    return at
+
+
+def _turning(s: Structure) -> None:
+    """In space the turns of every joint angle are counted; in the plane the bodies' own angles count them, unless
+    somebody says how many there are at the start. Angles that are coordinates of the forest count their own.
+    """
+    told = {d.coordinate for d in s.model.drivers} | {i.name for i in s.model.initial}
+    for joint in s.model.joints:
+        for what, c in joint.measured(s.model.planar).items():
+            needed = not s.model.planar or f"{joint.name}.{what}" in told
+            if c.row.kind == angle.KIND and needed and step_of(s, joint.name, what) is None:
+                count(s, joint, what, *coordinate_frames(s, joint, what)[:2])
+
+
+def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:
+    """Add a term to a measured quantity."""
+    s.terms.append(TermSpec(m, F, M, formula, sign, e, measured=True))
+
+
+def sort(s: Structure) -> None:
+    """Terms by kind, frames on ground first, those that no loop asks for last; offsets of every kind."""
+    used = _used(s)
+    order = sorted(range(len(s.frames)), key=lambda k: 0 if s.frames[k].body < 0 else 1 if k in used else 2)
+    new = np.empty(len(order), np.int64)
+    new[order] = np.arange(len(order))
+    s.frames = [s.frames[k] for k in order]
+    s.terms.sort(key=lambda t: t.formula.kind)
+    for t in s.terms:
+        t.F, t.M = int(new[t.F]), int(new[t.M])
+        if t.measured:
+            t.row += len(s.rows)
+    for k, t in enumerate(s.terms):
+        if not t.measured:
+            s.terms_of.setdefault(t.element.name, []).append(k)
+    angles = ints(s.angles, 3)
+    angles[:, :2] = new[angles[:, :2]]
+    s.frame_at = {key: int(new[k]) for key, k in s.frame_at.items()}
+    s.tables["angle_i"] = angles
+    for k, name in enumerate(sorted(s.prescribed, key=s.prescribed.__getitem__)):
+        s.slices[name] = slice(len(s.rows) + k, len(s.rows) + k + 1)
+    s.tables["frame_i"] = np.array([f.body for f in s.frames], np.int64)
+    s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
+    terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
+    ground = int((s.tables["frame_i"] < 0).sum())
+    absolute = not s.tree_joints and not (s.coupled and s.rows)
+    solver = SCHUR if absolute else COUPLED if s.rows else ARTICULATED
+    moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
+    s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
+    _force_frames(s, new)
+
+
+def _used(s: Structure) -> set[int]:
+    """Frames that the compiled loops ask for; those of tree joints often only results do."""
+    used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
+    for k, e in enumerate(s.forces):
+        used |= {int(s.tables["force_i"][k, column]) for column in ((1,) if hasattr(e, "effort") else (0, 1))}
+    return used - {-1}  # forces along a measured quantity that have no frame of their own
+
+
+def _force_frames(s: Structure, new: np.ndarray) -> None:
+    """New numbers of frames in the force table."""
+    table = s.tables["force_i"]
+    for k, e in enumerate(s.forces):
+        for column in (1,) if hasattr(e, "effort") else (0, 1):
+            if table[k, column] >= 0:
+                table[k, column] = new[table[k, column]]

@@ -1,0 +1,355 @@
+"""Structure + parameter values -> floats: the System's tables and the drawn state.
+
+Runs again for every change of a parameter; nothing is compiled and no description is validated here. Parameters may be
+complex: all tables are then complex, and of a small imaginary part of one parameter their imaginary parts are its
+multiple by the exact derivatives (a complex step). What is chosen is chosen by real parts.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..constraints import angle, curve
+from ..constraints.registry import FORMULAS
+from ..math.scalar import absolute, maximum
+from ..model.body import GROUND, Body
+from ..model.coupling import Coupling
+from ..model.element import resolve
+from ..model.force import BodyForce, TwoPointForce
+from ..model.geometry import vector
+from ..model.inertia import mass_properties
+from ..model.joint import Joint
+from .coordinates import BodyState, free_velocities, positions
+from .inertia import inverse_inertia
+from .specs import FrameSpec, Structure, TermSpec
+from .system import (
+    BODY_P,
+    BODY_R,
+    BODY_TURNS,
+    BODY_WIDTH,
+    EXCESS,
+    INERTIA,
+    INVERSE,
+    MASS,
+    OFFSET,
+    PER_COMPACT,
+    PER_MASS,
+    REVOLUTE,
+    TREE,
+    TREE_P,
+    TREE_R,
+    TREE_TURNS,
+    System,
+)
+
+REGULARISATION = 1e-9
+TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
+BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
+
+
+@dataclass
+class Values:
+    """A compiled mechanism: the System, the drawn state, and the numbers of every element."""
+
+    structure: Structure
+    system: System
+    q: np.ndarray
+    v: np.ndarray
+    numbers: dict[str, SimpleNamespace]
+    bodies: dict[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
+    length: float  # a typical length of the mechanism [m]
+    poses: Poses  # where frames are when it is drawn
+
+    @property
+    def told(self) -> dict[str, float]:
+        """Values of the parameters that it was made with."""
+        names = list(self.structure.model.parameters)
+        return dict(zip(names, self.system.const[: len(names)].real.tolist(), strict=True))
+
+
+def values(
+    s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None
+) -> Values:
+    """Numbers of a mechanism.
+
+    Parameters
+    ----------
+    s : Structure
+    parameters : mapping, optional
+        Values in SI units in place of the model's own. If one is complex, all tables and the state are.
+    holds : mapping, optional
+        Values of the coordinates that are held (see ``structure``).
+    """
+    model = s.model
+    env = model.environment(parameters)
+    numbers = {e.name: resolve(e, env) for e in model.elements()}
+    given = (*env.values(), *(holds or {}).values())
+    dtype: Any = complex if any(isinstance(x, complex) for x in given) else float
+    bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
+    for b in model.bodies:
+        bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
+    pose = Poses(s, numbers, bodies)
+    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
+    length = _length(s, frame_x, bodies)
+    body_x, semidefinite = _body_x(s, bodies, frame_x, length)
+    _tree_frames(s, pose, numbers, body_x)
+    const, curve_at = _constants(s, numbers, env, dtype)
+    term_x = _term_x(s, pose, numbers, holds or {}, curve_at, dtype)
+    glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
+    t = s.tables
+    system = System(
+        t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers, dtype), t["angle_i"],
+        t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
+    )  # fmt: skip
+    x = Values(s, system, np.zeros(s.nq, dtype), np.zeros(s.nv, dtype), numbers, bodies, float(length.real), pose)
+    drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
+    x.q[:], x.v[:] = positions(x, drawn), free_velocities(x, drawn)
+    return x
+
+
+def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
+    m = mass_properties(b, n, env, planar)
+    R = b.rotation(n)
+    p = vector(n.position, planar, b.name)
+    w = np.zeros(3)
+    if n.angular_velocity is not None:
+        w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
+    arm = R @ m.com
+    v = vector(n.velocity, planar, b.name) + np.cross(w, arm)
+    return SimpleNamespace(
+        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
+    )
+
+
+class Poses:
+    """Where the frames of elements are when the mechanism is drawn."""
+
+    def __init__(self, s: Structure, numbers: dict[str, SimpleNamespace], bodies: dict[str, SimpleNamespace]) -> None:
+        self.s, self.numbers, self.bodies = s, numbers, bodies
+        self.model = s.model
+        self._found: dict[str, dict] = {}
+
+    def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
+        """Position from the body's centre of mass and rotation, in body axes."""
+        if f.element is None:
+            return np.zeros(3), np.eye(3)
+        p, R, name = self.world(f)
+        b = self.bodies[name]
+        return b.R.T @ (p - b.c), b.R.T @ R
+
+    def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
+        """Position, rotation and carrier of a frame in the drawn configuration."""
+        if f.element is None:
+            return np.zeros(3), np.eye(3), GROUND
+        e = f.element
+        n = self.numbers[e.name]
+        end = e.ends()[f.role]
+        name = self.model.carrier(end, e)
+        if isinstance(e, BodyForce):
+            p, R = self.named(end)
+            if isinstance(self.model[end], Body):
+                at = getattr(n, "at", None)
+                p = self.bodies[name].c if at is None else vector(at, self.model.planar, e.title)
+            return p, R, name
+        p, R = self._placed(e, n)[f.role] if hasattr(e, "placed") and n.at is not None else self.named(end)
+        if f.coordinate:
+            R = R @ np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}"))
+        return p, R, name
+
+    def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        if e.name not in self._found:
+            self._found[e.name] = e.placed(n, self.model.planar)
+        return self._found[e.name]
+
+    def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Drawn pose of a body's reference frame or of a named frame."""
+        if name in self.bodies:
+            return self.bodies[name].p, self.bodies[name].R
+        e = self.model[name]
+        n = self.numbers[name]
+        b = self.bodies[e.body]
+        return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
+
+    def separation(self, e: Any) -> float:
+        """Drawn distance from the first of an element's frames to the last, by way of all between."""
+        points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
+        return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
+
+    def ends(self, e: Any) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Drawn frames F and M of a joint."""
+        F, M = (self.world(FrameSpec(0, e, role))[:2] for role in "FM")
+        return F, M
+
+    def axis(self, joint: str) -> np.ndarray:
+        """Axis of a joint's angle in the world as drawn."""
+        e = self.model[joint]
+        R = self.ends(e)[0][1]
+        turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
+        return (R @ np.array(turn) if len(turn) else R)[:, 2]
+
+    def drawn(self, t: TermSpec) -> float:
+        """What a term's formula gives in the drawn configuration."""
+        poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
+        F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
+        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.kind == angle.KIND else (*t.formula.par[:6], 0.0, 0.0)
+        return FORMULAS[t.formula.kind](par, F, M, self.turned(t.owner), None)[0]
+
+    def turned(self, owner: Any) -> float:
+        """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
+        if isinstance(owner, Joint) or not self.model.planar:
+            return 0.0
+        own = self.numbers[owner.name].angle
+        return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
+
+
+def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> Any:
+    """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
+    centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
+    ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
+    longest = ways[np.argmax((ways.real**2).sum(axis=1))]
+    length = np.sqrt((longest**2).sum())
+    return length if length.real > 0.0 else 1.0
+
+
+def _reach(ways: np.ndarray) -> Any:
+    """The largest component of some ways, taken positive."""
+    flat = ways.ravel()
+    return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
+
+
+def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
+    """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
+    nb = len(s.tables["body_i"])
+    body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
+    semidefinite = 0.0
+    of_body = [_reach(frame_x[s.tables["frame_i"] == b, :3]) for b in range(nb)]
+    for name, b in s.place.items():
+        if b < 0:
+            continue
+        d = bodies[name]
+        J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
+        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2)
+        size = size if size.real > 0.0 else d.mass * length**2
+        inverse, more = inverse_inertia(J, size, s.model.planar)
+        if more.any():
+            semidefinite = 1.0
+        body_x[b, MASS] = d.mass
+        body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
+        for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
+            body_x[b, at : at + 9] = A.ravel()
+    return body_x, semidefinite
+
+
+def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -> None:
+    """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
+
+    A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
+    """
+    for t in s.tree_joints.values():
+        joint = t.joint
+        rest = np.array(joint.rest or np.eye(3))
+        (pF, RF), (pM, RM) = (pose.local(FrameSpec(0, joint, role)) for role in "FM")
+        start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
+        if t.reversed:
+            start, end = (pM, RM @ rest.T), (-RF.T @ pF, RF.T)
+        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [
+            np.eye(3)
+        ]
+        for k, (link, turn) in enumerate(zip(t.links, turns, strict=True)):
+            p, R = start if k == 0 else (np.zeros(3), np.eye(3))
+            body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
+            p, R = end if k == len(turns) - 1 else (np.zeros(3), np.eye(3))
+            body_x[link, BODY_P : BODY_P + 3], body_x[link, BODY_R : BODY_R + 9] = turn.T @ p, (turn.T @ R).ravel()
+        for link in t.links:
+            _leave_out(body_x[link], s.tables["body_i"][link, TREE])
+        for link, step in zip(t.links, t.primitives, strict=False):
+            if step.coordinate in joint.coordinates:
+                body_x[link, OFFSET] = joint.offset(numbers[joint.name], step.coordinate)
+
+
+def _leave_out(x: np.ndarray, kind: int) -> None:
+    """Note in a body's row which of its joint's constant rotations are none: they need not be multiplied.
+
+    One about the axis of a hinge may as well come after the hinge's own, and becomes one with what stands there.
+    """
+    tree, body = slice(TREE_R, TREE_R + 9), slice(BODY_R, BODY_R + 9)
+    T = x[tree].reshape(3, 3).copy()
+    if kind == REVOLUTE and T[2, 2] == 1.0 and not T[2, :2].any() and not T[:2, 2].any():
+        x[BODY_P : BODY_P + 3] = T @ x[BODY_P : BODY_P + 3]
+        x[body], x[tree] = (T @ x[body].reshape(3, 3)).ravel(), np.eye(3).ravel()
+    for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
+        if not x[rotation].imag.any() and np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
+            x[rotation] = np.eye(3).ravel()
+        x[turns] = (x[rotation] != np.eye(3).ravel()).any()
+
+
+def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
+    """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
+    const: list[Any] = list(s.const or [0.0])
+    const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
+    curve_at = {}
+    for e in s.model.joints:
+        if curves := e.curves(numbers[e.name]):
+            curve_at[e.name] = len(const)
+            for data in curves:
+                const += data
+    return np.array(const, dtype), curve_at
+
+
+def _term_x(
+    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
+) -> np.ndarray:
+    """Parameters of the terms: axes from the declaration, constants from the numbers."""
+    x = np.zeros((len(s.terms), 8), dtype)
+    factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
+    factors = {name: f / f[0] for name, f in factors.items()}
+    for k, t in enumerate(s.terms):
+        x[k] = t.formula.par
+        x[k, 7] = t.sign * t.formula.par[7]
+        e = t.element
+        n = numbers[e.name]
+        if t.hint >= 0 and t.formula.kind == angle.KIND:
+            x[k, 0] = 1.0
+        if isinstance(e, Joint) and t.owner is None:
+            x[k, :7] = e.constants(n, t.formula, *pose.ends(e))
+            if t.formula.kind == curve.KIND:
+                at = curve_at[e.name]
+                x[k, 1:3] = at, at + len(e.curves(n)[0])
+        elif isinstance(e, Joint):
+            x[k, 7] *= e.weight(n, t.what, *pose.ends(e))
+        elif isinstance(e, Coupling):
+            x[k, 7] *= factors[e.name][t.index]
+            x[k, 6] = _coupled(e, n, t, pose)
+        elif t.owner is not None:
+            x[k, 6] = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
+    return x
+
+
+def _offset(t: TermSpec, numbers: dict) -> float:
+    """Value of a term's coordinate as drawn."""
+    return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
+
+
+def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
+    """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
+    total = e.total(n)
+    if total is None:
+        return pose.drawn(t)
+    share = total / e.first_weight(n) if t.index == 0 else 0.0
+    return t.sign * (share - _offset(t, pose.numbers))
+
+
+def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: Any) -> np.ndarray:
+    x = np.zeros((len(s.forces), 16), dtype)
+    for k, e in enumerate(s.forces):
+        separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
+        par = e.parameters(numbers[e.name], separation)
+        x[k, : len(par)] = par
+    return x

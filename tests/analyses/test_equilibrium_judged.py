@@ -1,0 +1,131 @@
+"""What is judged at an equilibrium is judged by the size of what is balanced there: closed forms and plain cases."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import jn_zeros
+
+import flyball as fb
+from tests.analyses.made import G, chain, conical_pendulum
+
+
+def test_a_box_on_a_rope_may_turn_about_it():
+    m = fb.Mechanism("box on a rope", gravity=(0, 0, -G))
+    m.add(fb.Body("box", mass=2, inertia=(0.1,) * 3, position=(0, 0, -1)))
+    m.add(fb.Rope("rope", ["ground", "box"], at=[(0, 0, 0), (0, 0, -0.8)], stiffness=1e4))
+    found = m.equilibrium()
+    assert found.stability == "marginal"
+    assert found.least == 0.0
+    assert found.weakest == {"box.turn z": pytest.approx(1.0)}
+    assert found["box.z"] == pytest.approx(-1 - 2 * G / 1e4, rel=1e-12)
+
+
+def tub(planar: bool, motor: bool = False, laundry: bool = False) -> fb.Mechanism:
+    """A tub between springs that pull against each other, with a drum in it."""
+
+    def at(x, y, z=0.0):
+        return (x, y) if planar else (x, y, z)
+
+    def inertia(size):
+        return size if planar else (size,) * 3
+
+    m = fb.Mechanism("tub", planar=planar, gravity=at(0, -G), parameters={"speed": 0.0})
+    m.add(fb.Body("tub", mass=20, inertia=inertia(1.0), position=at(0, 0)))
+    m.add(fb.Body("drum", mass=5, inertia=inertia(0.3), position=at(0, 0)))
+    m.add(fb.Revolute("axle", "tub", "drum", at=at(0, 0), **({} if planar else {"axis": (0, 0, 1)})))
+    for k, (x, y) in enumerate(((-0.3, 0.3), (0.3, 0.3), (-0.3, -0.3), (0.3, -0.3))):
+        for side in (0.0,) if planar else (-0.2, 0.2):
+            hooks = at(2 * x, 1.7 * y, 1.9 * side), at(x, y, side)
+            free = 0.8 * np.linalg.norm(np.subtract(*hooks))
+            m.add(fb.SpringDamper(f"spring {k} {side > 0}", "ground", "tub", at=hooks, stiffness=5000, length=free))
+    if motor:
+        m.add(fb.Driver("motor", "axle.angle", "speed*t"))
+    if laundry:
+        m.add(fb.Body("laundry", mass=1, inertia=inertia(0.0), position=at(0.2, 0)))
+        m.add(fb.Fixed("glue", "drum", "laundry", at=at(0.2, 0)))
+    return m
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_a_free_drum_in_a_sprung_tub_is_marginal(planar):
+    found = tub(planar).equilibrium()
+    assert found.stability == "marginal"
+    assert found.least == 0.0
+    assert found.unbalanced == 0.0
+
+
+@pytest.mark.parametrize("planar", [True, False])
+@pytest.mark.parametrize("laundry", [True, False])
+def test_a_held_drum_in_a_sprung_tub_is_stable(planar, laundry):
+    m = tub(planar, True, laundry)
+    found = m.equilibrium()
+    assert found.stability == "stable"
+    assert found.unbalanced == 0.0
+    layers = [m.modes(about=found, coordinates=layer) for layer in ("absolute", "joint")]
+    assert layers[0].stable
+    assert layers[0].omega == pytest.approx(layers[1].omega, rel=1e-9)
+
+
+def test_a_straight_chain_hangs_as_it_is_drawn():
+    """J0(2 w sqrt(l / g)) = 0 (D. Bernoulli 1732), to the order of a link's length."""
+    found = chain(60).equilibrium()
+    assert found.stability == "stable"
+    assert found["J0.fy"] == pytest.approx(G, rel=1e-12)
+    assert chain(3000).modes(count=2).omega == pytest.approx(jn_zeros(0, 2) / 2 * np.sqrt(G), rel=1e-4)
+
+
+def test_forces_that_cancel_but_for_rounding():
+    """0.1 + 0.2 - 0.3 is 5.6e-17."""
+    m = fb.Mechanism("block", planar=True)
+    m.add(fb.Body("block", mass=1, inertia=1), fb.Translational("slide", "ground", "block", at=(0, 0), axis=(1, 0)))
+    for k, force in enumerate(("0.1", "0.2", "-0.3")):
+        m.add(fb.Actuator(f"push {k}", "slide.displacement", force=force))
+    assert m.equilibrium().stability == "marginal"
+    for layer in ("absolute", "joint"):
+        assert m.modes(coordinates=layer).kinds == ("rigid", "rigid")
+
+
+def ziegler(load: float) -> fb.Mechanism:
+    """Ziegler's column (1952) with a wheel and a block on the stiffest of springs beside it, which touch nothing."""
+    m = fb.Mechanism("Ziegler", planar=True)
+    for k, mass in enumerate((2.0, 1.0)):
+        m.add(fb.Body(f"rod {k}", mass=mass, inertia=1e-9, position=(0, k + 1.0)))
+        m.add(fb.Revolute(f"J{k}", "ground" if k == 0 else "rod 0", f"rod {k}", at=(0, float(k))))
+        m.add(fb.TorsionalSpringDamper(f"spring {k}", joint=f"J{k}", stiffness=1.0))
+    m.add(fb.PointForce("push", "rod 1", at=(0, 2), force=("0", f"-{load}"), axes="body"))
+    m.add(fb.Body("wheel", mass=1, inertia=1), fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    m.add(fb.Body("block", mass=1, inertia=1, position=(3, 0)))
+    m.add(fb.Translational("slide", "ground", "block", at=(3, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("bush", "ground", "block", at=((2, 0), (3, 0)), stiffness=1e14))
+    return m
+
+
+def test_nothing_stiff_or_free_beside_it_hides_flutter_or_makes_it_up():
+    limit = 3.5 - np.sqrt(2)
+    assert ziegler(0.99 * limit).equilibrium().stability == "marginal"
+    assert ziegler(1.01 * limit).equilibrium().stability == "unstable"
+
+
+@pytest.mark.parametrize(
+    ("options", "why"),
+    [
+        ({"turning": ["vertical.angle"], "stable": True}, "no hill to go down"),
+        ({"turning": ["vertical.angle"], "preload": ["push.x"]}, "holds a mechanism at rest"),
+        ({"stable": True, "preload": ["push.x"]}, "give one of the two"),
+    ],
+)
+def test_options_that_say_nothing_beside_each_other_are_refused(options, why):
+    m = conical_pendulum()
+    m.add(fb.PointForce("push", "bob", force=("0", "0", "0")))
+    with pytest.raises(fb.ModelError, match=why):
+        m.equilibrium(**options)
+
+
+def test_a_steady_motion_found_from_another_keeps_the_described_speed():
+    """cos(tilt) = g / (l w^2)."""
+    near = conical_pendulum(0.9).equilibrium(turning=["vertical.angle"])
+    m = conical_pendulum(1.0)
+    found = m.equilibrium(turning=["vertical.angle"], start=near)
+    assert found.speeds["vertical.angle"] == pytest.approx(np.sqrt(G / np.cos(1.0)), rel=1e-9)
+    assert found["bob.z"] == pytest.approx(-np.cos(1.0), rel=1e-7)
