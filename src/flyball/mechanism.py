@@ -22,3 +22,8 @@ class Mechanism(Motions, Statics, Design, Freedom, Model):
         from .model.io import save
 
         save(self, path)
+
+    def _repr_html_(self) -> str:
+        from .view.described import described
+
+        return described(self)

@@ -29,7 +29,7 @@ PLANAR = [
         fb.Revolute,
         ("A", "ground", "crnk"),
         {"at": (0, 0)},
-        r"Revolute 'A': there is no body or frame named 'crnk' \(did you mean 'crank'\?\)",
+        r"Revolute 'A': body_j: there is no body or frame named 'crnk' \(did you mean 'crank'\?\)",
     ),
     (
         fb.Revolute,

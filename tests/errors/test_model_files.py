@@ -76,7 +76,7 @@ def test_malformed_toml_is_shown_with_its_line() -> None:
         (
             BODY + "[[joints]]\ntype = 'Spherical'\nname = 'S'\nbody_i = 'ground'\nbody_j = 'crnk'\nat = [0, 0, 0]",
             [
-                "m.toml: [[joints]] 1 'S' (line 5): Spherical 'S': there is no body or frame named 'crnk' (did you mean 'crank'?)"
+                "m.toml: [[joints]] 1 'S' (line 5): Spherical 'S': body_j: there is no body or frame named 'crnk' (did you mean 'crank'?)"
             ],
         ),
         ("[[drivers]]\nname = 'd'\ncoordinate = 3\nlaw = 2", ["field 'coordinate' must be a text, got 3"]),

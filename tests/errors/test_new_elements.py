@@ -142,7 +142,7 @@ PLANAR = {
     "Motor of a slide": ({"joint": "S", "torque": 3}, "Translational 'S' has no coordinate 'angle'"),
     "Motor of a body": ({"joint": "arm", "torque": 3}, "'arm' is a Body, no joint"),
     "PointForce of three": ({"body": "arm", "force": (1, 2, 3)}, "needs 2 components, such as"),
-    "PointTorque of three": ({"body": "arm", "torque": (1, 2, 3)}, "in a planar mechanism a torque is one number"),
+    "PointTorque of three": ({"body": "arm", "torque": (1, 2, 3)}, "torque: in a planar mechanism it is one number"),
     # sensors
     "Sensor unknown": ({"of": "B.angle"}, "'B.angle' is no curve of a part.*no part named 'B'.*known: arm, cart"),
     "Sensor without a curve": ({"of": "A"}, "'A' is no curve; Revolute 'A' has A.angle, A.rate, A.fx"),

@@ -72,9 +72,11 @@ def test_going_on_with_another_mechanism_is_refused():
 
 def test_units_of_initial_conditions_and_times():
     m = block()
-    m.add(fb.Revolute("J", "ground", "b", at=(0, 0)), fb.Initial("J.angle", value="5 mm"))
+    m.add(fb.Revolute("J", "ground", "b", at=(0, 0)))
     with pytest.raises(fb.UnitError, match=r"value of Initial 'J.angle'"):
-        m.assemble()
+        m.add(fb.Initial("J.angle", value="5 mm"))
+    with pytest.raises(fb.UnitError, match=r"rate of Initial 'J.angle'"):
+        m.add(fb.Initial("J.angle", rate="5 deg"))
     with pytest.raises(fb.UnitError, match="t_end"):
         block().simulate("1 kg")
     assert block().simulate("10 ms").t[-1] == 0.01

@@ -51,6 +51,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
 }
 LATER = {  # imports inside functions, beyond those: the methods that lead from a thing to what is done with it
     "methods": {"analysis"},
+    "mechanism": {"view"},
     "files": {"model", "results"},
     "results": {"view"},
     "cli": {"analysis", "compiler", "equations", "files", "mechanism", "model", "results", "view"},

@@ -105,7 +105,7 @@ class JointFriction(CoordinateForce):
         return f"{self.joint}.{self._coordinate()}"
 
     def _coordinate(self) -> str:
-        return self.coordinate or ("displacement" if self.radius is None else "angle")
+        return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
 
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""

@@ -36,11 +36,11 @@ def wrench(par, F, M, laws, values):
     return in_world(par, F, M, laws), (o, o, o)
 
 
-def components(e: Element, given: tuple, planar: bool, example: str) -> None:
+def components(e: Element, field: str, given: tuple, planar: bool, example: str) -> None:
     """Refuse a vector of laws with too few or too many components."""
     wanted = 2 if planar else 3
     if len(given) != wanted:
-        raise ModelError(f"{e.title}: it needs {wanted} components, such as {example}, got {given}")
+        raise ModelError(f"{e.title}: {field} needs {wanted} components, such as {example}, got {given}")
 
 
 @element
@@ -72,7 +72,7 @@ class PointForce(BodyForce):
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame] | None:
         """Nowhere of its own; refuses a number of components that the mechanism does not have."""
-        components(self, self.force, planar, "(0, -5)" if planar else "(0, 0, -5)")
+        components(self, "force", self.force, planar, "(0, -5)" if planar else "(0, 0, -5)")
         return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

@@ -49,9 +49,9 @@ class PointTorque(BodyForce):
         """Nowhere of its own; refuses a number of components that the mechanism does not have."""
         given = self.torque if isinstance(self.torque, tuple) else (self.torque,)
         if planar and len(given) != 1:
-            raise ModelError(f"{self.title}: in a planar mechanism a torque is one number or law, got {given}")
+            raise ModelError(f"{self.title}: torque: in a planar mechanism it is one number or law, got {given}")
         if not planar:
-            components(self, given, planar, "(0, 0, 2)")
+            components(self, "torque", given, planar, "(0, 0, 2)")
         return None
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

@@ -14,7 +14,7 @@ from ..constraints.blocks import CURVE, Row
 from ..errors import ModelError
 from ..math.scalar import absolute
 from ..math.spline import complex_cubic, packed
-from ..model.element import Length, Numbers, Point, Unit, element, nonnegative
+from ..model.element import Flag, Length, Numbers, Point, Unit, element, nonnegative
 from ..model.geometry import vector
 from ..model.joint import Joint, WorldFrame
 from ..model.table import Table
@@ -23,7 +23,10 @@ from ..model.table import Table
 def _list(value: Any) -> Any:
     if isinstance(value, str):
         return value
-    return tuple(map(tuple, value.tolist() if hasattr(value, "tolist") else value))
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if not isinstance(value, list | tuple) or not all(isinstance(p, list | tuple) for p in value):
+        raise ValueError("give points (x, y)")
+    return tuple(map(tuple, value))
 
 
 Points = Annotated[tuple[Numbers, ...], BeforeValidator(_list), Unit("m")]
@@ -60,7 +63,7 @@ class Cam(Joint):
 
     points: Points
     centre: Point = (0.0, 0.0, 0.0)
-    closed: bool = True
+    closed: Flag = True
     radius: Length = 0.0
 
     blocks: ClassVar = (CURVE,)

@@ -60,7 +60,8 @@ class Coupler(Coupling):
     def check(self, n: SimpleNamespace) -> None:
         """A weight for each of at least two different coordinates, none of them zero."""
         if len(self.coordinates) < 2:
-            raise ModelError(f"{self.title}: it couples {len(self.coordinates)} coordinate; give two or more")
+            one = "1 coordinate" if self.coordinates else "no coordinates"
+            raise ModelError(f"{self.title}: it couples {one}; give two or more")
         twice = [c for k, c in enumerate(self.coordinates) if c in self.coordinates[:k]]
         if twice:
             raise ModelError(f"{self.title}: it names {twice[0]!r} twice; name it once, with both weights added up")

@@ -33,6 +33,7 @@ class Distance(Joint):
     length: Length | None = None
 
     blocks: ClassVar = CONSTANT_DISTANCE
+    axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "link"
 
     def check(self, n: SimpleNamespace) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.coupling import Coupling, sense, shared_body
-from ..model.element import Numbers, Unit, element
+from ..model.element import Flag, Numbers, Unit, element
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -39,7 +39,7 @@ class GearPair(Coupling):
     joint_1: str = field(kw_only=False)
     joint_2: str = field(kw_only=False)
     teeth: Annotated[Numbers, Unit(None)]
-    internal: bool = False
+    internal: Flag = False
 
     drawn: ClassVar[str] = "gear"
     dimensions: ClassVar = {"teeth": ("1", "m")}

@@ -47,6 +47,7 @@ class GeneralUniversal(Joint):
         "angle_2": Coordinate(ANGLE, "MF", turn_F=Z_TO_X, sign=-1.0, offset="angle_2"),
     }
     planar_normal: ClassVar[str] = ""
+    axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:

@@ -95,6 +95,7 @@ class RollingBall(Joint):
 
     blocks: ClassVar = (ON_PLANE, no_slip("x"), no_slip("y"))
     planar_normal: ClassVar[str] = ""
+    axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "rolling"
 
     def check(self, n: SimpleNamespace) -> None:

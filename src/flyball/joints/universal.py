@@ -44,6 +44,7 @@ class Universal(Joint):
     chain: ClassVar = (Primitive("R", "z", "angle_1"), Primitive("R", "x", "angle_2"))
     rest: ClassVar = ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0), (1.0, 0.0, 0.0))
     planar_normal: ClassVar[str] = ""
+    axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "universal"
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:

@@ -102,10 +102,18 @@ def compile_law(
         args = tuple(arguments(tree, known))
         tree = Node("function", args, _function(expression, args, code, functions))
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
-    writer.write(folded(_expand(tree, writer.varying), expression.text))
+    writer.write(_folded(expression, tree, writer.varying))
     at = len(code)
     code += [len(writer.program) // 2, writer.deepest, *writer.program]
     return at, writer.deepest
+
+
+def _folded(expression: Expression, tree: Node, varying: Collection[str]) -> Node:
+    """The law in simpler operations, its constant parts as numbers."""
+    try:
+        return folded(_expand(tree, varying), expression.text)
+    except ExpressionError as error:
+        raise ExpressionError(f"{expression.where}: {error}" if expression.where else str(error)) from None
 
 
 def _refuse_twins(

@@ -16,6 +16,7 @@ from .element import (
     AngularVelocity,
     Density,
     Element,
+    Flag,
     Law,
     Mass,
     Number,
@@ -118,7 +119,7 @@ class Body(Element):
     angular_velocity: AngularVelocity | None = None
     shape: Shapes = field(default=None)
     density: Density | None = None
-    as_drawn: bool = False
+    as_drawn: Flag = False
     color: str | None = None
 
     category: ClassVar[str] = "bodies"

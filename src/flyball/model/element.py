@@ -20,6 +20,7 @@ from ..errors import ModelError
 from .expressions import number
 
 T = TypeVar("T", bound=type)
+LARGEST = 1e50  # numbers of elements; what is computed from them holds products of several
 LONG = 300  # letters of a value in a message
 
 
@@ -28,6 +29,11 @@ class Unit:
     """Dimension of a field, as an SI unit; any, if None."""
 
     dimension: str | None
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A field that is a vector of the plane or of space, or several of them."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,8 @@ def plain(value: Any) -> Any:
     """NumPy scalars and arrays become Python numbers and lists; a bool is no number."""
     if isinstance(value, bool):
         raise ValueError("a truth value is not a number")
+    if isinstance(value, bytes):
+        raise ValueError("bytes are no text")
     if hasattr(value, "tolist"):
         return value.tolist()
     if isinstance(value, (list, tuple)):
@@ -49,6 +57,16 @@ def plain(value: Any) -> Any:
     return value
 
 
+def _flag(value: Any) -> Any:
+    """True and false are nothing else: no "yes", no 1."""
+    if hasattr(value, "item"):
+        value = value.item()
+    if not isinstance(value, bool):
+        raise ValueError("give true or false")
+    return value
+
+
+Flag = Annotated[bool, BeforeValidator(_flag)]
 Number = Annotated[float | str, BeforeValidator(plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(plain)]
@@ -63,11 +81,11 @@ Mass = Annotated[Number, Unit("kg")]
 Density = Annotated[Number, Unit("kg/m^3")]
 Stiffness = Annotated[Number, Unit("N/m")]
 Damping = Annotated[Number, Unit("N*s/m")]
-Point = Annotated[Numbers, Unit("m")]
-PointPair = Annotated[tuple[Numbers, Numbers], Unit("m")]
-Direction = Annotated[Numbers, Unit("")]
-Directions = Annotated[tuple[Numbers, Numbers], Unit("")]
-Velocity = Annotated[Numbers, Unit("m/s")]
+Point = Annotated[Numbers, Unit("m"), Vector()]
+PointPair = Annotated[tuple[Numbers, Numbers], Unit("m"), Vector()]
+Direction = Annotated[Numbers, Unit(""), Vector()]
+Directions = Annotated[tuple[Numbers, Numbers], Unit(""), Vector()]
+Velocity = Annotated[Numbers, Unit("m/s"), Vector()]
 AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plain), Unit("rad/s")]
 
 
@@ -211,18 +229,29 @@ def resolve(e: Element, env: Mapping[str, float]) -> SimpleNamespace:
     """The element's fields with every number in SI floats; laws and other fields as they are written."""
     n = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
     for name, unit in fields_with(e.__class__, Unit).items():
-        setattr(n, name, _numbers(getattr(e, name), env, unit.dimension, e, name))
+        setattr(n, name, si_numbers(getattr(e, name), env, unit.dimension, f"{name} of {e.title}"))
     return n
 
 
-def _numbers(value: Any, env: Mapping[str, float], dimension: str, e: Element, name: str) -> Any:
+def si_numbers(value: Any, env: Mapping[str, float], dimension: str | None, where: str) -> Any:
+    """What was written, a number or nested lists of them, in SI units; ``where`` is what it is, for messages."""
     if value is None:
         return None
     if isinstance(value, (tuple, list)):
-        return tuple(_numbers(v, env, dimension, e, name) for v in value)
-    if type(value) is float and value - value == 0.0:
-        return value
-    return number(value, env, dimension, f"{name} of {e.title}")
+        return tuple(si_numbers(v, env, dimension, where) for v in value)
+    if type(value) is not float or value - value != 0.0:
+        value = number(value, env, dimension, where)
+    return limited(value, dimension, where)
+
+
+def limited(value: Any, dimension: str | None, where: str) -> Any:
+    """The number; refused if it is so large that nothing can be computed with it."""
+    if not abs(value) <= LARGEST:
+        unit = f" {dimension}" if dimension not in (None, "", "1") else ""
+        raise ModelError(
+            f"{where}: {value:g}{unit} is beyond {LARGEST:g}, where squares and products overflow; is its unit right?"
+        )
+    return value
 
 
 def written(e: Element) -> dict[str, Any]:
@@ -243,6 +272,15 @@ def _data(value: Any) -> Any:
     if isinstance(value, Element):
         return {"type": type(value).__name__, **written(value)}
     return value
+
+
+def field_with(e: Element, *values: str) -> str:
+    """The field that holds one of these texts, for messages: "body_i: "; nothing if there is none."""
+    for f in dataclasses.fields(e):
+        given = getattr(e, f.name)
+        if f.name != "name" and any(given == v or (isinstance(given, tuple) and v in given) for v in values):
+            return f"{f.name}: "
+    return ""
 
 
 def positive(e: Element, n: SimpleNamespace, *names: str, why: str = "") -> None:

@@ -93,7 +93,8 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
                 number(value, env, pair[turning], f"{name} of {e.title}")
             elif value is not None and name in fields_with(e.__class__, LawOf):
                 tables = {x.name: x for x in model.tables}
-                law_expression(value, pair[turning], f"{name} of {e.title}", tables=tables)
+                names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
+                law_expression(value, pair[turning], f"{name} of {e.title}", tables, names)
     elif isinstance(e, Coupling):
         for name, kinds in e.dimensions.items():
             value = getattr(e, name)

@@ -19,6 +19,7 @@ import numpy as np
 
 from ..errors import ExpressionError, ModelError, UnitError
 from ..math import scalar
+from .attached import refuse_attached, remedy
 from .function import apply, arguments, function_tree
 from .grammar import CONSTANTS, FUNCTIONS, Node, did_you_mean, read, refuse
 from .units import is_unit, split_quantity, to_si
@@ -69,12 +70,24 @@ class Expression:
         return frozenset(node.value for node in self.tree.walk() if node.kind == "name")
 
     @cached_property
+    def _quantities(self) -> tuple[tuple[str, str], ...]:
+        """Number and unit of each quantity in it, such as ``(60 rpm)``."""
+        nodes = (n for n in self.tree.walk() if n.kind == "number" and self.function is None)
+        parts = (split_quantity(self.text[n.start : n.stop]) for n in nodes)
+        return tuple(p for p in parts if p is not None and p[1])
+
+    @cached_property
     def tables(self) -> frozenset[str]:
         """Names of the tables called."""
         return frozenset(node.value for node in self.tree.walk() if node.kind == "table")
 
     def require(self, known: Collection[str]) -> None:
         """Raise `ExpressionError`, with the place and the nearest known names, if a name used is not known."""
+        for part in self._quantities:
+            try:
+                refuse_attached(*part, {*known, *CONSTANTS}, None)
+            except UnitError as error:
+                raise ExpressionError(f"'{self}': {error}") from None
         if self.names <= set(known):
             return
         nodes = self.tree.walk() if self.function is None else arguments(self.tree, known)
@@ -84,16 +97,16 @@ class Expression:
         name = node.value
         guess = did_you_mean(name, [*known, *FUNCTIONS])
         if name == "t":
-            remedy = "time t is known only in laws of drivers and forces"
+            cure = "time t is known only in laws of drivers and forces"
         elif guess:
-            remedy = guess.strip()
+            cure = guess.strip()
         elif self.function is not None:
-            remedy = "the names of a function's arguments say what it is given: use known ones, or give a default"
+            cure = "the names of a function's arguments say what it is given: use known ones, or give a default"
         elif is_unit(name):
-            remedy = f"a unit follows a single number, as in '2 {name}'; give the quantity a parameter's name"
+            cure = f"a unit follows a single number, as in '2 {name}', in a formula within parentheses"
         else:
-            remedy = f"define a parameter '{name}', or correct the name"
-        listed = f"known names: {', '.join(sorted(known)) or 'none'}; {remedy}"
+            cure = f"define a parameter '{name}', or correct the name"
+        listed = f"known names: {', '.join(sorted(known)) or 'none'}; {cure}"
         refuse(self.text, node.start, node.stop, f"unknown name '{name}'", listed)
 
     def evaluate(self, env: Mapping[str, Any], tables: Mapping[str, Table] | None = None) -> Any:
@@ -130,7 +143,9 @@ def _parsed(text: str, tables: frozenset[str]) -> Expression:
     return Expression(*read(text, tables))
 
 
-def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str) -> Any:
+def number(
+    value: Any, env: Mapping[str, Any], dimension: str | None, where: str, names: Collection[str] | None = None
+) -> Any:
     """Turn what a user wrote into a number in SI units.
 
     Parameters
@@ -143,6 +158,8 @@ def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str
         SI unit wanted, e.g. "m", "rad", "N*m*s/rad", "1"; None for any. An expression is taken as being in it.
     where
         What the number is, for messages: "mass of body 'crank'".
+    names
+        Names that a user could mean where they stand behind a unit, if not those of `env`.
 
     Raises
     ------
@@ -150,7 +167,7 @@ def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str
         With a message that begins with `where`.
     """
     try:
-        result = _number(value, env, dimension)
+        result = _number(value, env, dimension, env if names is None else names)
     except ModelError as error:
         raise type(error)(f"{where}: {error}") from None
     if isinstance(result, Complex) and not (result - result == 0):
@@ -164,10 +181,13 @@ def number(value: Any, env: Mapping[str, Any], dimension: str | None, where: str
     return result
 
 
-def law_expression(value: Any, dimension: str | None, where: str, tables: Collection[str] = ()) -> Expression:
+def law_expression(
+    value: Any, dimension: str | None, where: str, tables: Collection[str] = (), names: Collection[str] = ()
+) -> Expression:
     """Turn what a user wrote as a law into an expression.
 
-    It may be a number, a quantity ("120 rpm"), a formula of t that may call ``tables``, or a Python function.
+    It may be a number, a quantity ("120 rpm"), a formula of t that may call ``tables``, or a Python function. ``names``
+    are those that the law may use, t besides.
     """
     try:
         if isinstance(value, Expression):
@@ -178,7 +198,7 @@ def law_expression(value: Any, dimension: str | None, where: str, tables: Collec
             return Expression.of_function(value, where)
     except ModelError as error:
         raise type(error)(f"{where}: {error}") from None
-    return Expression.constant(number(value, {}, dimension, where))
+    return Expression.constant(number(value, {}, dimension, where, {"t", *names, *tables}))
 
 
 def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
@@ -199,7 +219,7 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
         if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None):
             formulas[name] = law_expression(value, None, f"parameter '{name}'")
         else:
-            values[name] = number(value, {}, None, f"parameter '{name}'")
+            values[name] = number(value, {}, None, f"parameter '{name}'", parameters.keys())
     for name, formula in formulas.items():
         try:
             formula.require(parameters.keys())
@@ -213,6 +233,10 @@ def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
 def folded(node: Node, text: str) -> Node:
     """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
     args = tuple(folded(arg, text) for arg in node.args)
+    if node.kind in ("step", "step5") and args[1].kind == args[3].kind == "number" and args[1].value == args[3].value:
+        value = float(args[1].value)
+        wider = f"give x1 another value than x0 = {value:g}; a jump is where(x < {value:g}, y0, y1)"
+        refuse(text, node.start, node.stop, "this step has no width", wider)
     if node.kind in _UNFOLDED or any(arg.kind != "number" for arg in args):
         return replace(node, args=args)
     value = float(OPERATIONS[node.kind](*(float(arg.value) for arg in args)))
@@ -227,7 +251,7 @@ def is_number_text(text: str) -> bool:
     return split_quantity(text) is not None
 
 
-def _number(value: Any, env: Mapping[str, Any], dimension: str | None) -> Any:
+def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Collection[str]) -> Any:
     if isinstance(value, bool | np.bool_):
         raise ModelError(f"{value} is true or false, a number is wanted; write 1 or 0 if you mean that")
     if isinstance(value, Real):
@@ -244,13 +268,14 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None) -> Any:
         )
     parts = split_quantity(value)
     if parts is None:
-        return _number(Expression.parse(value), env, dimension)
+        return _number(Expression.parse(value), env, dimension, names)
+    names = {*names, *CONSTANTS}
+    if parts[1]:
+        refuse_attached(*parts, names, dimension)
     try:
         return to_si(value, dimension)
     except UnitError as error:
-        if parts[1] in env or parts[1] in FUNCTIONS or parts[1] in CONSTANTS:
-            raise UnitError(f"{error}; if you mean a product, write '{parts[0]}*{parts[1]}'") from None
-        raise
+        raise UnitError(f"{error}{remedy(*parts)}") from None
 
 
 def _in_order(formulas: Mapping[str, Expression]) -> list[str]:

@@ -1,16 +1,21 @@
-"""Reading of formulas: text to a tree of known operations, by Python's own grammar. Nothing is ever executed."""
+"""Reading of formulas: text to a tree of known operations, by Python's own grammar. Nothing is ever executed.
+
+A quantity may stand in a formula where parentheses or commas enclose it: ``"(60 rpm)*t"``, ``"sin(30 deg)"``.
+"""
 
 from __future__ import annotations
 
 import ast
 import difflib
 import math
+import re
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any, NoReturn
 
-from ..errors import ExpressionError, ModelError
+from ..errors import ExpressionError, ModelError, UnitError
+from .units import split_quantity, to_si
 
 CONSTANTS = {"pi": math.pi, "e": math.e}
 
@@ -47,6 +52,8 @@ _BINARY = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/", ast.Pow: "**
 _COMPARE = {ast.Lt: ("<", False), ast.LtE: ("<=", False), ast.Gt: ("<", True), ast.GtE: ("<=", True)}
 _CONDITIONS = ("<", "<=", "and", "or", "not")
 _DEEPEST = 200
+_ENCLOSED = re.compile(r"(?<=[(,])[^(),<>]*(?=[),])")  # all that stands between parentheses or commas
+_WORDS = re.compile(r"\b(if|else|and|or|not|is|for|lambda)\b")
 
 
 @dataclass(frozen=True)
@@ -72,7 +79,8 @@ def read(text: str, tables: Collection[str] = ()) -> tuple[str, Node]:
     if not text:
         raise ExpressionError("the expression is empty; write a number, a quantity such as '5 mm', or a formula")
     try:
-        return text, _Reader(text, tables).read(ast.parse(text, mode="eval").body)
+        masked, quantities = _masked(text)
+        return text, _Reader(text, masked, quantities, tables).read(ast.parse(masked, mode="eval").body)
     except SyntaxError as error:
         start = (error.offset or 1) - 1
         refuse(text, start, start + 1, f"cannot read the expression ({error.msg})", _remedy(text))
@@ -82,11 +90,37 @@ def read(text: str, tables: Collection[str] = ()) -> tuple[str, Node]:
         raise ExpressionError(f"'{text[:60]}...' is nested too deep; split it into parameters") from None
 
 
+def _masked(text: str) -> tuple[str, dict[str, tuple[float, int]]]:
+    """The text with a name, which no user can have meant, in place of each quantity; its value and its length."""
+    quantities: dict[str, tuple[float, int]] = {}
+    spare = (c for c in map(chr, range(0x4E00, 0x9FA0)) if c not in text)
+
+    def put(match: re.Match[str]) -> str:
+        inner = match[0].strip()
+        parts = split_quantity(inner)
+        if parts is None or not parts[1] or _WORDS.search(inner):
+            return match[0]
+        start = match.start() + match[0].index(inner)
+        try:
+            value = to_si(inner, None)
+        except UnitError as error:
+            refuse(text, start, start + len(inner), str(error), f"for a product write {parts[0]}*{parts[1]}")
+        name = next(spare)
+        quantities[name] = value, len(inner)
+        return match[0].replace(inner, name.ljust(len(inner)))
+
+    return _ENCLOSED.sub(put, text), quantities
+
+
 class _Reader:
     """Turns Python's syntax tree into nodes, refusing all that is no formula."""
 
-    def __init__(self, text: str, tables: Collection[str]) -> None:
+    def __init__(
+        self, text: str, masked: str, quantities: dict[str, tuple[float, int]], tables: Collection[str]
+    ) -> None:
         self.text = text
+        self.masked = masked  # as Python reads it, as long as the text
+        self.quantities = quantities
         self.tables = tables
         self.depth = 0
 
@@ -112,7 +146,7 @@ class _Reader:
 
     def span(self, node: Any) -> tuple[int, int]:
         """Where a node stands, in characters (Python counts bytes)."""
-        data = self.text.encode()
+        data = self.masked.encode()
         start, stop = node.col_offset, node.end_col_offset
         return len(data[:start].decode()), len(data[:stop].decode())
 
@@ -127,6 +161,10 @@ class _Reader:
         return self.made(node, "number", value=value if exact else float(value))
 
     def read_Name(self, node: ast.Name) -> Node:
+        if node.id in self.quantities:
+            value, length = self.quantities[node.id]
+            start, _ = self.span(node)
+            return Node("number", (), value, start, start + length)
         if node.id in FUNCTIONS:
             example = f"{node.id}({', '.join(FUNCTIONS[node.id])})"
             self.refuse(node, f"'{node.id}' is a function", f"give its arguments: {example}")
@@ -203,8 +241,8 @@ def refuse(text: str, start: int, stop: int, problem: str, remedy: str) -> NoRet
 
 def _remedy(text: str) -> str:
     if any(a.isdigit() and b.isalpha() for a, b in pairwise(text)):
-        return "write every multiplication, as in 2*x; a unit can follow a single number only ('5 mm')"
-    return _ALLOWED + "; a unit can follow a single number only ('5 mm'): give the quantity a parameter's name"
+        return "write every multiplication, as in 2*x; a quantity in a formula stands in parentheses: 2*(5 mm)"
+    return _ALLOWED + "; a quantity in a formula stands in parentheses, as in (60 rpm)*t"
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:

@@ -72,6 +72,7 @@ class Joint(Element):
     spatial: ClassVar[bool] = True
     in_space: ClassVar[str] = "Prismatic"  # what to take in its place where it is for the plane only
     needs_axis: ClassVar[bool] = False
+    axisless: ClassVar[bool] = False  # no axis of that name is its own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
 
     def ends(self) -> dict[str, str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-import itertools
+import dataclasses
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -13,16 +13,18 @@ import numpy as np
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .coupling import Coupling
-from .element import Element, LawOf, Number, fields_with, plain, resolve
+from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
-from .expressions import law_expression, number, resolve_parameters
-from .force import BodyForce, CoordinateForce, Force, TwoFrameForce, TwoPointForce
+from .expressions import folded, law_expression, number, resolve_parameters
+from .force import Force, TwoFrameForce
 from .function import function_name
 from .geometry import vector
 from .joint import Joint
+from .references import check_references
 from .sensor import IMU, Sensor
+from .summary import summary
 from .table import Table
-from .validity import check_body, check_by_frames, check_joint, refuse_twins
+from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -136,6 +138,9 @@ class Model:
 
     __hash__ = None  # type: ignore[assignment]
 
+    def __repr__(self) -> str:
+        return summary(self)
+
     def find(self, name: str) -> Element | None:
         """The part with that name, if there is one."""
         return self._names.get(name)
@@ -166,7 +171,7 @@ class Model:
                     f"condition"
                 )
             self._check_name(e)
-            self._check_references(e)
+            check_references(self, e)
             self.validate(e, self.environment())
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
@@ -185,7 +190,7 @@ class Model:
         old = self[e.name]
         if old.category != e.category:
             raise ModelError(f"{e.title} cannot take the place of {old.title}")
-        self._check_references(e)
+        check_references(self, e)
         self.validate(e, self.environment())
         parts = getattr(self, e.category)
         parts[parts.index(old)] = e
@@ -206,50 +211,15 @@ class Model:
         if e.name in self._names:
             raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
 
-    def _check_references(self, e: Element) -> None:
-        if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
-            carriers = [self.carrier(name, e) for name in (e.body_i, e.body_j)]
-            if carriers[0] == carriers[1]:
-                raise ModelError(f"{e.title}: both its ends are on {carriers[0]!r}; it must join two different bodies")
-        elif isinstance(e, Frame):
-            if e.body != GROUND:
-                self.body(e.body, e)
-        elif isinstance(e, BodyForce):
-            if self.carrier(e.body, e) == GROUND:
-                raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
-        elif isinstance(e, CoordinateForce):
-            e.examine(self)
-            self._check_path(e)
-        elif isinstance(e, Coupling):
-            for text in e.coupled():
-                self.coordinate(text, e)
-            e.examine(self)
-        elif isinstance(e, Sensor):
-            self.measured(e)
-        elif isinstance(e, IMU):
-            if self.carrier(e.frame, e) == GROUND:
-                raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
-        elif isinstance(e, (Driver, Initial)):
-            self.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
-
-    def _check_path(self, e: CoordinateForce) -> None:
-        """What it acts along exists, and can move."""
-        if e.coordinate_text():
-            self.coordinate(e.coordinate_text(), e)
-        carriers = [self.carrier(name, e) for name in e.ends().values()]
-        for k, (a, b) in enumerate(itertools.pairwise(carriers)):
-            if a == b:
-                raise ModelError(
-                    f"{e.title}: points {k + 1} and {k + 2} are both on {a!r}, so the rope between them never changes "
-                    f"its length; leave one out"
-                )
-
     def body(self, name: str, e: Element) -> Body:
         """The body of that name, as asked for by e."""
         found = self._names.get(name)
         if not isinstance(found, Body):
             names = [b.name for b in self.bodies]
-            raise ModelError(f"{e.title}: there is no body named {name!r}{suggest(name, names)}; {listing(names)}")
+            raise ModelError(
+                f"{e.title}: {field_with(e, name)}there is no body named {name!r}{suggest(name, names)}; "
+                f"{listing(names)}"
+            )
         return found
 
     def carrier(self, name: str, e: Element) -> str:
@@ -260,7 +230,8 @@ class Model:
         if name != GROUND and not isinstance(found, Body):
             names = carriers(self)
             raise ModelError(
-                f"{e.title}: there is no body or frame named {name!r}{but_is(self, name, 'body or frame')}"
+                f"{e.title}: {field_with(e, name)}there is no body or frame named {name!r}"
+                f"{but_is(self, name, 'body or frame')}"
                 f"{suggest(name, names)}; {listing(names)}"
             )
         return name
@@ -271,14 +242,14 @@ class Model:
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
             raise ModelError(
-                f"{e.title}: there is no joint named {name!r}{but_is(self, name, 'joint')}{suggest(name, names)}; "
-                f"{listing(names)}"
+                f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}there is no joint named {name!r}"
+                f"{but_is(self, name, 'joint')}{suggest(name, names)}; {listing(names)}"
             )
         has = found.measured(self.planar)
         if coordinate not in has:
             raise ModelError(
-                f"{e.title}: {found.title} has no coordinate {coordinate!r}{suggest(coordinate, has)}; it has "
-                f"{', '.join(has) or 'none'}"
+                f"{e.title}: {field_with(e, f'{name}.{coordinate}', name)}{found.title} has no coordinate "
+                f"{coordinate!r}{suggest(coordinate, has)}; it has {', '.join(has) or 'none'}"
             )
         return found
 
@@ -289,10 +260,15 @@ class Model:
         if isinstance(found, (Body, Frame)):
             axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
             if what not in axes:
-                raise ModelError(f"{e.title}: {owner!r} has the coordinates {', '.join(axes)}, not {what!r}")
+                raise ModelError(
+                    f"{e.title}: {field_with(e, text)}{owner!r} has the coordinates {', '.join(axes)}, not {what!r}"
+                )
             return found, what
         if not what:
-            raise ModelError(f"{e.title}: {text!r} is no coordinate; write joint.coordinate, for instance 'A.angle'")
+            raise ModelError(
+                f"{e.title}: {field_with(e, text)}{text!r} is no coordinate; write joint.coordinate, for instance "
+                f"'A.angle'"
+            )
         return self.joint(owner, e, what), what
 
     def measured(self, e: Sensor) -> tuple[str, str, int] | None:
@@ -312,18 +288,24 @@ class Model:
         """Resolve the element's numbers and refuse those that make no sense."""
         n = resolve(e, env)
         e.check(n)
+        check_vectors(e, n, self.planar)
         self._check_laws(e)
         check_units(self, e, env)
         if isinstance(e, Body):
             check_body(self, e, n, env)
+        elif isinstance(e, Frame):
+            check_frame(self, e, n)
         elif isinstance(e, Joint):
             check_joint(self, e, n)
         elif isinstance(e, Force):
             e.placed(n, self.planar)
             if isinstance(e, TwoFrameForce) and n.at is None:
                 check_by_frames(self, e)
-        elif isinstance(e, (Driver, Initial)):
-            self._check_told(e, env)
+        elif isinstance(e, Initial):
+            unit = self.unit(e.name, e)
+            for name, value, wanted in (("value", e.value, unit), ("rate", e.rate, f"{unit}/s")):
+                if value is not None:
+                    si_numbers(value, env, wanted, f"{name} of {e.title}")
 
     def _check_laws(self, e: Element) -> None:
         for name, of in fields_with(e.__class__, LawOf).items():
@@ -357,12 +339,13 @@ class Model:
             )
         tables = {x.name: x for x in self.tables}
         try:
-            expression = law_expression(value, of.dimension, where, tables=tables)
+            expression = law_expression(value, of.dimension, where, tables, self.names_in_laws(of))
+            expression = dataclasses.replace(expression, where=where)
+            if expression.tree.kind == "number":
+                limited(expression.tree.value, of.dimension, where)
             sensors = {k: x for k in expression.names if isinstance(x := self._names.get(k), Sensor)}
-            known = {"t", *of.inputs, *sensors, *self.parameters}
-            if not expression.names <= known:  # for the message, all that there are
-                known |= {x.name for x in self.sensors if isinstance(x, Sensor)}
-            expression.require(known)
+            expression.require(self.names_in_laws(of))
+            folded(expression.tree, expression.text)
             refuse_twins(expression.names, of.inputs, sensors, self.parameters)
         except ExpressionError as error:
             text = str(error)
@@ -370,6 +353,10 @@ class Model:
         for name in sorted(sensors):
             self._check_sensed(sensors[name], where, driver)
         return expression
+
+    def names_in_laws(self, of: LawOf) -> set[str]:
+        """All names that such a law may use."""
+        return {"t", *of.inputs, *self.parameters, *(x.name for x in self.sensors if isinstance(x, Sensor))}
 
     def _check_sensed(self, e: Sensor, where: str, driver: bool) -> None:
         """Whether a law may use a sensor."""
@@ -384,8 +371,3 @@ class Model:
                 f"{where}: sensor {e.name!r} measures {e.of!r}, a rate; a driver follows positions and angles only. "
                 f"For a controller use an Actuator or a Motor"
             )
-
-    def _check_told(self, e: Driver | Initial, env: Mapping[str, float]) -> None:
-        """An initial condition says something."""
-        if isinstance(e, Initial) and e.value is None and e.rate is None:
-            raise ModelError(f"{e.title}: it gives neither value nor rate; give value=, rate=, or both")

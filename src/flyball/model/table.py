@@ -12,7 +12,7 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
 from ..math.spline import packed, spline, symbolic
-from .element import Element, element, plain
+from .element import Element, element, limited, plain
 from .grammar import CONSTANTS, FUNCTIONS
 from .units import to_si
 
@@ -120,6 +120,7 @@ class Table(Element):
         for k, value in enumerate(values):
             if value - value != 0.0:
                 raise ModelError(f"{self.title}: {name}[{k}] is {value}; give a finite number, or leave the point out")
+            limited(value, None, f"{self.title}: {name}[{k}]")
         try:
             return np.array(values) * (to_si(f"1 {unit}", None) if unit else 1.0)
         except UnitError as error:

@@ -17,10 +17,11 @@ _QUANTITY = re.compile(  # a number keeps its exponent: "1e6*t" is a formula, no
     rf"\s*(?P<number>{_NUMBER})(?![eE][+-]?\d)\s*(?P<unit>(?:1\s*/\s*)?[^\W\d_].*|[°%µ].*|)\s*", re.DOTALL
 )
 _UNIT = re.compile(r"[\w\s°%µ²³·*/^().-]{1,60}")
+_NO_UNITS = ("speed_of_light", "elementary_charge", "pi", "e")
 _TOWER = re.compile(r"\d{3,}|(?:\*\*|\^)[\s(+-]*[\d.]+[\s)]*(?:\*\*|\^)")
 
 # For each SI unit: what the quantity is called, and a value as a user would write it.
-_KINDS = {
+KINDS = {
     "1": ("a plain number", "0.5"),
     "m": ("a length", "5 mm"),
     "rad": ("an angle", "30 deg"),
@@ -43,7 +44,8 @@ _KINDS = {
     "Pa": ("a pressure", "2 MPa"),
 }
 
-_SYMBOLS = "m mm cm km g kg s ms min h N mN kN MN Nm rad deg rpm rev turn Hz kHz Pa kPa MPa GPa J kJ W kW in ft lbf K"
+_SYMBOLS = "m mm cm km in ft g kg s ms min h deg rad rpm rev turn Hz kHz N mN kN MN Nm lbf Pa kPa MPa GPa J kJ W kW K"
+SYMBOLS = frozenset(_SYMBOLS.split())
 
 
 def split_quantity(text: str) -> tuple[str, str] | None:
@@ -94,6 +96,22 @@ def is_unit(text: str) -> bool:
     return True
 
 
+def powers_as_written(unit: str) -> dict[str, float]:
+    """Long name of each symbol of a unit -> its power: "N/mm" is newton 1, millimeter -1; `UnitError` if unknown."""
+    _unit(unit, unit, None)
+    return dict(_registry().Quantity(1.0, unit).unit_items())
+
+
+def powers_in_si(unit: str) -> dict[str, float]:
+    """Base unit -> its power; `UnitError` if the unit is unknown."""
+    return dict(_unit(unit, unit, None)[1])
+
+
+def unit_name(symbol: str) -> str:
+    """Long name of a single unit ("mm": "millimeter"), or nothing if it is unknown."""
+    return str(_registry().get_name(symbol)) if is_unit(symbol) else ""
+
+
 @lru_cache(maxsize=1)
 def _registry() -> Any:
     import pint
@@ -116,6 +134,10 @@ def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tup
         raise UnitError(f"'{text}': '{unit}' is not a unit; write {_example(dimension)}")
     try:
         parsed = registry.parse_units(unit)
+        if any(
+            name.endswith("_constant") or name in _NO_UNITS for name, _ in registry.Quantity(1.0, parsed).unit_items()
+        ):
+            raise pint.UndefinedUnitError(unit)  # "2 k" is no multiple of Boltzmann's constant
         zero = registry.Quantity(0.0, parsed).to_base_units().magnitude
         base = registry.Quantity(1.0, parsed).to_base_units()
     except pint.UndefinedUnitError:
@@ -137,7 +159,7 @@ def _check_kind(text: str, unit: str, found: tuple[tuple[str, float], ...], dime
     angle, wanted_angle = powers.pop("radian", 0), wanted.pop("radian", 0)
     if powers == wanted and (angle == wanted_angle or (angle == 0 and wanted_angle < 0)):
         return
-    name = _KINDS.get(dimension or "1", ("a quantity", ""))[0]
+    name = KINDS.get(dimension or "1", ("a quantity", ""))[0]
     units = "*".join(f"{n}^{p:g}" if p != 1 else n for n, p in found) or "no unit"
     remedy = ""
     if powers == wanted:
@@ -153,12 +175,12 @@ def _example(dimension: str | None) -> str:
         return "for example '5 mm' or '2 kN/m'"
     if dimension in ("", "1"):
         return "for example '0.5'"
-    example = _KINDS.get(dimension, ("", f"2 {dimension}"))[1]
+    example = KINDS.get(dimension, ("", f"2 {dimension}"))[1]
     return f"for example '{example}', or a number in {dimension}"
 
 
 def _hint(unit: str) -> str:
     """Suggestion for a unit whose only fault is its capitals ("KG", "RPM")."""
-    right = {symbol.lower(): symbol for symbol in _SYMBOLS.split()}
+    right = {symbol.lower(): symbol for symbol in SYMBOLS}
     words = [right[w.lower()] for w in re.findall(r"[^\W\d]+", unit) if right.get(w.lower(), w) != w]
     return f" (did you mean {', '.join(repr(w) for w in words)}?)" if words else ""

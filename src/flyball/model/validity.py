@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body
+from .element import Element, Vector, fields_with
 from .force import TwoFrameForce
 from .geometry import vector
 from .inertia import mass_properties
@@ -16,19 +17,35 @@ if TYPE_CHECKING:
     from .model import Model
 
 
+def check_vectors(e: Element, n: Any, planar: bool) -> None:
+    """Every vector has two components (in the plane) or three."""
+    for name in fields_with(e.__class__, Vector):
+        value = getattr(n, name)
+        for v in value if isinstance(value, tuple) and any(isinstance(x, tuple) for x in value) else (value,):
+            if v is not None and len(v) != 3 and not (planar and len(v) == 2):
+                wanted = 2 if planar else 3
+                raise ModelError(f"{name} of {e.title}: expected {wanted} components, got {len(v)}: {v}")
+
+
+def check_frame(model: Model, e: Any, n: Any) -> None:
+    """How a body's or a frame's axes are told: by an angle in the plane, by an orientation in space."""
+    if model.planar and n.orientation is not None:
+        raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
+    if not model.planar and n.angle != 0.0:
+        raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
+    e.rotation(n)
+
+
 def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
     """Mass properties, pose and velocities of a body."""
     mass_properties(e, n, env, model.planar)
     vector(n.position, model.planar, f"position of {e.title}")
     vector(n.velocity, model.planar, f"velocity of {e.title}")
-    if model.planar and n.orientation is not None:
-        raise ModelError(f"{e.title}: in a planar mechanism give angle=, not orientation=")
-    if not model.planar and n.angle != 0.0:
-        raise ModelError(f"{e.title}: in a spatial mechanism give orientation=, not angle=")
-    if isinstance(n.angular_velocity, tuple) == model.planar and n.angular_velocity is not None:
+    given = n.angular_velocity
+    if given is not None and (isinstance(given, tuple) == model.planar or (not model.planar and len(given) != 3)):
         wanted = "one number" if model.planar else "three components"
-        raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {n.angular_velocity}")
-    e.rotation(n)
+        raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {given}")
+    check_frame(model, e, n)
 
 
 def check_joint(model: Model, e: Joint, n: Any) -> None:
@@ -40,6 +57,8 @@ def check_joint(model: Model, e: Joint, n: Any) -> None:
         )
     if not model.planar and not e.spatial:
         raise ModelError(f"{e.title}: {type(e).__name__} is for planar mechanisms; in space use {e.in_space}")
+    if e.axisless and n.axis is not None:
+        raise ModelError(f"{e.title}: axis has no effect on a {type(e).__name__}; leave it out")
     if n.at is None:
         check_by_frames(model, e)
         return

@@ -20,3 +20,16 @@ def listing(names: list[str]) -> str:
         return "there is none yet; add it first"
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     return f"known: {shown}"
+
+
+def shortened(names: Iterable[str], most: int = 60) -> str:
+    """Names with commas between them, in about so many letters: the last one too where some are left out."""
+    every = list(names)
+    if len(", ".join(every)) <= most or len(every) < 4:
+        return ", ".join(every)
+    kept: list[str] = []
+    for name in every[:-1]:
+        if kept and len(", ".join([*kept, name, every[-1]])) > most - 5:
+            break
+        kept.append(name)
+    return f"{', '.join(kept)}, ... {every[-1]}"

@@ -64,9 +64,16 @@ def animation(result: Result, *, paths: Iterable[Path] = (), show: Collection[st
 
 
 def record(
-    result: Result, *, paths: Iterable[Path] = (), show: Collection[str] = USUAL, curves: bool = True
+    result: Result,
+    *,
+    paths: Iterable[Path] = (),
+    show: Collection[str] = USUAL,
+    curves: bool = True,
+    told: bool = True,
 ) -> Recording:
-    """Make the recording that pictures and pages read, with or without curves and arrows; see `animation`.
+    """Make the recording that pictures and pages read; see `animation`.
+
+    Without ``curves`` it has no curves and arrows, unless ``told`` no notes and facts of parts.
 
     Bodies are placed by their reference frames, so that shapes lie on them as the user gave them. Bodies without
     shapes get some that follow from their joints and inertia.
@@ -92,13 +99,13 @@ def record(
         channels=channels,
         shown=shown(result, [c.name for c in channels]),
         size=looks.size,
-        notes=dict(result.health.lines()),
+        notes=dict(result.health.lines()) if told else {},
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
         arrows=arrows(result, places, every) if curves else (),
         frames=tuple(_frames(result, places)),
         paths=tuple(_path(result, p) for p in paths),
         show=_chosen(show),
-        facts=facts(result),
+        facts=facts(result) if told else {},
         down=_down(result),
     )
 

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
-from ..element import Density, Element, Mass, Point, positive
+from ..element import Density, Element, Flag, Mass, Point, positive
 from ..geometry import orientation_matrix, vector
 from ..orientation import Orientation
 
@@ -47,8 +47,8 @@ class Solid(Element):
     orientation: Orientation = (1.0, 0.0, 0.0, 0.0)
     density: Density | None = None
     mass: Mass | None = None
-    looks: bool = False
-    hole: bool = False
+    looks: Flag = False
+    hole: Flag = False
 
     category: ClassVar[str] = "shapes"
     points: ClassVar[tuple[str, ...]] = ("position",)  # fields that are points of the body

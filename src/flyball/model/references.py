@@ -1,0 +1,58 @@
+"""Whether what an element names is there, and is what the element needs."""
+
+from __future__ import annotations
+
+import itertools
+from typing import TYPE_CHECKING
+
+from ..errors import ModelError
+from .body import GROUND, Driver, Frame, Initial
+from .coupling import Coupling
+from .element import Element
+from .force import BodyForce, CoordinateForce, TwoFrameForce, TwoPointForce
+from .joint import Joint
+from .sensor import IMU, Sensor
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def check_references(model: Model, e: Element) -> None:
+    """Refuse what names parts that are not there, or both times the same one."""
+    if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
+        carriers = [model.carrier(name, e) for name in (e.body_i, e.body_j)]
+        if carriers[0] == carriers[1]:
+            raise ModelError(f"{e.title}: both its ends are on {carriers[0]!r}; it must join two different bodies")
+    elif isinstance(e, Frame):
+        if e.body != GROUND:
+            model.body(e.body, e)
+    elif isinstance(e, BodyForce):
+        if model.carrier(e.body, e) == GROUND:
+            raise ModelError(f"{e.title}: a force on ground moves nothing; name a body")
+    elif isinstance(e, CoordinateForce):
+        e.examine(model)
+        _check_path(model, e)
+    elif isinstance(e, Coupling):
+        for text in e.coupled():
+            model.coordinate(text, e)
+        e.examine(model)
+    elif isinstance(e, Sensor):
+        model.measured(e)
+    elif isinstance(e, IMU):
+        if model.carrier(e.frame, e) == GROUND:
+            raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
+    elif isinstance(e, (Driver, Initial)):
+        model.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
+
+
+def _check_path(model: Model, e: CoordinateForce) -> None:
+    """What it acts along exists, and can move."""
+    if e.coordinate_text() or hasattr(e, "coordinate"):
+        model.coordinate(e.coordinate_text(), e)
+    carriers = [model.carrier(name, e) for name in e.ends().values()]
+    for k, (a, b) in enumerate(itertools.pairwise(carriers)):
+        if a == b:
+            raise ModelError(
+                f"{e.title}: points {k + 1} and {k + 2} are both on {a!r}, so the rope between them never changes "
+                f"its length; leave one out"
+            )
