@@ -20,11 +20,13 @@ from ..results.result import Result
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
+from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.steady import kinematic, moved_on, seen_from
+from .linear.spectrum import spectrum
+from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
 
@@ -108,7 +110,9 @@ def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations,
     f = free(e, like)
     refuse_singular(e, f)
     still = np.zeros((len(x.v),) * 2)
-    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame.told = told(x, frame, frozen)
+    return e, f, frame
 
 
 def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
@@ -175,6 +179,11 @@ def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequen
     return [A, B + A @ shift, C, D + C @ shift]
 
 
+def _sorted(w: np.ndarray) -> np.ndarray:
+    """By imaginary, then real part; the upper one of a pair after the lower."""
+    return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
+
+
 def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
@@ -184,11 +193,11 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
     sign = np.array([n.sign for n in (*named, *rates)])
-    own = sign[: len(named)]
+    own, A = sign[: len(named)], sign[:, None] * A * sign
     second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
     return LinearModel(
         name=s.model.name,
-        A=sign[:, None] * A * sign,
+        A=A,
         B=sign[:, None] * B,
         C=C * sign,
         D=D,
@@ -203,7 +212,9 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
         damping=second[1],
         stiffness=second[2],
         turning=frame.turning,
+        eigenvalues=_sorted(spectrum(A, None if r.doubt is None else r.doubt.signed(sign)).values),
         t=x.t,
         motion=r.position[:, : len(sign)] * sign,
         point=shot,
+        seen_from=frame.told,
     )

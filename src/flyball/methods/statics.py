@@ -9,9 +9,9 @@ if TYPE_CHECKING:
     from ..model.model import Model
     from ..results.equilibrium import Equilibrium
     from ..results.linear import LinearModel
-    from ..results.locus import RootLocus
     from ..results.modes import Modes
     from ..results.result import Result
+    from ..results.root_locus import RootLocus
     from ..results.series import EquilibriumSeries
 else:
     Model = object  # a mechanism is one; signatures alone load nothing
@@ -256,6 +256,6 @@ class Statics(Model):
         ModelError
             If there is no such parameter, or ``about`` is an equilibrium, which is one of other values.
         """
-        from ..analysis.locus import RootLocusOptions, root_locus
+        from ..analysis.root_locus import RootLocusOptions, root_locus
 
         return root_locus(self, RootLocusOptions.asked(locals()))

@@ -12,7 +12,7 @@ from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..results.equilibrium import Equilibrium
 from ..results.linear import follow
-from ..results.locus import Crossing, RootLocus
+from ..results.root_locus import Crossing, RootLocus
 from .linearize import InstantOptions, LinearizeOptions, linearize
 from .progress import shown
 from .series import EquilibriaOptions, checked, equilibria, stopped
