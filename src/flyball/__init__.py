@@ -115,6 +115,7 @@ _HOME = {
     "Table": "model.table",
     "load": "files",
     "PerformanceNotice": "errors",
+    "StartWarning": "errors",
     "load_result": "files",
     "Result": "results.result",
     "FlyballError": "errors",

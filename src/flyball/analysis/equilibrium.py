@@ -16,7 +16,8 @@ from ..errors import ModelError, NotConverged
 from ..model.model import Model
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from ..tables.names import velocity_names
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .linear.curves import snapshot
 from .linear.derivatives import State
 from .linear.preload import preloaded

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -10,13 +11,15 @@ from functools import partial
 import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
+from ..errors import StartWarning
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
+from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
 from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
-from .assemble import Assembly
+from .assembly.start import Assembly
 from .motion import partition
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.options import STABILIZATION, Integration, output_times
@@ -47,6 +50,8 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     times = output_times(t_start, o.t_end, o.outputs)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
+    for d in changed_velocities(begun.base.departures):
+        warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from ..analysis.assemble import Assembly
+    from ..analysis.assembly.start import Assembly
     from ..analysis.check import Report
     from ..analysis.mass import MassReport
     from ..analysis.mobility import Mobility

@@ -19,7 +19,7 @@ from ...tables.forest import step_of
 from ...tables.names import velocity_names
 from ...tables.specs import Structure
 from ...tables.system import BODY_LAW, V0
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..motion.layer import in_coordinates
 from .balance import settled, unbalanced
 from .derivatives import Equations, State

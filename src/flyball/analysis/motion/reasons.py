@@ -36,7 +36,7 @@ from ...tables.system import (
     TREE,
     VALUE,
 )
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
