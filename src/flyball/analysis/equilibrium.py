@@ -20,6 +20,7 @@ from .assemble import assemble
 from .assembly.start import Assembly
 from .linear.curves import snapshot
 from .linear.derivatives import State
+from .linear.kinks import kinks
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.stability import GROWTH, stability
@@ -208,6 +209,7 @@ def _finished(x: Rest, preload: dict[str, float], way: str) -> Equilibrium:
         result=snapshot(State.resting(x.c, x.t, x.q, x.lam)),
         assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
         preload=preload,
+        kinks=s.kinks,
     )
 
 
@@ -217,6 +219,13 @@ def _failure(x: Rest) -> NotConverged:
     names = velocity_names(x.c.structure)
     left = best.equations.block("r")
     residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    jumps = "; ".join(k.text for k in kinks(best.equations) if k.jump)
+    if jumps:
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
+            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            residuals,
+        )
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
         f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",

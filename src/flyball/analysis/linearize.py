@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel
 from ..results.result import Result
@@ -24,6 +25,7 @@ from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
+from .linear.kinks import refuse_kinks
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
@@ -66,11 +68,13 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    for name in o.outputs:
+        one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     x = o.state(model)
     model, named = with_inputs(x.c.structure.model, o.inputs)
     if named:
         x = _in_copy(model, x)
-    e, f, frame = _about(x, o.frozen)
+    e, f, frame = _about(x, o.frozen, to=[i.name for i in named if i.name == i.parameter])
     r = _reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or o.outputs):
         _refuse_turning(e, f, r, frame, named, o.outputs)
@@ -105,10 +109,12 @@ def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> 
     return f, frame, _reduced(e, f, frame, None)
 
 
-def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations, Free, Frame]:
+def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = ()) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e, like)
     refuse_singular(e, f)
+    both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
+    refuse_kinks(e, *both, to)
     still = np.zeros((len(x.v),) * 2)
     frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
     frame.told = told(x, frame, frozen)

@@ -17,6 +17,7 @@ from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
+from .linear.kinks import refuse_kinks
 from .linear.spectrum import EQUAL, spectrum
 from .linear.steady import balanced
 from .linearize import InstantOptions, without_inputs
@@ -96,6 +97,7 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
     e = Equations(x)
     if not frozen:
         balanced(x, e)
+    refuse_kinks(e)
     if not all(row.holonomic for row in x.c.structure.rows):
         raise AnalysisError(
             f"{x.c.structure.model.name!r} has {len(x.v)} velocities and constraints on velocities only; modes of so "

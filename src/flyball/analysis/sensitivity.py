@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ModelError, SingularityError
 from ..model.model import Model, listing, suggest
+from ..model.quantities import one
 from ..results.linear import follow
 from ..results.result import Result
 from ..results.sensitivity import Sensitivity
@@ -22,6 +23,7 @@ from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
+from .linear.kinks import refuse_kinks
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.undetermined import refuse_undetermined
@@ -66,7 +68,7 @@ class DerivativeOptions(Options):
         if self.about is not None and self.analysis != "modes":
             raise ModelError(f"about is for modes; with analysis={self.analysis!r} it does nothing")
         if self.about not in (None, "equilibrium"):
-            raise ModelError(f"about must be 'equilibrium' or nothing, got {self.about!r}")
+            raise ModelError(f"about must be 'equilibrium' or nothing, got {_what(self.about)}")
 
     def of_motion(self, name: str) -> Any:
         """An option of a motion, or what is usual."""
@@ -110,6 +112,8 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
         if name not in env:
             known = list(env)
             raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+    for name in o.of if o.analysis != "modes" else ():
+        one(model, name)
     times = np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs"))
     rtol, atol = o.of_motion("rtol"), o.of_motion("atol")
     a = Question(model.snapshot(), o.of, o.to or tuple(env), o.t, dict(o.parameters or {}), times, o.about, rtol, atol)
@@ -124,6 +128,11 @@ def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
     parts = [check(a.model, a.parameters, name, again) for name in a.to]
     out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
     return out
+
+
+def _what(value: Any) -> str:
+    """A value in a message: a text as it is, else what kind of thing it is."""
+    return repr(value) if isinstance(value, (str, float, int)) else f"a {type(value).__name__}"
 
 
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
@@ -148,8 +157,17 @@ def _instant(a: Question) -> Sensitivity:
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    found = _columns(a, x, directions, start_tangents(a.model, a.parameters, base, x, directions))
+    tangents = start_tangents(a.model, a.parameters, base, x, directions)
+    _refuse_kinks(a, e, tangents)
+    found = _columns(a, x, directions, tangents)
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
+
+
+def _refuse_kinks(a: Question, e: Equations, tangents: Sequence[Tangent]) -> None:
+    """Refuse forces that have no slope along the changes with the parameters, or by one of these."""
+    none = np.zeros((len(e.state.v), 1))
+    dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
+    refuse_kinks(e, dq, dv, a.to)
 
 
 def _at_instant(a: Question) -> Found:
@@ -170,6 +188,7 @@ def _motion(a: Question) -> Sensitivity:
         way = _driven(a, x, directions, times)
     else:
         refuse_jumps(a.model, a.to)
+        _refuse_kinks(a, e, ())
         way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
             times, a.rtol, a.atol
         )
@@ -239,6 +258,7 @@ def _equilibrium(a: Question) -> Sensitivity:
         left = d.along(x, still, still)
         q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
         tangents.append(Tangent(q, still, still, lam))
+    _refuse_kinks(a, rest.equations, tangents)
     column = _columns(a, x, directions, tangents)
     return Sensitivity(
         "equilibrium", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], column[None]
@@ -257,7 +277,9 @@ def _at_rest(a: Question) -> Found:
 
 def _modes(a: Question) -> Sensitivity:
     state = _states(a)
-    f, _, base = without_inputs(state(a.parameters))
+    begin = state(a.parameters)
+    f, _, base = without_inputs(begin)
+    _refuse_kinks(a, Equations(begin), ())
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         return without_inputs(state(parameters), like=f)[2].A

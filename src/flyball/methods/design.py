@@ -71,7 +71,7 @@ class Design(Model):
             If a name does not exist, an option has no effect in this analysis, a reaction is left undetermined by
             redundancy, or a law jumps during a motion.
         SingularityError
-            If what is asked has no derivative there.
+            If what is asked has no derivative there: at a kink of a force, for instance.
         """
         from ..analysis.sensitivity import SensitivityOptions, sensitivity
 

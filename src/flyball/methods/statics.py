@@ -63,6 +63,8 @@ class Statics(Model):
             If a name does not exist, or options say nothing beside each other.
         NotConverged
             If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
+        SingularityError
+            If it is found where a force jumps, or has a kink whose sides leave its stability open.
         """
         from ..analysis.equilibrium import EquilibriumOptions, equilibrium
 
@@ -161,7 +163,7 @@ class Statics(Model):
         AnalysisError
             If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
         SingularityError
-            At a singular position.
+            At a singular position, or where a force has a kink or jumps.
         ModelError
             If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
         """
