@@ -13,7 +13,7 @@ import pytest
 
 import flyball as fb
 from flyball.analysis import simulate
-from flyball.analysis.assemble import Assembly
+from flyball.analysis.assembly.start import Assembly
 from flyball.analysis.motion.options import Options, options_from
 from flyball.analysis.motion.start import Start, begin
 

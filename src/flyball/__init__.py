@@ -94,10 +94,10 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
-    from .results.locus import RootLocus as RootLocus
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
     from .results.result import Result as Result
+    from .results.root_locus import RootLocus as RootLocus
     from .results.sensitivity import Sensitivity as Sensitivity
     from .results.series import EquilibriumSeries as EquilibriumSeries
     from .results.singularities import Singularities as Singularities
@@ -115,6 +115,7 @@ _HOME = {
     "Table": "model.table",
     "load": "files",
     "PerformanceNotice": "errors",
+    "StartWarning": "errors",
     "load_result": "files",
     "Result": "results.result",
     "FlyballError": "errors",
@@ -140,7 +141,7 @@ _HOME = {
     "LinearModel": "results.linear",
     "Modes": "results.modes",
     "Optimum": "results.optimum",
-    "RootLocus": "results.locus",
+    "RootLocus": "results.root_locus",
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
 }

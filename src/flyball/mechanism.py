@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .model.model import Model
 
 if TYPE_CHECKING:
-    from .analysis.assemble import Assembly
+    from .analysis.assembly.start import Assembly
     from .analysis.check import Report
     from .analysis.mass import MassReport
     from .analysis.mobility import Mobility
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from .results.equilibrium import Equilibrium
     from .results.inverse import InverseDynamics
     from .results.linear import LinearModel
-    from .results.locus import RootLocus
     from .results.modes import Modes
     from .results.optimum import Optimum
     from .results.result import Result
+    from .results.root_locus import RootLocus
     from .results.sensitivity import Sensitivity
     from .results.series import EquilibriumSeries
     from .results.singularities import Singularities
@@ -101,8 +101,8 @@ class Mechanism(Model):
         return equilibria(self, parameter, values, **options)
 
     def root_locus(self, parameter: str, values: Sequence[float], **options: Any) -> RootLocus:
-        """Eigenvalues over values of a parameter; see `flyball.analysis.locus.root_locus` for the options."""
-        from .analysis.locus import root_locus
+        """Eigenvalues over values of a parameter; see `flyball.analysis.root_locus.root_locus` for the options."""
+        from .analysis.root_locus import root_locus
 
         return root_locus(self, parameter, values, **options)
 

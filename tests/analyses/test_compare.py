@@ -296,7 +296,7 @@ def test_the_table_names_everything(top, tmp_path):
     plain = json.loads(json.dumps(top.as_dict()["formulations"]["partitioning"]))
     assert plain["position_drift"] < ROUNDING
     assert len(top) == len(list(top)) == 9
-    with pytest.raises(KeyError, match="nothing"):
+    with pytest.raises(fb.ModelError, match="nothing"):
         top["nothing"]
     top.plot(tmp_path / "compared.png")
     assert (tmp_path / "compared.png").stat().st_size > 20_000

@@ -19,7 +19,6 @@ from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result
 from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
-from .assemble import Assembly
 from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.options import Options, options_from, output_times
@@ -208,7 +207,7 @@ def _start(job: _Task, way: Way) -> Start:
         )
     c = compiled(job.model, parameters=job.parameters, coupled=True)
     c.z = a.compiled.z.copy()
-    return replace(job.base, assembly=Assembly(c, a.t, a.q, a.v, a.moved, a.iterations, a.sped))
+    return replace(job.base, assembly=replace(a, compiled=c))
 
 
 def _motion(job: _Task, start: Start, o: Options) -> tuple[Result | None, str]:

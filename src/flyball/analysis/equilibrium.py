@@ -16,9 +16,11 @@ from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from ..tables.names import velocity_names
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .linear.curves import snapshot
 from .linear.derivatives import State
+from .linear.kinks import kinks
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.stability import GROWTH, stability
@@ -79,6 +81,8 @@ def equilibrium(
         If a name does not exist, or options say nothing beside each other.
     NotConverged
         If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
+    SingularityError
+        If it is found where a force jumps, or has a kink whose sides leave its stability open.
     """
     _refuse_together(stable, preload, turning)
     a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
@@ -231,6 +235,7 @@ def _finished(x: Rest, preload: dict[str, float], way: str) -> Equilibrium:
         result=snapshot(State.resting(x.c, x.t, x.q, x.lam)),
         assembly=Assembly(x.c, x.t, x.q, np.zeros(len(x.scale))),
         preload=preload,
+        kinks=s.kinks,
     )
 
 
@@ -240,6 +245,13 @@ def _failure(x: Rest) -> NotConverged:
     names = velocity_names(x.c.structure)
     left = best.equations.block("r")
     residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    jumps = "; ".join(k.text for k in kinks(best.equations) if k.jump)
+    if jumps:
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
+            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            residuals,
+        )
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
         f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",

@@ -18,7 +18,8 @@ from ..model.body import Driver
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.result import Result
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
 from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian

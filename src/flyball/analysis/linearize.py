@@ -14,15 +14,19 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
+from ..model.quantities import one
 from ..results.linear import LinearModel
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
+from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
+from .linear.kinks import refuse_kinks
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.steady import kinematic, moved_on, seen_from
+from .linear.spectrum import spectrum
+from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
@@ -74,21 +78,28 @@ def linearize(
     AnalysisError
         If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
     SingularityError
-        At a singular position.
+        At a singular position, or where a force has a kink or jumps.
     ModelError
         If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
     """
-    if isinstance(inputs, str) or isinstance(outputs, str):
-        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    _refuse_names(model, inputs, outputs)
     x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
     model, named = with_inputs(x.c.structure.model, inputs)
     if named:
         x = _in_copy(model, x)
-    e, f, frame = _about(x, frozen)
+    e, f, frame = _about(x, frozen, to=[i.name for i in named if i.name == i.parameter])
     r = _reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or outputs):
         _refuse_turning(e, f, r, frame, named, outputs)
     return _model(e, f, r, frame, named, outputs)
+
+
+def _refuse_names(model: Model, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+    """Refuse outputs that do not exist; inputs are looked up where they are added."""
+    if isinstance(inputs, str) or isinstance(outputs, str):
+        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
+    for name in outputs:
+        one(model, name)
 
 
 def _refuse_turning(
@@ -119,12 +130,16 @@ def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> 
     return f, frame, _reduced(e, f, frame, None)
 
 
-def _about(x: State, frozen: bool, like: Free | None = None) -> tuple[Equations, Free, Frame]:
+def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = ()) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e, like)
     refuse_singular(e, f)
+    both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
+    refuse_kinks(e, *both, to)
     still = np.zeros((len(x.v),) * 2)
-    return e, f, Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame.told = told(x, frame, frozen)
+    return e, f, frame
 
 
 def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
@@ -191,6 +206,11 @@ def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequen
     return [A, B + A @ shift, C, D + C @ shift]
 
 
+def _sorted(w: np.ndarray) -> np.ndarray:
+    """By imaginary, then real part; the upper one of a pair after the lower."""
+    return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
+
+
 def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
     x, s = e.state, e.state.c.structure
     shot = snapshot(x)
@@ -200,11 +220,11 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
     sign = np.array([n.sign for n in (*named, *rates)])
-    own = sign[: len(named)]
+    own, A = sign[: len(named)], sign[:, None] * A * sign
     second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
     return LinearModel(
         name=s.model.name,
-        A=sign[:, None] * A * sign,
+        A=A,
         B=sign[:, None] * B,
         C=C * sign,
         D=D,
@@ -219,7 +239,9 @@ def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input],
         damping=second[1],
         stiffness=second[2],
         turning=frame.turning,
+        eigenvalues=_sorted(spectrum(A, None if r.doubt is None else r.doubt.signed(sign)).values),
         t=x.t,
         motion=r.position[:, : len(sign)] * sign,
         point=shot,
+        seen_from=frame.told,
     )

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import AssemblyError, ModelError
 from ..model.model import Model
 from ..tables.system import SEMIDEFINITE
-from .assemble import Assembly, assemble
+from .assembly.start import Assembly, assembled
 from .compiled import Compiled
 
 if TYPE_CHECKING:
@@ -193,7 +193,7 @@ def mobility(
     gap = ""
     if a is None:
         try:
-            a = assemble(model, t=t, parameters=parameters)
+            a = assembled(model, t=t, parameters=parameters)
         except AssemblyError as error:
             if error.best is None:
                 raise

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
+from ..model.quantities import one
 from ..results.linear import follow
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
@@ -22,6 +23,7 @@ from .linear.differences import Found, aside, check, derivative
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
+from .linear.kinks import refuse_kinks
 from .linear.rest import Rest
 from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.undetermined import refuse_undetermined
@@ -96,7 +98,7 @@ def sensitivity(
     ModelError
         If a name does not exist, a reaction is left undetermined by redundancy, or a law jumps during a motion.
     SingularityError
-        If what is asked has no derivative there.
+        If what is asked has no derivative there: at a kink of a force, for instance.
     """
     _refuse(model, of, to, analysis, parameters)
     env, start = model.environment(parameters), number(t, {}, "s", "t")
@@ -126,10 +128,17 @@ def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, p
         raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
     if analysis not in ANALYSES:
         raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, list(ANALYSES))}; {listing(list(ANALYSES))}")
+    for name in of if analysis != "modes" else ():
+        one(model, name)
     known = list(model.environment(parameters))
     for name in to:
         if name not in known:
             raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+
+
+def _what(value: Any) -> str:
+    """A value in a message: a text as it is, else what kind of thing it is."""
+    return repr(value) if isinstance(value, (str, float, int)) else f"a {type(value).__name__}"
 
 
 def _row(x: State, names: Sequence[str]) -> np.ndarray:
@@ -154,8 +163,17 @@ def _instant(a: Question) -> Sensitivity:
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    found = _columns(a, x, directions, start_tangents(a.model, a.parameters, base, x, directions))
+    tangents = start_tangents(a.model, a.parameters, base, x, directions)
+    _refuse_kinks(a, e, tangents)
+    found = _columns(a, x, directions, tangents)
     return Sensitivity("instant", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], found[None])
+
+
+def _refuse_kinks(a: Question, e: Equations, tangents: Sequence[Tangent]) -> None:
+    """Refuse forces that have no slope along the changes with the parameters, or by one of these."""
+    none = np.zeros((len(e.state.v), 1))
+    dq, dv = (np.column_stack([none, *ways]) for ways in ([k.q for k in tangents], [k.v for k in tangents]))
+    refuse_kinks(e, dq, dv, a.to)
 
 
 def _at_instant(a: Question) -> Found:
@@ -176,6 +194,7 @@ def _motion(a: Question) -> Sensitivity:
         way = _driven(a, x, directions, times)
     else:
         refuse_jumps(a.model, a.to)
+        _refuse_kinks(a, e, ())
         way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
             times, a.rtol, a.atol
         )
@@ -231,6 +250,7 @@ def _equilibrium(a: Question) -> Sensitivity:
         left = d.along(x, still, still)
         q, lam = rest.solved(left[d.e.at["r"]], left[d.e.at["g"]])
         tangents.append(Tangent(q, still, still, lam))
+    _refuse_kinks(a, rest.equations, tangents)
     column = _columns(a, x, directions, tangents)
     return Sensitivity(
         "equilibrium", a.of, a.to, _units(x, a.of), {}, np.array([a.t]), _row(x, a.of)[None], column[None]
@@ -249,7 +269,9 @@ def _at_rest(a: Question) -> Found:
 
 def _modes(a: Question) -> Sensitivity:
     state = _states(a)
-    f, _, base = without_inputs(state(a.parameters))
+    begin = state(a.parameters)
+    f, _, base = without_inputs(begin)
+    _refuse_kinks(a, Equations(begin), ())
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
         return without_inputs(state(parameters), like=f)[2].A
@@ -265,7 +287,7 @@ def _modes(a: Question) -> Sensitivity:
 def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
     """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
     if a.about not in (None, "equilibrium"):
-        raise ModelError(f"about must be 'equilibrium' or nothing, got {a.about!r}")
+        raise ModelError(f"about must be 'equilibrium' or nothing, got {_what(a.about)}")
     begin: list[Any] = []
 
     def state(parameters: Mapping[str, float]) -> State:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import time
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
+from ..errors import StartWarning
 from ..laws.functions import forget, interrupts_kept
 from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
+from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
 from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
-from .assemble import Assembly
+from .assembly.start import Assembly
 from .motion import partition
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.options import STABILIZATION, Options, options_from, output_times
@@ -73,6 +76,8 @@ def simulate(
     times = output_times(t_start, t_end, outputs)
     begun = begin(model, t_start, parameters, start, chosen.coordinates)
     begun.since = started
+    for d in changed_velocities(begun.base.departures):
+        warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
     follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
     return moved(begun, t_end, times, chosen, FOLLOW if follow else INTEGRATE, progress)
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...results.result import Result
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import CHANGED, DENSE, TOLERANCE, _null_space, lengths, self_stresses
 

@@ -10,7 +10,7 @@ import numpy as np
 from ...model.body import Body, Initial
 from ...model.joint import Joint
 from ...tables.system import NV, V0
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import lengths
 from .supports import irreducible

@@ -17,7 +17,8 @@ from ...equations.scratch import work
 from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
 from ...tables.system import NQ, Q0
-from ..assemble import Assembly, closed_near
+from ..assembly.positions import closed_near
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import lengths, motions_of, rank_of
 

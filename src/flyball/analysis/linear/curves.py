@@ -15,7 +15,7 @@ from ...results.health import Health
 from ...results.result import Result
 from ...tables.system import G_VALUE, NU, V0
 from ...tables.values import Values
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import Mobility, mobility
 from .derivatives import STEP, State

@@ -11,6 +11,7 @@ from ...errors import SimulationError
 from ...model.model import Model
 from ...numerics.integrators import explicit as ex
 from ...results import doubts
+from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Owed, Result
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
@@ -80,7 +81,8 @@ def _health(start: Start, clock: ex.Clock, o: Options) -> Health:
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
         options={k: getattr(o, k) for k in o.__dataclass_fields__},
-        remarks=remarks(start.assembly),
+        remarks=(*map(not_allowed, changed_velocities(start.base.departures)), *remarks(start.assembly)),
+        departures=start.base.departures,
         coordinates=start.coordinates,
     )
 

@@ -12,7 +12,8 @@ from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
 from ...tables.system import G_VALUE, Q0, SEMIDEFINITE
-from ..assemble import Assembly, assemble
+from ..assemble import assemble
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import mobility
 from .layer import in_coordinates

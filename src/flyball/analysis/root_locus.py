@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..results.linear import follow
-from ..results.locus import Crossing, RootLocus
+from ..results.root_locus import Crossing, RootLocus
 from .linearize import linearize
 from .series import checked, equilibria, stopped
 
