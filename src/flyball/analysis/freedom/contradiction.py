@@ -14,11 +14,13 @@ import numpy as np
 
 from ...model.body import Driver, Initial
 from ...model.joint import Joint
+from ...numerics.rank import TOLERANCE, null_space, parts
+from ...numerics.rank import rank as rank_of
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
-from ..mobility import TOLERANCE, scaled_jacobian
 from .freedoms import free_motions
 from .geometry import positions_nearby
+from .jacobian import scaled_jacobian
 
 PART = 1e-6  # part of the largest share in a contradiction below which an element has none
 MOVES = 1e-6  # part of its own gradient by which what is free moves a coordinate, below which it does not
@@ -66,9 +68,8 @@ def story(c: Compiled, t: float, q: np.ndarray, v: np.ndarray, right: np.ndarray
     case = Case(c, t, q, v, right, per)
     c.at(t, q, v)
     G, size, _ = scaled_jacobian(c)
-    U, d, _ = np.linalg.svd(G.toarray(), full_matrices=True)
-    rank = int((d > TOLERANCE * d.max(initial=0.0)).sum())
-    over = U[:, rank:] @ (U[:, rank:].T @ (right / np.maximum(size, 1e-300)))
+    Y = parts(G.toarray()).dependencies
+    over = Y @ (Y.T @ (right / np.maximum(size, 1e-300)))
     s = c.structure
     shares = {k: float(np.abs(over[rows]).max(initial=0.0)) for k, rows in s.slices.items()}
     names = [k for k, x in shares.items() if x > PART * max(shares.values()) > 0.0]
@@ -78,7 +79,7 @@ def story(c: Compiled, t: float, q: np.ndarray, v: np.ndarray, right: np.ndarray
     if len(asking) > 1:
         return _several(case, asking, names)
     others = ~case.rows([k for k in s.slices if _asks(s, k)])
-    free = _null_space(G.toarray()[others])
+    free = null_space(G.toarray()[others])
     if not free.shape[1]:
         return _nothing_free(case, asking[0], [k for k in names if k not in asking], int(others.sum()), G[others])
     return _not_moved(case, asking[0], [k for k in names if k not in asking])
@@ -117,9 +118,8 @@ def _nothing_free(case: Case, name: str, holding: list[str], rows: int, G: Any) 
     """No freedom is left without what asks: a structure, or one whose freedom its dimensions do not leave."""
     counted = case.c.structure.nv - rows
     names = ", ".join(holding[:NAMED])
-    rank = int(np.linalg.matrix_rank(G.toarray(), tol=TOLERANCE))
     begin = f"{_title(case, name)} finds nothing to move: the constraints of {names} leave no freedom"
-    if counted >= 0 or case.c.structure.model.planar or rank == rows:
+    if counted >= 0 or case.c.structure.model.planar or rank_of(G.toarray()) == rows:
         return (
             f"{begin}, and counting joints leaves {counted}: it is a structure. Replace a joint by one that holds "
             f"less, add a body between two of them, or leave the driver out"
@@ -164,7 +164,7 @@ def _not_moved(case: Case, name: str, holding: list[str]) -> str:
     a = Assembly(own, case.t, case.q, case.v)
     own.at(case.t, case.q, case.v)
     G, _, scale = scaled_jacobian(own)
-    motions = _null_space(G.toarray()) * scale[:, None]
+    motions = null_space(G.toarray()) * scale[:, None]
     free = ", ".join(m.name for m in free_motions(a, motions)[:NAMED])
     coordinate = _coordinate(case, name)
     near = [q for q in positions_nearby(a, motions) if _moved_at(case, name, q)]
@@ -187,12 +187,4 @@ def _moved_at(case: Case, name: str, q: np.ndarray) -> bool:
     c.at(case.t, q, case.v)
     G = scaled_jacobian(c)[0].toarray()
     others = ~case.rows([k for k in c.structure.slices if _asks(c.structure, k)])
-    return bool(np.abs(G[case.rows([name])] @ _null_space(G[others])).max(initial=0.0) > MOVES)
-
-
-def _null_space(G: np.ndarray) -> np.ndarray:
-    """Motions (nv, f) that rows of unit size allow."""
-    if not len(G):
-        return np.eye(G.shape[1])
-    _, d, Vt = np.linalg.svd(G, full_matrices=True)
-    return Vt[int((d > TOLERANCE * d.max(initial=0.0)).sum()) :].T
+    return bool(np.abs(G[case.rows([name])] @ null_space(G[others])).max(initial=0.0) > MOVES)
