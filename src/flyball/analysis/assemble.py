@@ -270,9 +270,10 @@ def _disagreement(c: Compiled, best: Assembly) -> AssemblyError:
     g = c.work.row[G_VALUE]
     lawless = [r.element for r, x in zip(c.structure.rows, g, strict=True) if r.law >= 0 and not np.isfinite(x)]
     if lawless:
+        missed = c.structure.missed(c.work.stack)
         raise AssemblyError(
             f"{c.structure.model.name!r} cannot be assembled at t = {t:g} s: the law of {lawless[0].title} has no "
-            f"finite value there"
+            f"finite value there{f': {missed.message}' if missed is not None else ''}"
         )
     gaps: dict[str, tuple[float, float, str]] = {}
     for name, rows in c.structure.slices.items():

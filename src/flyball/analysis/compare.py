@@ -22,6 +22,7 @@ from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU,
 from .assemble import Assembly
 from .compiled import Compiled, compiled
 from .motion import partition
+from .motion.ahead import refuse_missing
 from .motion.options import Options, options_from, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin
@@ -124,6 +125,7 @@ def compare(
     span = (t_start, float(number(t_end, {}, "s", "t_end")))
     times = output_times(*span, outputs)
     base = begin(model, t_start, parameters, start, "absolute")
+    refuse_missing(base.base, span[1])
     job = _Task(model, span, times, chosen, base, parameters, start)
     truth, told = _reference(job)
     if "max_steps" not in options:

@@ -171,7 +171,9 @@ class Equations:
         out = np.zeros((len(steps), self.width), complex)
         residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
         if not np.isfinite(out.view(float)).all():
-            raise ModelError(f"the equations of {x.c.structure.model.name!r} are not finite at t = {x.t:.6g} s")
+            missed = x.c.structure.missed(W.stack)
+            why = f": {missed.message}" if missed is not None else ""
+            raise ModelError(f"the equations of {x.c.structure.model.name!r} are not finite at t = {x.t:.6g} s{why}")
         return out
 
     def _jacobian(self, what: int):
