@@ -45,7 +45,7 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
     from flyball.analysis.motion.options import Options
     from flyball.analysis.motion.start import begin
     from flyball.analysis.simulate import clock_for, run_clock
-    from flyball.equations.entry import INTEGRATE
+    from flyball.equations.engine import INTEGRATE
     from flyball.numerics.integrators import explicit as ex
     from flyball.numerics.integrators.tableaux import tableau
     from flyball.tables.cost import counts

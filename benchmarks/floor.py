@@ -224,7 +224,7 @@ def mechanisms() -> dict[str, Any]:
 
 def main() -> None:
     from flyball.analysis.motion.start import begin
-    from flyball.equations.entry import MOTION
+    from flyball.equations.engine import MOTION
     from flyball.equations.motion import STAGES
     from flyball.tables.system import STABILIZE, TOL_G, TOL_V
 

@@ -1,9 +1,106 @@
-"""flyball: rigid-body mechanisms, described once, analysed in every way an engineer asks for."""
+"""flyball: rigid-body mechanisms, described once, analysed in every way an engineer asks for.
+
+A guided map, by task; ``help(fb.Revolute)`` and the like say the rest. All results are in SI units and radians.
+
+Describe a mechanism
+    Mechanism     name, planar or spatial, gravity, parameters; ``m.add(...)`` takes the parts
+    Body, Frame   what moves, and named axes on it; ``Body(shape=...)`` computes masses from
+                  Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Link, Mesh, Prism, Rod, Sphere,
+                  Torus, Tube
+    joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
+                  Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
+                  RollingDisk, RollingBall, KnifeEdge
+    couplings     GearPair, RackAndPinion, Coupler
+    forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Actuator, Motor,
+                  JointFriction, PointForce, PointTorque
+    Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
+    Sensor, IMU   measured quantities with names of their own
+    load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one
+
+Look before you run
+    m             its repr says what is in it; in a notebook with a picture
+    m.check()     -> Report: freedoms, redundant joints, assembly, masses
+    m.mobility()  -> Mobility: freedoms and redundant sets by name, with cures
+    m.assemble()  -> Assembly: positions that close; m.mass_properties() -> MassReport
+
+Ask how it moves
+    m.simulate(t_end)             -> Result: motion, reactions, energies, health
+    m.kinematics(times)           -> Result, where drivers prescribe the motion
+    m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
+    m.singularities(driver, range) -> Singularities: where it locks up or branches
+    m.compare(t_end)              -> Comparison of formulations of the equations of motion
+
+Ask where it rests, and what small motions do
+    m.equilibrium()               -> Equilibrium, stable or not; m.equilibria(parameter, values) -> EquilibriumSeries
+    m.linearize(inputs, outputs)  -> LinearModel: A, B, C, D, Bode plots
+    m.modes()                     -> Modes, animated; m.root_locus(parameter, values) -> RootLocus
+
+Ask what a number changes
+    any analysis takes ``parameters={"rod": 0.6}``
+    m.sensitivity(of, to)         -> Sensitivity: exact derivatives
+    m.optimize(of, to)            -> Optimum: the values that fit best
+
+Read a result
+    run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
+    run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
+    lines(), as_dict(), plot()    text, plain data and a picture of any result; run.to_html(path), run.to_report(path)
+    run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray
+
+When something is wrong
+    FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
+    AssemblyError, SimulationError, MobilityError, SingularityError, NotConverged and AnalysisError for what was asked.
+
+Orientations by themselves: ``help(fb.rotations)``. From a shell: ``flyball --help``.
+"""
 
 from __future__ import annotations
 
 import importlib
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
+    from . import rotations as rotations
+    from .analysis.assemble import Assembly as Assembly
+    from .analysis.check import Report as Report
+    from .analysis.mass import MassReport as MassReport
+    from .analysis.mobility import Mobility as Mobility
+    from .errors import AnalysisError as AnalysisError
+    from .errors import AssemblyError as AssemblyError
+    from .errors import ExpressionError as ExpressionError
+    from .errors import FlyballError as FlyballError
+    from .errors import MobilityError as MobilityError
+    from .errors import ModelError as ModelError
+    from .errors import NotConverged as NotConverged
+    from .errors import PerformanceNotice as PerformanceNotice
+    from .errors import SimulationError as SimulationError
+    from .errors import SingularityError as SingularityError
+    from .errors import SingularOrientationError as SingularOrientationError
+    from .errors import SingularOrientationWarning as SingularOrientationWarning
+    from .errors import UnitError as UnitError
+    from .files import load as load
+    from .files import load_result as load_result
+    from .forces import *
+    from .joints import *
+    from .mechanism import Mechanism as Mechanism
+    from .model.body import Body as Body
+    from .model.body import Driver as Driver
+    from .model.body import Frame as Frame
+    from .model.body import Initial as Initial
+    from .model.sensor import IMU as IMU
+    from .model.sensor import Sensor as Sensor
+    from .model.shapes import *
+    from .model.table import Table as Table
+    from .results.comparison import Comparison as Comparison
+    from .results.equilibrium import Equilibrium as Equilibrium
+    from .results.inverse import InverseDynamics as InverseDynamics
+    from .results.linear import LinearModel as LinearModel
+    from .results.locus import RootLocus as RootLocus
+    from .results.modes import Modes as Modes
+    from .results.optimum import Optimum as Optimum
+    from .results.result import Result as Result
+    from .results.sensitivity import Sensitivity as Sensitivity
+    from .results.series import EquilibriumSeries as EquilibriumSeries
+    from .results.singularities import Singularities as Singularities
 
 __version__ = "0.4.0"
 
@@ -32,6 +129,20 @@ _HOME = {
     "MobilityError": "errors",
     "SingularityError": "errors",
     "NotConverged": "errors",
+    "Assembly": "analysis.assemble",
+    "MassReport": "analysis.mass",
+    "Mobility": "analysis.mobility",
+    "Report": "analysis.check",
+    "Comparison": "results.comparison",
+    "Equilibrium": "results.equilibrium",
+    "EquilibriumSeries": "results.series",
+    "InverseDynamics": "results.inverse",
+    "LinearModel": "results.linear",
+    "Modes": "results.modes",
+    "Optimum": "results.optimum",
+    "RootLocus": "results.locus",
+    "Sensitivity": "results.sensitivity",
+    "Singularities": "results.singularities",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)
@@ -39,6 +150,8 @@ _MODULES = ("rotations",)
 
 def __getattr__(name: str) -> Any:
     """Public names are imported when first asked for: shapes, joints and forces from the folders that hold them."""
+    if name == "__all__":
+        return [k for k in __dir__() if not k.startswith("_")]
     if name in _HOME:
         return getattr(importlib.import_module(f".{_HOME[name]}", __name__), name)
     if name in _MODULES:
@@ -48,7 +161,10 @@ def __getattr__(name: str) -> Any:
             module = importlib.import_module(f".{room}", __name__)
             if hasattr(module, name) and isinstance(getattr(module, name), type):
                 return getattr(module, name)
-    raise AttributeError(f"module 'flyball' has no attribute {name!r}")
+    from .model.words import suggest
+
+    hint = "" if name.startswith("_") else suggest(name, __dir__())
+    raise AttributeError(f"module 'flyball' has no attribute {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

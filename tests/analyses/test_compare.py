@@ -17,7 +17,7 @@ from flyball.analysis.compiled import compiled
 from flyball.analysis.motion import partition
 from flyball.cli import app
 from flyball.equations import motion
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.tables.names import velocity_names
 from flyball.tables.system import (
     COUPLED,

@@ -19,7 +19,7 @@ from flyball.constraints import (
     skew,
     spin,
 )
-from flyball.constraints.registry import FORMULAS
+from flyball.constraints.registry import KINDS
 from flyball.model.element import resolve
 
 OVAL = [(2.0 * np.cos(u), 1.2 * np.sin(u)) for u in np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)]
@@ -58,7 +58,7 @@ WORLD = (coincident.KIND, skew.KIND)  # they speak of an axis of the world, not 
 def label(case) -> str:
     """Name of a case in pytest's output."""
     kind, name = case
-    return f"{FORMULAS[kind].__module__.rsplit('.', 1)[1]} {name}".strip()
+    return f"{KINDS[kind].row.__module__.rsplit('.', 1)[1]} {name}".strip()
 
 
 def has_value(case) -> bool:
@@ -97,7 +97,7 @@ def record(m: dict, dtype=float) -> tuple:
 def evaluated(case, F: dict, M: dict, hint: float, dtype=float) -> tuple:
     """The row's value, wrench and bias."""
     kind, name = case
-    return FORMULAS[kind](PARAMETERS[kind][name], record(F, dtype), record(M, dtype), hint, DATA)
+    return KINDS[kind].row(PARAMETERS[kind][name], record(F, dtype), record(M, dtype), hint, DATA)
 
 
 def moved(m: dict, t: float) -> dict:

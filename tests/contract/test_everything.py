@@ -7,7 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball import forces
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.equations.motion import derivative
 from flyball.model.coupling import Coupling
 from flyball.model.io import dumps, loads

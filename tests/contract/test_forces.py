@@ -1,7 +1,5 @@
 """Every force element, found by registry: power = -dE/dt, and the same on any kind of number and anywhere."""
 
-import inspect
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -193,22 +191,3 @@ def test_rotation_vector_and_its_gradient(angle):
 def test_rotation_vector_says_nothing_at_half_a_turn():
     R = Rotation.from_rotvec((0.0, 0.0, np.pi - 1e-4)).as_matrix()
     assert np.isnan(rotation_vector(tuple(R.ravel()))).any()
-
-
-@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
-def test_kind_stands_in_dispatch(kind):
-    """A force that dispatch does not list would be described and never act."""
-    from flyball.equations import dispatch
-
-    formula = kind.effort if kind in ALONG else kind.wrench
-    module = formula.__module__.rsplit(".", 1)[1]
-    assert f"element.{module}.{formula.__name__}" in inspect.getsource(dispatch)
-    assert kind.kind == inspect.getmodule(formula).KIND
-
-
-def test_kind_numbers_are_of_one_formula_each():
-    formulas = {}
-    for kind in forces.ALL:
-        formulas.setdefault(kind.kind, set()).add(kind.effort if kind in ALONG else kind.wrench)
-    assert sorted(formulas) == list(range(len(formulas)))
-    assert all(len(x) == 1 for x in formulas.values())

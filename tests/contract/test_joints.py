@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import flyball as fb
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.equations.motion import derivative
 from flyball.model.io import dumps, loads
 from flyball.tables.system import GAMMA

@@ -6,7 +6,7 @@ from scipy.optimize import minimize_scalar
 from scipy.spatial.transform import Rotation
 
 from flyball.constraints import angle, blade, rolling, spin
-from flyball.constraints.registry import FORMULAS
+from flyball.constraints.registry import KINDS
 from tests.contract.frames import AXES, DATA, PARAMETERS, evaluated, frames, moved, random_motion, rate, record
 
 H = 1e-5
@@ -58,7 +58,7 @@ def test_slip_of_an_upright_disk_adds_up():
             "v": np.array([2.0 * np.cos(2.0 * t), 0, 0]),
             "w": np.array([0, 3.0 * t * t, 0]),
         }
-        slip.append(rate(FORMULAS[rolling.KIND](par, record(F), record(M), 0.0, DATA), F, M))
+        slip.append(rate(KINDS[rolling.KIND].row(par, record(F), record(M), 0.0, DATA), F, M))
     assert 0.5 * np.dot(weight, slip) == pytest.approx(np.sin(2.0) - 0.5 * 1.0, abs=1e-12)
 
 
@@ -86,9 +86,9 @@ def test_spin_is_the_rotation_seen_from_F_about_an_axis_of_M(seed):
 def test_an_angle_is_the_one_next_to_its_hint(turns):
     """Whole turns come from the hint, the rest from the frames, also where the two disagree by nearly half a turn."""
     F, M = random_motion(4)
-    plain = FORMULAS[angle.KIND]((0.0,) * 8, record(F), record(M), 0.0, DATA)[0]
+    plain = KINDS[angle.KIND].row((0.0,) * 8, record(F), record(M), 0.0, DATA)[0]
     assert -np.pi < plain <= np.pi
     for off in (-3.1, 0.0, 3.1):
         hint = plain + 2.0 * np.pi * turns + off
-        value = FORMULAS[angle.KIND]((1.0, *(0.0,) * 7), record(F), record(M), hint, DATA)[0]
+        value = KINDS[angle.KIND].row((1.0, *(0.0,) * 7), record(F), record(M), hint, DATA)[0]
         assert value == pytest.approx(plain + 2.0 * np.pi * turns, abs=1e-12)

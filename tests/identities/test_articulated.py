@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.analysis.compiled import compiled
 from flyball.equations import tree as joints
 from flyball.equations.articulated import articulate, articulated_solve
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.equations.mass import mass_entries
 from flyball.equations.tree import column
 from flyball.math.vec import quaternion_matrix

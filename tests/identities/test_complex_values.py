@@ -16,7 +16,7 @@ from flyball.model.coupling import Coupling
 from flyball.model.expressions import Expression, number
 from flyball.model.geometry import triad
 from flyball.model.grammar import FUNCTIONS
-from flyball.model.shapes import ALL as SHAPES
+from flyball.model.shapes import SHAPES
 from flyball.tables.inertia import inverse_inertia
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import structure

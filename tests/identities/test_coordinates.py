@@ -9,7 +9,7 @@ import pytest
 import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.equations.mass import mass_entries
 from flyball.equations.records import load
 from flyball.results.records import Records

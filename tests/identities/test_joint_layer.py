@@ -11,7 +11,7 @@ import flyball as fb
 from flyball import joints as room
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.results.records import Records
 from tests.contract.zoo import CASES, declared, two_bodies
 

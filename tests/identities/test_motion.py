@@ -10,7 +10,7 @@ from flyball.analysis import simulate
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.equations import motion
-from flyball.equations.entry import MOTION, motion_kernel
+from flyball.equations.engine import MOTION, motion_kernel
 from flyball.numerics.integrators import explicit
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.tables.system import PASS, STABILIZE, TOL_G, TOL_V

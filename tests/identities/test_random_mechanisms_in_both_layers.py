@@ -11,7 +11,7 @@ import pytest
 import flyball as fb
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.tables.system import F_APPLIED, GAMMA
 from tests.contract.zoo import JOINTS
 from tests.identities.test_results_in_both_layers import agree, spanning_tree

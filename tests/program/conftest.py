@@ -1,11 +1,12 @@
 """Three processes on a copy of the package, shared by the tests of the cache and of the house.
 
 The first compiles. For the second nothing has changed. Before the third a formula is edited, a joint is added (one
-new file, one export) and a force (one new file, one line of dispatch).
+new file, one export) and a force (one new file).
 """
 
 import pytest
 
+from flyball import forces
 from tests.program.copied import Copy
 
 FALL = """
@@ -69,7 +70,7 @@ from ..model.element import Damping, element
 from ..model.force import BodyForce
 from .point_force import inputs
 
-KIND = 7
+KIND = {kind}
 
 
 @formula
@@ -94,9 +95,6 @@ class Drag(BodyForce):
         return (n.coefficient,)
 '''
 
-LAST_FORCE = "    return element.bushing.wrench(par, F, M, laws, values)\n"
-DRAG = "    if kind == element.drag.KIND:\n        return element.drag.wrench(par, F, M, laws, values)\n"
-
 
 @pytest.fixture(scope="session")
 def runs(tmp_path_factory):
@@ -108,6 +106,5 @@ def runs(tmp_path_factory):
     copy.edit("equations/loads.py", "sub(gravity, load3", "sub(neg(gravity), load3")
     copy.add("joints/sheet.py", JOINT)
     copy.append("joints/__init__.py", "from .sheet import Sheet as Sheet\n")
-    copy.add("forces/drag.py", FORCE)
-    copy.edit("equations/dispatch.py", LAST_FORCE, DRAG + LAST_FORCE)
+    copy.add("forces/drag.py", FORCE.replace("{kind}", str(1 + max(force.kind for force in forces.ALL))))
     return copy, first, second, copy.run(FALL + SLIDE + PRINT)

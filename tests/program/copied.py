@@ -20,11 +20,11 @@ warnings.simplefilter("error", NumbaWarning)
 
 def cache_counts():
     from flyball.compiler.jit import KERNELS
-    used = [k for k in KERNELS if k._dispatcher is not None]
-    stats = [k.dispatcher.stats for k in used]
+    used = [k for k in KERNELS if k.used]
+    counts = [k.from_cache for k in used]
     return {
-        "hits": sum(sum(s.cache_hits.values()) for s in stats),
-        "misses": sum(sum(s.cache_misses.values()) for s in stats),
+        "hits": sum(hits for hits, _ in counts),
+        "misses": sum(misses for _, misses in counts),
         "kernels": [k.__qualname__ for k in used],
     }
 """

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.compiler.jit import stamped
+from flyball.compiler.stamp import compiled_files
 from flyball.model.element import Element
 from tests.program.copied import PACKAGE
 
@@ -192,14 +192,14 @@ def test_formulas_and_solvers_stand_on_numpy_alone(own):
 
 def test_compiled_code_is_made_of_stamped_files():
     """What formulas and kernels name comes from files whose edits the cache notices."""
-    known = set(stamped())
+    known = compiled_files()
     for path in FILES:
         tree = TREES[path]
         marked = [n for n in ast.walk(tree) if isinstance(n, ast.FunctionDef)]
         marked = [n for n in marked if {ast.unparse(d) for d in n.decorator_list} & {"formula", "kernel"}]
         if not marked:
             continue
-        assert path in known, f"{path} holds compiled code: add it to jit.COMPILED"
+        assert path in known, f"{path} holds compiled code: add it to stamp.COMPILED"
         used = {n.id for f in marked for n in ast.walk(f) if isinstance(n, ast.Name)}
         for node in tree.body:
             if isinstance(node, ast.ImportFrom) and node.level and used & {a.asname or a.name for a in node.names}:
@@ -302,13 +302,12 @@ def test_every_joint_is_one_file_and_one_export():
 
 
 def test_adding_a_joint_and_a_force_touches_nothing_else(runs):
-    """One new file and one export; one new file and one line of dispatch (and the formula that the cache test edits)."""
+    """One new file and one export; one new file (and the formula that the cache test edits)."""
     copy, *_ = runs
     assert copy.changed() == {
         "joints/sheet.py",
         "joints/__init__.py",
         "forces/drag.py",
-        "equations/dispatch.py",
         "equations/loads.py",
     }
 

@@ -10,7 +10,7 @@ import numpy as np
 from flyball.analysis.assemble import Assembly
 from flyball.analysis.compiled import Compiled
 from flyball.analysis.mobility import mobility
-from flyball.equations.entry import MOTION
+from flyball.equations.engine import MOTION
 from flyball.results.result import Result
 from flyball.tables.system import BODY_LAW, EFFORT, LAM, V0, X_SOLVED
 from tests.results.made_up import healthy

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..equations.entry import INTEGRATE
+from ..equations.engine import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..model.expressions import number
 from ..model.model import Model

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..equations.entry import POSITION, evaluate
+from ..equations.engine import POSITION, evaluate
 from ..equations.motion import NONE
 from ..equations.records import load
 from ..equations.scratch import work

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ..equations.entry import FOLLOW, INTEGRATE
+from ..equations.engine import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
 from ..model.expressions import number

@@ -313,7 +313,7 @@ def _null_space(A) -> tuple[int, np.ndarray]:
 
 
 def _factor_entry():
-    from ..equations.entry import factor_kernel
+    from ..numerics.ldl import factor_kernel
 
     return factor_kernel
 
@@ -353,7 +353,7 @@ def self_stresses(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, n
 
     World axes, torques divided by the mechanism's length. The mechanism has been evaluated at the position.
     """
-    from ..constraints.registry import FORMULAS
+    from ..constraints.registry import KINDS
     from ..equations.records import load
     from ..equations.rows import parameters
 
@@ -365,7 +365,7 @@ def self_stresses(a: Assembly, lam: np.ndarray, names: list[str]) -> dict[str, n
             t = s.terms[k]
             par = parameters(S.term_x, k)
             hint = c.z[t.hint] if t.hint >= 0 else 0.0
-            _, f, tM, tF, _ = FORMULAS[t.formula.kind](par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
+            _, f, tM, tF, _ = KINDS[t.formula.kind].row(par, load(W.FK, t.F), load(W.FK, t.M), hint, S.const)
             force, torque = np.array(f), np.array(tM)
             if s.frames[t.M].role != "M":  # measured from M to F
                 force, torque = -force, np.array(tF)

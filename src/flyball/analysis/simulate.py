@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from ..equations.entry import FOLLOW, INTEGRATE, motion_kernel
+from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..laws.functions import forget, interrupts_kept
 from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
-from ..numerics.integrators.tableaux import tableau
+from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.result import Result
 from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assemble import Assembly
@@ -145,7 +145,7 @@ def _energy_size(a: Assembly, span: float) -> float:
 
 
 def run_clock(
-    a: Assembly, clock: ex.Clock, method: object, progress: Callable | None, task: int
+    a: Assembly, clock: ex.Clock, method: Tableau, progress: Callable | None, task: int
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work

@@ -12,7 +12,7 @@ import typer
 
 from ..errors import PerformanceNotice
 
-KERNELS = {  # of equations/entry.py: what to say before they are compiled
+KERNELS = {  # what to say before they are compiled
     "motion_kernel": "compiling for this machine, once: about half a minute",
     "residual_kernel": "compiling the derivatives of the equations for this machine, once: about a quarter of a minute",
 }
@@ -30,9 +30,10 @@ def announce_compiling(talk: bool, *kernels: str) -> None:
 
 
 def _will_compile(name: str) -> bool:
-    from ..equations import entry
+    from ..equations.engine import engine
+    from ..equations.residual import residual_kernel
 
-    return getattr(entry, name).cold
+    return {"motion_kernel": engine, "residual_kernel": residual_kernel}[name].cold  # type: ignore[attr-defined]
 
 
 @contextmanager

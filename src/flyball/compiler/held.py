@@ -19,6 +19,14 @@ def held(fields):  # type: ignore[no-untyped-def]
     return fields
 
 
+_TYPES: list[Any] = []
+
+
+def held_type(whole: Any) -> Any:
+    """Numba's type of ``held(x)`` for an x of type ``whole``."""
+    return _TYPES[0](whole)
+
+
 @on_numba
 def _register() -> None:
     from llvmlite import ir
@@ -34,6 +42,12 @@ def _register() -> None:
             self.whole = whole
             digest = hashlib.sha1(whole.name.encode(), usedforsecurity=False).hexdigest()[:8]
             super().__init__(name=f"{whole.instance_class.__name__}_{digest}")
+
+        def __reduce__(self) -> Any:
+            """As the caches of all processes know it."""
+            return held_type, (self.whole,)
+
+    _TYPES[:] = [Held]
 
     @register_model(Held)
     class HeldModel(models.OpaqueModel):

@@ -1,32 +1,25 @@
-"""The two compile decorators, ``@formula`` and ``@kernel``, and the stamp that keeps compiled caches honest.
+"""The two compile decorators, ``@formula`` and ``@kernel``.
 
 ``@formula`` marks plain Python code that compiled code may call. The function itself stays plain Python, so the same
 source runs on floats, complex numbers, arrays over time and symbols. ``@kernel`` marks an entry point that is compiled
 and cached on disk. Numba is imported when the first kernel is called, never before: describing and checking a
 mechanism does not pay for a compiler.
-
-Numba's own cache looks at the file of the kernel only, and silently serves old code after an edit of a callee
-elsewhere. Here every cache file carries a hash of all sources that compiled code is made of.
 """
 
 from __future__ import annotations
 
-import hashlib
-import pathlib
 import threading
 from collections.abc import Callable
-from functools import lru_cache, update_wrapper
+from functools import update_wrapper
 from typing import Any, TypeVar
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-PACKAGE = pathlib.Path(__file__).parent.parent
-COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "numerics", "tables/system.py")
-"""Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
-KERNELS: list[Kernel] = []
+OPTIONS = {"error_model": "numpy", "_nrt": False}  # how formulas and kernels are compiled
+KERNELS: list[Any] = []
+LOCK = threading.RLock()
 _pending: list[Callable[[], None]] = []
 _started = False
-LOCK = threading.RLock()
 
 
 def on_numba(callback: Callable[[], None]) -> Callable[[], None]:
@@ -44,7 +37,7 @@ def formula(function: F) -> F:
     def register() -> None:
         from numba.extending import register_jitable
 
-        register_jitable(error_model="numpy", _nrt=False, no_cfunc_wrapper=True)(function)
+        register_jitable(**OPTIONS, no_cfunc_wrapper=True)(function)
 
     on_numba(register)
     return function
@@ -72,9 +65,11 @@ class Kernel:
             start_numba()
             from numba import config, njit
 
-            made = njit(error_model="numpy", nogil=True, _nrt=False, no_cfunc_wrapper=True)(self.function)
+            made = njit(**OPTIONS, nogil=True, no_cfunc_wrapper=True)(self.function)
             if not config.DISABLE_JIT:
-                made._cache = _cache_class()(self.function)
+                from .cache import cache_of
+
+                made._cache = cache_of(self.function)
                 made._compile_for_args = self._compiling(made._compile_for_args)
             self._dispatcher = made
         return self._dispatcher
@@ -90,12 +85,20 @@ class Kernel:
         return compile_once
 
     @property
+    def used(self) -> bool:
+        """Whether this process has asked for it."""
+        return self._dispatcher is not None
+
+    @property
+    def from_cache(self) -> tuple[int, int]:
+        """How often it was found in the cache, and how often compiled, in this process."""
+        stats = self.dispatcher.stats
+        return sum(stats.cache_hits.values()), sum(stats.cache_misses.values())
+
+    @property
     def cold(self) -> bool:
         """Whether a call compiles first: nothing of this version is in memory or in the cache."""
-        try:
-            return not self.dispatcher.signatures and not self.dispatcher._cache._cache_file._load_index()
-        except Exception:  # internals of Numba: where they differ, say nothing
-            return False
+        return not self.dispatcher.signatures and getattr(self.dispatcher._cache, "empty", False)
 
     def __call__(self, *args: Any) -> Any:
         """Run it, compiled."""
@@ -114,45 +117,3 @@ def start_numba() -> None:
         for callback in _pending:
             callback()
         _pending.clear()
-
-
-def stamped() -> list[pathlib.Path]:
-    """The source files of `COMPILED`."""
-    files: set[pathlib.Path] = set()
-    for pattern in COMPILED:
-        for path in PACKAGE.glob(pattern):
-            files |= set(path.rglob("*.py")) if path.is_dir() else {path}
-    return sorted(files)
-
-
-@lru_cache(maxsize=1)
-def source_stamp() -> str:
-    """Hash of every source file that compiled code is made of: what a cached kernel must agree with."""
-    digest = hashlib.sha256()
-    for path in stamped():
-        digest.update(str(path.relative_to(PACKAGE)).encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
-
-
-@lru_cache(maxsize=1)
-def _cache_class() -> Any:
-    """Numba's function cache with our stamp in place of a look at one file's date."""
-    from numba.core import caching
-
-    class Stamped:
-        def get_source_stamp(self) -> str:
-            return source_stamp()
-
-    locators = [
-        type(base.__name__, (Stamped, base), {})
-        for base in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, caching.UserWideCacheLocator)
-    ]
-
-    class Implementation(caching.CompileResultCacheImpl):
-        _locator_classes = locators
-
-    class Cache(caching.FunctionCache):
-        _impl_class = Implementation
-
-    return Cache

@@ -9,6 +9,7 @@ from ..compiler.jit import formula
 from ..math.vec import cross, dot, mv, sub
 
 KIND = 1
+OFTEN = True
 
 
 @formula

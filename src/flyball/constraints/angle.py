@@ -11,6 +11,8 @@ from ..math.scalar import atan2, rounded
 from ..math.vec import add, col, cross, dot, neg, scale, sub
 
 KIND = 4
+OFTEN = True
+TURNS = True
 
 
 @formula

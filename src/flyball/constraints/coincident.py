@@ -9,6 +9,7 @@ from ..compiler.jit import formula
 from ..math.vec import dot, sub
 
 KIND = 0
+OFTEN = True
 
 
 @formula

@@ -6,6 +6,7 @@ from ..compiler.jit import formula
 from ..math.vec import dot, norm, scale, sub
 
 KIND = 3
+OFTEN = True
 
 
 @formula

@@ -10,6 +10,7 @@ from ..compiler.jit import formula
 from ..math.vec import cross, dot, mv, neg
 
 KIND = 2
+OFTEN = True
 
 
 @formula

@@ -1,29 +1,75 @@
-"""Every kind of constraint term, found in the files of this folder: kind -> formula."""
+"""Every kind of constraint term, found in the files of this folder.
+
+A file says ``KIND``, its number (or ``ROWS``, several numbers and their formulas), and ``row``. It may also say
+
+- ``OFTEN = True``: the kind is so frequent that compiled code has a loop for it alone; such kinds are the first;
+- ``TURNS = True``: its value is an angle, of which whole turns are counted (parameter 0 says whether to);
+- ``foot`` and ``progress``: it leans on a place on a curve: where that is, and how fast it moves. Parameters 1 and 2
+  then say where the curve's two splines stand.
+"""
 
 from __future__ import annotations
 
 import importlib
+import itertools
 import pkgutil
 from collections.abc import Callable
+from dataclasses import dataclass
+from types import ModuleType
 
 
-def _found() -> dict[int, Callable]:
-    rows: dict[int, Callable] = {}
+@dataclass(frozen=True)
+class Kind:
+    """A kind of constraint term."""
+
+    number: int
+    row: Callable
+    """``row(par, F, M, hint, data)`` -> value, force on M, torque on M, torque on F, acceleration bias."""
+    often: bool = False
+    turns: bool = False
+    foot: Callable | None = None
+    progress: Callable | None = None
+
+    @property
+    def place(self) -> bool:
+        """Whether it leans on a place on a curve."""
+        return self.foot is not None
+
+
+def _kinds_of(module: ModuleType) -> list[Kind]:
+    rows = getattr(module, "ROWS", {module.KIND: module.row} if hasattr(module, "KIND") else {})
+    often, turns = getattr(module, "OFTEN", False), getattr(module, "TURNS", False)
+    foot = getattr(module, "foot", None)
+    progress = module.progress if foot is not None else None
+    return [Kind(number, row, often, turns, foot, progress) for number, row in rows.items()]
+
+
+def ordered(found: list[Kind]) -> tuple[Kind, ...]:
+    """Kinds by number.
+
+    Raises
+    ------
+    RuntimeError
+        If a number is taken twice, one is left out, or a frequent kind comes after one that is not.
+    """
+    kinds = sorted(found, key=lambda k: k.number)
+    for a, b in itertools.pairwise(kinds):
+        if a.number == b.number:
+            raise RuntimeError(f"KIND {a.number} is taken twice: by {a.row.__module__} and {b.row.__module__}")
+        if b.often and not a.often:
+            raise RuntimeError(f"{b.row.__module__}: OFTEN is for the first kinds; {a.row.__module__} comes before it")
+    if [k.number for k in kinds] != list(range(len(kinds))):
+        raise RuntimeError(f"the KINDs of constraints/ must be 0, 1, 2, ...; there are {[k.number for k in kinds]}")
+    return tuple(kinds)
+
+
+def _modules() -> list[ModuleType]:
     package = __name__.rpartition(".")[0]
     path = importlib.import_module(package).__path__
-    for info in pkgutil.iter_modules(path):
-        if info.name == "registry":
-            continue
-        module = importlib.import_module(f"{package}.{info.name}")
-        own = getattr(module, "ROWS", {module.KIND: module.row} if hasattr(module, "KIND") else {})
-        for kind, formula in own.items():
-            if kind in rows:
-                raise RuntimeError(f"constraints/{info.name}.py: KIND {kind} is taken by {rows[kind].__module__}")
-            rows[kind] = formula
-    if sorted(rows) != list(range(len(rows))):
-        raise RuntimeError(f"the KINDs of constraints/ must be 0, 1, 2, ...; there are {sorted(rows)}")
-    return rows
+    names = [info.name for info in pkgutil.iter_modules(path) if info.name != "registry"]
+    return [importlib.import_module(f"{package}.{name}") for name in names]
 
 
-FORMULAS = _found()
-"""``row(par, F, M, hint, data)`` -> value, force on M, torque on M, torque on F, acceleration bias."""
+KINDS = ordered([k for module in _modules() for k in _kinds_of(module)])
+RARE = sum(k.often for k in KINDS)
+"""Kinds from this number on share one loop: nearly as fast, and much less to compile."""

@@ -1,97 +1,87 @@
-"""The only file that lists kinds: constraint terms and forces. Adding one adds one case here."""
+"""Loops over elements of every kind. The lists of kinds are written from the registries, so no kind is named here.
+
+An unknown kind gives nan, which a run tells of; it is never answered by another element's formula.
+"""
 
 from __future__ import annotations
 
-from .. import forces as element
-from ..compiler.jit import formula
-from ..constraints import (
-    alignment,
-    along,
-    angle,
-    blade,
-    coincident,
-    curve,
-    distance,
-    perpendicular,
-    rolling,
-    skew,
-    spin,
-)
+from ..compiler.written import ladder, written
+from ..constraints.registry import KINDS, RARE
+from ..forces import EFFORTS, INPUTS, WRENCHES
 from ..tables.system import TERM_KINDS
-from .rows import begin, begin_biases, each_bias, each_value, end, end_biases, rare_biases, rare_values
+from . import rows, turns
 
-RARE = 5  # kinds below have loops of their own; from here on they share one: nearly as fast, much less to compile
+NAN = "nan + 0.0 * par[0]"
+NONE = f"({NAN}, {NAN}, {NAN})"
+OFTEN = KINDS[:RARE]
 
+rare = ladder(
+    __name__,
+    "rare",
+    "par, F, M, hint, data",
+    {k.number: k.row for k in KINDS[RARE:]},
+    f"{NAN}, {NONE}, {NONE}, {NONE}, {NAN}",
+)
+"""The formula of a kind that has no loop of its own."""
 
-@formula
-def rare(kind, par, F, M, hint, data):
-    """The formula of one of the other kinds."""
-    if kind == alignment.KIND_AXIS:
-        return alignment.axis_row(par, F, M, hint, data)
-    if kind == alignment.KIND_FULL:
-        return alignment.full_row(par, F, M, hint, data)
-    if kind == skew.KIND:
-        return skew.row(par, F, M, hint, data)
-    if kind == curve.KIND:
-        return curve.row(par, F, M, hint, data)
-    if kind == rolling.KIND:
-        return rolling.row(par, F, M, hint, data)
-    if kind == blade.KIND:
-        return blade.row(par, F, M, hint, data)
-    return spin.row(par, F, M, hint, data)
+inputs = ladder(__name__, "inputs", "par, F, M", INPUTS, f"({NAN}, {NAN})")
+"""What the laws of a force between frames may depend on."""
 
+wrench = ladder(__name__, "wrench", "par, F, M, laws, values", WRENCHES, f"({NONE}, {NONE})")
+"""Wrench of a force between frames on M."""
 
-@formula
-def row_values(S, W, t, z):
-    """Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
-    begin(S, W)
-    each_value(S, W, z, coincident.KIND, coincident.row)
-    each_value(S, W, z, along.KIND, along.row)
-    each_value(S, W, z, perpendicular.KIND, perpendicular.row)
-    each_value(S, W, z, distance.KIND, distance.row)
-    each_value(S, W, z, angle.KIND, angle.row)
-    rare_values(S, W, z, RARE, TERM_KINDS, rare)
-    end(S, W, t)
+effort = ladder(__name__, "effort", "par, x, rate, laws, load", EFFORTS, NAN)
+"""Force along a measured quantity."""
 
+_LOOPS = {name: getattr(rows, name) for name in ("begin", "end", "begin_biases", "end_biases")}
+_ROWS = {"rare": rare} | {f"row_{k.number}": k.row for k in OFTEN}
 
-@formula
-def row_biases(S, W, t, v, z):
-    """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
-    begin_biases(S, W, v)
-    each_bias(S, W, z, coincident.KIND, coincident.row)
-    each_bias(S, W, z, along.KIND, along.row)
-    each_bias(S, W, z, perpendicular.KIND, perpendicular.row)
-    each_bias(S, W, z, distance.KIND, distance.row)
-    each_bias(S, W, z, angle.KIND, angle.row)
-    rare_biases(S, W, z, RARE, TERM_KINDS, rare)
-    end_biases(S, W, t)
+row_values = written(
+    __name__,
+    "row_values",
+    "S, W, t, z",
+    [
+        "begin(S, W)",
+        *(f"each_value(S, W, z, {k.number}, row_{k.number})" for k in OFTEN),
+        f"rare_values(S, W, z, {RARE}, {TERM_KINDS}, rare)",
+        "end(S, W, t)",
+    ],
+    _LOOPS | _ROWS | {"each_value": rows.each_value, "rare_values": rows.rare_values},
+)
+"""Values, Jacobian and rates of all constraint rows, from the poses; ``z`` are the states that angles lean on."""
 
+row_biases = written(
+    __name__,
+    "row_biases",
+    "S, W, t, v, z",
+    [
+        "begin_biases(S, W, v)",
+        *(f"each_bias(S, W, z, {k.number}, row_{k.number})" for k in OFTEN),
+        f"rare_biases(S, W, z, {RARE}, {TERM_KINDS}, rare)",
+        "end_biases(S, W, t)",
+    ],
+    _LOOPS | _ROWS | {"each_bias": rows.each_bias, "rare_biases": rows.rare_biases},
+)
+"""Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
 
-@formula
-def inputs(kind, par, F, M):
-    """What the laws of a force between frames may depend on."""
-    if kind == element.spring_damper.KIND:
-        return element.spring_damper.inputs(par, F, M)
-    return element.point_force.inputs(par, F, M)
+_PLACES = [k for k in KINDS if k.place]
+_FEET = {f"foot_{k.number}": k.foot for k in _PLACES}
 
+progress = written(
+    __name__,
+    "progress",
+    "S, W, z, dz",
+    ["turn(S, W, z, dz)"]
+    + [f"move_on(S, W, z, dz, {k.number}, foot_{k.number}, progress_{k.number})" for k in _PLACES],
+    _FEET | {f"progress_{k.number}": k.progress for k in _PLACES} | {"turn": turns.turn, "move_on": turns.move_on},
+)
+"""Rates of the states that count turns of angles and places on curves."""
 
-@formula
-def wrench(kind, par, F, M, laws, values):
-    """Wrench of a force between frames on M."""
-    if kind == element.spring_damper.KIND:
-        return element.spring_damper.wrench(par, F, M, laws, values)
-    if kind == element.point_force.KIND:
-        return element.point_force.wrench(par, F, M, laws, values)
-    if kind == element.point_torque.KIND:
-        return element.point_torque.wrench(par, F, M, laws, values)
-    return element.bushing.wrench(par, F, M, laws, values)
-
-
-@formula
-def effort(kind, par, x, rate, laws, load):
-    """Force along a measured quantity."""
-    if kind == element.coordinate_spring.KIND:
-        return element.coordinate_spring.effort(par, x, rate, laws, load)
-    if kind == element.rope.KIND:
-        return element.rope.effort(par, x, rate, laws, load)
-    return element.joint_friction.effort(par, x, rate, laws, load)
+remember = written(
+    __name__,
+    "remember",
+    "S, W, z",
+    ["remember_turns(S, W, z)", *(f"remember_places(S, W, z, {k.number}, foot_{k.number})" for k in _PLACES)],
+    _FEET | {"remember_turns": turns.remember_turns, "remember_places": turns.remember_places},
+)
+"""Put the states that count turns and places where the poses in W say they are: no drift over long motions."""

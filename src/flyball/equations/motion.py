@@ -48,7 +48,7 @@ from ..tables.system import (
     WORST_V,
     X_SOLVED,
 )
-from .dispatch import row_biases, row_values
+from .dispatch import progress, remember, row_biases, row_values
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .kinematics import motions, poses
 from .loads import efforts, forces, gather, inertial
@@ -56,7 +56,6 @@ from .partition import exchange
 from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tree import normalise, rates, retract
-from .turns import progress, remember
 
 NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
 NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5

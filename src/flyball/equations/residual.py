@@ -9,7 +9,8 @@ Newton-Euler: Luh, Walker and Paul 1980; Featherstone 2008, section 5.3), so no 
 
 from __future__ import annotations
 
-from ..compiler.jit import formula
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
 from ..math.vec import add, cross, load3, put3, scale, sub
 from ..tables.system import (
     BIAS,
@@ -129,3 +130,9 @@ def accelerated(S, W, vdot):
         put3(W.IC, b, 3, a)
         put3(W.BK, b, 18, add(load3(W.BK, b, 18), alpha))
         put3(W.BK, b, 21, add(load3(W.BK, b, 21), a))
+
+
+@kernel
+def residual_kernel(S, W, t, state, vdot, lam, steps, out):
+    """The equations at states near one state, see ``residuals``; compiled for complex numbers, when first needed."""
+    residuals(held(S), held(W), t, state, vdot, lam, steps, out)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints import curve
 from ..constraints.angle import row as angle
 from ..math.vec import dot, sub
 from ..tables.system import TERM_F, TERM_HINT, TERM_M
@@ -12,31 +11,41 @@ from .rows import parameters
 
 
 @formula
-def progress(S, W, z, dz):
-    """Rates of the states that count turns of angles and places on curves."""
+def turn(S, W, z, dz):
+    """Rates of the states that count turns of angles."""
     for k in range(S.angle_i.shape[0]):
         F = load(W.FK, S.angle_i[k, 0])
         M = load(W.FK, S.angle_i[k, 1])
         n = angle((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, 0.0, S.const)[2]
         dz[S.angle_i[k, 2]] = dot(n, sub(M[2], F[2]))
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
-        F = load(W.FK, S.term_i[k, TERM_F])
-        M = load(W.FK, S.term_i[k, TERM_M])
-        par = parameters(S.term_x, k)
-        s = curve.foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
-        dz[S.term_i[k, TERM_HINT]] = curve.progress(par, F, M, s, S.const)[0]
 
 
 @formula
-def remember(S, W, z):
-    """Put the states that count turns and places where the poses in W say they are: no drift over long motions."""
+def move_on(S, W, z, dz, kind, foot, progress):
+    """Rates of the states that say where the terms of a kind are on their curves."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        par = parameters(S.term_x, k)
+        s = foot(par, F, M, z[S.term_i[k, TERM_HINT]], S.const)
+        dz[S.term_i[k, TERM_HINT]] = progress(par, F, M, s, S.const)[0]
+
+
+@formula
+def remember_turns(S, W, z):
+    """Put the states that count turns where the poses in W say they are."""
     for k in range(S.angle_i.shape[0]):
         F = load(W.FK, S.angle_i[k, 0])
         M = load(W.FK, S.angle_i[k, 1])
         h = S.angle_i[k, 2]
         z[h] = angle((1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), F, M, z[h], S.const)[0]
-    for k in range(S.kinds[curve.KIND], S.kinds[curve.KIND + 1]):
+
+
+@formula
+def remember_places(S, W, z, kind, foot):
+    """Put the places of a kind's terms where the poses in W say they are."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
         F = load(W.FK, S.term_i[k, TERM_F])
         M = load(W.FK, S.term_i[k, TERM_M])
         h = S.term_i[k, TERM_HINT]
-        z[h] = curve.foot(parameters(S.term_x, k), F, M, z[h], S.const)
+        z[h] = foot(parameters(S.term_x, k), F, M, z[h], S.const)

@@ -1,7 +1,9 @@
-"""Force elements: one file each. A new force is a new file here and one line in ``equations/dispatch.py``."""
+"""Force elements: one file each, found by itself. A new force is a new file here and nothing else."""
 
 import importlib
 import pkgutil
+from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 from ..model.force import Force
 
@@ -12,3 +14,34 @@ ALL = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module
 """Every force element that a file of this folder defines; all are public."""
 
 globals().update({c.__name__: c for c in ALL})
+
+
+def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
+    """Kind -> formula of that name; elements of one kind share it.
+
+    Raises
+    ------
+    RuntimeError
+        If two elements have one kind and different formulas.
+    """
+    out: dict[int, Callable] = {}
+    for c in elements:
+        if (f := getattr(c, name, None)) is not None and out.setdefault(c.kind, f) is not f:
+            raise RuntimeError(f"kind {c.kind} is taken twice: by {out[c.kind].__module__} and {f.__module__}")
+    return out
+
+
+INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench", "effort"))
+if set(WRENCHES) & set(EFFORTS):
+    raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
+if TYPE_CHECKING:  # for editors; nothing else needs these lines
+    from .bushing import Bushing as Bushing
+    from .coordinate_spring import Actuator as Actuator
+    from .coordinate_spring import CoordinateSpring as CoordinateSpring
+    from .joint_friction import JointFriction as JointFriction
+    from .motor import Motor as Motor
+    from .point_force import PointForce as PointForce
+    from .point_torque import PointTorque as PointTorque
+    from .rope import Rope as Rope
+    from .spring_damper import SpringDamper as SpringDamper
+    from .torsional_spring import TorsionalSpringDamper as TorsionalSpringDamper

@@ -20,7 +20,8 @@ from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 
-from ..compiler.jit import LOCK, PACKAGE, start_numba
+from ..compiler.jit import LOCK, start_numba
+from ..compiler.stamp import PACKAGE
 from ..errors import PerformanceNotice
 from ..model.expressions import Expression
 from ..model.function import MOST, function_name

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.jit import formula
+from ..compiler.jit import formula, kernel
 
 
 class Pattern(NamedTuple):
@@ -135,3 +135,9 @@ def _symbolic(n: int, perm: np.ndarray, Ap: np.ndarray, Ai: np.ndarray) -> Patte
             Li[fill[i]] = k
             fill[i] += 1
     return Pattern(perm, Ap, Ai, Lp, Li, Rp, Ri, Rx)
+
+
+@kernel
+def factor_kernel(P, A, L, D, Y):
+    """Factor a sparse symmetric matrix; see ``ldl_factor``."""
+    return ldl_factor(P, A, L, D, Y)

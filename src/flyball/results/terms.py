@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from ..constraints.registry import FORMULAS
+from ..constraints.registry import KINDS
 from ..equations.rows import COEFFICIENT, parameters
 from ..math.vec import neg, scale
 from ..model.joint import Joint
@@ -26,7 +26,7 @@ def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
     t = x.structure.terms[k]
     F, M = result.records.frame(t.F), result.records.frame(t.M)
     hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
-    return F, M, FORMULAS[t.formula.kind](parameters(x.system.term_x, k), F, M, hint, x.system.const)
+    return F, M, KINDS[t.formula.kind].row(parameters(x.system.term_x, k), F, M, hint, x.system.const)
 
 
 def coefficient(result: Result, k: int) -> float:
@@ -39,7 +39,7 @@ def along(result: Result, joint: Joint, what: str) -> Wrench:
     (i, turn_i), (j, turn_j), c = coordinate_frames(result.values, joint, what)
     F, M = turned(result.records.frame(i), turn_i), turned(result.records.frame(j), turn_j)
     par = (*c.row.par[:6], 0.0, 0.0)
-    _, f, tM, tF, _ = FORMULAS[c.row.kind](par, F, M, 0.0, result.values.system.const)
+    _, f, tM, tF, _ = KINDS[c.row.kind].row(par, F, M, 0.0, result.values.system.const)
     force, torque = (f, tM) if c.frames[1] == "M" else (neg(f), tF)
     return scale(c.sign, force), scale(c.sign, torque)
 

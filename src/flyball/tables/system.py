@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..constraints.registry import FORMULAS
+from ..constraints.registry import KINDS
 from ..numerics.ldl import Pattern
 
 # columns of System.body_i
@@ -52,7 +52,7 @@ SCHUR, COUPLED, ARTICULATED = range(3)
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
 
-TERM_KINDS = len(FORMULAS)
+TERM_KINDS = len(KINDS)
 
 
 class System(NamedTuple):

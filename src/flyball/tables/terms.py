@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints import angle, curve
 from ..constraints.blocks import ANGLE, Row, point_coordinate
+from ..constraints.registry import KINDS
 from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
 from ..model.expressions import Expression
@@ -45,7 +45,7 @@ def _joint_rows(s: Structure, joint: Joint) -> None:
             continue
         used = row.far if s.far and row.far is not None else row
         term = TermSpec(len(s.rows), F, M, used, 1.0, joint)
-        if used.kind == curve.KIND:
+        if KINDS[used.kind].place:
             term.hint = s.state(f"{joint.name}.place")
         s.terms.append(term)
         for what in row.plus:
@@ -81,7 +81,7 @@ def _told_row(s: Structure, e: Driver | Initial, text: str, law: int) -> RowSpec
     """The row of a coordinate that follows a law."""
     first = len(s.rows)
     term = coordinate_term(s, text, e, first)
-    s.rows.append(RowSpec(e, text, law, wrap=term.formula.kind == angle.KIND))
+    s.rows.append(RowSpec(e, text, law, wrap=KINDS[term.formula.kind].turns))
     s.slices[e.name] = slice(first, first + 1)
     return s.rows[-1]
 
@@ -105,7 +105,7 @@ def coordinate_term(
         F, M, sign = 0, frame(s, owner, "M"), 1.0
         formula = ANGLE if what == "angle" else point_coordinate(what)
     term = TermSpec(row, F, M, formula, sign, e, owner, what, measured)
-    if formula.kind == angle.KIND and (counted or measured):
+    if KINDS[formula.kind].turns and (counted or measured):
         term.hint = count(s, owner, what, F, M)
     s.terms.append(term)
     return term
@@ -129,7 +129,7 @@ def _turning(s: Structure) -> None:
     for joint in s.model.joints:
         for what, c in joint.measured(s.model.planar).items():
             needed = not s.model.planar or f"{joint.name}.{what}" in told
-            if c.row.kind == angle.KIND and needed and step_of(s, joint.name, what) is None:
+            if KINDS[c.row.kind].turns and needed and step_of(s, joint.name, what) is None:
                 count(s, joint, what, *coordinate_frames(s, joint, what)[:2])
 
 

@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints import angle, curve
-from ..constraints.registry import FORMULAS
+from ..constraints.registry import KINDS
 from ..math.scalar import absolute, maximum
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
@@ -198,8 +197,8 @@ class Poses:
         """What a term's formula gives in the drawn configuration."""
         poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
         F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
-        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if t.formula.kind == angle.KIND else (*t.formula.par[:6], 0.0, 0.0)
-        return FORMULAS[t.formula.kind](par, F, M, self.turned(t.owner), None)[0]
+        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if KINDS[t.formula.kind].turns else (*t.formula.par[:6], 0.0, 0.0)
+        return KINDS[t.formula.kind].row(par, F, M, self.turned(t.owner), None)[0]
 
     def turned(self, owner: Any) -> float:
         """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
@@ -315,11 +314,11 @@ def _term_x(
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
         n = numbers[e.name]
-        if t.hint >= 0 and t.formula.kind == angle.KIND:
+        if t.hint >= 0 and KINDS[t.formula.kind].turns:
             x[k, 0] = 1.0
         if isinstance(e, Joint) and t.owner is None:
             x[k, :7] = e.constants(n, t.formula, *pose.ends(e))
-            if t.formula.kind == curve.KIND:
+            if KINDS[t.formula.kind].place:
                 at = curve_at[e.name]
                 x[k, 1:3] = at, at + len(e.curves(n)[0])
         elif isinstance(e, Joint):

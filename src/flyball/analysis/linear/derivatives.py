@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.entry import MOTION, residual_kernel
+from ...equations.engine import MOTION
+from ...equations.residual import residual_kernel
 from ...equations.scratch import work
 from ...errors import ModelError, PerformanceNotice
 from ...laws.evaluation import evaluate_jet

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...equations.entry import residual_kernel
+from ...equations.residual import residual_kernel
 from ...equations.scratch import work
 from ...errors import ModelError
 from ...tables.specs import Structure

@@ -15,7 +15,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...equations.entry import residual_kernel
+from ...equations.residual import residual_kernel
 from ...equations.scratch import work
 from ...equations.tree import lengths, quaternion_at
 from ...tables.names import velocity_names

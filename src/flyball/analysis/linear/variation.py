@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...equations.tree import normalise, retract
 from ...errors import SimulationError
 from ...tables.system import EFFORT, G_VALUE, LAM, NU, X_SOLVED

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...equations.entry import FOLLOW, motion_kernel
+from ...equations.engine import FOLLOW, motion_kernel
 from ...numerics.integrators import explicit as ex
 from ...numerics.integrators.tableaux import tableau
 from ..assemble import Assembly

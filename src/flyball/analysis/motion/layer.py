@@ -6,7 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...errors import ModelError
 from ...tables.cost import cost
 from ...tables.spanning import spanning

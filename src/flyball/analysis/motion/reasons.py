@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...equations import motion
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...equations.loads import wide
 from ...equations.records import load
 from ...laws.evaluation import evaluate, evaluate_jet

@@ -1,0 +1,60 @@
+"""Compiled code on disk: Numba's cache with our stamp, and with patience for damaged files."""
+
+from __future__ import annotations
+
+import contextlib
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, ClassVar
+
+from .stamp import source_stamp
+
+
+def cache_of(function: Any) -> Any:
+    """The cache of one kernel."""
+    return _cache_class()(function)
+
+
+@lru_cache(maxsize=1)
+def _cache_class() -> Any:
+    from numba.core import caching
+
+    class Stamped:
+        """Says what the sources are, in place of Numba's look at one file's date."""
+
+        @classmethod
+        def from_function(cls, function: Any, file: str) -> Any:
+            made = super().from_function(function, file)  # type: ignore[misc]
+            if made is not None:
+                made.file = Path(function.__code__.co_filename)
+            return made
+
+        def get_source_stamp(self) -> str:
+            return source_stamp(self.file)  # type: ignore[attr-defined]
+
+    bases = caching.CompileResultCacheImpl._locator_classes
+
+    class Implementation(caching.CompileResultCacheImpl):
+        _locator_classes: ClassVar = [type(base.__name__, (Stamped, base), {}) for base in bases]
+
+    class Cache(caching.FunctionCache):
+        _impl_class = Implementation
+
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            """What is kept for these types; nothing where the files are damaged, which are then written anew."""
+            try:
+                return super().load_overload(sig, target_context)
+            except Exception:
+                with contextlib.suppress(OSError):
+                    self.flush()
+                return None
+
+        @property
+        def empty(self) -> bool:
+            """Whether nothing of this version is kept."""
+            try:
+                return not self._cache_file._load_index()
+            except Exception:  # damaged, or another Numba
+                return True
+
+    return Cache

@@ -1,0 +1,116 @@
+"""The one engine: everything that needs the right-hand side, compiled once, behind a door that any loop may go through.
+
+Another loop (an implicit method, contact) hands its own desk to the engine: a `Clock` with the time in ``real[T]`` and
+the state in ``y[0]``. It never contains the right-hand side, so that it compiles in half a second.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.door import door, enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..numerics.integrators.explicit import Clock, T, advance
+from ..numerics.integrators.tableaux import Tableau, tableau
+from ..tables.system import COORDINATES, System, Work
+from .dispatch import remember
+from .follow import follow
+from .motion import arrive, derivative, move, place, report
+from .residual import residual
+
+POSITION, MOTION, INTEGRATE, FOLLOW, ARRIVE, REPORT, RESIDUAL = range(7)
+
+
+@formula
+def perform(S, W, R, clock, out, task):
+    """One task; see `motion_kernel`. A formula, so that callees have one caller's flags and are compiled once."""
+    t = clock.real[T]
+    y = clock.y[0]
+    if task == POSITION:
+        nq = S.kinds[COORDINATES]
+        z = y[nq + W.vel.shape[1] :]
+        place(S, W, t, y[:nq], z)
+        move(S, W, t, y[nq : nq + W.vel.shape[1]], z)
+        remember(S, W, z)
+        return 0
+    if task == MOTION:
+        return derivative(t, y, clock.K[0], S, W)
+    if task == FOLLOW:
+        return follow(S, W, clock, out)
+    if task == ARRIVE:
+        status, moved = arrive(t, y, clock.K[0], S, W)
+        out[0, 0] = moved
+        return status
+    if task == REPORT:
+        return report(t, y, out[0], S, W)
+    if task == RESIDUAL:
+        for i in range(y.shape[0]):
+            W.y[0, i] = y[i]
+        residual(S, W, t, W.y[0], out[1], out[2], out[0])
+        return 0
+    return advance(derivative, arrive, report, S, W, R, clock, out)
+
+
+class Sheet(NamedTuple):
+    """Where the engine writes."""
+
+    rows: np.ndarray
+
+
+@door
+def engine(S, W, R, clock, sheet, task):
+    """`perform` behind an address."""
+    return perform(S, W, R, clock, sheet.rows, task)
+
+
+@kernel
+def through(address, S, W, R, clock, sheet, task):
+    """From Python through the door."""
+    return enter(address, held(S), held(W), held(R), held(clock), held(sheet), task)
+
+
+def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray, task: int) -> int:
+    """Have the engine do a task.
+
+    Parameters
+    ----------
+    S, W : System, Work
+        Tables and scratch; kinematics and rows at the state are left in W.
+    R : Tableau
+        The integrator's coefficients; only INTEGRATE looks at them.
+    clock : Clock
+        Time and state.
+    out : (n, width)
+        Rows of output.
+    task : int
+        POSITION: kinematics and rows; the state's turns and places on curves are brought up to it. MOTION: also its
+        derivative, in ``clock.K[0]``. ARRIVE: the state is put on the constraints, and how far that moved it goes to
+        ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. RESIDUAL: of the equations at the accelerations
+        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. INTEGRATE: go on with the integration; FOLLOW: go on with
+        what the drivers prescribe.
+
+    Returns
+    -------
+    int
+        Of INTEGRATE and FOLLOW the number of rows written, of the others a status.
+    """
+    sheet = Sheet(out)
+    return through(engine.address(S, W, R, clock, sheet), S, W, R, clock, sheet, task)
+
+
+def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[int, np.ndarray]:
+    """Evaluate at one state; returns (status, derivative) and leaves kinematics and rows in W.
+
+    With POSITION the turns and places in ``y`` are brought up to date.
+    """
+    real = np.zeros(10)
+    real[T] = t
+    Y = np.zeros((3, len(y)))
+    Y[0] = y
+    clock = Clock(real, np.zeros(9, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), np.zeros(0, np.int64))
+    status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
+    y[:] = Y[0]
+    return status, clock.K[0]

@@ -1,0 +1,68 @@
+"""The lists of kinds that compiled loops choose from are those of the registries; what is unknown is nan."""
+
+import math
+
+import numpy as np
+import pytest
+
+from flyball import forces
+from flyball.constraints.registry import KINDS, RARE, Kind, ordered
+from flyball.equations import dispatch
+from flyball.model.force import CoordinateForce
+from tests.contract.frames import random_motion, record
+from tests.contract.test_forces import LAWS, full
+
+UNKNOWN = 1000
+
+
+def frames():
+    F, M = random_motion(3)
+    return record(F), record(M)
+
+
+@pytest.mark.parametrize("kind", forces.ALL, ids=lambda k: k.__name__)
+def test_every_force_is_answered_by_its_own_formula(kind):
+    par = full(kind)
+    if issubclass(kind, CoordinateForce):
+        told = par, 0.7, 0.3, LAWS, 2.0
+        assert dispatch.effort(kind.kind, *told) == kind.effort(*told)
+        return
+    F, M = frames()
+    assert dispatch.inputs(kind.kind, par, F, M) == kind.inputs(par, F, M)
+    told = par, F, M, LAWS, kind.inputs(par, F, M)
+    assert dispatch.wrench(kind.kind, *told) == kind.wrench(*told)
+
+
+def test_no_unknown_kind_is_answered_by_another_ones_formula():
+    F, M = frames()
+    par = (1.0,) * 16
+    wrench = dispatch.wrench(UNKNOWN, par, F, M, LAWS, (0.1, 0.2))
+    inputs = dispatch.inputs(UNKNOWN, par, F, M)
+    row = dispatch.rare(UNKNOWN, par[:8], F, M, 0.0, np.zeros(3))
+    numbers = [*wrench[0], *wrench[1], *inputs, row[0], *row[1], *row[2], *row[3], row[4]]
+    assert all(math.isnan(x) for x in [*numbers, dispatch.effort(UNKNOWN, par, 0.7, 0.3, LAWS, 2.0)])
+
+
+def test_two_forces_of_one_kind_are_refused():
+    class Twin(forces.Rope):
+        """Another formula under the rope's number."""
+
+        effort = staticmethod(lambda par, x, rate, laws, load: 0.0)
+
+    with pytest.raises(RuntimeError, match=rf"kind {forces.Rope.kind} is taken twice.*rope.*test_dispatch"):
+        forces.formulas([*forces.ALL, Twin], "effort")
+
+
+def a_row(par, F, M, hint, data):
+    raise NotImplementedError
+
+
+def test_kinds_of_rows_are_numbered_without_gaps_and_frequent_ones_first():
+    n = len(KINDS)
+    with pytest.raises(RuntimeError, match=r"KIND 3 is taken twice: by flyball\.constraints\.distance and"):
+        ordered([*KINDS, Kind(3, a_row)])
+    with pytest.raises(RuntimeError, match="must be 0, 1, 2"):
+        ordered([*KINDS, Kind(n + 1, a_row)])
+    with pytest.raises(RuntimeError, match="OFTEN is for the first kinds"):
+        ordered([*KINDS, Kind(n, a_row, often=True)])
+    assert [k.often for k in KINDS] == [True] * RARE + [False] * (n - RARE)

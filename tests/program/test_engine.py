@@ -1,0 +1,104 @@
+"""The engine behind its door: loops of others go through it, and never contain it."""
+
+import time
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.motion.start import begin
+from flyball.compiler.door import enter
+from flyball.compiler.held import held
+from flyball.compiler.jit import formula, kernel
+from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, Sheet, engine, motion_kernel
+from flyball.numerics.integrators.explicit import Clock, T
+from flyball.numerics.integrators.tableaux import tableau
+from flyball.tables.system import LAM
+from tests.layers import LAYERS
+
+
+@formula
+def classical(address, S, W, R, clock, sheet, h, steps):
+    """Runge and Kutta's classical method (1901), of an engine that it knows by its address only."""
+    y, n = clock.y, clock.y.shape[1]
+    for _ in range(steps):
+        t = clock.real[T]
+        for i in range(n):
+            y[1, i] = y[2, i] = y[0, i]
+        for stage in range(4):
+            enter(address, S, W, R, clock, sheet, MOTION)
+            w = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
+            part = h if stage == 2 else 0.5 * h
+            clock.real[T] = t + (0.0 if stage == 3 else part)
+            for i in range(n):
+                y[2, i] += w * clock.K[0, i]
+                y[0, i] = y[1, i] + part * clock.K[0, i]
+        for i in range(n):
+            y[0, i] = y[2, i]
+        clock.real[T] = t + h
+    return enter(address, S, W, R, clock, sheet, ARRIVE)
+
+
+@kernel
+def classical_kernel(address, S, W, R, clock, sheet, h, steps):
+    return classical(address, held(S), held(W), held(R), held(clock), held(sheet), h, steps)
+
+
+def desk(model, coordinates):
+    """What the engine needs: tables, scratch, a clock at the start, and a sheet to write on."""
+    start = begin(model.snapshot(), 0.0, None, None, coordinates)
+    c = start.assembly.compiled
+    s, S = c.structure, c.values.system
+    n = len(start.y)
+    clock = Clock(
+        np.zeros(10), np.zeros(9, np.int64), np.zeros(0), np.zeros((3, n)), np.zeros((1, n)), np.zeros(0, np.int64)
+    )
+    clock.y[0] = start.y
+    width = 1 + n + s.nv + 3 * len(S.row_i) + 3 * len(s.measured) + len(s.prescribed)
+    return s, S, c.work, tableau("rk45"), clock, Sheet(np.zeros((3, width)))
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_loop_of_ones_own_goes_through_the_door(coordinates):
+    model = fb.load("examples/andrews.toml")
+    s, S, W, R, clock, sheet = desk(model, coordinates)
+    address = engine.address(S, W, R, clock, sheet)
+    began = time.process_time()
+    assert classical_kernel(address, S, W, R, clock, sheet, 1e-5, 100) == 0
+    took = time.process_time() - began
+    r = model.simulate(1e-3, coordinates=coordinates, rtol=1e-12, atol=1e-13)
+    assert clock.y[0, : s.nq] == pytest.approx(r.final[1][: s.nq], abs=1e-9)
+    assert took < 8.0  # seconds, on a busy machine; with the right-hand side inside it would be some twenty
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_tasks_agree_with_each_other(coordinates):
+    """The row of output holds accelerations and multipliers that leave no residual, of a mechanism with loops."""
+    s, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), coordinates)
+    assert motion_kernel(S, W, R, clock, sheet.rows, ARRIVE) == 0
+    moved = sheet.rows[0, 0]
+    assert 0.0 <= moved < 1e-9
+    assert motion_kernel(S, W, R, clock, sheet.rows, MOTION) == 0
+    vdot = clock.K[0, s.nq : s.nq + s.nv].copy()
+    nr = len(S.row_i)
+    lam = W.row[LAM].copy()
+    out = np.zeros((3, sheet.rows.shape[1]))
+    out[1, : s.nv], out[2, :nr] = vdot, lam
+    assert motion_kernel(S, W, R, clock, out, RESIDUAL) == 0
+    free = np.ones(s.nv, bool)
+    free[[int(S.body_i[b, 3]) for b in s.prescribed.values()]] = False
+    largest = np.abs(lam).max(initial=1.0)
+    assert np.abs(out[0, : s.nv][free]).max(initial=0.0) < 1e-9 * largest
+    assert np.abs(out[0, s.nv : s.nv + 2 * nr]).max(initial=0.0) < 1e-9
+    row = np.zeros((1, 1 + clock.y.shape[1] + s.nv + nr + len(s.prescribed)))
+    assert motion_kernel(S, W, R, clock, row, REPORT) == 0
+    assert row[0, 0] == 0.0
+    assert row[0, 1 : 1 + clock.y.shape[1]] == pytest.approx(clock.y[0], abs=1e-12)
+
+
+def test_other_tables_than_those_it_was_made_for_are_refused():
+    """Complex tables would be read as if they were real."""
+    _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
+    complex_tables = S._replace(body_x=S.body_x.astype(complex))
+    with pytest.raises(Exception, match="no door was made for"):
+        motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
