@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.entry import MOTION
+from ...equations.engine import MOTION
 from ...errors import ModelError
 from ...laws.functions import Missed, forget
 from ...model.expressions import Expression
