@@ -110,7 +110,7 @@ def test_a_start_beyond_the_ends_is_told_at_once():
     m = cart("curve(value - 0.5)")
     says = r"force of Actuator 'A': at t = 0 s Table 'curve' is asked for x = -0.5, and its points go from 0 to 1"
     for ask in (lambda: m.simulate(1.0), m.equilibrium, m.modes, m.linearize):
-        with pytest.raises(fb.ModelError, match=says):
+        with pytest.raises(fb.FlyballError, match=says):
             ask()
     assert any("Table 'curve' is asked for x = -0.5" in w for w in m.check().warnings)
     with pytest.raises(fb.AssemblyError, match=r"law of Driver 'D' has no finite value there: .*asked for x = 3,"):

@@ -91,7 +91,7 @@ def test_amplitude_and_keys(opened: Open, two: Modes) -> None:
 
 def test_unstable_ones_are_flagged_and_rigid_ones_come_last(opened: Open) -> None:
     modes = upright().modes()
-    assert sorted(modes.kinds) == ["decay", "decay", "rigid", "rigid", "unstable", "unstable"]
+    assert sorted(modes.kinds) == ["decay", "decay", "rigid", "unstable", "unstable"]
     tab = opened(page(modes, count=4), "play=0")
     kinds = tab.locator(".modes .kind").all_inner_texts()
     assert sorted(kinds) == ["decay", "decay", "unstable", "unstable"]

@@ -6,89 +6,87 @@ iterations with shift and invert (Ericsson and Ruhe 1980): nothing is reduced, s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError
+from ..errors import AnalysisError
 from ..model.model import Model
 from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
-from .linear.instant import instant
+from .linear.kinks import refuse_kinks
+from .linear.spectrum import EQUAL, spectrum
 from .linear.steady import balanced
-from .linearize import without_inputs
+from .linearize import InstantOptions, without_inputs
+from .options import count as at_least
 
 DENSE = 600  # velocities up to which all modes are found
 RIGID = 1e-6  # shift, of the largest stiffness over the largest mass
 FEW = 10
-REAL = 1e-12  # imaginary parts below this part of the fastest eigenvalue are rounding
+ROUNDED = 1e-11  # parts of a shape below this part of its largest are rounding
 UNDAMPED = 1e-12
 TINY = 1e-7  # directions of random motions below this part of the largest are none
 REFINED = 2  # times that a solution is improved: rows may be redundant
 
 
-def modes(
-    model: Model,
-    *,
-    about: Any = None,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-    count: int | None = None,
-    frozen: bool = False,
-) -> Modes:
-    """Natural motions about an equilibrium or a steady motion.
+@dataclass(frozen=True, kw_only=True)
+class ModesOptions(InstantOptions):
+    """What `Mechanism.modes` is asked."""
 
-    Parameters
-    ----------
-    model, about, t, parameters, coordinates, frozen
-        As for `flyball.analysis.linearize.linearize`.
-    count : int, optional
-        How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
+    count: int | None
 
-    Returns
-    -------
-    Modes
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.count is not None:
+            at_least(self.count, "count")
 
-    Raises
-    ------
-    AnalysisError, SingularityError, ModelError
-        As for `linearize`.
-    """
-    if count is not None and count < 1:
-        raise ModelError(f"count must be at least 1, got {count!r}")
-    x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
+
+def modes(model: Model, o: ModesOptions) -> Modes:
+    """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    count, frozen = o.count, o.frozen
+    x = o.state(model)
     if len(x.v) > DENSE and x.c.structure.tree:
-        x, _ = instant(model, about, t=t, parameters=parameters, coordinates="absolute")
+        x = o.state(model, "absolute")
     if len(x.v) > DENSE and not np.abs(x.v).max() > 0.0:
         return _sparse(x, count or FEW, frozen)
     f, frame, r = without_inputs(x, frozen)
-    w, V = np.linalg.eig(r.A) if len(r.A) else (np.zeros(0, complex), np.zeros((0, 0)))
-    one = np.flatnonzero(w.imag >= 0.0)
+    own = spectrum(r.A, r.doubt)
+    w = own.values
+    listed = np.array([k for group in own.groups for k in group[: own.geometric[group[0]]]], int)
+    one = listed[w[listed].imag >= 0.0]
     one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
     rest = one[count:] if count is not None else one[:0]
     one = one[:count]
-    shapes = r.position[:, : len(r.A)] @ V[:, one]
-    found = _made(x, w[one].astype(complex), shapes, frame.turning, float(np.abs(w).max(initial=0.0)))
+    shapes = r.position[:, : len(r.A)] @ own.vectors[:, one]
+    found = _made(x, w[one], shapes, float(np.abs(w).max(initial=0.0)))
+    found.turning, found.seen_from = frame.turning, frame.told
+    found.multiplicity, found.geometric_multiplicity = own.multiplicity[one], own.geometric[one]
+    found.residual = own.residual
     found.growing = bool((w[rest].real > GROWS * np.abs(w[rest])).any())
     return found
 
 
-def _made(x: State, w: np.ndarray, shapes: np.ndarray, turning: np.ndarray, fastest: float) -> Modes:
+def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float) -> Modes:
+    """Modes whose largest part is 1, seen from the ground."""
     names = velocity_names(x.c.structure)
-    length = x.c.values.length / x.c.sizes
-    sign = np.array([n.sign for n in names])
+    length = (x.c.values.length / x.c.sizes)[:, None]
+    sign = np.array([n.sign for n in names])[:, None]
+    size = length * np.abs(shapes)
     for k in range(shapes.shape[1]):
-        size = length * np.abs(shapes[:, k])
-        if size.max(initial=0.0) > 0.0:
-            shapes[:, k] /= shapes[np.argmax(size), k]
-    w = np.where(np.abs(w.imag) <= REAL * fastest, w.real, w) + 0j
-    own = sign[:, None] * shapes
+        if size[:, k].max(initial=0.0) > 0.0:
+            shapes[:, k] /= shapes[np.argmax(size[:, k]), k]
+    least = ROUNDED * (length * np.abs(shapes)).max(axis=0, initial=0.0) / length
+    shapes = np.where(np.abs(shapes.real) > least, shapes.real, 0.0) + 1j * np.where(
+        np.abs(shapes.imag) > least, shapes.imag, 0.0
+    )
     units = tuple(n.unit for n in names)
-    return Modes(w, own, tuple(n.name for n in names), units, turning, snapshot(x), fastest)
+    one = np.ones(len(w), int)
+    return Modes(
+        w, sign * shapes, tuple(n.name for n in names), units, np.zeros(3), snapshot(x), fastest, False, one, one.copy()
+    )
 
 
 def _sparse(x: State, count: int, frozen: bool) -> Modes:
@@ -99,6 +97,7 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
     e = Equations(x)
     if not frozen:
         balanced(x, e)
+    refuse_kinks(e)
     if not all(row.holonomic for row in x.c.structure.rows):
         raise AnalysisError(
             f"{x.c.structure.model.name!r} has {len(x.v)} velocities and constraints on velocities only; modes of so "
@@ -142,7 +141,21 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
     order = np.argsort(squares)[:count]
     w = np.sqrt(squares[order].astype(complex))
     w = np.where(squares[order] < 0.0, w.imag + 0j, 1j * w.real)
-    return _made(x, w, V[:, order].astype(complex), np.zeros(3), float(np.sqrt(typical / abs(M).max())))
+    V = V[:, order]
+    found = _made(x, w, V.astype(complex), float(np.sqrt(typical / abs(M).max())))
+    again = np.array([invert(M @ v) for v in V.T]).T * (squares[order] - shift)
+    found.residual = float((np.linalg.norm(again - V, axis=0) / np.linalg.norm(V, axis=0)).max(initial=0.0))
+    _repeated(found)
+    return found
+
+
+def _repeated(found: Modes) -> None:
+    """Multiplicities among the modes of a mechanism at rest: equal frequencies, and zeros, which are double."""
+    w = found.eigenvalues
+    still = np.array([kind == "rigid" for kind in found.kinds], bool)
+    near = np.abs(w[:, None] - w) <= EQUAL * np.abs(w)
+    found.geometric_multiplicity = np.where(still, still.sum(), near.sum(axis=1))
+    found.multiplicity = np.where(still, 2, 1) * found.geometric_multiplicity
 
 
 def _few(invert: Any, K: Any, M: Any, most: int) -> tuple[np.ndarray | None, np.ndarray]:

@@ -35,11 +35,15 @@ class LinearModel:
         M, D and K of M a'' + D a' + K a = 0 in the first f states; None where constraints are on velocities only.
     turning : ndarray (3,) [rad/s]
         Angular velocity of the frame that the states are seen from, zero about an equilibrium.
+    eigenvalues : ndarray (n,) complex [1/s]
+        Of A, by imaginary, then real part; those that cannot be told apart are replaced by their mean.
     t : float [s]
     motion : ndarray (nv, n)
         Changes of all positions along the mechanism's velocities, per unit of each state.
     point : Result
         The state itself, as a result with one time.
+    seen_from : str
+        The frame from which the motion is steady, in words; empty about an equilibrium.
     """
 
     name: str
@@ -58,15 +62,11 @@ class LinearModel:
     damping: np.ndarray | None
     stiffness: np.ndarray | None
     turning: np.ndarray
+    eigenvalues: np.ndarray
     t: float
     motion: np.ndarray = field(repr=False)
     point: Result = field(repr=False)
-
-    @property
-    def eigenvalues(self) -> np.ndarray:
-        """Eigenvalues of A [1/s], by imaginary, then real part."""
-        found = np.linalg.eigvals(self.A)
-        return found[np.lexsort((found.real, np.abs(found.imag)))]
+    seen_from: str = ""
 
     def to_control(self) -> Any:
         """The model as ``control.StateSpace``; its names have ``_`` in place of points and blanks.
@@ -94,7 +94,7 @@ class LinearModel:
         i, k = self.input_index(input), self.output_index(output)
         n = len(self.A)
         b, c, d = self.B[:, [i]], self.C[[k]], self.D[[k]][:, [i]]
-        poles = np.linalg.eigvals(self.A)
+        poles = self.eigenvalues
         pencil, E = np.block([[self.A, b], [c, d]]), np.zeros((n + 1, n + 1))
         E[:n, :n] = np.eye(n)
         size = 1.0 + np.abs(poles).max(initial=0.0)
@@ -164,8 +164,8 @@ class LinearModel:
             for k, (name, unit) in enumerate(zip(getattr(self, f"{what}s"), units, strict=True)):
                 now = f", {self.output_values[k]:.6g} at the state itself" if what == "output" else ""
                 out.append((what, f"{name} [{unit}]{now}"))
-        if self.turning.any():
-            out.append(("seen from", f"a frame that turns with ({', '.join(f'{x:.4g}' for x in self.turning)}) rad/s"))
+        if self.seen_from:
+            out.append(("seen from", self.seen_from))
         out += [("eigenvalues", f"{_written(w)} 1/s") for w in self.eigenvalues if w.imag >= 0.0]
         if len(self.inputs) == len(self.outputs) == 1:
             zeros, _, gain = self.transfer()
@@ -176,7 +176,12 @@ class LinearModel:
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names."""
         matrices = {k: getattr(self, k) for k in ("A", "B", "C", "D", "mass", "damping", "stiffness")}
-        out: dict[str, Any] = {"name": self.name, "t": self.t, "turning": self.turning.tolist()}
+        out: dict[str, Any] = {
+            "name": self.name,
+            "t": self.t,
+            "turning": self.turning.tolist(),
+            "seen_from": self.seen_from,
+        }
         for what in ("states", "inputs", "outputs"):
             units = getattr(self, f"{what[:-1]}_units")
             out[what] = [{"name": n, "unit": u} for n, u in zip(getattr(self, what), units, strict=True)]

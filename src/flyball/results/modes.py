@@ -11,7 +11,7 @@ import numpy as np
 if TYPE_CHECKING:
     from .result import Result
 
-ROUNDING = 1e-9  # damping ratios below this are written as 0
+ROUNDING = 1e-9  # damping ratios below this are 0
 STILL = 1e-6  # part of the fastest eigenvalue below which one is zero: a double zero shows rounding by its square root
 GROWS = 1e-6  # damping ratios above minus this are not growth
 
@@ -36,6 +36,14 @@ class Modes:
         Whether a mode that was not asked for grows.
     fastest : float [1/s]
         Size of the largest eigenvalue, those that were not asked for included: what zeros are compared with.
+    multiplicity, geometric_multiplicity : ndarray (n,) int
+        How often each eigenvalue is repeated, and how many shapes it has; where these are fewer, the eigenvalue is
+        defective: motions also grow as t exp(eigenvalue t), such as a body that nothing holds and that drifts away.
+    residual : float
+        The largest part that A x - eigenvalue x leaves of |A| |x| + |eigenvalue| |x|, over all shapes; refused above
+        1e-9.
+    seen_from : str
+        The frame from which the motion is steady, in words; empty at rest.
     """
 
     eigenvalues: np.ndarray
@@ -46,6 +54,10 @@ class Modes:
     point: Result = field(repr=False)
     fastest: float = 0.0
     growing: bool = False
+    multiplicity: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    geometric_multiplicity: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    residual: float = 0.0
+    seen_from: str = ""
 
     @property
     def _still(self) -> np.ndarray:
@@ -66,7 +78,8 @@ class Modes:
         """-Re / |eigenvalue|: 0 undamped, 1 no oscillation, negative where the motion grows; 0 for rigid ones."""
         size = np.abs(self.eigenvalues)
         still = self._still
-        return np.where(still, 0.0, -self.eigenvalues.real / np.where(still, 1.0, size))
+        ratio = np.where(still, 0.0, -self.eigenvalues.real / np.where(still, 1.0, size))
+        return np.where(np.abs(ratio) > ROUNDING, ratio, 0.0)
 
     @property
     def kinds(self) -> tuple[str, ...]:
@@ -96,15 +109,25 @@ class Modes:
         out = [("mode", f"{'frequency [Hz]':>15} {'omega [rad/s]':>15} {'damping ratio':>14}  kind         moves")]
         for k in range(len(self)):
             most = ", ".join(list(self.shape(k, 0.3))[:4])
-            ratio = self.damping_ratio[k]
-            ratio = ratio if abs(ratio) > ROUNDING else 0.0
-            figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {ratio:14.4g}"
+            figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {self.damping_ratio[k]:14.4g}"
             out.append((str(k), f"{figures}  {self.kinds[k]:<12} {most}"))
         if not len(self):
             return [("modes", "none: no freedom is left to move in")]
-        if self.turning.any():
-            turning = ", ".join(f"{x:.4g}" for x in self.turning)
-            out.append(("seen from", f"a frame that turns with ({turning}) rad/s"))
+        out += [("repeated", text) for text in self.repeated()]
+        if self.seen_from:
+            out.append(("seen from", self.seen_from))
+        return out
+
+    def repeated(self) -> list[str]:
+        """What is to be known of eigenvalues that are repeated, a text for each."""
+        out, told = [], set()
+        for k, (m, g) in enumerate(zip(self.multiplicity.tolist(), self.geometric_multiplicity.tolist(), strict=True)):
+            if m > 1 and (value := complex(self.eigenvalues[k])) not in told:
+                told.add(value)
+                own = np.flatnonzero(self.eigenvalues == value)
+                few = f", with {g} shape{'s' * (g > 1)} only: defective, motions also grow in proportion to time"
+                which = f"modes {own[0]} to {own[-1]}" if len(own) > 1 else f"mode {k}"
+                out.append(f"{which}: the eigenvalue is {m}-fold{few if g < m else f', with {g} shapes'}")
         return out
 
     def as_dict(self) -> dict[str, Any]:
@@ -116,11 +139,14 @@ class Modes:
                 "omega": float(self.omega[k]),
                 "damping_ratio": float(self.damping_ratio[k]),
                 "kind": self.kinds[k],
+                "multiplicity": int(self.multiplicity[k]),
+                "geometric_multiplicity": int(self.geometric_multiplicity[k]),
                 "shape": {n: [x.real, x.imag] for n, x in self.shape(k).items()},
             }
             for k, w in enumerate(self.eigenvalues)
         ]
-        return {"turning": self.turning.tolist(), "modes": modes}
+        about = {"turning": self.turning.tolist(), "seen_from": self.seen_from, "residual": self.residual}
+        return about | {"modes": modes}
 
     def motion(self, k: int, amplitude: float = 0.1, outputs: int = 81) -> Result:
         """Mode k as a motion over one period, largest part ``amplitude`` (radians, or parts of the length).

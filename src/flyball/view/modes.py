@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import ModelError
-from ..results.modes import ROUNDING
 from ..results.result import Result
 from .animate import record
 from .page import document
@@ -97,7 +96,7 @@ def _mode(modes: Modes, k: int, n: int) -> RecordedMode:
         end=_begin(n) + PERIOD,
         frequency=float(modes.frequency[k]),
         omega=float(modes.omega[k]),
-        damping_ratio=float(modes.damping_ratio[k]) if abs(modes.damping_ratio[k]) > ROUNDING else 0.0,
+        damping_ratio=float(modes.damping_ratio[k]),
         kind=modes.kinds[k],
         shape=tuple((n, units[n], abs(z), float(np.degrees(np.angle(z)))) for n, z in parts),
     )
@@ -113,7 +112,6 @@ def _notes(modes: Modes, shown: int) -> dict[str, str]:
         "about": f"{'steady motion' if np.abs(modes.point.v).max(initial=0.0) > 0.0 else 'rest'}, "
         f"t = {modes.point.t[0]:g} s",
     }
-    if modes.turning.any():
-        turning = ", ".join(f"{w:.4g}" for w in modes.turning)
-        out["seen from"] = f"a frame that turns with ({turning}) rad/s"
+    if modes.seen_from:
+        out["seen from"] = modes.seen_from
     return out

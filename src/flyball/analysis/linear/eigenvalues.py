@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from ...errors import SingularityError
+from .spectrum import EQUAL, WIDEST, equal, subspace
 
-EQUAL = 1e-9  # difference of eigenvalues, of the matrix' size, below which they are one
 ROUNDED = 100.0 * np.finfo(float).eps  # of the matrix' size: what is uncertain of it
 PLAIN = 1e-6  # part of the matrix' size by which a group of equal eigenvalues differs from a multiple of the identity
 STAYED = 1e-3  # of what dA would do to a group in a finite step: eigenvalues that moved less have stayed
@@ -54,7 +54,8 @@ def changes(A: np.ndarray, dA: np.ndarray, aside: Aside | None = None) -> tuple[
     w, left, right = w[order], left[:, order], right[:, order]
     size = float(np.linalg.norm(B, 2)) or 1.0
     out = np.zeros((len(w), len(dA)), complex)
-    for group in _groups(w, np.abs((left.conj() * right).sum(axis=0)), size):
+    angle = np.abs((left.conj() * right).sum(axis=0))
+    for group in equal(w, size * np.clip(ROUNDED / np.maximum(angle, 1e-300), EQUAL, WIDEST)):
         if len(group) == 1:
             y, x = left[:, group[0]], right[:, group[0]]
             out[group[0]] = np.array([y.conj() @ d @ x for d in dB]) / (y.conj() @ x)
@@ -63,26 +64,11 @@ def changes(A: np.ndarray, dA: np.ndarray, aside: Aside | None = None) -> tuple[
     return w.astype(complex), out
 
 
-def _groups(w: np.ndarray, angle: np.ndarray, size: float) -> list[list[int]]:
-    """Indices of eigenvalues that are the same as far as can be told; ``angle`` is |y^H x| of unit vectors."""
-    blur = size * np.maximum(EQUAL, np.minimum(ROUNDED / np.maximum(angle, 1e-300), 1e-4))
-    near = np.abs(w[:, None] - w) <= np.maximum(blur[:, None], blur)
-    left, out = set(range(len(w))), []
-    while left:
-        group, more = set(), {min(left)}
-        while more:
-            group |= more
-            more = {int(j) for i in more for j in np.flatnonzero(near[i])} - group
-        left -= group
-        out.append(sorted(group))
-    return out
-
-
 def _together(
     B: np.ndarray, dB: np.ndarray, w: np.ndarray, group: list[int], size: float, scale: np.ndarray, aside: Aside | None
 ) -> np.ndarray:
     """Derivatives of equal eigenvalues, (group, k)."""
-    V, W = (_subspace(X, v, len(group)) for X, v in ((B, w[group]), (B.conj().T, w[group].conj())))
+    V, W = (subspace(X, v) for X, v in ((B, w[group]), (B.conj().T, w[group].conj())))
     inner = np.linalg.inv(W.conj().T @ V)
     own = inner @ (W.conj().T @ B @ V)
     plain = np.abs(own - np.trace(own) / len(group) * np.eye(len(group))).max() <= PLAIN * size
@@ -105,15 +91,3 @@ def _together(
                 f"eigenvectors: it has no derivative by {name!r}. Ask a little to the side of this value"
             )
     return out
-
-
-def _subspace(B: np.ndarray, values: np.ndarray, count: int) -> np.ndarray:
-    """Orthonormal basis (n, count) of what belongs to these eigenvalues."""
-    from scipy.linalg import schur
-
-    def nearest(z: complex) -> float:
-        return float(np.abs(values - z).min())
-
-    T = np.diag(schur(B, "complex")[0])
-    last = np.sort([nearest(z) for z in T])[count - 1]
-    return schur(B, "complex", sort=lambda z: nearest(z) <= last * (1.0 + 1e-9) + 1e-300)[1][:, :count]

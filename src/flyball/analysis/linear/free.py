@@ -20,6 +20,7 @@ from ..compiled import Compiled
 from .derivatives import Equations
 
 TOLERANCE = 1e-8  # singular values below this part of the largest count as none; rows scaled to unit length
+ROUNDED = 1e-14  # entries of a basis below this are none, where its largest are about 1
 CLOSED = 1e-10  # of the mechanism's length
 PASSES = 20
 STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
@@ -60,7 +61,8 @@ class Free:
     def turned(self, T: np.ndarray, later: Equations) -> Free:
         """The same motions turned by T (nv, nv), under the constraints of a later instant."""
         other = free(later)
-        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ T.T, "left_v": self.left_v @ T.T}
+        back = np.linalg.inv(T)
+        bases = {"Z": T @ self.Z, "Zv": T @ self.Zv, "left": self.left @ back, "left_v": self.left_v @ back}
         return replace(self, holonomic=other.holonomic, rows=other.rows, **bases)
 
     def solve(self, right: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
@@ -127,6 +129,7 @@ def _basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple
         chosen = np.sort(order[: N.shape[1]])
     Z = scale[:, None] * N
     Z = Z @ np.linalg.inv(Z[chosen])
+    Z[np.abs(Z) <= ROUNDED * scale[:, None] / scale[chosen]] = 0.0
     Z[chosen] = np.eye(len(chosen))
     return Z, chosen
 

@@ -8,13 +8,14 @@ import numpy as np
 
 from ...errors import ModelError, NotConverged
 from ...tables.names import velocity_names
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from .free import free
 from .inputs import with_inputs
 from .rest import Rest
 
 BALANCED = 1e-9  # forces left, of those that act
+ROUNDED = 1e-13  # part of a force along the free motions that is none
 
 
 def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]]:
@@ -39,9 +40,13 @@ def preloaded(a: Assembly, names: Sequence[str]) -> tuple[Rest, dict[str, float]
     c.follow(a.compiled.hints)
     x = Rest.at(c, a.t, a.q)
     e = x.equations
-    Z = free(e).Z
+    own = free(e)
+    Z = own.Z
     by = np.array([e.by_law(i.parameter)[e.at["r"]] for i in inputs]).T
-    w = np.linalg.lstsq(Z.T @ by, -Z.T @ e.block("r"), rcond=1e-10)[0]
+    along = Z.T @ by
+    most = (np.abs(by) * own.scale[:, None]).sum(axis=0) / own.scale[own.chosen, None]
+    along[np.abs(along) <= ROUNDED * most] = 0.0  # what the constraints carry balances nothing
+    w = np.linalg.lstsq(along, -Z.T @ e.block("r"), rcond=1e-10)[0]
     changed = c.parameters | {i.parameter: float(value) for i, value in zip(inputs, w, strict=True)}
     loaded = compiled(model, parameters=changed)
     loaded.follow(c.hints)

@@ -22,6 +22,7 @@ import numpy as np
 from .derivatives import Equations
 from .free import TOLERANCE, Free
 from .loads import refuse_undetermined
+from .rounding import Doubt, Terms, without_rounding
 
 
 @dataclass
@@ -36,11 +37,14 @@ class Frame:
         Rate at which co-moving changes of positions and velocities turn.
     N : ndarray (nv, nv) [1/s]
         (rate of a change of position) = (change of velocity) + N (change of position).
+    told : str
+        What it is, for people; empty at rest.
     """
 
     turning: np.ndarray
     H: np.ndarray
     N: np.ndarray
+    told: str = ""
 
 
 @dataclass
@@ -66,6 +70,8 @@ class Reduced:
         Changes of all positions, velocities, accelerations, multipliers and efforts of prescribed coordinates.
     M, D, K : ndarray (f, f) or None
         M a'' + D a' + K a = 0 where all constraints are on positions.
+    doubt : Doubt
+        What is uncertain of A by rounding.
     """
 
     rate: np.ndarray
@@ -76,6 +82,7 @@ class Reduced:
     M: np.ndarray | None = None
     D: np.ndarray | None = None
     K: np.ndarray | None = None
+    doubt: Doubt | None = None
 
     @property
     def A(self) -> np.ndarray:
@@ -120,14 +127,18 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     if e.state.c.structure.loads:
         by_multipliers[:, : e.block("n").size] += e.by_reactions
         Y = _left(e, f)
-    b_dot = -np.linalg.solve(Y.T @ M @ f.Zv, Y.T @ (M @ known + others)) if f.Zv.shape[1] else a_dot[:0]
+    size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
+    terms = Terms(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, Y, M)
+    forces = Y.T @ (M @ known + others)
+    doubt = without_rounding(terms, a_dot, forces, e, f)
+    b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else a_dot[:0]
     acceleration = f.Zv @ b_dot + known + H @ u
     left = M @ (acceleration - H @ u) + others
     multipliers = np.linalg.lstsq(f.scale[:, None] * by_multipliers, -f.scale[:, None] * left, rcond=1e-12)[0]
-    out = Reduced(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers)
+    out = Reduced(np.vstack([a_dot, b_dot]), x, u, acceleration, multipliers, doubt=doubt)
     if f.Zv.shape == f.Z.shape:
         turned = (H - N) @ f.Z  # u = Z a' + turned a
-        out.M = Y.T @ M @ f.Z
+        out.M = terms.mass
         out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
         out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
     return out

@@ -4,21 +4,22 @@ Along such a motion the linear equations x' = A(t) x have coefficients that only
 exp(t H). In co-moving coordinates y = T^-1 x they are constant, y' = (A(0) - H) y; in any others their eigenvalues
 mean nothing (a conical pendulum seen from the ground). H turns positions with the frame, and takes from the rotations,
 which have components along the bodies' axes, the spin of each body against the frame: a wheel that spins about its axis
-of symmetry is the same wheel.
+of symmetry is the same wheel. Where a motion is steady from several frames, that which stands still or turns least is
+taken (see ``frames``).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...equations.tree import column, normalise, quaternion_at, rates
+from ...equations.tree import normalise, rates
 from ...errors import AnalysisError
 from ...laws.opcodes import INPUT
-from ...results.records import Records
 from ...tables.names import velocity_names
-from ...tables.system import FORCE_LAW, FREE, PLANAR, TREE, V0, System
+from ...tables.system import FORCE_LAW, System
 from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
+from .frames import frames, generator, kinematic
 from .free import Free
 from .reduced import Frame, reduced
 
@@ -28,46 +29,6 @@ BALANCED = 1e-6  # unbalanced forces of an equilibrium, of those that act
 NEAR = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
 SAME = 1e-5  # relative difference of linear equations that are the same
 STILL = 1e-9  # speed below which nothing moves, of what gravity or the fastest body gives
-UNDECIDED = 1e-9  # singular values below this part of the largest leave the frame's turning open
-
-
-def kinematic(x: State) -> np.ndarray:
-    """N of `Frame`: changes of rotations have components along axes that turn, (nv, nv)."""
-    S = x.c.values.system
-    N = np.zeros((len(x.v),) * 2)
-    for b in range(len(S.body_i)):
-        _, w0 = quaternion_at(S, b)
-        if w0 >= 0:
-            at = slice(w0, w0 + 3)
-            N[at, at] = -_skew(x.v[at])
-    return N
-
-
-def frames(x: State) -> list[Frame]:
-    """Frames from which the motion may look steady, the most likely first.
-
-    All bodies' velocities and angular velocities then turn with the frame: a = W x v, alpha = W x w. What this leaves
-    open is chosen so that the frame stands still, or so that it turns with one of the bodies.
-    """
-    c = x.c
-    c.at(x.t, x.q, x.v)
-    r = Records(c.values, x.q[None], x.v[None], x.vdot[None])
-    kept = [np.array([r.body(b)[k] for b in c.structure.place.values() if b >= 0])[..., 0] for k in (2, 3, 4, 5)]
-    w, v, alpha, a = kept
-    length = c.values.length
-    A = np.vstack([-_skew(u) for u in [*(v / length), *w]])
-    right = np.r_[(a / length).ravel(), alpha.ravel()]
-    U, d, Vt = np.linalg.svd(A)
-    known = d > UNDECIDED * d[0]
-    least = Vt[known].T @ ((U[:, : len(d)][:, known].T @ right) / d[known])
-    open_ = Vt[~known]
-    turns = [least]
-    for spin in w:
-        other = least + open_.T @ (open_ @ (spin - least))
-        if min(np.abs(other - seen).max() for seen in turns) > UNDECIDED * (1.0 + np.abs(w).max()):
-            turns.append(other)
-    N = kinematic(x)
-    return [Frame(turning, _generator(x, turning), N) for turning in turns]
 
 
 def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
@@ -86,7 +47,7 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
     if np.abs(g.rows @ g.Zv).max(initial=0.0) > SAME * np.abs(g.rows).max(initial=0.0) * np.abs(g.Zv).max(initial=0.0):
         return False
     now = reduced(e, f, frame).A
-    other = reduced(then, g, Frame(frame.turning, _generator(later, frame.turning), kinematic(later))).A
+    other = reduced(then, g, Frame(frame.turning, generator(later, frame.turning), kinematic(later))).A
     return bool(np.abs(other - now).max(initial=0.0) <= SAME * np.abs(now).max(initial=0.0))
 
 
@@ -170,7 +131,7 @@ def moved_on(x: State, f: Free, frame: Frame) -> tuple[Equations, Free, Frame]:
 
     tau, later = _later(x, frame)
     then = Equations(later)
-    own = Frame(frame.turning, _generator(later, frame.turning), kinematic(later))
+    own = Frame(frame.turning, generator(later, frame.turning), kinematic(later))
     return then, f.turned(expm(tau * frame.H), then), own
 
 
@@ -201,25 +162,3 @@ def _later(x: State, frame: Frame) -> tuple[float, State]:
     later = State.moving(c, x.t + STEPS * h, q, v)
     c.z = z
     return STEPS * h, later
-
-
-def _generator(x: State, turning: np.ndarray) -> np.ndarray:
-    """H of `Frame`, at the poses that the mechanism was last evaluated at."""
-    S, W = x.c.values.system, x.c.work
-    H = np.zeros((len(x.v),) * 2)
-    for b in range(len(S.body_i)):
-        kind, v0 = int(S.body_i[b, TREE]), int(S.body_i[b, V0])
-        if kind == PLANAR:
-            H[v0 : v0 + 2, v0 : v0 + 2] = _skew(turning)[:2, :2]
-        if kind == FREE:
-            H[v0 : v0 + 3, v0 : v0 + 3] = _skew(turning)
-        _, w0 = quaternion_at(S, b)
-        if w0 >= 0:
-            axes = np.array([column(S, W, b, w0 - v0 + k)[0] for k in range(3)])  # rows, along the world's
-            H[w0 : w0 + 3, w0 : w0 + 3] = -_skew(axes @ (W.BK[b, 12:15] - turning))
-    return H
-
-
-def _skew(w: np.ndarray) -> np.ndarray:
-    """Matrix of the cross product w x ."""
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

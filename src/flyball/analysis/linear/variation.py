@@ -19,7 +19,7 @@ from ...errors import SimulationError
 from ...tables.system import EFFORT, G_VALUE, LAM, NU, X_SOLVED
 from ..compiled import Compiled
 from .derivatives import State
-from .steady import kinematic
+from .frames import kinematic
 from .tangent import Direction, Linear, Tangent, closed
 
 CLOSED = 1e-12  # of the mechanism's length

@@ -13,7 +13,7 @@ from ...laws.functions import Missed, forget
 from ...model.expressions import Expression
 from ...model.grammar import Node
 from ...model.table import Table
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..linear.jumps import laws
 
 SAMPLES = 257  # times at which the arguments of tables are looked at

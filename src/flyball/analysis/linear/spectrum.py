@@ -1,0 +1,168 @@
+"""Eigenvalues and eigenvectors of a system matrix, with what is uncertain of them, and which of them are one.
+
+A perturbation E of the matrix moves a simple eigenvalue by y^H E x / y^H x (Wilkinson 1965). With E what rounding may
+have made of every entry, parts of an eigenvalue that are smaller are none. Where eigenvectors are nearly parallel,
+rounding by r splits a defective eigenvalue by as much as sqrt(r), but not its mean: eigenvalues that cannot be told
+apart are replaced by theirs (Kato 1966, II.2), and how many eigenvectors they have in common is found in the invariant
+subspace that belongs to them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...errors import AnalysisError
+from .rounding import Doubt
+
+ROUNDED = 4.0 * np.finfo(float).eps  # of every entry: what is uncertain of it at least
+EQUAL = 1e-9  # difference of eigenvalues, of their own size, below which they are one
+WIDEST = 1e-4  # of the matrix' size: a defective eigenvalue is not split further than this by rounding
+NULL = 1e-9  # singular values below this part of the largest are none
+FOUND = 1e-9  # what may be left of A x - w x, of |A| |x| + |w| |x|
+LOST = 1e-15  # of the largest entry: left out where balancing makes too much of small entries
+
+
+@dataclass
+class Spectrum:
+    """Eigenvalues and eigenvectors.
+
+    Attributes
+    ----------
+    raw : ndarray (n,) complex
+        Eigenvalues as computed: sums of those of a group, and of their powers, are exact to rounding.
+    values : ndarray (n,) complex
+        The same, those of one group replaced by their mean; real and imaginary parts that are rounding are 0.
+    vectors : ndarray (n, n) complex
+        Eigenvectors, of a group as many as it has, then as computed.
+    groups : list of list of int
+        Indices of eigenvalues that are one.
+    multiplicity, geometric : ndarray (n,) int
+        How many eigenvalues are one with each, and how many eigenvectors they have in common.
+    residual : float
+        The largest part of A x - w x, of |A| |x| + |w| |x|.
+    """
+
+    raw: np.ndarray
+    values: np.ndarray
+    vectors: np.ndarray
+    groups: list[list[int]]
+    multiplicity: np.ndarray
+    geometric: np.ndarray
+    residual: float
+
+
+def spectrum(A: np.ndarray, doubt: Doubt | None = None) -> Spectrum:
+    """Solve the eigenvalue problem of a real matrix.
+
+    Parameters
+    ----------
+    A : ndarray (n, n)
+    doubt : Doubt, optional
+        What is uncertain of it, besides the last digits of its entries.
+
+    Raises
+    ------
+    AnalysisError
+        If eigenvectors do not fulfil A x = w x.
+    """
+    n = len(A)
+    if not n:
+        none = np.zeros(0, complex)
+        return Spectrum(none, none, np.zeros((0, 0), complex), [], np.zeros(0, int), np.zeros(0, int), 0.0)
+    B, scale, w, left, right, residual = _pairs(A)
+    E = [(np.eye(n), ROUNDED * np.abs(B))]
+    if doubt is not None:
+        E.append((doubt.by / scale[:, None], doubt.size * scale))
+    size = float(np.linalg.norm(B, 2))
+    angle = np.abs((left.conj() * right).sum(axis=0))
+    blur = sum((np.abs(left.conj().T @ L) * (X @ np.abs(right)).T).sum(axis=1) for L, X in E)
+    blur = np.minimum(blur / np.maximum(angle, 1e-300), WIDEST * size)
+    out = Spectrum(w, w.copy(), right.copy(), equal(w, blur), np.ones(n, int), np.ones(n, int), residual)
+    for group in out.groups:
+        if len(group) > 1:
+            mean, blurred, X = _together(B, E, w[group])
+            out.values[group], blur[group] = mean, blurred
+            out.vectors[:, group[: X.shape[1]]] = X
+            out.multiplicity[group], out.geometric[group] = len(group), X.shape[1]
+    out.values = _clean(out.values, blur)
+    out.vectors = scale[:, None] * out.vectors
+    out.vectors /= np.maximum(np.abs(out.vectors).max(axis=0), 1e-300)
+    return out
+
+
+def _pairs(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
+    """Balanced matrix, its scale, eigenvalues, left and right unit eigenvectors, and the largest residual."""
+    from scipy.linalg import eig, matrix_balance
+
+    kept = np.abs(A) > LOST * np.abs(A).max()
+    worst = np.inf
+    for X in (A, np.where(kept, A, 0.0)):
+        _, (scale, _) = matrix_balance(X, permute=False, separate=True)
+        B = A / scale[:, None] * scale
+        w, left, right = eig(X / scale[:, None] * scale, left=True)
+        w = w.astype(complex)
+        size = np.linalg.norm(np.abs(B) @ np.abs(right), axis=0) + np.abs(w)
+        residual = np.linalg.norm(B @ right - w * right, axis=0)
+        worst = float((residual / np.where(size > 0.0, size, 1.0)).max())
+        if worst <= FOUND:
+            return B, scale, w, left, right, worst
+    raise AnalysisError(
+        f"eigenvectors of the linear equations were found to {worst:.1e} only: their coefficients differ too much in "
+        f"size. Look for stiffnesses or masses that are far too large or small"
+    )
+
+
+def _clean(w: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """Eigenvalues without parts that are rounding."""
+    return np.where(np.abs(w.real) <= blur, 0.0, w.real) + 1j * np.where(np.abs(w.imag) <= blur, 0.0, w.imag)
+
+
+def equal(w: np.ndarray, blur: np.ndarray) -> list[list[int]]:
+    """Indices of eigenvalues that are the same as far as can be told, where ``blur`` is what each is uncertain by."""
+    size = np.abs(w)
+    near = np.abs(w[:, None] - w) <= np.maximum(
+        np.minimum(blur[:, None], blur), EQUAL * np.minimum(size[:, None], size)
+    )
+    left, out = set(range(len(w))), []
+    while left:
+        group, more = set(), {min(left)}
+        while more:
+            group |= more
+            more = {int(j) for i in more for j in np.flatnonzero(near[i])} - group
+        left -= group
+        out.append(sorted(group))
+    return out
+
+
+def _together(
+    B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], w: np.ndarray
+) -> tuple[complex, float, np.ndarray]:
+    """Of eigenvalues that are one: their mean, what it is uncertain by, and the eigenvectors that they have."""
+    V, W = subspace(B, w), subspace(B.conj().T, w.conj())
+    inner = np.linalg.inv(W.conj().T @ V) @ W.conj().T
+    mean = complex(w.mean())
+    doubt = sum(np.abs(inner @ L) @ X @ np.abs(V) for L, X in E)
+    blur = float(np.trace(doubt)) / len(w)
+    if abs(mean.imag) <= blur:
+        mean = complex(mean.real)
+    _, d, Vh = np.linalg.svd(inner @ B @ V - mean * np.eye(len(w)))
+    count = max(1, int((d <= max(100.0 * doubt.max(), NULL * d[0], EQUAL * abs(mean))).sum()))
+    X = V @ Vh[len(w) - count :].conj().T
+    if mean.imag == 0.0:
+        X = np.linalg.svd(np.hstack([X.real, X.imag]))[0][:, :count]
+    return mean, blur, X
+
+
+def subspace(B: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Orthonormal basis (n, k) of what belongs to k eigenvalues."""
+    from scipy.linalg import schur
+
+    def nearest(z: complex) -> float:
+        return float(np.abs(values - z).min())
+
+    T = np.diag(schur(B, "complex")[0])
+    last = np.sort([nearest(z) for z in T])[len(values) - 1]
+    return schur(B, "complex", sort=lambda z: nearest(z) <= last * (1.0 + 1e-9) + 1e-300)[1][:, : len(values)]
