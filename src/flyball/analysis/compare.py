@@ -115,22 +115,10 @@ class _Task:
 def compare(model: Model, o: CompareOptions) -> Comparison:
     """Integrate the same motion by several formulations: see `Mechanism.compare`."""
     model = model.snapshot()
-<<<<<<< HEAD
-    t_start = number(t_start, {}, "s", "t_start") if start is None else start.final[0]
-    span = (t_start, float(number(t_end, {}, "s", "t_end")))
-    times = output_times(*span, outputs)
-    base = begin(model, t_start, parameters, start, "absolute")
-    refuse_missing(base.base, span[1])
-    job = _Task(model, span, times, chosen, base, parameters, start)
-    truth, told = _reference(job)
-    if "max_steps" not in options:
-        taken = truth.health.steps + truth.health.rejected if truth is not None else 0
-        job.options = replace(chosen, max_steps=LIMIT * max(taken, 1000))
-    return _compared(job, names, repeats, truth, told, progress)
-=======
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     base = begin(model, t_start, o.parameters, o.start, "absolute")
+    refuse_missing(base.base, times[-1])
     job = _Task(model, o, (t_start, o.t_end), times, base)
     with shown(o.progress, "comparing") as tell:
         truth, told = _reference(job)
@@ -138,7 +126,6 @@ def compare(model: Model, o: CompareOptions) -> Comparison:
             taken = truth.health.steps + truth.health.rejected if truth is not None else 0
             job.max_steps = LIMIT * max(taken, 1000)
         return _compared(job, truth, told, tell)
->>>>>>> main
 
 
 def _compared(job: _Task, truth: Result | None, told: str, tell: Tell) -> Comparison:
