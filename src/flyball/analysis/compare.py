@@ -118,7 +118,7 @@ def compare(model: Model, o: CompareOptions) -> Comparison:
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     base = begin(model, t_start, o.parameters, o.start, "absolute")
-    refuse_missing(base.base, times[-1])
+    refuse_missing(base.base, o.t_end)
     job = _Task(model, o, (t_start, o.t_end), times, base)
     with shown(o.progress, "comparing") as tell:
         truth, told = _reference(job)
