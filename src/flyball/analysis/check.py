@@ -14,6 +14,7 @@ from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
 from ..results.departure import Departure, changed_velocities, not_allowed, summary
+from ..results.numbers import tuple_of
 from ..tables.values import Values
 from .assemble import assemble
 from .assembly.start import Assembly
@@ -36,9 +37,9 @@ class BodyReport:
 
     def line(self) -> str:
         """What a reader wants to see."""
-        com = ", ".join(f"{x:.4g}" for x in self.com)
+        com = tuple_of(self.com)
         moments = ", ".join(f"{x:.4g}" for x in self.moments)
-        text = f"{self.mass:.4g} kg, centre of mass ({com}) m, "
+        text = f"{self.mass:.4g} kg, centre of mass {com} m, "
         if not self.axes:
             return text + f"inertia {moments} kg m^2"
         if self.moments[-1] - self.moments[0] <= EQUAL * self.moments[-1]:
@@ -95,8 +96,7 @@ class Report:
         if len(self.bodies) > 30:
             out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
         if len(self.bodies) > 1:
-            com = ", ".join(f"{x:.4g}" for x in self.com)
-            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at ({com}) m"))
+            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at {tuple_of(self.com)} m"))
         return out + [("warning", w) for w in self.warnings]
 
     def _freedoms(self) -> str:

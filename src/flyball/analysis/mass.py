@@ -10,12 +10,12 @@ import numpy as np
 
 from ..model.inertia import principal, shifted
 from ..model.model import Model
+from ..results.numbers import tuple_of
 from ..results.records import Records
 from ..tables.structure import structure
 from ..tables.values import Values, values
 from .assemble import assemble
 
-ROUNDING = 1e-12
 ALIGNED = 1e-9  # a principal axis that differs by less from an axis of the body is that axis
 
 
@@ -189,7 +189,7 @@ def directions(axes: np.ndarray) -> str:
 
 def _tuple(p: np.ndarray) -> str:
     """Components in brackets; what is only rounding beside the others is 0."""
-    return f"({_list(np.where(np.abs(p) < ROUNDING * np.abs(p).max(), 0.0, p))})"
+    return tuple_of(p, 5)
 
 
 def _list(p: np.ndarray) -> str:

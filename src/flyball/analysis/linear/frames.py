@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations.tree import quaternion_at, rates
+from ...results.numbers import tuple_of
 from ...results.records import Records
 from ...tables.system import NV, V0
 from .derivatives import State
@@ -75,7 +76,7 @@ def told(x: State, frame: Frame, frozen: bool) -> str:
         return "the coordinates of this very instant"
     if not frame.turning.any():
         return "the ground"
-    return f"a frame that turns with ({', '.join(f'{w:.4g}' for w in frame.turning)}) rad/s"
+    return f"a frame that turns with {tuple_of(frame.turning)} rad/s"
 
 
 def generator(x: State, turning: np.ndarray) -> np.ndarray:
