@@ -137,7 +137,7 @@ def root_locus(
     title : str
     path : path, optional
         Write a PNG, SVG or PDF file instead of returning the figure.
-    known : sequence of (value, eigenvalue), optional
+    known : sequence of Crossing, optional
         The crossings, where they need not be interpolated.
     """
     roots, values = np.asarray(roots), np.asarray(gains, float)
@@ -152,8 +152,8 @@ def root_locus(
         _bounded(ax, roots)
         if known is None:
             _crossings(ax, roots, values, parameter_name)
-        for value, at in known or ():
-            _ringed(ax, at, f"{parameter_name} = {value:.5g}")
+        for c in known or ():
+            _ringed(ax, c.eigenvalue, f"{parameter_name} = {c.value:.5g}")
         for mark, own in (("x", values[:1]), ("o", values[-1:])):
             for g in own:
                 ax.plot([], [], mark, color="#555555", label=f"{parameter_name} = {g:.4g}")
