@@ -19,6 +19,7 @@ from .linearize import without_inputs
 from .series import checked, equilibria, stopped
 
 SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
+ROUNDED = 1e-13  # of the largest value: what is none
 ASIDE = (0.25, 0.0625, 0.015625, 0.00390625)  # of the way to the next value: samples beside where branches meet
 MEETINGS = 16  # places where branches meet that are shown finely
 
@@ -71,18 +72,18 @@ def root_locus(
     if about is not None and equilibrium:
         raise ModelError("root_locus: about the end of a motion, or about equilibria? Say about= or equilibrium=True")
     points = checked(model, parameter, values)
-    base, t = dict(parameters or {}), number(t, {}, "s", "t")
-    along = equilibria(model, parameter, points, parameters=base, t=t) if equilibrium else None
+    base, now = dict(parameters or {}), number(t, {}, "s", "t")
+    along = equilibria(model, parameter, points, parameters=base, t=now) if equilibrium else None
 
     def at(place: float) -> Sample:
         value = float(np.interp(place, np.arange(len(points)), points))
-        given = {"t": value, "parameters": base} if parameter == "t" else {"t": t, "parameters": base}
+        given = {"t": value, "parameters": base} if parameter == "t" else {"t": now, "parameters": base}
         if parameter != "t":
             given["parameters"] = {**base, parameter: value}
         own = about
         if along is not None:
             k = int(place)
-            own = along[k] if place == k else _near(model, parameter, value, along, k, base, t)
+            own = along[k] if place == k else _near(model, parameter, value, along, k, base, now)
         x, _ = instant(model, own, coordinates=coordinates, **given)
         return sample(place, value, *without_inputs(x, frozen))
 
@@ -168,12 +169,13 @@ def _heading(search: Search, kept: list[Sample]) -> None:
 def _crossings(events: Sequence[Event], taken: Sequence[Sample]) -> list[Crossing]:
     """Changes of stability, those at one place and eigenvalue as one."""
     fastest = max(float(np.abs(x.w).max(initial=0.0)) for x in taken)
+    least = ROUNDED * max(abs(x.value) for x in taken)
     found: list[tuple[float, Crossing]] = []
     for e in sorted(events, key=lambda e: e.at.place):
         if not e.change:
             continue
         kind = "flutter" if e.eigenvalue.imag > 0.0 else "divergence"
-        own = Crossing(e.at.value, e.eigenvalue, kind, e.change)
+        own = Crossing(e.at.value if abs(e.at.value) > least else 0.0, e.eigenvalue, kind, e.change)
         if found:
             place, other = found[-1]
             if e.at.place - place <= SAME and abs(other.eigenvalue - own.eigenvalue) <= SAME * fastest:

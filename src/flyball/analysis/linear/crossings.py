@@ -31,30 +31,27 @@ TRIED = 200  # evaluations between two values, after which only the change of st
 LEFT = 1e-6  # of what it is at the ends: what a smooth function may be at its zero
 UNEVEN = 0.4375  # where a stretch is parted: not where a round value is likely to lie
 
-EVENTS = {  # change of counts -> what happens
-    "a real one through zero": Counter({"+real": 1, "-real": -1}),
-    "a pair through the axis": Counter({"+pair": 1, "-pair": -1}),
-    "parting at zero": Counter({"axis": -1, "+real": 1, "-real": 1}),
-    "pairs meet": Counter({"axis": -2, "+pair": 1, "-pair": 1}),
-    "+ real ones meet": Counter({"+real": -2, "+pair": 1}),
-    "- real ones meet": Counter({"-real": -2, "-pair": 1}),
+BESIDE = 1e-6  # part of a stretch that is next to its end
+WRONG = 6  # halvings in which eigenvalues that seem to change places with others are followed
+
+MEETINGS = {  # what happens -> change of counts, of how many eigenvalues with a positive real part
+    "parting at zero": ({"axis": -1, "+real": 1, "-real": 1}, 1),
+    "pairs meet": ({"axis": -2, "+pair": 1, "-pair": 1}, 2),
+    "+ real ones meet": ({"+real": -2, "+pair": 1}, 0),
+    "- real ones meet": ({"-real": -2, "-pair": 1}, 0),
 }
+
+Smooth = Callable[[Sample], tuple[float, complex]]  # a function that is zero at an event, and the eigenvalue
 
 
 @dataclass
 class Event:
-    """A change of where eigenvalues lie: at ``at``, between ``before`` and ``after``."""
+    """A change of where eigenvalues lie, and how many more have a positive real part after it."""
 
     what: str
     at: Sample
     eigenvalue: complex
-    before: Sample
-    after: Sample
-
-    @property
-    def change(self) -> int:
-        """How many eigenvalues more have a positive real part after it."""
-        return self.after.growing - self.before.growing
+    change: int
 
 
 class Search:
@@ -85,30 +82,40 @@ class Search:
         return self._parted(a, b, len(self.taken), 0)
 
     def _parted(self, a: Sample, b: Sample, before: int, depth: int) -> list[Event]:
-        if a.counts == b.counts:
-            return []
+        through = _through(a, b)
         tired = len(self.taken) - before > TRIED
+        if a.counts == b.counts and (not through or depth > WRONG or tired):
+            return []
         if tired and a.growing == b.growing:
             return []
-        what = _what(a, b)
-        found = None if what is None else self._found(what, a, b)
-        if found is not None:
-            return [found]
+        if depth == 0 and (at_end := self._at_end(a, b) or self._at_end(b, a)):
+            return at_end
+        found = self._alone(a, b, through) if _explained(a, b, through) else self._met(a, b)
+        if found:
+            return found
         if depth == BISECTED or b.place - a.place <= EXACT * max(1.0, b.place):
-            return [_left(a, b)]
+            return [_left(a, b)] if a.growing != b.growing else []
         middle = self.at(a.place + UNEVEN * (b.place - a.place))
         if tired:
             near = (a, middle) if a.growing != middle.growing else (middle, b)
             return self._parted(*near, before, depth + 1)
         return self._parted(a, middle, before, depth + 1) + self._parted(middle, b, before, depth + 1)
 
-    def _found(self, what: str, a: Sample, b: Sample) -> Event | None:
-        """The event, from its smooth function; None if it has not the zero that it should."""
+    def _at_end(self, x: Sample, y: Sample) -> list[Event]:
+        """What begins to grow, or ceases to, at the very end x of the stretch to y."""
+        there = np.isin(x.kinds, ("axis", "zero"))
+        on = match(x, y)
+        ones = np.flatnonzero(there & np.isin(y.kinds[on], ("+pair", "+real")))
+        if not len(ones) or self.at(x.place + BESIDE * (y.place - x.place)).counts != y.counts:
+            return []
+        more = 1 if y.place > x.place else -1
+        found = [(complex(0.0, x.w[k].imag), 2 if y.kinds[on[k]] == "+pair" else 1) for k in ones]
+        return [Event("at the end", x, w, n * more) for w, n in found]
+
+    def _zero(self, of: Smooth, a: Sample, b: Sample) -> tuple[Sample, complex] | None:
+        """Where a smooth function is zero, and the eigenvalue there; None if it has not the zero that it should."""
         from scipy.optimize import brentq
 
-        of = self._alone(a, b) if "through" in what else self._meeting(what, a, b)
-        if of is None:
-            return None
         f0, f1 = of(a)[0], of(b)[0]
         if f0 * f1 > 0.0 or (f0 == 0.0 and f1 == 0.0):
             return None
@@ -116,18 +123,30 @@ class Search:
         place = float(brentq(lambda x: of(self.at(x))[0], x0, x1, xtol=EXACT * max(1.0, x1), rtol=EXACT))
         at = self.at(place)
         left, value = of(at)
-        if abs(left) > LEFT * max(abs(f0), abs(f1)):
-            return None
-        return Event(what, at, value, a, b)
+        return None if abs(left) > LEFT * max(abs(f0), abs(f1)) else (at, value)
 
-    def _alone(self, a: Sample, b: Sample) -> Callable[[Sample], tuple[float, complex]] | None:
-        """Real part of the one eigenvalue that changes sides, and it."""
-        on = match(a, b)
-        sides = a.w.real * b.w[on].real
-        ones = np.flatnonzero((sides < 0.0) & (a.w.imag >= 0.0) & (b.w[on].imag >= 0.0))
-        if len(ones) != 1:
-            return None
-        known = {a.place: complex(a.w[ones[0]]), b.place: complex(b.w[on[ones[0]]])}
+    def _alone(self, a: Sample, b: Sample, through: list[tuple[complex, complex]]) -> list[Event] | None:
+        """Eigenvalues that change sides, each by itself; None if one has not the zero that it should."""
+        out = []
+        for w0, w1 in through:
+            found = self._zero(self._followed({a.place: w0, b.place: w1}), a, b)
+            if found is None:
+                return None
+            out.append(Event("through", *found, int(np.sign(w1.real)) * (2 if found[1].imag else 1)))
+        return out
+
+    def _met(self, a: Sample, b: Sample) -> list[Event] | None:
+        """Two eigenvalues that meet, if that is all that happens."""
+        for what, (counts, more) in MEETINGS.items():
+            for sign in (1, -1):
+                if _changed(a, b) == {k: sign * n for k, n in counts.items()}:
+                    of = self._meeting(what, a, b)
+                    found = None if of is None else self._zero(of, a, b)
+                    return None if found is None else [Event(what, *found, sign * more)]
+        return None
+
+    def _followed(self, known: dict[float, complex]) -> Smooth:
+        """Real part of an eigenvalue that is known at some places, and where it is on the axis."""
 
         def of(x: Sample) -> tuple[float, complex]:
             if x.place not in known:
@@ -142,7 +161,7 @@ class Search:
 
         return of
 
-    def _meeting(self, what: str, a: Sample, b: Sample) -> Callable[[Sample], tuple[float, complex]] | None:
+    def _meeting(self, what: str, a: Sample, b: Sample) -> Smooth | None:
         """The square of half the difference of two eigenvalues that meet, and their mean."""
         if what == "parting at zero":
 
@@ -168,15 +187,29 @@ class Search:
         return of
 
 
-def _what(a: Sample, b: Sample) -> str | None:
-    """The one event that makes of one sample's counts the other's, if there is one."""
+def _changed(a: Sample, b: Sample) -> dict[str, int]:
+    """How many eigenvalues more lie where, in b than in a."""
     change = Counter(b.counts)
     change.subtract(a.counts)
-    change = Counter({k: n for k, n in change.items() if n})
-    for what, own in EVENTS.items():
-        if change in (own, Counter({k: -n for k, n in own.items()})):
-            return what
-    return None
+    return {k: n for k, n in change.items() if n}
+
+
+def _through(a: Sample, b: Sample) -> list[tuple[complex, complex]]:
+    """Eigenvalues, one of each pair, that go on as such with a real part of the other sign: (in a, in b)."""
+    on = match(a, b)
+    alike = np.isin(a.kinds, ("+real", "-real")) == np.isin(b.kinds[on], ("+real", "-real"))
+    signs = ("+real", "-real", "+pair", "-pair")
+    moved = np.isin(a.kinds, signs) & np.isin(b.kinds[on], signs) & alike & (a.w.real * b.w[on].real < 0.0)
+    return [(complex(a.w[k]), complex(b.w[on[k]])) for k in np.flatnonzero(moved)]
+
+
+def _explained(a: Sample, b: Sample, through: list[tuple[complex, complex]]) -> bool:
+    """Whether eigenvalues that change sides are all that changes."""
+    change: Counter[str] = Counter()
+    for w0, w1 in through:
+        what = "pair" if w0.imag else "real"
+        change.update({("+" if w.real > 0.0 else "-") + what: n for w, n in ((w0, -1), (w1, 1))})
+    return bool(through) and {k: n for k, n in change.items() if n} == _changed(a, b)
 
 
 def _pair(what: str, a: Sample, b: Sample) -> tuple[np.ndarray, np.ndarray] | None:
@@ -204,4 +237,4 @@ def _left(a: Sample, b: Sample) -> Event:
     more = a if a.growing > b.growing else b
     ones = more.w[np.isin(more.kinds, ("+real", "+pair"))]
     value = complex(ones[np.argmin(np.abs(ones.real))]) if len(ones) else 0j
-    return Event("several", b, complex(0.0, value.imag), a, b)
+    return Event("several", b, complex(0.0, value.imag), b.growing - a.growing)
