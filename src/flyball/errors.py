@@ -25,6 +25,10 @@ class PerformanceNotice(UserWarning):
     """Something works, but far slower than it could."""
 
 
+class StartWarning(UserWarning):
+    """A velocity that was described is not the one that a motion starts with: the constraints do not allow it."""
+
+
 class SingularOrientationError(FlyballError, ValueError):
     """Coordinates of an orientation do not exist, or have no finite rates, where it was asked for them.
 

@@ -81,7 +81,7 @@ def test_an_orientation_about_three_axes(axis):
 def test_velocities_that_assembly_makes_consistent():
     """A rod on a hinge, drawn with a velocity of its centre that the hinge does not allow altogether."""
     m = fb.Mechanism("rod", planar=True, parameters={"v": 1.0, "mass": 2.0, "x": 0.5})
-    m.add(fb.Body("rod", mass="mass", inertia=0.3, position=("x", 0), velocity=("v", "v")))
+    m.add(fb.Body("rod", mass="mass", inertia=0.3, position=("x", 0), velocity=("v", "v"), angular_velocity=0))
     m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
     found = m.sensitivity(["rod.vy", "rod.vx"], ["v", "mass", "x"], verify=True)
     total = 2.0 * 0.25 + 0.3  # w = m x v / (m x^2 + J), the motion nearest in kinetic energy
@@ -89,3 +89,18 @@ def test_velocities_that_assembly_makes_consistent():
     assert found["rod.vy", "mass"] == pytest.approx(0.25 * (1 / total - 2.0 * 0.25 / total**2), rel=1e-8)
     assert found["rod.vx", "v"] == pytest.approx(0, abs=1e-10)
     assert found.difference < 1e-5
+
+
+def test_velocities_that_follow_from_given_ones():
+    """The same rod with nothing said of its turn: the velocity across it is kept, whatever it weighs."""
+    m = fb.Mechanism("rod", planar=True, parameters={"v": 1.0, "mass": 2.0, "x": 0.5})
+    m.add(fb.Body("rod", mass="mass", inertia=0.3, position=("x", 0), velocity=(0, "v")))
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    found = m.sensitivity(["rod.vy", "rod.omega"], ["v", "mass", "x"], verify=True)
+    assert found.values[0] == pytest.approx([1.0, 2.0], rel=1e-14)
+    assert found.derivatives[0] == pytest.approx(np.array([[1, 0, 0], [2, 0, -4]]), rel=1e-9, abs=1e-10)
+    m.add(fb.Body("tail", mass=1, inertia=0.1, position=("2*x", 0), angular_velocity="-v"))
+    m.add(fb.Revolute("B", "rod", "tail", at=("1.5*x", 0)))
+    found = m.sensitivity(["tail.vy", "tail.omega"], ["v", "x"], verify=True)
+    assert found.values[0] == pytest.approx([1.25, -1], rel=1e-12)  # 1.5 v of the joint, less v x / 2
+    assert found.derivatives[0] == pytest.approx(np.array([[1.25, -0.5], [-1, 0]]), rel=1e-8, abs=1e-8)

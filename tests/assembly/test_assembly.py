@@ -347,11 +347,13 @@ def test_fixed_bodies_that_cannot_meet():
 
 
 @pytest.mark.parametrize("off", [1e-5, 1e-7, 1e-9])
-def test_velocities_all_but_at_a_singular_position(off):
+@pytest.mark.parametrize("resting", [True, False])
+def test_velocities_all_but_at_a_singular_position(off, resting):
     """A parallelogram a hair from flat: its cranks can only turn at the same rate, and rest is always allowed."""
     m = fb.Mechanism("flat", planar=True)
     tip = (0.3 * np.cos(off), 0.3 * np.sin(off))
-    m.add(fb.Body("bar", mass=1, inertia=0.01, position=(tip[0] + 0.25, tip[1])))
+    given = {"velocity": (0, 0), "angular_velocity": 0} if resting else {}
+    m.add(fb.Body("bar", mass=1, inertia=0.01, position=(tip[0] + 0.25, tip[1]), **given))
     for name, x in (("left", 0.0), ("right", 0.5)):
         m.add(fb.Body(name, mass=1, inertia=0.01, position=(x, 0), angular_velocity=4.0))
         m.add(fb.Revolute(f"A {name}", "ground", name, at=(x, 0)))
@@ -362,7 +364,8 @@ def test_velocities_all_but_at_a_singular_position(off):
     assert np.abs(c.jacobian() @ a.v).max() < 1e-11
     turn = a.v.reshape(3, 3)[:, 2]  # of the bar and both cranks
     # the momentum of the two cranks, 2 x 0.01 x 4, is shared with the bar of 1 kg that they carry at 0.3 m
-    w = 2 * 0.01 * 4.0 / (2 * 0.01 + 1.0 * 0.3**2)
+    # where it is said to rest; else it follows them
+    w = 2 * 0.01 * 4.0 / (2 * 0.01 + 1.0 * 0.3**2) if resting else 4.0
     assert turn == pytest.approx([0.0, w, w], abs=1e-4)
 
 

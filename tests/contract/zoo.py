@@ -108,10 +108,24 @@ def two_bodies(where: str, gravity=GRAVITY, names=("a", "b")) -> fb.Mechanism:
     if planar:
         made = {
             "a": fb.Body(
-                "a", mass=1.7, inertia=0.09, position=(0.1, -0.2), com=(0.03, -0.02), angle=0.4, angular_velocity=0.9
+                "a",
+                mass=1.7,
+                inertia=0.09,
+                position=(0.1, -0.2),
+                com=(0.03, -0.02),
+                angle=0.4,
+                velocity=(0, 0),
+                angular_velocity=0.9,
             ),
             "b": fb.Body(
-                "b", mass=1.1, inertia=0.05, position=(0.6, 0.3), com=(-0.04, 0.05), angle=-0.7, angular_velocity=-50.0
+                "b",
+                mass=1.1,
+                inertia=0.05,
+                position=(0.6, 0.3),
+                com=(-0.04, 0.05),
+                angle=-0.7,
+                velocity=(0, 0),
+                angular_velocity=-50.0,
             ),
         }
     else:

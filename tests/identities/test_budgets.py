@@ -136,6 +136,7 @@ def test_describing_a_body_otherwise_changes_nothing():
             "inertia_axes": turn.inv(),
             "position": centre,
             "orientation": R0 * turn,
+            "velocity": (0, 0, 0),
         },
     ]
     paths = []

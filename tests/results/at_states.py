@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from flyball.analysis.assemble import Assembly
+from flyball.analysis.assembly.start import Assembly
 from flyball.analysis.compiled import Compiled
 from flyball.analysis.mobility import mobility
 from flyball.equations.engine import MOTION

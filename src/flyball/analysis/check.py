@@ -13,8 +13,10 @@ from ..model.body import GROUND
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
+from ..results.departure import Departure, changed_velocities, not_allowed, summary
 from ..tables.values import Values
-from .assemble import Assembly, assemble
+from .assemble import assemble
+from .assembly.start import Assembly
 from .mass import MassProperties, directions, letters, report
 from .mobility import mobility
 
@@ -63,14 +65,14 @@ class Report:
     redundancy: int  # how many rows say nothing new
     undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
     moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
-    sped: dict[str, float]  # body -> how much assembly changed a velocity described for it [m/s or rad/s]
+    departures: tuple[Departure, ...]  # what of the description the assembled start does not have
     mass: float  # of all bodies together [kg]
     com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return asdict(self)
+        return asdict(self) | {"departures": [d.as_dict() for d in self.departures]}
 
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
@@ -87,7 +89,7 @@ class Report:
                 "; ..." if len(self.undetermined) > 12 else ""
             )
             out.append(("reactions not determined", text))
-        out.append(("assembly", self._assembly()))
+        out.append(("assembly", summary(self.departures)))
         for name, b in list(self.bodies.items())[:30]:
             out.append((f"body {name}", b.line()))
         if len(self.bodies) > 30:
@@ -101,19 +103,6 @@ class Report:
         text = f"{self.freedoms} at this position"
         if self.gruebler != self.freedoms:
             text += f" (counting gives {self.gruebler})"
-        return text
-
-    def _assembly(self) -> str:
-        text = "closed as drawn"
-        if self.moved:
-            worst = max(self.moved, key=self.moved.__getitem__)
-            count = _count(len(self.moved), "body", "bodies")
-            text = f"closed after moving {count}, {worst} farthest: {self.moved[worst]:.3g} m"
-        if self.sped:
-            worst = max(self.sped, key=self.sped.__getitem__)
-            text += (
-                f"; velocities described for {', '.join(self.sped)} changed, {worst} most: by {self.sped[worst]:.3g}"
-            )
         return text
 
     def __str__(self) -> str:
@@ -161,7 +150,7 @@ def check(model: Model) -> Report:
         redundancy=m.redundancy,
         undetermined=m.undetermined,
         moved=a.moved,
-        sped=a.sped,
+        departures=a.departures,
         mass=weights.total.mass,
         com=tuple(weights.total.com.tolist()),
         warnings=tuple(_warnings(model, a, bodies, m.freedoms)),
@@ -176,6 +165,7 @@ def _body(b: MassProperties, planar: bool) -> BodyReport:
 def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms: int) -> Iterator[str]:
     for b in model.bodies:
         yield from _of_inertia(a.compiled.values, b.name, bodies[b.name])
+    yield from (not_allowed(d) for d in changed_velocities(a.departures))
     held, pushed = _touched(model)
     for b in model.bodies:
         if b.name not in held | pushed:

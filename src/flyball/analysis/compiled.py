@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -64,6 +65,15 @@ class Compiled:
     def sizes(self) -> np.ndarray:
         """What a large step is along every velocity: the mechanism's length [m], or a radian, (nv,)."""
         return np.array([self.values.length if n.unit == "m" else 1.0 for n in velocity_names(self.structure)])
+
+    @cached_property
+    def metric(self) -> np.ndarray:
+        """Whether the value of a row is a length [m]; else it is a turn, or a cosine, (nr,)."""
+        out = np.zeros(len(self.structure.rows), bool)
+        for t in self.structure.terms:
+            if not t.measured:
+                out[t.row] = t.formula.measure == "m"
+        return out
 
     @property
     def hints(self) -> dict[str, float]:
@@ -170,9 +180,10 @@ def compiled(
     held: Mapping[str, complex] | None = None,
     tree: Sequence[str] = (),
     coupled: bool = False,
+    solved: bool = True,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled)
+    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled, solved=solved)
     x = values(s, parameters, held)
     w = work(s, x.system)
     w.option[STABILIZE] = NONE

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..errors import AnalysisError, ModelError
-from ..model.expressions import number
 from ..model.model import Model
+from ..results.equilibrium import Equilibrium
 from ..results.root_locus import Crossing, RootLocus
 from .linear.crossings import Event, Search
-from .linear.instant import instant
 from .linear.sample import Sample, match, sample
-from .linearize import without_inputs
-from .series import checked, equilibria, stopped
+from .linearize import InstantOptions, without_inputs
+from .progress import Tell, shown
+from .series import EquilibriaOptions, checked, equilibria, stopped
 
 SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
 ROUNDED = 1e-13  # of the largest value: what is none
@@ -24,78 +24,70 @@ ASIDE = (0.25, 0.0625, 0.015625, 0.00390625)  # of the way to the next value: sa
 MEETINGS = 16  # places where branches meet that are shown finely
 
 
-def root_locus(
-    model: Model,
-    parameter: str,
-    values: Sequence[float],
-    *,
-    equilibrium: bool = False,
-    about: Any = None,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-    frozen: bool = False,
-) -> RootLocus:
-    """Eigenvalues over values of a parameter, as branches, and where stability changes.
+@dataclass(frozen=True, kw_only=True)
+class RootLocusOptions(InstantOptions):
+    """What `Mechanism.root_locus` is asked."""
 
-    Between two values all changes of where eigenvalues lie (in the left or right half plane, on an axis, at zero) are
-    bracketed by counting and found to rounding; where branches meet, values are added. A pair that leaves the left half
-    plane and comes back between two values goes unseen, unless the branch heads for the axis: give more values.
+    parameter: str
+    values: Sequence[float] | np.ndarray
+    equilibrium: bool
+    progress: bool | Callable[[float], None]
 
-    Parameters
-    ----------
-    model : Model
-    parameter : str
-        A parameter of the model, or ``"t"``.
-    values : sequence of float
-        In SI units.
-    equilibrium : bool
-        About the equilibrium at each value, each following from the one before; else as described at each value.
-    about : Result, optional
-        About the end of a motion, at all values.
-    t, parameters, coordinates, frozen
-        As for `flyball.analysis.linearize.linearize`.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.about, Equilibrium):
+            raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
+        if self.about is not None and self.equilibrium:
+            raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
 
-    Returns
-    -------
-    RootLocus
+    def here(self, value: float, about: Equilibrium | None) -> InstantOptions:
+        """Where the mechanism is at a value; at an equilibrium if that is given."""
+        t, parameters = self.t, dict(self.parameters or {})
+        if self.parameter == "t":
+            t = value
+        else:
+            parameters[self.parameter] = float(value)
+        return InstantOptions(
+            about=self.about if about is None else about,
+            t=t if about is None else None,
+            parameters=parameters,
+            coordinates=self.coordinates,
+            frozen=self.frozen,
+        )
 
-    Raises
-    ------
-    NotConverged
-        If the mechanism cannot be linearised at a value; ``series`` holds what was found before.
-    ModelError
-        If there is no such parameter, or ``about`` is an equilibrium, which is one of other values.
-    """
-    if about is not None and hasattr(about, "stability"):
-        raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
-    if about is not None and equilibrium:
-        raise ModelError("root_locus: about the end of a motion, or about equilibria? Say about= or equilibrium=True")
-    points = checked(model, parameter, values)
-    base, now = dict(parameters or {}), number(t, {}, "s", "t")
-    along = equilibria(model, parameter, points, parameters=base, t=now) if equilibrium else None
+    def rest(self, values: Sequence[float] | np.ndarray, start: Equilibrium | None = None) -> EquilibriaOptions:
+        """What is asked for the equilibria at values."""
+        return EquilibriaOptions(
+            parameter=self.parameter,
+            values=values,
+            t=self.t or 0.0,
+            parameters=self.parameters,
+            start=start,
+            stable=False,
+            progress=False,
+        )
+
+
+def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
+    """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
+    points = checked(model, o.parameter, o.values)
+    along = equilibria(model, o.rest(points)) if o.equilibrium else None
 
     def at(place: float) -> Sample:
         value = float(np.interp(place, np.arange(len(points)), points))
-        given = {"t": value, "parameters": base} if parameter == "t" else {"t": now, "parameters": base}
-        if parameter != "t":
-            given["parameters"] = {**base, parameter: value}
-        own = about
+        about = None
         if along is not None:
-            k = int(place)
-            own = along[k] if place == k else _near(model, parameter, value, along, k, base, now)
-        x, _ = instant(model, own, coordinates=coordinates, **given)
-        return sample(place, value, *without_inputs(x, frozen))
+            about = along[int(place)]
+            if place != int(place):  # between those of the series
+                about = equilibria(model, o.rest([along.values[int(place)], value], about))[1]
+        return sample(place, value, *without_inputs(o.here(value, about).state(model), o.frozen))
 
-    return _traced(RootLocus(model.name, parameter, points[:0], np.zeros((0, 0), complex)), points, at)
-
-
-def _near(model: Model, parameter: str, value: float, along: Any, k: int, base: dict, t: float) -> Any:
-    """The equilibrium at a value between those of a series."""
-    return equilibria(model, parameter, [along.values[k], value], parameters=base, start=along[k], t=t)[1]
+    done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
+    with shown(o.progress, f"eigenvalues over {o.parameter}") as tell:
+        return _traced(done, points, at, tell)
 
 
-def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample]) -> RootLocus:
+def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], tell: Tell) -> RootLocus:
     """The locus at the values, then between them."""
     taken: list[Sample] = []
     for k, value in enumerate(points):
@@ -106,9 +98,10 @@ def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample]) 
         except AnalysisError as error:
             raise stopped(done, value, error) from error
         _told(done, taken)
+        tell(0.5 * (k + 1) / len(points), f"{value:.6g}")
     search = Search(at, min(x.counts.get("zero", 0) for x in taken))
     search.taken = list(taken)
-    events = _events(search, taken)
+    events = _events(search, taken, tell)
     done.crossings = _crossings(events, taken)
     _refined(search, [e for e in events if "meet" in e.what or "part" in e.what], taken)
     _told(done, search.taken)
@@ -129,14 +122,18 @@ def _told(done: RootLocus, taken: Sequence[Sample]) -> None:
     done.seen_from = tuple(dict.fromkeys(x.told for x in order if x.told))
 
 
-def _events(search: Search, taken: Sequence[Sample]) -> list[Event]:
+def _events(search: Search, taken: Sequence[Sample], tell: Tell) -> list[Event]:
     """Events between the given values; those that lie on an event are passed over."""
     kept = [taken[0]]
     for k, x in enumerate(taken[1:], 1):
         if k == len(taken) - 1 or not _on_event(search, kept[-1], x, taken[k + 1]):
             kept.append(x)
     _heading(search, kept)
-    return [e for a, b in pairwise(kept) for e in search.between(a, b)]
+    found = []
+    for a, b in pairwise(kept):
+        found += search.between(a, b)
+        tell(0.5 + 0.5 * b.place / len(taken), "where stability changes")
+    return found
 
 
 def _on_event(search: Search, a: Sample, x: Sample, b: Sample) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
@@ -130,6 +131,11 @@ class JointFriction(CoordinateForce):
             )
         if self._coordinate().startswith("angle") and n.radius is None:
             raise ModelError(f"{self.title}: friction about an angle needs the radius of the bearing; give radius=")
+
+    def counted(self, components: Iterable[str]) -> tuple[str, ...]:
+        """Those of a reaction's components (``"force x"``, ``"torque y"``, ...) that the load counts."""
+        moments = self.bending_length is not None or self.twist_length is not None
+        return tuple(k for k in components if moments or k.startswith("force"))
 
     @staticmethod
     def sticking(par: tuple[float, ...]) -> tuple[float, float]:

@@ -93,16 +93,18 @@ class Body(Element):
     orientation : quaternion (scalar first), Bryant angles (x-y-z) [rad], rotation object or 3x3 matrix
         Spatial: orientation of the reference frame.
     velocity : vector [m/s]
-        Velocity of the reference frame's origin at the start, world axes. A guess: assembly makes it consistent.
+        Velocity of the reference frame's origin at the start, world axes. It is kept where joints and drivers allow
+        it; where they do not, the nearest is taken and said. If not given it is free: it follows from what is given
+        elsewhere, and is zero where nothing determines it.
     angular_velocity : number or vector [rad/s]
-        At the start, world axes.
+        At the start, world axes; the same holds.
     shape : shape or list of shapes
         What the body looks like and, unless ``inertia`` is given, what it weighs (see `Solid`).
     density : number [kg/m^3]
         Of the shapes that have no mass or density of their own.
     as_drawn : bool
-        Assembly must not change the pose and velocities given here. It holds nothing during the motion: to weld a body
-        to ground add a `Fixed` joint.
+        Assembly must not change the pose, nor the velocities given here. It holds nothing during the motion: to weld a
+        body to ground add a `Fixed` joint.
     color : str
         Colour in pictures: a name of CSS such as ``"steelblue"``, or ``"#rgb"`` or ``"#rrggbb"``.
     """
@@ -115,7 +117,7 @@ class Body(Element):
     position: Point = (0.0, 0.0, 0.0)
     angle: Angle = 0.0
     orientation: Orientation | None = None
-    velocity: Velocity = (0.0, 0.0, 0.0)
+    velocity: Velocity | None = None
     angular_velocity: AngularVelocity | None = None
     shape: Shapes = field(default=None)
     density: Density | None = None
@@ -200,6 +202,7 @@ class Driver(Element):
     law: Law = field(kw_only=False)
 
     category: ClassVar[str] = "drivers"
+    omission: ClassVar[float] = 0.5  # what it costs to leave it out where rows are too many
 
 
 @element

@@ -152,7 +152,8 @@ class Model:
     def __getitem__(self, name: str) -> Any:
         """The part with that name."""
         if name not in self._names:
-            raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(name, self._names)}")
+            known = self.names()
+            raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
         return self._names[name]
 
     def add(self, *elements: Element) -> Any:

@@ -40,7 +40,8 @@ def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
     """Mass properties, pose and velocities of a body."""
     mass_properties(e, n, env, model.planar)
     vector(n.position, model.planar, f"position of {e.title}")
-    vector(n.velocity, model.planar, f"velocity of {e.title}")
+    if n.velocity is not None:
+        vector(n.velocity, model.planar, f"velocity of {e.title}")
     given = n.angular_velocity
     if given is not None and (isinstance(given, tuple) == model.planar or (not model.planar and len(given) != 3)):
         wanted = "one number" if model.planar else "three components"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -77,15 +78,24 @@ def _accelerations(result: Result) -> str:
 
 
 def _open_loads(result: Result) -> list[str]:
-    found = []
-    for f in _with_loads(result):
-        if f.joint in result.health.undetermined:
-            what = ", ".join(result.health.undetermined[f.joint])
-            found.append(
-                f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
-                f"({what}): its load is one choice of many. Replace a joint by one that holds less, such as Spherical"
-            )
-    return found
+    return [
+        f"{f.title} follows the reaction of {f.joint!r}, which redundant constraints leave undetermined "
+        f"({', '.join(what)}): its load is one choice of many. Replace a joint by one that holds less, as Spherical"
+        for f, what in open_loads(_with_loads(result), result.health.undetermined)
+    ]
+
+
+def open_loads(frictions: Iterable[Any], undetermined: Mapping[str, tuple[str, ...]]) -> list[tuple[Any, tuple]]:
+    """Frictions whose load counts components of their joint's reaction that are undetermined, with these.
+
+    Parameters
+    ----------
+    frictions : iterable of JointFriction
+    undetermined : mapping
+        Joint -> components, as of `Mobility`.
+    """
+    found = [(f, f.counted(undetermined.get(f.joint, ()))) for f in frictions]
+    return [(f, what) for f, what in found if what]
 
 
 def _creep(result: Result) -> list[str]:

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from .departure import Departure, summary
+
 LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
 """Figures that are found when first asked for."""
 
@@ -31,6 +33,7 @@ class Health:
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
+    departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
 
     @property
     def _simulated(self) -> bool:
@@ -86,6 +89,7 @@ class Health:
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late"}
+        plain["departures"] = [d.as_dict() for d in self.departures]
         return plain | {k: getattr(self, k) for k in LATE}
 
     def lines(self) -> list[tuple[str, str]]:
@@ -93,6 +97,7 @@ class Health:
         out = [
             ("status", self.status),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
+            *([("assembly", summary(self.departures))] if self.departures else []),
             ("freedoms", str(self.freedoms)),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
             ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
+from .departure import Departure
 from .files import ARRAYS, FORMAT, GROUP
 from .health import Health
 from .result import Result
@@ -105,4 +106,5 @@ def _health(data: dict[str, Any]) -> Health:
     late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
     late["warnings"] = tuple(data.get("warnings", ()))
     data["remarks"] = tuple(data.get("remarks", ()))
+    data["departures"] = tuple(map(Departure.from_dict, data.get("departures", ())))
     return Health(**{k: v for k, v in data.items() if k in known}, late=late)

@@ -121,7 +121,7 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
     if n.angular_velocity is not None:
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
     arm = R @ m.com
-    v = vector(n.velocity, planar, b.name) + np.cross(w, arm)
+    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
     return SimpleNamespace(
         p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
     )

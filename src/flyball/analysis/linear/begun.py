@@ -11,13 +11,20 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ...equations.tree import retract
 from ...model.model import Model
-from ..assemble import Assembly, assemble, inverse_weights, movable
+from ...tables.system import NU
+from ..assemble import assemble
+from ..assembly.described import described, deviation
+from ..assembly.positions import inverse_weights
+from ..assembly.start import Assembly
+from ..assembly.velocities import Wanted
 from ..motion.driven import leaves_no_freedom
 from ..motion.start import Start
 from .derivatives import State
 from .differences import derivative
 from .free import TOLERANCE
+from .loads import STEP
 from .tangent import Direction, Linear, Tangent, closed, tangent_rate, tangent_step
 
 ROUNDED = 1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
@@ -59,27 +66,44 @@ def held(base: Assembly) -> bool:
 
 
 def as_described(model: Model, base: Assembly) -> bool:
-    """Whether the start is what the description says, to rounding."""
+    """Whether the start is what the description says, to rounding, or all that it leaves open follows from it."""
     drawn, length = base.compiled.values, base.compiled.values.length
     apart = np.abs(tangent_step(base.compiled, drawn.q, base.q)).max(initial=0.0)
-    faster = np.abs(base.v - drawn.v).max(initial=0.0)
-    near = apart <= ROUNDED * min(1.0, length) and faster <= ROUNDED * np.abs(base.v).max(initial=0.0)
-    return bool(near) and not model.initial
+    if apart > ROUNDED * min(1.0, length) or model.initial:
+        return False
+    return bool(_none_added(base)) or (_wanted(base).determined and not base.departures)
+
+
+def _none_added(base: Assembly) -> bool:
+    """Whether velocities that are not described are zero."""
+    faster = np.abs(base.v - described(base.compiled.values, base.q)).max(initial=0.0)
+    return bool(faster <= ROUNDED * np.abs(base.v).max(initial=0.0))
+
+
+def _wanted(base: Assembly) -> Wanted:
+    c = base.compiled
+    c.at(base.t, base.q, base.v)
+    return Wanted.at(c, base.q, c.work.row[NU].copy())
 
 
 def _described(d: Direction, base: Assembly, x: State) -> tuple[np.ndarray, np.ndarray]:
     """Changes of the described positions and velocities, put on the constraints in the way of assembly."""
     c, at = base.compiled, d.e.at
     dq = tangent_rate(c, x.q, d.derivative(d.values.q))
-    dv = d.derivative(d.values.v)
     c.at(x.t, x.q, x.v)
     G = c.jacobian()
     which = np.array([r.holonomic for r in c.structure.rows], bool)
     size = np.sqrt(inverse_weights(c))
-    left = d.along(x, dq, dv)[at["g"]][which]
+    left = d.along(x, dq, np.zeros(len(x.v)))[at["g"]][which]
     if which.any():
         dq -= size * np.linalg.lstsq(G[which] * size, left, rcond=TOLERANCE)[0]
-    R = c.inverse_mass_root(movable(c))
-    if len(G):
-        dv -= R @ np.linalg.lstsq(G @ R, d.along(x, dq, dv)[at["n"]], rcond=TOLERANCE)[0]
+    q = x.q.astype(complex)
+    retract(d.values.system, q, 1j * STEP * dq)
+    dv = d.derivative(described(d.values, q)) if _none_added(base) else np.zeros(len(x.v))
+    w = _wanted(base)
+    if w.G.shape[0]:
+        of_held = [d.derivative(deviation(d.values, g, q, x.v + 1j * STEP * dv)) for g in w.held]
+        of_soft = [w.weights[g.name] @ d.derivative(deviation(d.values, g, q, x.v + 1j * STEP * dv)) for g in w.soft]
+        missed = np.concatenate([d.along(x, dq, dv)[at["n"]], *of_held])
+        dv += w.steps()(-missed, -np.concatenate([np.zeros(0), *of_soft]))
     return dq, dv

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from ...errors import AnalysisError
+from ...errors import AnalysisError, ModelError
 from ...model.model import Model
 from ...tables.names import velocity_names
 from ...tables.values import values
@@ -33,7 +33,7 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
 
     Raises
     ------
-    AnalysisError
+    AnalysisError, ModelError
         That of the function, if it fails however small the step is.
     """
     value = model.environment(parameters)[name]
@@ -54,7 +54,7 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
     for _ in range(TRIES):
         try:
             error, found_, rounded = at(h)
-        except AnalysisError as error_:
+        except (AnalysisError, ModelError) as error_:  # of a model: what a parameter so far off makes of it is none
             if type(error_) is AnalysisError:  # what is asked for is not there aside: no smaller step makes it so
                 raise AnalysisError(f"a little to the side of {name!r} = {value:g}, {error_}") from None
             if way > 1.0:

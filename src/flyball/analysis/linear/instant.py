@@ -10,7 +10,8 @@ from ...model.expressions import number
 from ...model.model import Model
 from ...results.equilibrium import Equilibrium
 from ...results.result import Result
-from ..assemble import Assembly, assemble
+from ..assemble import assemble
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..motion.layer import in_coordinates
 from ..motion.start import begin

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import ModelError, NotConverged
 from ...tables.names import velocity_names
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from .free import free
 from .inputs import with_inputs

@@ -12,7 +12,7 @@ import numpy as np
 from ...equations.engine import FOLLOW, motion_kernel
 from ...numerics.integrators import explicit as ex
 from ...numerics.integrators.tableaux import tableau
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..mobility import mobility
 from .start import Start
 

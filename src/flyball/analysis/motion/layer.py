@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...errors import ModelError
+from ...errors import AnalysisError, ModelError
+from ...results.doubts import open_loads
 from ...tables.cost import cost
 from ...tables.spanning import spanning
 from ...tables.system import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
-from ..assemble import Assembly
+from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
+from ..mobility import mobility
 
+CURE = "or replace one of these by a joint that holds less, such as Spherical"
 COORDINATES = ("auto", "absolute", "joint")
 THIN = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
 MOST = 8  # joints that are taken out of the forest, one after the other, before it is given up
@@ -36,10 +40,19 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
     ------
     ModelError
         For an unknown wish.
+    AnalysisError
+        If friction follows reactions that redundancy leaves undetermined, for joint coordinates: there a tree joint
+        would carry all, here what redundant joints carry is chosen by the size of their rows.
     """
     known(wish)
     if wish == "absolute":
         return a, "absolute: as asked for"
+    if why := _open_loads(a):
+        if wish == "joint":
+            raise AnalysisError(
+                f"{a.compiled.structure.model.name!r} has no motion of its own in joint coordinates: {why}"
+            )
+        return a, f"absolute: {why}"
     c, why = _forest(a, parameters)
     if c is None:
         return a, f"absolute: {why}"
@@ -51,7 +64,24 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
     else:
         why = "as asked for"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
-    return Assembly(c, a.t, q, v, a.moved, a.iterations, a.sped), f"joint: {why}{_cuts(c)}"
+    return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cuts(c)}"
+
+
+def _open_loads(a: Assembly) -> str:
+    """Why friction needs absolute coordinates, if it does."""
+    s = a.compiled.structure
+    if not s.loads:
+        return ""
+    m = mobility(s.model, a)
+    found = open_loads(s.loads, m.undetermined)
+    if not found:
+        return ""
+    titles = ", ".join(f.title for f, _ in found)
+    names = ", ".join(m.redundant[:8])
+    return (
+        f"{titles} follow{'s' if len(found) == 1 else ''} reactions that the constraints of {names} leave open; "
+        f"what each carries is then a choice (the least for its size), which is made for rows"
+    )
 
 
 def known(wish: str) -> None:

@@ -18,7 +18,8 @@ from ...model.element import LawOf
 from ...model.joint import Joint
 from ...model.model import Model, listing, suggest
 from ...tables.system import G_VALUE, GAMMA, NV, V0
-from ..assemble import Assembly, assemble
+from ..assemble import assemble
+from ..assembly.start import Assembly
 from ..compiled import compiled
 from .closure import Closure, Place
 

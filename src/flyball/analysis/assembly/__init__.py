@@ -1,0 +1,1 @@
+"""Pieces of ``assemble``: closed positions, consistent velocities, and what is in the way of either."""

@@ -1,0 +1,142 @@
+"""Velocities that the description gives: those of the state, and how far a state is from them.
+
+A body may be told the velocity of its reference frame's origin, its angular velocity, both or neither, along world
+axes. What it is not told is free.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...math.vec import cross
+from ...model.geometry import quaternion_to_matrix, rotation_about
+from ...results.departure import Departure
+from ...tables.system import NV, Q0, V0
+from ...tables.values import Values
+from ..compiled import Compiled
+
+KEPT = 1e-6  # part of a velocity by which it may differ from the given one, near singular positions, and is still kept
+STILL = 1e-9  # part of the mechanism's largest velocity that is none
+
+
+@dataclass(frozen=True)
+class Given:
+    """A body that is told how it moves."""
+
+    name: str
+    at: int  # its first velocity
+    n: int  # how many it has
+    origin: bool  # whether the velocity of its reference frame's origin is given
+    turning: bool  # whether its angular velocity is
+    as_drawn: bool
+
+    @property
+    def whole(self) -> bool:
+        """Whether nothing of it is free."""
+        return self.origin and self.turning
+
+    @property
+    def shifts(self) -> int:
+        """How many of its velocities are translations."""
+        return 2 if self.n == 3 else 3
+
+
+def given(c: Compiled) -> list[Given]:
+    """Bodies that are told how they move; of a mechanism in absolute coordinates."""
+    out = []
+    for b in c.structure.model.bodies:
+        origin, turning = b.velocity is not None, b.angular_velocity is not None
+        if origin or turning:
+            row = c.values.system.body_i[c.structure.place[b.name]]
+            out.append(Given(b.name, int(row[V0]), int(row[NV]), origin, turning, b.as_drawn))
+    return out
+
+
+def described(x: Values, q: np.ndarray) -> np.ndarray:
+    """Velocities (nv,) as described, at the pose q; zero where nothing is."""
+    v = np.zeros(x.structure.nv, np.result_type(x.v, q))
+    for name, b in x.structure.place.items():
+        if b >= 0:
+            row = x.system.body_i[b]
+            v[row[V0] : row[V0] + row[NV]] = _own(x, name, q)
+    return v
+
+
+def _own(x: Values, name: str, q: np.ndarray) -> list[Any]:
+    """Velocities of one body as described."""
+    d, R = x.bodies[name], _rotation(x, name, q)
+    u = _origin(d) + _cross(d.w, R @ d.com)
+    return [u[0], u[1], d.w[2]] if x.structure.model.planar else [*u, *(R.T @ d.w)]
+
+
+def _cross(a: Any, b: Any) -> np.ndarray:
+    """Cross product; NumPy's own takes ten times as long."""
+    return np.array(cross(a, b))
+
+
+def _origin(d: Any) -> np.ndarray:
+    """Velocity of the reference frame's origin, as described."""
+    return d.v - _cross(d.w, d.R @ d.com)
+
+
+def _rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
+    """Rotation of a body at q; to the bit as it is drawn where it was not turned."""
+    at = int(x.system.body_i[x.structure.place[name], Q0])
+    here = q[at + 2 : at + 3] if x.structure.model.planar else q[at + 3 : at + 7]
+    drawn = x.q[at + 2 : at + 3] if x.structure.model.planar else x.q[at + 3 : at + 7]
+    if np.array_equal(here, drawn):
+        return x.bodies[name].R
+    return rotation_about(2, here[0]) if x.structure.model.planar else quaternion_to_matrix(here)
+
+
+def deviation(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """What a body's velocities have beyond those it is told: of its mass centre and the turn where both are given.
+
+    Else of its reference frame's origin along world axes, or of the turn (of a spatial body along its own axes).
+    """
+    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    own = v[g.at : g.at + g.n]
+    if g.whole:
+        return own - np.array(_own(x, g.name, q))
+    if g.origin:
+        w = np.array([0.0, 0.0, own[2]]) if g.n == 3 else R @ own[3:]
+        moved = np.r_[own[:2], 0.0] if g.n == 3 else own[:3]
+        return (moved - _cross(w, R @ d.com) - _origin(d))[: g.shifts]
+    return own[2:] - d.w[2:] if g.n == 3 else own[3:] - R.T @ d.w
+
+
+def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
+    """Derivatives of `deviation` by the body's own velocities."""
+    if g.whole:
+        return np.eye(g.n)
+    if g.turning:
+        return np.eye(g.n)[g.shifts :]
+    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    a = R @ d.com
+    if g.n == 3:
+        return np.array([[1.0, 0.0, a[1]], [0.0, 1.0, -a[0]]])
+    return np.hstack([np.eye(3), np.array([_cross(a, k) for k in R.T]).T])
+
+
+def not_kept(c: Compiled, q: np.ndarray, v: np.ndarray) -> list[Departure]:
+    """Given velocities that the state (q, v) does not have."""
+    x, out = c.values, []
+    told, largest = given(c), float(np.abs(v / c.sizes).max(initial=0.0)) * x.length
+    for g in told:
+        d, R = x.bodies[g.name], _rotation(x, g.name, q)
+        own = v[g.at : g.at + g.n]
+        planar = g.n == 3
+        w = np.array([0.0, 0.0, own[2]]) if planar else R @ own[3:]
+        u = (np.r_[own[:2], 0.0] if planar else own[:3]) - _cross(w, R @ d.com)
+        pairs = [("velocity", _origin(d)[: g.shifts], u[: g.shifts], "m/s", 1.0)] if g.origin else []
+        turns = slice(2, 3) if planar else slice(0, 3)
+        pairs += [("angular_velocity", d.w[turns], w[turns], "rad/s", x.length)] if g.turning else []
+        for what, wanted, got, unit, size in pairs:
+            apart = np.abs(got - wanted).max()
+            own_size = max(np.abs(wanted).max(), np.abs(got).max())
+            if apart > KEPT * own_size and apart * size > STILL * max(largest, size * np.abs(wanted).max()):
+                out.append(Departure(g.name, what, tuple(wanted.tolist()), tuple(got.tolist()), unit))
+    return out

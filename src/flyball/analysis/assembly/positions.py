@@ -1,0 +1,148 @@
+"""Closed positions from rough guesses: damped Gauss-Newton with steps of least weighted size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...tables.system import G_VALUE
+from ..compiled import Compiled
+
+CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
+OPEN = 1e-6  # the same, above which a position found on residuals that lead from far away is none
+RESTARTS = 12
+ITERATIONS = 200
+DENSE = 300  # rows up to which a step of assembly goes through a singular value decomposition
+NO_PIVOT = 1e-14  # added for redundant rows of large mechanisms; iterations take it out again
+DIGITS = 16 * np.finfo(float).eps  # part of a coordinate that a few operations leave uncertain
+NO_PART = 1e-10  # singular values below this part of the largest are taken for rounding
+
+
+def misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
+    """The largest row at a position: radians, or parts of the mechanism's length and of what rounding leaves there."""
+    c.at(t, q, v)
+    g = np.abs(c.work.row[G_VALUE])
+    if not np.isfinite(g).all():
+        return np.inf
+    return float((g / np.where(c.metric, c.values.length + rounding(c) / CLOSED, 1.0)).max(initial=0.0))
+
+
+def rounding(c: Compiled) -> float:
+    """What is left of a closed row [m] by rounding of the places last evaluated: far from the origin it is much."""
+    return DIGITS * float(np.abs(c.work.FK[:, :3]).max(initial=0.0))
+
+
+def movable(c: Compiled) -> np.ndarray:
+    """1 for velocities of bodies that may move, 0 for those of bodies that stay as drawn."""
+    s = c.structure
+    out = np.ones(s.nv)
+    for name, b in s.place.items():
+        if b >= 0 and s.model[name].as_drawn:
+            v0, n = s.tables["body_i"][b, 3], s.tables["body_i"][b, 5]
+            out[v0 : v0 + n] = 0.0
+    return out
+
+
+def inverse_weights(c: Compiled) -> np.ndarray:
+    """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
+    body_i = c.structure.tables["body_i"]
+    w = np.ones(c.structure.nv)
+    for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True):
+        k = {3: 2, 6: 3}.get(int(n), 0)
+        w[v0 + k : v0 + n] = 1.0 / c.values.length**2
+    return w * movable(c)
+
+
+def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
+    """Least step with G d = r, in the metric of the inverse weights R R^T (R sparse), damped.
+
+    Near a singular position a combination of rows may speak of a motion by a part of 1e-8 only: where the size allows
+    it the singular values of G R are used, not their squares, which would drown in rounding.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    B = c.sparse_jacobian() @ R
+    if B.shape[0] <= DENSE:
+        used = np.unique(B.indices)
+        U, s, Vt = np.linalg.svd(B[:, used].toarray(), full_matrices=False)
+        largest = s.max(initial=0.0) or 1.0
+        keep = s > NO_PART * largest
+        x = np.zeros(B.shape[1])
+        x[used] = Vt[keep].T @ (s[keep] / (s[keep] ** 2 + damping * largest**2) * (U[:, keep].T @ r))
+        return R @ x
+    # [1 B^T; B -delta] with B of unit size: B B^T would square the spread of singular values here too
+    m, n = B.shape
+    size = np.sqrt(B.multiply(B).sum(axis=1).max()) or 1.0
+    B = B / size
+    K = sp.bmat([[sp.identity(n), B.T], [B, -(damping + NO_PIVOT) * sp.identity(m)]], format="csc")
+    return R @ splu(K).solve(np.r_[np.zeros(n), r / size])[:n]
+
+
+def _moved_by(c: Compiled, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+    from ...equations.tree import retract
+
+    new = q.copy()
+    retract(c.values.system, new, d)
+    return new
+
+
+def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
+    """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
+    import scipy.sparse as sp
+
+    w = inverse_weights(c)
+    R = sp.diags(np.sqrt(w)).tocsr()
+    limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
+    size = misfit(c, t, q, v)
+    g = c.work.row[G_VALUE].copy()
+    damping = 0.0
+    norm = float(g @ g)
+    for k in range(ITERATIONS):
+        if size < 1e-13:
+            return q, k
+        c.at(t, q, v)
+        d = _step(c, -g, R, damping)
+        over = np.abs(d / limit).max(initial=0.0)
+        d = d / over if over > 1.0 else d
+        new = _moved_by(c, q, d)
+        new_size = misfit(c, t, new, v)
+        trial = c.work.row[G_VALUE].copy()
+        new_norm = float(trial @ trial)
+        if np.isfinite(new_size) and new_norm < norm:
+            gain = 1.0 - new_norm / norm
+            q, g, size, norm = new, trial, new_size, new_norm
+            damping = 0.0 if damping < 1e-12 else damping / 10
+            if gain < 1e-9:
+                return q, k
+        else:
+            damping = max(10 * damping, 1e-8)
+            if damping > 1e4 or size < 1e-11:
+                return q, k
+    return q, ITERATIONS
+
+
+def close(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, int]:
+    """Close from far: Newton from the guess, then from shaken guesses when it is caught short of closed."""
+    w = inverse_weights(c)
+    best, count = newton(c, t, q, v)
+    least = misfit(c, t, best, v)
+    random = np.random.default_rng(0)
+    for k in range(RESTARTS):
+        if least < 1e-9:
+            break
+        shake = random.normal(size=len(w)) * np.sqrt(w) * c.values.length * 0.05 * 1.5**k
+        trial, more = newton(c, t, _moved_by(c, best if k % 2 == 0 else q, shake), v)
+        count += more
+        gap = misfit(c, t, trial, v)
+        if gap < 1e-9:
+            # closed from a shaken start: come back as near to the guess as the constraints allow
+            return trial, count
+        if gap < least:
+            best, least = trial, gap
+    return best, count
+
+
+def closed_near(c: Compiled, t: float, q: np.ndarray) -> np.ndarray | None:
+    """The closed position next to q, or None if none is found; of a mechanism with the rows of its positions."""
+    q, _ = newton(c, t, q, np.zeros(c.structure.nv))
+    return q if misfit(c, t, q, np.zeros(c.structure.nv)) <= CLOSED else None

@@ -1,0 +1,143 @@
+"""A consistent start: closed positions and velocities near those described."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...model.geometry import quaternion_to_matrix, rotation_about
+from ...model.model import Model
+from ...results.departure import Departure
+from ...tables.system import NQ, Q0
+from ..compiled import Compiled, compiled
+from .described import not_kept
+from .gaps import contradictory_velocities, disagreement, no_rate
+from .positions import CLOSED, OPEN, close, misfit, newton, rounding
+from .told import driven, told, turns, wind
+from .velocities import consistent, contradiction
+
+
+@dataclass
+class Assembly:
+    """A consistent start: the compiled mechanism, its state, and what of the description could not be kept."""
+
+    compiled: Compiled
+    t: float
+    q: np.ndarray
+    v: np.ndarray
+    moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
+    iterations: int = 0
+    departures: tuple[Departure, ...] = ()  # positions that assembly changed, given velocities that cannot be
+
+    @property
+    def y(self) -> np.ndarray:
+        """State vector with work states zero."""
+        return np.r_[self.q, self.v, self.compiled.z]
+
+
+def assembled(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
+    """Find positions and velocities that fulfil all constraints at time t, near those described.
+
+    Raises
+    ------
+    AssemblyError
+        If no closed position, or no consistent velocity, is found; the message names the joints that disagree and by
+        how much.
+    """
+    model = model.snapshot()
+    plain = compiled(model, parameters=parameters)
+    env = model.environment(parameters)
+    values, rates = told(model, env)
+    known = dict(values) | driven(model, model.drivers, t, env)
+    plain.follow(turns(plain, known))
+    drawn = plain.values.q.copy()
+    wind(plain, known, drawn)
+    q, count = _closed(model, plain, t, drawn, values, parameters)
+    plain.at(t, q, plain.values.v)
+    if error := no_rate(plain, t):
+        raise error
+    v, wanted, c = consistent(model, plain, parameters, t, q, rates)
+    if gaps := contradiction(wanted, v):
+        raise contradictory_velocities(c, gaps, Assembly(plain, t, q, v))
+    plain.at(t, q, v)
+    near = rounding(plain)
+    departures = (*_repositioned(plain, drawn, q, near), *not_kept(plain, q, v))
+    return Assembly(plain, t, q, v, _moved(plain, drawn, q, near), count, departures)
+
+
+def _closed(
+    model: Model,
+    plain: Compiled,
+    t: float,
+    drawn: np.ndarray,
+    values: Mapping[str, float],
+    parameters: Mapping[str, float] | None,
+) -> tuple[np.ndarray, int]:
+    """A closed position near the drawn one, and how many iterations led there; ``plain`` follows its turns."""
+    q, v = drawn.copy(), plain.values.v
+    holds = [i for i in model.initial if i.name in values]
+    near = plain
+    if holds or not all(r.holonomic for r in plain.structure.rows):
+        near = compiled(model, parameters=parameters, positions=True, holds=holds, held=values)
+        near.follow(plain.hints)
+    count = 0
+    if misfit(near, t, q, v) > CLOSED or _by_frames(model):
+        far = compiled(model, parameters=parameters, far=True, holds=holds, held=values)
+        far.follow(plain.hints)
+        if misfit(far, t, q, v) > OPEN:
+            q, count = close(far, t, q, v)
+            near.follow(far.hints)
+        q, more = newton(near, t, q, v)
+        count += more
+        if misfit(near, t, q, v) > CLOSED or misfit(far, t, q, v) > OPEN:
+            plain.follow(near.hints)
+            raise disagreement(far, Assembly(plain, t, q, v))
+    plain.follow(near.hints)
+    return q, count
+
+
+def _by_frames(model: Model) -> bool:
+    """Whether some joint is given by frames, so that nothing says it is drawn closed."""
+    return any(j.at is None for j in model.joints)
+
+
+def _moved(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> dict[str, float]:
+    """Body -> how far its mass centre went, beyond rounding."""
+    out = {}
+    k = 2 if c.structure.model.planar else 3
+    for name, b in c.structure.place.items():
+        if b >= 0:
+            at = slice(int(c.values.system.body_i[b, Q0]), int(c.values.system.body_i[b, Q0]) + k)
+            d = float(np.linalg.norm(after[at] - before[at]))
+            if d > 1e-12 * c.values.length + near:
+                out[name] = d
+    return out
+
+
+def _repositioned(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> list[Departure]:
+    """Poses of reference frames that are not those drawn, beyond rounding."""
+    out, x = [], c.values
+    k = 2 if x.structure.model.planar else 3
+    small = 1e-12 * x.length + near
+    for name, b in x.structure.place.items():
+        if b < 0:
+            continue
+        at, n = int(x.system.body_i[b, Q0]), int(x.system.body_i[b, NQ])
+        was, now = before[at : at + n], after[at : at + n]
+        com = x.bodies[name].com
+        p, o = (_origin(z, com, k) for z in (was, now))
+        what, unit = ("angle", "rad") if k == 2 else ("orientation", "1")
+        turned = Departure(name, what, tuple(was[k:].tolist()), tuple(now[k:].tolist()), unit)
+        if np.linalg.norm(o - p) > small:
+            out.append(Departure(name, "position", tuple(p.tolist()), tuple(o.tolist()), "m"))
+        if turned.distance > 1e-12:
+            out.append(turned)
+    return out
+
+
+def _origin(q: np.ndarray, com: np.ndarray, k: int) -> np.ndarray:
+    """Origin of a body's reference frame from its coordinates."""
+    R = rotation_about(2, q[2]) if k == 2 else quaternion_to_matrix(q[3:7])
+    return q[:k] - (R @ com)[:k]

@@ -1,0 +1,260 @@
+"""Consistent velocities at a closed position.
+
+In this order: the constraints are fulfilled, with what drivers and initial rates ask for; what is described is kept
+exactly where that allows it, else as nearly, measured by the kinetic energy of the difference; what is left free has
+the least kinetic energy, so that what nothing determines rests (Thomson's theorem: as blows would start it).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...model.model import Model
+from ...tables.system import NU
+from ..compiled import Compiled, compiled
+from .described import Given, described, deviation, given, gradient
+from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
+
+CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
+WRONG = 1e-9  # the same, above which rows contradict one another
+BLOCKED = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
+SOFT = 1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
+
+
+@dataclass
+class Wanted:
+    """Rows that velocities must fulfil (hard), and those that they should (soft), at a position.
+
+    ``root``: R with R R^T the inverse mass matrix, zero for bodies whose motion is given and must not change. Soft
+    rows are weighted so that the sum of their squares is twice the kinetic energy of the difference.
+    """
+
+    c: Compiled
+    q: np.ndarray
+    nu: np.ndarray
+    G: Any
+    root: Any
+    held: list[Given]  # hard, besides the constraints
+    soft: list[Given]
+    weights: dict[str, np.ndarray]
+
+    @classmethod
+    def at(cls, c: Compiled, q: np.ndarray, nu: np.ndarray, still: np.ndarray | None = None) -> Wanted:
+        """At the position last evaluated, q, for rows with the right-hand sides nu."""
+        import scipy.sparse as sp
+
+        told = given(c)
+        free = np.ones(c.structure.nv)
+        for g in told:
+            if g.as_drawn and g.whole:
+                free[g.at : g.at + g.n] = 0.0
+        root = c.inverse_mass_root(free)
+        held = [g for g in told if g.as_drawn and not g.whole]
+        soft = [g for g in told if not g.as_drawn]
+        weights = {g.name: _weight(root[g.at : g.at + g.n, g.at : g.at + g.n].toarray(), g) for g in soft}
+        G = c.sparse_jacobian()
+        if held:
+            G = sp.vstack([G, _stacked(c, q, held, {})]).tocsr()
+        return cls(c, q, nu, G, root, held, soft, weights)
+
+    @property
+    def determined(self) -> bool:
+        """Whether these rows leave no velocity free."""
+        A = np.vstack([x.toarray() for x in self._whitened()])
+        free = (abs(self.root).sum(axis=0) > 0.0).sum()
+        return bool(np.linalg.matrix_rank(A, tol=BLOCKED * _norm(A)) == free) if A.size else free == 0
+
+    def _whitened(self, soft: bool = True) -> tuple[Any, Any]:
+        """Both kinds of rows, by velocities whose squares are twice the kinetic energy."""
+        return self.G @ self.root, _stacked(self.c, self.q, self.soft if soft else [], self.weights) @ self.root
+
+    def missed(self, v: np.ndarray) -> np.ndarray:
+        """Of the hard rows."""
+        n = len(self.nu)
+        return np.r_[self.nu - self.G[:n] @ v, *(-deviation(self.c.values, g, self.q, v) for g in self.held)]
+
+    def lost(self, v: np.ndarray) -> np.ndarray:
+        """Of the soft rows."""
+        x = self.c.values
+        parts = [-self.weights[g.name] @ deviation(x, g, self.q, v) for g in self.soft]
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def steps(self, soft: bool = True) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """(missed, lost) -> the change of velocities that takes them away; without soft rows only what is missed."""
+        A, C = self._whitened(soft)
+        solve = _dense(A, C) if A.shape[0] + C.shape[0] <= DENSE else _sparse(A, C)
+        return lambda missed, lost: self.root @ solve(missed, lost)
+
+
+def _weight(R: np.ndarray, g: Given) -> np.ndarray:
+    """Square root of the mass matrix of a body, the part that its given velocities speak of."""
+    W = np.linalg.inv(R)
+    return W if g.whole else W[: g.shifts, : g.shifts] if g.origin else W[g.shifts :, g.shifts :]
+
+
+def _stacked(c: Compiled, q: np.ndarray, told: list[Given], weights: Mapping[str, np.ndarray]):
+    """Derivatives of the (weighted) deviations of bodies by all velocities, sparse."""
+    import scipy.sparse as sp
+
+    i, j, x, n = [], [], [], 0
+    for g in told:
+        T = gradient(c.values, g, q)
+        T = weights[g.name] @ T if g.name in weights else T
+        rows, columns = np.indices(T.shape)
+        i.append(n + rows.ravel())
+        j.append(g.at + columns.ravel())
+        x.append(T.ravel())
+        n += len(T)
+    if not n:
+        return sp.csr_matrix((0, c.structure.nv))
+    entries = (np.concatenate(x), (np.concatenate(i), np.concatenate(j)))
+    return sp.csr_matrix(entries, shape=(n, c.structure.nv))
+
+
+def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """Least x of those with |C x - s| least of those with A x = r, by singular values of A and of what it leaves of C.
+
+    Golub and Van Loan, *Matrix Computations*, section 6.2 (least squares with equality constraints).
+    """
+    import scipy.sparse as sp
+
+    used = np.unique(sp.vstack([A, C]).indices)
+    n = A.shape[1]
+    A, C = A[:, used].toarray(), C[:, used].toarray()
+    V, inverse = _pseudo_inverse(A, NO_PART * _norm(A))
+    left = C - (C @ V) @ V.T
+    inverse_left = _pseudo_inverse(left, BLOCKED * _norm(C))[1]
+
+    def solve(r: np.ndarray, s: np.ndarray) -> np.ndarray:
+        x = np.zeros(n)
+        x[used] = inverse @ r
+        x[used] += inverse_left @ (s - C @ x[used])
+        return x
+
+    return solve
+
+
+def _norm(A: np.ndarray) -> float:
+    """Largest singular value."""
+    return float(np.linalg.norm(A, 2)) if A.size else 0.0
+
+
+def _pseudo_inverse(A: np.ndarray, none: float) -> tuple[np.ndarray, np.ndarray]:
+    """(basis of the row space, pseudo-inverse); singular values up to ``none`` are none."""
+    U, s, Vt = np.linalg.svd(A, full_matrices=False)
+    keep = s > none
+    V = Vt[keep].T
+    return V, (V / s[keep]) @ U[:, keep].T
+
+
+def _sparse(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+    """One step of the proximal method of multipliers towards the same; iterations lead there.
+
+    Least e |x|^2 + |C x - s|^2 with A x = r, by [e 1, C^T, A^T; C, -1, 0; A, 0, -d], rows of unit size: the multipliers
+    that are kept from one step to the next take d out again (Rockafellar, Math. Oper. Res. 1, 1976).
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    n, m, k = A.shape[1], A.shape[0], C.shape[0]
+    size_A, size_C = (np.sqrt(np.asarray(X.multiply(X).sum(axis=1)).max(initial=0.0)) or 1.0 for X in (A, C))
+    A, C = A / size_A, C / size_C
+    d = NO_PIVOT / SOFT
+    K = splu(
+        sp.bmat(
+            [
+                [SOFT * sp.identity(n), C.T, A.T],
+                [C, -sp.identity(k), None],
+                [A, None, -d * sp.identity(m)],
+            ],
+            format="csc",
+        )
+    )
+    multipliers = np.zeros(m)
+
+    def solve(r: np.ndarray, s: np.ndarray) -> np.ndarray:
+        x = K.solve(np.r_[np.zeros(n), s / size_C, r / size_A - d * multipliers])
+        multipliers[:] = x[n + k :]
+        return x[:n]
+
+    return solve
+
+
+def consistent(
+    model: Model, plain: Compiled, parameters: Mapping | None, t: float, q: np.ndarray, rates: Mapping[str, float]
+) -> tuple[np.ndarray, Wanted, Compiled]:
+    """Velocities at the closed position q, and what was wanted of them.
+
+    Parameters
+    ----------
+    model : Model
+    plain : Compiled
+        In absolute coordinates.
+    parameters : mapping or None
+        Values in place of the model's.
+    t : float
+    q : ndarray
+    rates : mapping
+        Initial conditions for rates.
+
+    Returns
+    -------
+    v : ndarray (nv,)
+        Where rows contradict one another, those that miss them least; `contradiction` tells.
+    wanted : Wanted
+    c : Compiled
+        The mechanism whose rows these are: with those of the initial rates.
+    """
+    holds = [i for i in model.initial if i.name in rates]
+    c = compiled(model, parameters=parameters, holds=holds, held={}) if holds else plain
+    c.follow(plain.hints)
+    v = described(c.values, q)
+    c.at(t, q, v)
+    nu = c.work.row[NU].copy()
+    for i in holds:
+        nu[c.structure.slices[i.name]] = rates[i.name]
+    w = Wanted.at(c, q, nu)
+    if not w.G.shape[0] or np.abs(w.missed(v)).max() <= CONSISTENT * terms(w, v):
+        return v, w, c
+    v = _approach(w, v)
+    if w.soft and np.abs(w.missed(v)).max() > CONSISTENT * terms(w, v):  # soft rows pull at the others
+        v = _approach(w, v, soft=False)
+    return v, w, c
+
+
+def terms(w: Wanted, v: np.ndarray) -> float:
+    """What terms of the hard rows may be: a body that spins fast about its own axis leaves rounding in them all."""
+    largest = float(abs(w.G).max()) if w.G.nnz else 0.0
+    return max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
+
+
+def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
+    """Step after step, each from the residuals that the last one has left, down to rounding."""
+    step = w.steps(soft)
+    last = moved = np.inf
+    for _ in range(ITERATIONS):
+        missed = w.missed(v)
+        d = step(missed, w.lost(v) if soft else np.zeros(0))
+        worst, way = float(np.abs(missed).max()), float(np.abs(d).max(initial=0.0))
+        if way <= CONSISTENT * float(np.abs(v).max(initial=0.0)) or (worst > 0.9 * last and way > 0.9 * moved):
+            break
+        v, last, moved = v + d, worst, way
+    return v
+
+
+def contradiction(w: Wanted, v: np.ndarray) -> dict[str, float]:
+    """Elements whose rows the velocities miss, and by how much; none where they are consistent."""
+    r = np.abs(w.missed(v))
+    limit = WRONG * terms(w, v)
+    s = w.c.structure
+    gaps = {k: float(r[rows].max(initial=0.0)) for k, rows in s.slices.items()}
+    at = len(w.nu)
+    for g in w.held:
+        n = len(gradient(w.c.values, g, w.q))
+        gaps[g.name] = float(r[at : at + n].max())
+        at += n
+    return {k: gaps[k] for k in sorted(gaps, key=lambda k: -gaps[k]) if gaps[k] > limit}

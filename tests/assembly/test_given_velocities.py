@@ -1,0 +1,175 @@
+"""Given velocities are kept where the constraints allow it, and said where they do not; what is not given is free."""
+
+import json
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.assembly import velocities
+from flyball.model.io import dumps, loads
+from tests.layers import LAYERS, started, take
+
+
+@pytest.fixture(params=LAYERS, autouse=True)
+def layer(request, monkeypatch):
+    take(request.param, monkeypatch)
+
+
+def hinged(at=(1, 0), inertia=0.1, **given):
+    m = fb.Mechanism("hinged", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=inertia, position=at, **given), fb.Revolute("h", "ground", "b", at=(0, 0)))
+    return m
+
+
+def disk(**given):
+    """An upright wheel of 0.5 m on the ground, its axle along y."""
+    m = fb.Mechanism("disk", gravity=(0, 0, -9.81))
+    m.add(fb.Body("w", mass=2, inertia=(0.1, 0.2, 0.1), position=(0, 0, 0.5), **given))
+    m.add(fb.RollingDisk("roll", "ground", "w", at=(0, 0, 0.5), axis=(0, 1, 0), radius=0.5))
+    return m
+
+
+@pytest.mark.parametrize("inertia", [0.0, 1e-12, 0.1, 1e3])
+def test_a_velocity_that_a_hinge_allows_is_kept_whatever_the_inertia(inertia):
+    """(0, 1) at (1, 0) is a turn at 1 rad/s: to the bit, not shared out with a stand-in or the body's own inertia."""
+    m = hinged(inertia=inertia, velocity=(0, 1))
+    r = m.simulate(0.01, outputs=2)
+    assert r["b"].velocity[0].tolist() == pytest.approx([0, 1], abs=1e-15)
+    assert r["h"].rate[0] == pytest.approx(1, rel=1e-15)
+    assert r.health.departures == ()
+    assert r.health.warnings == ()
+
+
+def test_an_angular_velocity_alone_is_kept_and_the_rest_follows():
+    assert hinged(angular_velocity=3).simulate(0.01, outputs=2)["b"].velocity[0] == pytest.approx([0, 3], abs=1e-14)
+    r = disk(angular_velocity=(0, 6, 0)).simulate(0.01, outputs=2)
+    assert r["w"].angular_velocity[0] == pytest.approx([0, 6, 0], abs=1e-14)
+    assert r["w"].velocity[0] == pytest.approx([3, 0, 0], abs=1e-14)
+    r = disk(velocity=(3, 0, 0)).simulate(0.01, outputs=2)
+    assert r["w"].angular_velocity[0] == pytest.approx([0, 6, 0], abs=1e-13)
+
+
+def test_what_cannot_be_kept_is_said(capsys):
+    """By the result's health, by check, and as a warning; never by its name alone: what was given, what became of it."""
+    m = hinged(velocity=(5, 0))
+    with pytest.warns(fb.StartWarning, match=r"velocity of 'b': given \(5, 0\), got \(0, 0\) m/s"):
+        r = m.simulate(0.01, outputs=2)
+    (d,) = r.health.departures
+    assert (d.element, d.what, d.given, d.unit) == ("b", "velocity", (5.0, 0.0), "m/s")
+    assert d.got == pytest.approx((0, 0), abs=1e-14)
+    assert d.text in r.health.warnings[0]
+    assert d.text in dict(r.health.lines())["assembly"]
+    assert json.loads(json.dumps(r.health.as_dict()))["departures"][0]["given"] == [5.0, 0.0]
+    report = m.check()
+    assert [x.text for x in report.departures] == [d.text]
+    assert d.text in report.warnings[0]
+
+
+def test_departures_come_back_from_a_file(tmp_path):
+    with pytest.warns(fb.StartWarning):
+        r = hinged(velocity=(5, 0)).simulate(0.01, outputs=2)
+    r.save(tmp_path / "r.nc")
+    assert fb.load_result(tmp_path / "r.nc").health.departures == r.health.departures
+
+
+def test_of_contradicting_velocities_the_nearest_in_kinetic_energy():
+    """v = x w of a rod told (1, 1) and no turn: m x v / (m x^2 + J)."""
+    m = hinged(at=(0.5, 0), inertia=0.3, velocity=(1, 1), angular_velocity=0)
+    a = started(m)
+    w = 0.5 / (0.25 + 0.3)
+    assert a.compiled.moving(0.0, a.q, a.v)["b"].w[2] == pytest.approx(w, rel=1e-13)
+    assert {d.what for d in a.departures} == {"velocity", "angular_velocity"}
+
+
+def test_bodies_that_are_told_nothing_follow_and_what_nothing_determines_rests():
+    """A double pendulum whose second rod is told how it moves: the first follows. A body that hangs on nothing rests."""
+    m = fb.Mechanism("double", planar=True)
+    m.add(fb.Body("one", mass=1, inertia=0.1, position=(0.5, 0)))
+    m.add(fb.Body("two", mass=1, inertia=0.1, position=(1.5, 0), velocity=(0, 2), angular_velocity=1))
+    m.add(fb.Body("free", mass=1, inertia=0.1, com=(0.3, 0.4), velocity=(1, 2)), fb.Body("idle", mass=1, inertia=1))
+    m.add(fb.Revolute("A", "ground", "one", at=(0, 0)), fb.Revolute("B", "one", "two", at=(1, 0)))
+    r = m.simulate(0.01, outputs=2)
+    assert r["one"].omega[0] == pytest.approx(1.5, rel=1e-14)
+    assert r["two"].velocity[0] == pytest.approx([0, 2], abs=1e-14)
+    assert r["free"].velocity[0] == pytest.approx([1, 2], abs=1e-14)
+    assert r["free"].omega[0] == 0.0
+    assert np.abs(r["idle"].velocity[0]).max() == 0.0
+
+
+def test_a_free_joint_moves_as_a_blow_would_move_it():
+    """The first of two rods is told its turn: the second takes the least kinetic energy (Thomson's theorem)."""
+    m = fb.Mechanism("double", planar=True)
+    m.add(fb.Body("one", mass=1, inertia=0.1, position=(0.5, 0), angular_velocity=1))
+    m.add(fb.Body("two", mass=2, inertia=0.3, position=(1.5, 0)))
+    m.add(fb.Revolute("A", "ground", "one", at=(0, 0)), fb.Revolute("B", "one", "two", at=(1, 0)))
+    a = started(m)
+    state = a.compiled.moving(0.0, a.q, a.v)
+    assert state["one"].w[2] == pytest.approx(1, rel=1e-14)
+    assert state["two"].w[2] == pytest.approx(-2 * 0.5 / (2 * 0.25 + 0.3), rel=1e-13)  # d/dw of 2 (1 + w/2)^2 + 0.3 w^2
+
+
+def test_drivers_and_initial_rates_come_first():
+    m = hinged(velocity=(0, 1))
+    m.add(fb.Driver("motor", "h.angle", "2*t"))
+    with pytest.warns(fb.StartWarning, match=r"given \(0, 1\), got \(0, 2\)"):
+        assert m.simulate(0.01, outputs=2)["h"].rate[0] == pytest.approx(2, rel=1e-14)
+    m = hinged(velocity=(0, 1))
+    m.add(fb.Initial("h.angle", rate=3))
+    with pytest.warns(fb.StartWarning, match=r"given \(0, 1\), got \(0, 3\)"):
+        assert m.simulate(0.01, outputs=2)["h"].rate[0] == pytest.approx(3, rel=1e-14)
+
+
+def test_velocities_are_along_world_axes_of_the_assembled_position():
+    """A body that an initial angle turns is told its angular velocity in the world, not in the axes it was drawn with."""
+    m = fb.Mechanism("turned")
+    m.add(fb.Body("b", mass=1, inertia=(1, 2, 3), angular_velocity=(0, 0, 5)))
+    m.add(fb.Universal("u", "ground", "b", at=(0, 0, 0), axes=((0, 0, 1), (1, 0, 0))))
+    m.add(fb.Initial("u.angle_2", value=0.8))
+    assert m.simulate(0.001, outputs=2)["b"].angular_velocity[0] == pytest.approx([0, 0, 5], abs=1e-12)
+
+
+def test_positions_that_assembly_moved_are_said():
+    m = hinged()
+    m.add(fb.Initial("h.angle", value=0.5))
+    r = m.simulate(0.01, outputs=2)
+    moved = {d.what: d for d in r.health.departures}
+    assert moved["angle"].got == pytest.approx((0.5,))
+    assert moved["position"].got == pytest.approx((np.cos(0.5), np.sin(0.5)))
+    assert "closed after moving 1 body, b farthest" in dict(r.health.lines())["assembly"]
+    assert r.health.warnings == ()
+
+
+def test_not_given_and_zero_are_told_apart_in_files():
+    m = hinged()
+    m.add(fb.Body("still", mass=1, inertia=1, velocity=(0, 0), angular_velocity=0))
+    again = loads(dumps(m), fb.Mechanism)
+    assert (again["b"].velocity, again["b"].angular_velocity) == (None, None)
+    assert (again["still"].velocity, again["still"].angular_velocity) == ((0.0, 0.0), 0.0)
+    assert again == m
+
+
+def test_a_large_mechanism_keeps_and_shares_the_same(monkeypatch):
+    """A chain of 200 rods: told rates of all are kept; told what cannot be, it does as the dense solution does."""
+
+    def chain(n, **given):
+        m = fb.Mechanism("chain", planar=True)
+        for k in range(n):
+            told = {key: law(k) for key, law in given.items()}
+            m.add(fb.Body(f"b{k}", mass=1, inertia=0.1, position=(k + 0.5, 0), **told))
+            m.add(fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)))
+        return m
+
+    n = 200
+    a = chain(n, angular_velocity=lambda k: 0.01 * (k + 1)).assemble()
+    v = a.v.reshape(n, 3)
+    w = 0.01 * np.arange(1, n + 1)
+    assert v[:, 2] == pytest.approx(w, rel=1e-9)
+    assert v[:, 1] == pytest.approx(np.cumsum(w) - 0.5 * w, rel=1e-9)
+    assert a.departures == ()
+    contrary = chain(30, angular_velocity=lambda k: (-1) ** k, velocity=lambda k: (1, 0))
+    dense = contrary.assemble()
+    monkeypatch.setattr(velocities, "DENSE", 0)
+    sparse = contrary.assemble()
+    assert sparse.v == pytest.approx(dense.v, abs=1e-10)
+    assert len(sparse.departures) == len(dense.departures) > 30
