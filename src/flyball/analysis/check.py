@@ -19,6 +19,7 @@ from .assemble import assemble
 from .assembly.start import Assembly
 from .mass import MassProperties, directions, letters, report
 from .mobility import mobility
+from .motion.ahead import missed_at_start
 
 FAR = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
 EQUAL = 1e-9  # moments that differ by less than this part are the same
@@ -178,6 +179,8 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
         yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"
     elif freedoms == 0:
         yield "no freedom is left: it is a structure and will not move"
+    if any(x.beyond == "refuse" for x in model.tables) and (missed := missed_at_start(a)):
+        yield missed.message
     used = _names_used(model)
     for name in model.parameters:
         if name not in used:
