@@ -203,8 +203,8 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
     if not np.isfinite(x).all():
         return ""
-    gap, largest = missed(c, v, x, c.sizes)
-    if not gap.max() > LOCKED * largest:
+    gap, _, asked = missed(c, v, x, c.sizes)
+    if not gap.max() > LOCKED * asked:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
     why = story(c, t, q, v, c.work.row[GAMMA].copy(), "/s^2") or (
