@@ -14,7 +14,7 @@ from ..errors import AnalysisError, ModelError, SimulationError
 from ..model.expressions import number
 from ..model.model import Model
 from ..model.words import listing, suggest
-from ..numerics.integrators import explicit as ex
+from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result

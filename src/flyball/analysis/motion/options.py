@@ -8,19 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...equations import motion
+from ...equations import projection
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
 from .layer import known as known_coordinates
 
 STABILIZATION = {
-    "projection": motion.STAGES,
-    "projection-steps": motion.STEPS,
-    "baumgarte": motion.BAUMGARTE,
-    "none": motion.NONE,
-    "positions": motion.POSITIONS,
-    "velocities": motion.VELOCITIES,
-    "partitioning": motion.PARTITIONING,
+    "projection": projection.STAGES,
+    "projection-steps": projection.STEPS,
+    "baumgarte": projection.BAUMGARTE,
+    "none": projection.NONE,
+    "positions": projection.POSITIONS,
+    "velocities": projection.VELOCITIES,
+    "partitioning": projection.PARTITIONING,
 }
 FINEST = 1e-13  # relative tolerance below which rounding decides
 
