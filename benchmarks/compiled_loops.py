@@ -12,7 +12,7 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 from flyball.compiler.jit import start_numba
-from flyball.compiler.link import optimise_once
+from flyball.compiler.ways import optimise_once
 from flyball.equations.motion import STAGES, TIGHT_G, TIGHT_V, arrive, derivative, prepare, remember, settle
 from flyball.equations.solve import REFINEMENTS, factor, solve
 from flyball.equations.tree import retract

@@ -167,7 +167,7 @@ def compiled_loop(part: str) -> Callable:
         import numba
 
         from flyball.compiler.jit import start_numba
-        from flyball.compiler.link import optimise_once
+        from flyball.compiler.ways import optimise_once
 
         start_numba()
         names = scope()

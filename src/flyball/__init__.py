@@ -61,9 +61,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assemble import Assembly as Assembly
-    from .analysis.check import Report as Report
-    from .analysis.mass import MassReport as MassReport
-    from .analysis.mobility import Mobility as Mobility
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -90,10 +87,13 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.sensor import Sensor as Sensor
     from .model.shapes import *
     from .model.table import Table as Table
+    from .results.check import Report as Report
     from .results.comparison import Comparison as Comparison
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
+    from .results.mass import MassReport as MassReport
+    from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
     from .results.result import Result as Result
@@ -131,9 +131,9 @@ _HOME = {
     "SingularityError": "errors",
     "NotConverged": "errors",
     "Assembly": "analysis.assemble",
-    "MassReport": "analysis.mass",
-    "Mobility": "analysis.mobility",
-    "Report": "analysis.check",
+    "MassReport": "results.mass",
+    "Mobility": "results.mobility",
+    "Report": "results.check",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.series",

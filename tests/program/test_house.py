@@ -42,14 +42,16 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "symbolic": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables", "equations", "results"},
     "view": {*LIBRARY, *ELEMENTS, "tables", "equations", "results"},
     "errors": set(),
-    "mechanism": {"model"},
+    "methods": set(),
+    "mechanism": {"methods", "model"},
     "files": {"mechanism"},
-    "cli": set(),
+    "cli": {"methods"},
     "__init__": set(),
     "__main__": {"cli"},
 }
 LATER = {  # imports inside functions, beyond those: the methods that lead from a thing to what is done with it
-    "mechanism": {"analysis", "view"},
+    "methods": {"analysis"},
+    "mechanism": {"view"},
     "files": {"model", "results"},
     "results": {"view"},
     "cli": {"analysis", "compiler", "equations", "files", "mechanism", "model", "results", "view"},
@@ -92,10 +94,21 @@ def test_imports_point_one_way(path):
         assert target in allowed, f"{path.name}, line {line}: {own} must not import {target}"
 
 
+def test_the_plan_of_the_house_is_in_the_documentation():
+    """Every room stands in the table of docs/architecture.md, below all that it imports at once."""
+    text = (PACKAGE.parents[1] / "docs" / "architecture.md").read_text(encoding="utf-8")
+    rows = [line.split("|")[1] for line in text.splitlines() if line.startswith("| `")]
+    order = [name.removesuffix("/").removesuffix(".py") for row in rows for name in re.findall(r"`([\w./]+)`", row)]
+    rooms = {room(p) for p in FILES} - LEAF - {"__init__", "__main__"}
+    assert rooms <= set(order)
+    for own in rooms - {"compiler"}:
+        above = {*order[: order.index(own)], "compiler", *LEAF}
+        assert ALLOWED[own] & rooms <= above, f"{own} stands above what it imports"
+
+
 MODULES = {".".join(p.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): p for p in FILES}
 OWED = (  # circles of today; this list only ever gets shorter
     {"results.modes", "view.modes"},
-    {"analysis.mobility", *(f"analysis.freedom.{x}" for x in ("cures", "freedoms", "geometry", "redundancy"))},
 )
 
 
@@ -139,7 +152,6 @@ def test_imports_make_no_circle():
 
 OWED_NAMES = {
     *(("analysis.series", f"_{x}") for x in ("descent", "failure", "finished", "newton", "pushed", "stability")),
-    ("analysis.freedom.determinacy", "_null_space"),
 }
 
 
@@ -231,8 +243,10 @@ def test_files_stay_small():
 
 
 def own_lines(function: ast.FunctionDef) -> int:
-    """Lines of a function, those of functions inside it not counted."""
-    inner = [n for n in ast.walk(function) if isinstance(n, ast.FunctionDef) and n is not function]
+    """Lines of a function, its docstring and functions inside it not counted."""
+    inner: list[ast.stmt] = [n for n in ast.walk(function) if isinstance(n, ast.FunctionDef) and n is not function]
+    if ast.get_docstring(function):
+        inner.append(function.body[0])
     taken = {line for n in inner for line in range(n.lineno, n.end_lineno + 1)}
     return len(set(range(function.lineno, function.end_lineno + 1)) - taken)
 
@@ -244,8 +258,7 @@ def test_functions_stay_small():
         for n in ast.walk(TREES[p])
         if isinstance(n, ast.FunctionDef) and own_lines(n) > 60
     }
-    assert {k: v for k, v in long.items() if not k.endswith("simulate")} == {}  # its docstring lists every option
-    assert all(v <= 70 for v in long.values())
+    assert long == {}
 
 
 def test_public_names():

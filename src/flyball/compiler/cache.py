@@ -3,16 +3,28 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 
+from ..errors import PerformanceNotice
 from .stamp import source_stamp
 
 
 def cache_of(function: Any) -> Any:
-    """The cache of one kernel."""
-    return _cache_class()(function)
+    """The cache of one kernel; where Numba's internals are others, none: an outdated one would be served in silence."""
+    try:
+        return _cache_class()(function)
+    except (AttributeError, TypeError) as error:
+        from numba.core.caching import NullCache
+
+        warnings.warn(
+            f"compiled code cannot be kept with this version of Numba ({error}): every process compiles",
+            PerformanceNotice,
+            stacklevel=3,
+        )
+        return NullCache()
 
 
 @lru_cache(maxsize=1)

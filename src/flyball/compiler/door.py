@@ -43,7 +43,7 @@ class Door:
 
         from .cache import cache_of
         from .held import held_type
-        from .link import optimise_once
+        from .ways import optimise_once
 
         self._types = tuple(held_type(typeof(x)) for x in tuples)
         made = CFunc(self.function, ((*self._types, types.int64), types.int64), {}, dict(OPTIONS))

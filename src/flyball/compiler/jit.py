@@ -76,7 +76,7 @@ class Kernel:
 
     def _compiling(self, compile_for: Callable[..., Any]) -> Callable[..., Any]:
         """Numba's compilation for new types of arguments, done our way, one at a time."""
-        from .link import optimise_once
+        from .ways import optimise_once
 
         def compile_once(*args: Any, **options: Any) -> Any:
             with LOCK, optimise_once(self.function.__qualname__):

@@ -3,8 +3,8 @@
 Numba links, optimises and emits every callee as a library of its own, then again inside each of its callers, level by
 level. A kernel of ours takes in some hundred small formulas and is optimised as a whole anyway, so while one compiles
 its callees are only translated; the kernel then links them all and is optimised and emitted. The code is the same in
-kind and cold compilation several times faster. This leans on internals of Numba (tried with 0.60 to 0.68); where they
-are not as expected, compilation takes the usual, slower way.
+kind and cold compilation several times faster. This leans on internals of Numba; where they are not as expected
+(`ways.ours`), compilation takes the usual, slower way.
 """
 
 from __future__ import annotations
@@ -16,15 +16,17 @@ from typing import Any
 
 
 @contextmanager
-def optimise_once(top: str) -> Iterator[None]:
-    """While the kernel with the (unique) name ``top`` compiles, leave all optimisation and emission to it."""
+def linked_as_a_whole(top: str) -> Iterator[None]:
+    """While the kernel with the (unique) name ``top`` compiles, leave all optimisation and emission to it.
+
+    Raises
+    ------
+    AttributeError
+        If Numba's internals are others.
+    """
     from numba.core import codegen
 
-    library, target = getattr(codegen, "CPUCodeLibrary", None), getattr(codegen, "JITCPUCodegen", None)
-    wanted = ("finalize", "_optimize_functions", "_finalize_dynamic_globals", "_finalize_final_module")
-    if library is None or not all(hasattr(library, k) for k in wanted) or not hasattr(target, "set_env"):
-        yield
-        return
+    library, target = codegen.CPUCodeLibrary, codegen.JITCPUCodegen
     finalize, functions, set_env = library.finalize, library._optimize_functions, target.set_env
 
     def finalize_top(self: Any) -> None:
@@ -67,7 +69,8 @@ def _link_all(self: Any) -> None:
             seen[id(lib)] = lib
             todo += lib._linking_libraries
     for lib in seen.values():
-        self._reload_init.update(lib._reload_init)
+        if hasattr(lib, "_reload_init"):  # since 0.63
+            self._reload_init.update(lib._reload_init)
         self._final_module.link_in(_shared(lib), preserve=True)
     for function in self._final_module.functions:
         # nobody outside calls them: the optimiser may inline them, and drop arguments that they do not use

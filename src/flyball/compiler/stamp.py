@@ -33,7 +33,7 @@ def compiled_files() -> set[Path]:
 
 def stamped(file: Path) -> list[Path]:
     """The source files that a kernel which stands in ``file`` is made of."""
-    known, seen, todo = compiled_files(), set[Path](), [file]
+    known, seen, todo = compiled_files(), set[Path](), [file, *Path(__file__).parent.glob("*.py")]
     while todo:
         path = todo.pop()
         if path not in seen:

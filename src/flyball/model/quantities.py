@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from ..errors import ModelError
 from .body import Body, Driver, Frame
 from .coupling import Coupling
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce
@@ -85,6 +86,30 @@ def components(table: Mapping[str, Quantity], name: str) -> list[str]:
     """Names of the components of a vector, in order."""
     own = [(x.component, k) for k, x in table.items() if x.of == name and x.component is not None]
     return [k for _, k in sorted(own)]
+
+
+def one(model: Model, name: str) -> Quantity:
+    """The quantity of a name such as ``"slider.x"``, or of a sensor's name: one number at a time.
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name, or it has several components; the message names what comes near.
+    """
+    owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
+    if not owner:
+        raise ModelError(f"a quantity is named by a text, such as 'slider.x' or the name of a sensor, not {name!r}")
+    table = quantities(model, owner)
+    x = table.get(what if dot else "value")
+    if x is None and not dot:
+        listed = ", ".join(f"{owner}.{k}" for k, q in table.items() if not q.width)
+        raise ModelError(f"{name!r} is a whole part ({model[owner].title}); name one of {listed or 'another part'}")
+    if x is None:
+        raise ModelError(unknown(model[owner].title if owner != ENERGY else ENERGY, what, table))
+    if x.width:
+        own = ", ".join(f"{owner}.{k}" for k in components(table, what))
+        raise ModelError(f"{name!r} has {x.width} components" + (f"; name one: {own}" if own else ""))
+    return x
 
 
 def _effort(unit: str) -> str:

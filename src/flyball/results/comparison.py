@@ -9,6 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..errors import ModelError
+from ..model.words import listing, suggest
+
 if TYPE_CHECKING:
     from .result import Result
 
@@ -114,7 +117,7 @@ class Comparison:
         for f in self.formulations:
             if f.name == name:
                 return f
-        raise KeyError(f"{name!r} was not compared; there are {', '.join(self.names)}")
+        raise ModelError(f"{name!r} was not compared{suggest(str(name), self.names)}; {listing(list(self.names))}")
 
     def __iter__(self) -> Iterator[Formulation]:
         return iter(self.formulations)

@@ -41,6 +41,9 @@ class Equilibrium:
         The largest force left, as part of what acts.
     method : str
         What found it.
+    kinks : tuple of str
+        Forces with another slope on the other side of this very place, in words; stability is then judged from all
+        sides, and ``stiffness`` and ``least`` are of the side with the least.
     result : Result
         Everything by name, as a result with one time.
     """
@@ -58,11 +61,14 @@ class Equilibrium:
     assembly: Any = field(repr=False)
     preload: dict[str, float] = field(default_factory=dict)
     speeds: dict[str, float] = field(default_factory=dict)
+    kinks: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         """A curve's value there, or a part of the result."""
         found = self.result[name]
-        return float(found[0]) if isinstance(found, np.ndarray) else found
+        if not isinstance(found, np.ndarray):
+            return found
+        return float(found[0]) if found.ndim == 1 else found[0]
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
@@ -72,6 +78,7 @@ class Equilibrium:
         if self.weakest:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
             out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
+        out += [("kink", text) for text in self.kinks]
         out += [("speed", f"{k}: {v:.9g}") for k, v in self.speeds.items()]
         out += [("preload", f"{k}: {v + 0.0:.6g}") for k, v in self.preload.items()]
         return [*out, ("unbalanced", f"{self.unbalanced:.1g} of what acts")]
@@ -88,7 +95,7 @@ class Equilibrium:
         """Everything as plain numbers and names, all curves included."""
         kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
-        out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist()}
+        out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
         curves = self.result.channels().items()
         return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.quantities import ENERGY, components, quantities
+from ..model.quantities import ENERGY, one, quantities
 from ..tables.values import Values
 from .energy import Energy
 from .health import Health
@@ -168,13 +168,8 @@ class Result:
         ModelError
             If there is none of that name, or it has several components.
         """
-        owner, dot, what = name.partition(".")
-        unit, values = self._view(owner).quantity(what if dot else "value")
-        if values.ndim > 1:
-            own = components(quantities(self.model, owner), what)
-            parts = "; name one: " + ", ".join(f"{owner}.{k}" for k in own) if own else ""
-            raise ModelError(f"{name!r} has {values[0].size} components{parts}")
-        return unit, values
+        one(self.model, name)
+        return self.channel(name if "." in name else f"{name}.value")
 
     def channels(self) -> dict[str, tuple[str, np.ndarray]]:
         """Every named curve: ``"part.curve"`` -> (unit, values)."""

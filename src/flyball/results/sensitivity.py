@@ -46,14 +46,16 @@ class Sensitivity:
     derivatives: np.ndarray
     verification: np.ndarray | None = None
 
-    def __getitem__(self, key: tuple[str, str]) -> Any:
-        """Derivative of a quantity by a parameter.
+    def __getitem__(self, key: tuple[str, str] | str) -> Any:
+        """Derivative of a quantity by a parameter; of a quantity alone those by all parameters, as a dict.
 
         Raises
         ------
         ModelError
             If there is none of that name.
         """
+        if isinstance(key, str):
+            return {to: self[key, to] for to in self.to}
         of, to = key
         for what, name, names in (("quantity", of, self.of), ("parameter", to, self.to)):
             if name not in names:

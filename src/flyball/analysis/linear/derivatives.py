@@ -18,7 +18,7 @@ import numpy as np
 from ...equations.engine import MOTION
 from ...equations.residual import residual_kernel
 from ...equations.scratch import work
-from ...errors import ModelError, PerformanceNotice
+from ...errors import AnalysisError, ModelError, PerformanceNotice
 from ...laws.evaluation import evaluate_jet
 from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
@@ -38,6 +38,7 @@ from ...tables.system import (
 )
 from ...tables.values import Values, values
 from ..compiled import Compiled
+from ..motion.reasons import broken_force
 from .loads import STEP, as_complex, by_reactions, complex_tables
 
 NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
@@ -170,10 +171,28 @@ class Equations:
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
         out = np.zeros((len(steps), self.width), complex)
-        residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
+        try:
+            residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
+        except ZeroDivisionError:  # complex numbers know no infinity
+            out[:] = np.nan
         if not np.isfinite(out.view(float)).all():
-            raise ModelError(f"the equations of {x.c.structure.model.name!r} are not finite at t = {x.t:.6g} s")
+            raise self._not_finite(W.stack)
         return out
+
+    def _not_finite(self, stack: np.ndarray) -> AnalysisError:
+        """The error that names what is no number; ``stack`` is the laws' scratch."""
+        x = self.state
+        x.c.at(x.t, x.q, x.v, MOTION)
+        missed = x.c.structure.missed(stack)
+        why = (
+            missed.message
+            if missed
+            else broken_force(x.c, x.t) or "look for a law that divides by zero or leaves its range"
+        )
+        return AnalysisError(
+            f"the equations of {x.c.structure.model.name!r}, or their derivatives, are not finite at t = {x.t:.6g} s: "
+            f"{why}"
+        )
 
     def _jacobian(self, what: int):
         """Derivatives by positions (0), velocities (1) or accelerations (2)."""

@@ -5,8 +5,9 @@ Everything is in units of energy: translations count as parts of the mechanism's
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,7 @@ class Rest:
     t: float
     q: np.ndarray
     lam: np.ndarray
+    verdict: Any = field(default=None, repr=False)  # on its stability, once asked for
 
     @classmethod
     def at(cls, c: Compiled, t: float, q: np.ndarray) -> Rest:

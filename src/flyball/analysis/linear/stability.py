@@ -1,9 +1,4 @@
-"""Whether an equilibrium is stable: by the constrained stiffness, and where forces have no potential by the motion.
-
-Every coordinate is judged in units of the stiffness that acts on it, so that nothing stiff elsewhere hides a soft
-direction; such a change of units changes no sign (Sylvester's law of inertia). Stiffness that rounding may have made is
-none.
-"""
+"""Whether an equilibrium is stable: by the constrained stiffness, and where forces have no potential by the motion."""
 
 from __future__ import annotations
 
@@ -12,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.equilibrium import MARGINAL, STABLE, UNSTABLE
-from .balance import acting, connected, stiffness_rounding
+from .balance import connected
 from .derivatives import Equations
 from .free import Free, free
+from .kinks import kinks, refuse_kinks
 from .rest import Rest
+from .sides import from_all_sides
+from .stiffness import NEUTRAL, stiffness
 
-NEUTRAL = 1e-8  # stiffness below this part of what acts is none
 GROWTH = 1e-4  # real parts below this part of their eigenvalue are none
 ZERO = 1e-7  # eigenvalues below this part of the fastest of what is connected are none
 
@@ -32,11 +29,13 @@ class Stability:
         ``"stable"``, ``"marginal"`` or ``"unstable"``.
     free : Free
     stiffness : ndarray (f, f)
-        Of the freedoms.
+        Of the freedoms; at a kink on the side where least of it is.
     direction : ndarray (nv,)
         Of least stiffness, in scaled velocities.
     least : float
         That stiffness, as part of what springs, weights and reactions do along it by themselves.
+    kinks : tuple of str
+        Forces with another slope on the other side of this place, in words.
     """
 
     kind: str
@@ -44,33 +43,41 @@ class Stability:
     stiffness: np.ndarray
     direction: np.ndarray
     least: float
+    kinks: tuple[str, ...] = ()
 
 
 def stability(x: Rest) -> Stability:
-    """Stability of an equilibrium."""
+    """Stability of an equilibrium; where forces have kinks there, from all sides of them.
+
+    Raises
+    ------
+    SingularityError
+        If a force jumps there, or the sides of its kinks leave stability open.
+    """
+    if x.verdict is None:
+        x.verdict = _judged(x)
+    return x.verdict
+
+
+def _judged(x: Rest) -> Stability:
     e = x.equations
     f = free(e)
     if not f.Zv.shape[1]:
         return Stability(STABLE, f, np.zeros((0, 0)), np.zeros(len(x.scale)), np.inf)
-    K = f.Zv.T @ e.by_position[e.at["r"]] @ f.Zv
-    Z = f.Zv / x.scale[:, None]
-    noise = [np.abs(f.Zv.T @ d @ f.Zv) for d in stiffness_rounding(e)]
-    blur = np.max(noise, axis=0)
-    unit = np.abs(K).sum(axis=1) + blur.sum(axis=1)
-    unit = 1.0 / np.sqrt(np.where(unit > 0.0, unit, 1.0))
-    own, blur = (unit[:, None] * X * unit for X in (K, blur))
-    w, V = np.linalg.eigh(0.5 * (own + own.T))
-    along = Z @ (unit[:, None] * V)
-    sizes = np.linalg.norm(along, axis=0)
-    size = np.abs(along)
-    acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + (x.scale * acting(e)) @ size**2
-    real = np.abs(w) > np.einsum("ik,ij,jk->k", np.abs(V), blur, np.abs(V))
-    parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
-    k = int(np.argmin(parts))
-    kind = UNSTABLE if parts[k] < -NEUTRAL else MARGINAL if parts[k] <= NEUTRAL else STABLE
-    if (np.abs(own - own.T) > NEUTRAL + 2.0 * blur).any():  # no potential: flutter shows in the motion
+    still = 0.0 * f.Zv
+    found = [k for k in kinks(e) if k.felt(f.Zv * f.scale[f.chosen_v], still)]
+    if found:
+        kind, s = from_all_sides(x, f, found)
+        k = int(np.argmin(s.parts))
+        texts = tuple(dict.fromkeys(k.text for k in found))
+        return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]), texts)
+    s = stiffness(x, f)
+    k = int(np.argmin(s.parts))
+    kind = UNSTABLE if s.parts[k] < -NEUTRAL else MARGINAL if s.parts[k] <= NEUTRAL else STABLE
+    if not s.potential:  # flutter shows in the motion
+        refuse_kinks(e, still, f.Zv)
         kind = _by_motion(e, f)
-    return Stability(kind, f, K, along[:, k] / sizes[k], float(parts[k]))
+    return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
 
 
 def _by_motion(e: Equations, f: Free) -> str:

@@ -15,6 +15,7 @@ import numpy as np
 from ...equations.tree import retract
 from ...errors import ModelError, NotConverged
 from ...model.joint import Joint
+from ...model.words import listing, suggest
 from ...tables.forest import step_of
 from ...tables.names import velocity_names
 from ...tables.specs import Structure
@@ -90,9 +91,11 @@ def _place(b: Assembly, name: str) -> int:
     """The velocity of a joint's coordinate."""
     s = b.compiled.structure
     owner, _, what = name.partition(".")
-    element = s.model[owner]
+    element = s.model.find(owner)
     if not isinstance(element, Joint) or what not in element.coordinates:
-        raise ModelError(f"turning={name!r}: name a joint's coordinate, for instance 'A.angle'")
+        known = [f"{j.name}.{c}" for j in s.model.joints for c in j.measured(s.model.planar)]
+        hint = f"{suggest(str(name), known)}; {listing(known)}"
+        raise ModelError(f"turning={name!r}: name a joint's coordinate, for instance 'A.angle'{hint}")
     row = step_of(s, owner, what)
     if row is None:
         raise ModelError(

@@ -37,6 +37,7 @@ from ...tables.system import (
     VALUE,
 )
 from ..assembly.start import Assembly
+from ..compiled import Compiled
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
@@ -64,7 +65,8 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
     if clock.count[ex.STATUS] == ex.TOO_MANY:
         return f"{name!r}: {_too_many(a, clock)}{_rounded(clock)}. {kept}", None
-    found = fault(a.compiled.work.stack, a.compiled.structure.functions)
+    stack = a.compiled.work.stack
+    found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
     text = (
@@ -186,7 +188,7 @@ def _not_finite(a: Assembly, clock: ex.Clock) -> str:
     if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
         return ""
     t = float(clock.real[ex.T])
-    force = _broken_force(a, t)
+    force = broken_force(a.compiled, t)
     if force:
         return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)
@@ -196,9 +198,9 @@ def _not_finite(a: Assembly, clock: ex.Clock) -> str:
     )
 
 
-def _broken_force(a: Assembly, t: float) -> str:
-    """The force that is no number at the kinematics that the compiled loop has left, and why."""
-    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+def broken_force(c: Compiled, t: float) -> str:
+    """The force that is no number at the kinematics that the compiled loop has left, and why; else nothing."""
+    s, S, W = c.structure, c.values.system, c.work
     stack = np.zeros_like(W.stack)
     forces: list[Any] = list(s.forces)
     with np.errstate(all="ignore"):
@@ -210,7 +212,7 @@ def _broken_force(a: Assembly, t: float) -> str:
             if not math.isfinite(x) or not math.isfinite(y):
                 return f"what {e.title} measures is no number. {e.fails}"
             laws = [
-                evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed) if at >= 0 else 0.0
+                float(evaluate(S.code, S.const, at, stack, (t, x, y), W.sensed)) if at >= 0 else 0.0
                 for at in S.force_i[k, FORCE_LAW : FORCE_LAW + 3].tolist()
             ]
             if not np.isfinite(laws).all():

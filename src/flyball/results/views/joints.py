@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...constraints.registry import KINDS
+from ...errors import ModelError
 from ...math.scalar import atan2, rounded
 from ...math.vec import dot, mtv, sub
 from ...model.body import GROUND
+from ...model.words import listing, suggest
 from ...tables.forest import step_of
 from ...tables.system import Q0
 from ..records import TURN, coordinate_frames, turned
@@ -98,7 +100,7 @@ class JointView(View):
         names = [s.model.carrier(name, e) for name in (e.body_i, e.body_j)]
         on = names[1] if on is None else on
         if on not in names:
-            raise ValueError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}")
+            raise ModelError(f"{e.title} joins {names[0]!r} and {names[1]!r}, not {on!r}{suggest(str(on), names)}")
         if axes != "world":
             R = self._axes(axes, names)
             force, torque = mtv(R, force), mtv(R, torque)
@@ -117,7 +119,9 @@ class JointView(View):
         if axes == "joint":
             return records.frame(x.structure.frame_at[self.element.name, "F", ""])[1]
         if axes not in names:
-            raise ValueError(f"axes must be 'world', 'joint', {names[0]!r} or {names[1]!r}, not {axes!r}")
+            known = ["world", "joint", *names]
+            hint = suggest(str(axes), known)
+            raise ModelError(f"{self.element.title} knows no axes {axes!r}{hint}; {listing(known)}")
         return records.named(axes)[1] if axes != GROUND else tuple(np.eye(3).ravel())
 
     @property

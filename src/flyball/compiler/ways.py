@@ -1,0 +1,62 @@
+"""Which way kernels compile: linked as a whole where Numba's internals are as `link` expects, else the usual way."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from typing import Any
+
+from ..errors import PerformanceNotice
+from .link import linked_as_a_whole
+
+TRIED = ("0.62", "0.63", "0.64", "0.65", "0.66", "0.67", "0.68")
+"""Versions of Numba that the tests have passed with, or that lie between two such."""
+
+
+@contextmanager
+def optimise_once(top: str) -> Iterator[None]:
+    """While the kernel with the (unique) name ``top`` compiles, do it our way, where that is possible."""
+    if not ours():
+        yield
+        return
+    with linked_as_a_whole(top):
+        yield
+
+
+@lru_cache(maxsize=1)
+def ours() -> bool:
+    """Whether kernels may be linked our way; other versions of Numba are probed once in every process."""
+    import numba
+
+    if ".".join(numba.__version__.split(".")[:2]) in TRIED:
+        return True
+    try:
+        good = _probe() == 7.0
+    except Exception:
+        good = False
+    if not good:
+        warnings.warn(
+            f"Numba {numba.__version__} differs inside from those that flyball was tried with ({TRIED[0]} to "
+            f"{TRIED[-1]}): compiling takes the usual way, several times longer",
+            PerformanceNotice,
+            stacklevel=2,
+        )
+    return good
+
+
+def _probe() -> float:
+    """2 * 3 + 1, by a kernel of its own that calls a function of its own, linked our way."""
+    from numba import njit
+    from numba.extending import register_jitable
+
+    @register_jitable
+    def more(x: Any) -> Any:
+        return x + 1.0
+
+    def probe_kernel(a: Any, b: Any) -> Any:
+        return more(a * b)
+
+    with linked_as_a_whole(probe_kernel.__qualname__):
+        return njit(probe_kernel)(2.0, 3.0)

@@ -1,0 +1,169 @@
+"""Forces with another slope, or value, on the other side: judged from all sides at rest, refused by what is linear."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.analyses.made import G
+
+LAYERS = ("absolute", "joint")
+
+
+def slider(force: str, *tables: fb.Table, **parameters: float) -> fb.Mechanism:
+    """A block of 1 kg on a level slide, pushed along it by a law of its place."""
+    m = fb.Mechanism("slider", planar=True, parameters=parameters)
+    m.add(fb.Body("block", mass=1, inertia=1), fb.Translational("slide", "ground", "block", at=(0, 0), axis=(1, 0)))
+    m.add(*tables, fb.Actuator("push", "slide.displacement", force=force))
+    return m
+
+
+CORNER = fb.Table("corner", x=(-1, 0, 1), y=(1, 0, -3), interpolation="linear")
+ROUND = fb.Table("round", x=(-1, 0, 1), y=(1, 0, -3))
+
+KINKS = {
+    "-50*abs(value)": "unstable",  # pushed back on the right, away on the left
+    "50*abs(value)": "unstable",
+    "-50*abs(value) - 100*value": "stable",
+    "where(value < 0, -100*value, -50*value)": "stable",
+    "where(value < 0, 100*value, -50*value)": "unstable",
+    "-min(100*value, 20*value)": "stable",
+    "max(0, -100*value)": "marginal",
+    "-100*sqrt(value**2)": "unstable",
+    "corner(value)": "stable",
+    "abs(value) - 2*max(0, value)": "stable",  # -value on both sides, but not to one who asks at zero
+}
+
+
+@pytest.mark.parametrize("law", KINKS)
+def test_an_equilibrium_at_a_kink_is_judged_from_both_sides(law):
+    found = slider(law, CORNER).equilibrium()
+    assert found.stability == KINKS[law]
+    assert found["block.x"] == 0.0
+    (kink,) = found.kinks
+    assert kink == f"Actuator 'push': its law '{law}' has a kink at push.value = 0 m"
+    assert ("kink", kink) in found.lines()
+    assert found.as_dict()["kinks"] == [kink]
+
+
+@pytest.mark.parametrize("law", [*KINKS, "-50*sign(value)", "-5*abs(rate) - 9*value", "-5*sign(rate) - 9*value"])
+@pytest.mark.parametrize("layer", LAYERS)
+def test_linear_equations_at_a_kink_are_refused(law, layer):
+    m = slider(law, CORNER)
+    for ask in (m.modes, m.linearize):
+        with pytest.raises(fb.SingularityError, match=r"Actuator 'push': its law .* (kink|jumps) at push\.") as said:
+            ask(coordinates=layer)
+        assert said.value.elements == ("push",)
+
+
+@pytest.mark.parametrize(
+    ("law", "stiffness"),
+    [
+        ("-50*value*abs(value)", 0.0),
+        ("-9*value - 3*rate*abs(rate)", 9.0),  # as drag does
+        ("-step(value, 0, 0, 1, 1) - value", 1.0),
+        ("-9*value + 0*abs(value - 1e-3)", 9.0),
+        ("-9*abs(value - 1) + 9", -9.0),
+        ("-100*tanh(1e4*value)", 1e6),
+        ("round(value)", 2.0),
+    ],
+)
+@pytest.mark.parametrize("layer", LAYERS)
+def test_what_is_smooth_there_is_not_refused(law, stiffness, layer):
+    m = slider(law, ROUND)
+    assert m.equilibrium().kinks == ()
+    assert m.linearize(coordinates=layer).stiffness == pytest.approx(np.array([[stiffness]]), abs=1e-9)
+
+
+def test_a_force_that_jumps_is_named():
+    with pytest.raises(fb.SingularityError, match=r"'-50\*sign\(value\)' jumps at push.value = 0 m"):
+        slider("-50*sign(value)").equilibrium()
+    with pytest.raises(
+        fb.NotConverged, match=r"the search ended where Actuator 'push': its law .* jumps at push.value"
+    ):
+        slider("where(value < 0, 10, -10)").equilibrium()
+    found = slider("-5*sign(rate) - 9*value").equilibrium()  # rates play no part at rest
+    assert (found.stability, found.kinks) == ("stable", ())
+
+
+def test_a_force_without_a_value_is_named():
+    m = slider("-10*value/abs(value)")
+    for ask in (m.modes, m.equilibrium):
+        with pytest.raises(fb.AnalysisError, match="law of Actuator 'push' gives"):
+            ask()
+
+
+def between_ropes(spring: float = 0.0) -> fb.Mechanism:
+    """A block between two ropes at their free lengths, across which it may move too."""
+    m = fb.Mechanism("between ropes", planar=True)
+    m.add(fb.Body("block", mass=1, inertia=1))
+    m.add(fb.Rope("left", ["ground", "block"], at=[(-1, 0), (-0.1, 0)], stiffness=100))
+    m.add(fb.Rope("right", ["ground", "block"], at=[(1, 0), (0.1, 0)], stiffness=100))
+    if spring:
+        m.add(fb.Bushing("pad", "ground", "block", at=(0, 0), stiffness=(spring, spring), torsional_stiffness=spring))
+    return m
+
+
+def test_ropes_at_their_free_lengths():
+    found = between_ropes(7.0).equilibrium()
+    assert found.stability == "stable"
+    assert len(found.kinks) == 2
+    assert found.kinks[0] == "Rope 'left' has a kink at left.length = 0.9 m"
+    with pytest.raises(fb.SingularityError, match=r"Rope 'left' has a kink at left\.length = 0\.9 m; Rope 'right'"):
+        between_ropes(7.0).modes()
+
+
+@pytest.mark.parametrize(("c", "stability"), [(0.37, "stable"), (0.38, "unstable")])
+def test_of_two_freedoms_one_kinked(c, stability):
+    """V = (3 x^2 + y^2)/2 - c max(0, x - y)^2 has a minimum on its soft side up to c = 3/8."""
+    m = fb.Mechanism("two blocks", planar=True, parameters={"c": c})
+    for name, stiffness, y in (("a", 3.0, 0.0), ("b", 1.0, 1.0)):
+        m.add(fb.Body(name, mass=1, inertia=1, position=(0, y)))
+        m.add(fb.Translational(f"slide {name}", "ground", name, at=(0, y), axis=(1, 0)))
+        m.add(fb.CoordinateSpring(f"spring {name}", f"slide {name}.displacement", stiffness=stiffness))
+    m.add(fb.Sensor("x", of="slide a.displacement"), fb.Sensor("y", of="slide b.displacement"))
+    m.add(fb.Actuator("pull", "slide a.displacement", force="2*c*max(0, x - y)"))
+    m.add(fb.Actuator("push", "slide b.displacement", force="-2*c*max(0, x - y)"))
+    found = m.equilibrium()
+    assert found.stability == stability
+    assert len(found.kinks) == 2
+
+
+def test_a_kink_that_nothing_free_crosses_is_no_matter():
+    m = slider("-50*abs(value)")
+    m.add(fb.Driver("hold", "slide.displacement", "0*t"))
+    assert m.equilibrium().kinks == ()
+    assert len(m.modes().eigenvalues) == 0
+
+
+def test_drivers_that_follow_sensors_across_a_kink():
+    m = slider("-9*value")
+    m.add(fb.Sensor("x", of="slide.displacement"))
+    m.add(fb.Body("arm", mass=1, inertia=1, position=(0, 2)), fb.Revolute("A", "ground", "arm", at=(0, 2)))
+    m.add(fb.Driver("follow", "A.angle", "abs(x)"))
+    with pytest.raises(fb.SingularityError, match=r"Driver 'follow': its law 'abs\(x\)' has a kink at x.value = 0 m"):
+        m.modes()
+
+
+def test_sensitivities_at_a_kink_are_refused():
+    with pytest.raises(fb.SingularityError, match=r"has a kink at p = 0"):
+        slider("max(0, p) - 9*value", p=0.0).sensitivity(["block.ax"], ["p"])
+    with pytest.raises(fb.SingularityError, match=r"has a kink at p = 0"):
+        slider("max(0, p) - 9*value", p=0.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
+    with pytest.raises(fb.SingularityError, match=r"has a kink at push.value = 0 m"):
+        slider("p - 9*value - abs(value)", p=0.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
+    found = slider("p - 9*value - abs(value)", p=1.0).sensitivity(["block.x"], ["p"], analysis="equilibrium")
+    assert found["block.x", "p"] == pytest.approx(1 / 10)
+
+
+def test_an_unstable_side_is_left_downhill():
+    """A column whose rope holds it on one side only: it falls to the other."""
+    m = fb.Mechanism("column", planar=True, gravity=(0, -G))
+    m.add(fb.Body("rod", mass=1, inertia=1 / 12, position=(0, 0.5)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Rope("stay", ["ground", "rod"], at=[(-1, 0), (0, 1)], stiffness=1000))
+    found = m.equilibrium()
+    assert found.stability == "unstable"
+    assert found.kinks == (f"Rope 'stay' has a kink at stay.length = {np.sqrt(2):.6g} m",)
+    down = m.equilibrium(stable=True)
+    assert down.stability == "stable"
