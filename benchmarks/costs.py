@@ -42,8 +42,9 @@ def cases() -> Iterator[tuple[str, Any]]:
 
 def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], Any]:
     """(microseconds a stage, counts, start) of one mechanism."""
-    from flyball.analysis.motion.options import Options
+    from flyball.analysis.motion.options import projected
     from flyball.analysis.motion.start import begin
+    from flyball.analysis.progress import unwatched
     from flyball.analysis.simulate import clock_for, run_clock
     from flyball.equations.engine import INTEGRATE
     from flyball.numerics.integrators import explicit as ex
@@ -52,13 +53,13 @@ def stage_time(model: Any, coordinates: str) -> tuple[float, dict[str, float], A
 
     model = model.snapshot()
     start = begin(model, 0.0, None, None, coordinates)
-    options = Options(rtol=1e-7, atol=1e-9, max_steps=STEPS)
+    options = projected(coordinates, 1e-7, 1e-9, STEPS)
     found = []
     spent = 0.0
     while spent < CPU or len(found) < 3:
         clock = clock_for(start, 0.0, 10.0, np.array([10.0]), options)
         begun = time.process_time()
-        run_clock(start.assembly, clock, tableau("dop853"), None, INTEGRATE)
+        run_clock(start.assembly, clock, tableau("dop853"), unwatched, INTEGRATE)
         seconds = time.process_time() - begun
         spent += seconds
         found.append(seconds / (clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]) / STAGES)

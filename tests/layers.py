@@ -7,14 +7,13 @@ test does not say which. Mechanisms without a joint that can be a tree joint are
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import pytest
 
 import flyball as fb
 from flyball.analysis import simulate
 from flyball.analysis.assembly.start import Assembly
-from flyball.analysis.motion.options import Options, options_from
 from flyball.analysis.motion.start import Start, begin
 
 LAYERS = ("absolute", "joint")
@@ -31,16 +30,13 @@ def in_force() -> str:
 def take(layer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulate in that layer until the test ends."""
 
-    def options(given: Mapping[str, object]) -> Options:
-        return options_from({"coordinates": layer} | dict(given))
-
     def begun(model, t, parameters, before, coordinates) -> Start:
+        coordinates = layer if coordinates == AUTO else coordinates
         start = begin(model, t, parameters, before, coordinates)
         if coordinates == "joint" and not start.assembly.compiled.structure.tree:
             pytest.skip("no joint of it can be a tree joint")
         return start
 
-    monkeypatch.setattr(simulate, "options_from", options)
     monkeypatch.setattr(simulate, "begin", begun)
     monkeypatch.setattr(f"{__name__}._chosen", [layer])
 

@@ -306,10 +306,9 @@ def test_the_table_names_everything(top, tmp_path):
     ("more", "told"),
     [
         ({"formulations": ["baumgart"]}, "did you mean 'baumgarte'"),
-        ({"stabilization": "none"}, "compare chooses stabilization itself"),
-        ({"coordinates": "joint"}, "compare chooses coordinates itself"),
         ({"repeats": -1}, "repeats must be"),
-        ({"rtoll": 1e-3}, "no option 'rtoll'"),
+        ({"repeats": 1.5}, "repeats must be a whole number"),
+        ({"alpha": -1.0}, "alpha must be greater than 0"),
     ],
 )
 def test_wrong_input(more, told):
@@ -324,7 +323,7 @@ def test_command(tmp_path):
     assert out.exit_code == 0, out.output
     assert "coupled matrix" in out.output
     assert path.exists()
-    chosen = ["--only", "baumgarte", "--only", "none", "--rates", "50", "50", "--json"]
+    chosen = ["--only", "baumgarte", "--only", "none", "--alpha", "50", "--beta", "50", "--json"]
     out = CliRunner().invoke(app, [*arguments, *chosen])
     data = json.loads(out.output)
     assert list(data["formulations"]) == ["baumgarte", "none"]

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.cli import progress
+from flyball.cli import compiling
 from flyball.view.frequencies import frequencies, phase
 from flyball.view.linear import _ratio
 from tests.program.test_cli import Said
@@ -254,10 +254,10 @@ def test_what_falls_for_ever_has_no_equilibrium(here: Path) -> None:
 
 
 def test_each_kernel_has_its_notice(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setattr(progress.sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setattr(progress, "_will_compile", lambda name: name == "residual_kernel")
-    progress.announce_compiling(True, "motion_kernel", "residual_kernel")
+    monkeypatch.setattr(compiling.sys.stderr, "isatty", lambda: True, raising=False)
+    monkeypatch.setattr(compiling, "_will_compile", lambda name: name == "residual_kernel")
+    compiling.announce_compiling(True, "motion_kernel", "residual_kernel")
     assert "derivatives" in capsys.readouterr().err
-    progress.announce_compiling(True)
-    progress.announce_compiling(False, "residual_kernel")
+    compiling.announce_compiling(True)
+    compiling.announce_compiling(False, "residual_kernel")
     assert capsys.readouterr().err == ""

@@ -214,7 +214,7 @@ def test_what_does_not_exist_is_named():
         m.linearize(outputs=["pin.angel"])
     with pytest.raises(fb.ModelError, match="no parameter 'mass'"):
         m.linearize(parameters={"mass": 2.0})
-    with pytest.raises(fb.ModelError, match="lists of names"):
+    with pytest.raises(fb.ModelError, match="inputs is a list of names"):
         m.linearize("push")
     with pytest.raises(fb.ModelError, match="about must be"):
         m.linearize(about="here")

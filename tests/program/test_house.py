@@ -42,14 +42,16 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "symbolic": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables", "equations", "results"},
     "view": {*LIBRARY, *ELEMENTS, "tables", "equations", "results"},
     "errors": set(),
-    "mechanism": {"model"},
+    "methods": set(),
+    "mechanism": {"methods", "model"},
     "files": {"mechanism"},
-    "cli": set(),
+    "cli": {"methods"},
     "__init__": set(),
     "__main__": {"cli"},
 }
 LATER = {  # imports inside functions, beyond those: the methods that lead from a thing to what is done with it
-    "mechanism": {"analysis", "view"},
+    "methods": {"analysis"},
+    "mechanism": {"view"},
     "files": {"model", "results"},
     "results": {"view"},
     "cli": {"analysis", "compiler", "equations", "files", "mechanism", "model", "results", "view"},
@@ -231,8 +233,10 @@ def test_files_stay_small():
 
 
 def own_lines(function: ast.FunctionDef) -> int:
-    """Lines of a function, those of functions inside it not counted."""
-    inner = [n for n in ast.walk(function) if isinstance(n, ast.FunctionDef) and n is not function]
+    """Lines of a function, its docstring and functions inside it not counted."""
+    inner: list[ast.stmt] = [n for n in ast.walk(function) if isinstance(n, ast.FunctionDef) and n is not function]
+    if ast.get_docstring(function):
+        inner.append(function.body[0])
     taken = {line for n in inner for line in range(n.lineno, n.end_lineno + 1)}
     return len(set(range(function.lineno, function.end_lineno + 1)) - taken)
 
@@ -244,8 +248,7 @@ def test_functions_stay_small():
         for n in ast.walk(TREES[p])
         if isinstance(n, ast.FunctionDef) and own_lines(n) > 60
     }
-    assert {k: v for k, v in long.items() if not k.endswith("simulate")} == {}  # its docstring lists every option
-    assert all(v <= 70 for v in long.values())
+    assert long == {}
 
 
 def test_public_names():

@@ -11,7 +11,6 @@ import numpy as np
 
 from ..equations.engine import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
-from ..model.expressions import number
 from ..model.model import Model
 from ..model.words import listing, suggest
 from ..numerics.integrators import explicit as ex
@@ -21,9 +20,11 @@ from ..results.result import Result
 from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
 from .compiled import Compiled, compiled
 from .motion import partition
-from .motion.options import Options, options_from, output_times
+from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
-from .motion.start import Start, begin
+from .motion.start import Start, begin, start_time
+from .options import Options, count
+from .progress import Tell, shown, unwatched
 from .simulate import clock_for, run_clock
 
 FINE = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
@@ -56,127 +57,107 @@ WAYS = {
 }
 
 
+@dataclass(frozen=True, kw_only=True)
+class CompareOptions(Options):
+    """What `Mechanism.compare` is asked."""
+
+    t_end: float
+    t_start: float | None
+    outputs: int | Sequence[float]
+    formulations: tuple[str, ...] | None
+    repeats: int
+    parameters: Mapping[str, float] | None
+    start: Result | None
+    method: str
+    rtol: float
+    atol: float
+    max_step: float
+    max_steps: int | None
+    alpha: float
+    beta: float
+    progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        object.__setattr__(self, "formulations", _known(self.formulations))
+        count(self.repeats, "repeats", 0)
+        self.integration(WAYS["baumgarte"])
+
+    def integration(self, way: Way, max_steps: int = MOST) -> Integration:
+        """How a formulation is integrated."""
+        rates = (self.alpha, self.beta) if way.stabilization == "baumgarte" else (None, None)
+        return Integration(
+            coordinates=way.coordinates,
+            method=self.method,
+            rtol=self.rtol,
+            atol=self.atol,
+            max_step=self.max_step,
+            max_steps=max_steps if self.max_steps is None else self.max_steps,
+            stabilization=way.stabilization,
+            alpha=rates[0],
+            beta=rates[1],
+        )
+
+
 @dataclass
 class _Task:
     """What all formulations have to do."""
 
     model: Model
+    asked: CompareOptions
     span: tuple[float, float]
     times: np.ndarray
-    options: Options
     base: Start
-    parameters: Mapping[str, float] | None
-    before: Result | None
+    max_steps: int = MOST
 
 
-def compare(
-    model: Model,
-    t_end: float,
-    *,
-    t_start: float = 0.0,
-    outputs: int | Sequence[float] = 201,
-    formulations: Sequence[str] | None = None,
-    repeats: int = 5,
-    parameters: Mapping[str, float] | None = None,
-    start: Result | None = None,
-    progress: Callable[[float], None] | None = None,
-    **options: object,
-) -> Comparison:
-    """Integrate the same motion by several formulations and see what becomes of it.
-
-    All start from the same consistent state, with the same integrator and the same tolerances, in absolute coordinates
-    unless their name says otherwise. Drivers are followed by integration here, also where they leave no freedom. Where
-    states are not projected they are reported as they are.
-
-    Parameters
-    ----------
-    model : Model
-    t_end, t_start, outputs
-        As for `simulate`; drift and energy are looked at at the outputs.
-    formulations : sequence of str, optional
-        Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
-        ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default.
-    repeats : int
-        Times that each is run for its cost, fewer where that takes long; 0 for none.
-    parameters, start, progress
-        As for `simulate`.
-    **options
-        Of `Options`: rtol, atol, method, alpha, beta, max_step, max_steps (without it a formulation is given up after
-        twenty times the steps of the reference).
-
-    Returns
-    -------
-    Comparison
-        A formulation that fails is in it too, with its message and the motion up to then.
-
-    Raises
-    ------
-    AssemblyError, ModelError
-        If the start cannot be made consistent; for formulations or options that do not exist.
-    """
-    names = _known(formulations)
-    if not isinstance(repeats, (int, np.integer)) or repeats < 0:
-        raise ModelError(f"repeats must be a number of runs, 0 or more, not {repeats!r}")
-    chosen = _options(options)
+def compare(model: Model, o: CompareOptions) -> Comparison:
+    """Integrate the same motion by several formulations: see `Mechanism.compare`."""
     model = model.snapshot()
-    t_start = number(t_start, {}, "s", "t_start") if start is None else start.final[0]
-    span = (t_start, float(number(t_end, {}, "s", "t_end")))
-    times = output_times(*span, outputs)
-    base = begin(model, t_start, parameters, start, "absolute")
-    job = _Task(model, span, times, chosen, base, parameters, start)
-    truth, told = _reference(job)
-    if "max_steps" not in options:
-        taken = truth.health.steps + truth.health.rejected if truth is not None else 0
-        job.options = replace(chosen, max_steps=LIMIT * max(taken, 1000))
-    return _compared(job, names, repeats, truth, told, progress)
+    t_start = start_time(o.t_start, o.start)
+    times = output_times(t_start, o.t_end, o.outputs)
+    base = begin(model, t_start, o.parameters, o.start, "absolute")
+    job = _Task(model, o, (t_start, o.t_end), times, base)
+    with shown(o.progress, "comparing") as tell:
+        truth, told = _reference(job)
+        if o.max_steps is None:
+            taken = truth.health.steps + truth.health.rejected if truth is not None else 0
+            job.max_steps = LIMIT * max(taken, 1000)
+        return _compared(job, truth, told, tell)
 
 
-def _compared(
-    job: _Task,
-    names: Sequence[str],
-    repeats: int,
-    truth: Result | None,
-    told: str,
-    progress: Callable[[float], None] | None,
-) -> Comparison:
+def _compared(job: _Task, truth: Result | None, told: str, tell: Tell) -> Comparison:
     """Run all, first to see what becomes of the motion, then for their cost."""
     starts: dict[str, Start] = {}
     rows = []
+    names = job.asked.formulations or ()
     for k, name in enumerate(names):
         rows.append(_row(job, name, starts, truth))
-        if progress is not None:
-            progress((k + 1) / len(names) * (0.5 if repeats else 1.0))
-    _costs(job, rows, starts, repeats)
-    if progress is not None:
-        progress(1.0)
+        tell((k + 1) / len(names) * (0.5 if job.asked.repeats else 1.0), name)
+    _costs(job, rows, starts, tell)
+    tell(1.0)
     energy = float(truth.energy.kinetic.max(initial=0.0)) if truth is not None else np.nan
-    kept = {k: v for k, v in vars(job.options).items() if k not in ("coordinates", "stabilization")}
+    kept = {k: v for k, v in _choice(job, "baumgarte").choices().items() if k not in ("coordinates", "stabilization")}
     return Comparison(job.model.name, job.span[1], tuple(rows), told, energy, kept)
 
 
-def _known(names: Sequence[str] | None) -> list[str]:
+def _known(names: Sequence[str] | None) -> tuple[str, ...]:
     if names is None:
-        return list(WAYS)
-    wanted = [names] if isinstance(names, str) else list(names)
+        return tuple(WAYS)
+    wanted = (names,) if isinstance(names, str) else tuple(names)
     for name in wanted:
         if name not in WAYS:
             raise ModelError(f"there is no formulation {name!r}{suggest(str(name), WAYS)}; {listing(list(WAYS))}")
-    return list(dict.fromkeys(wanted))
-
-
-def _options(options: Mapping[str, object]) -> Options:
-    for name in ("stabilization", "coordinates"):
-        if name in options:
-            raise ModelError(f"compare chooses {name} itself; say which with formulations=, {listing(list(WAYS))}")
-    return options_from(options)
+    return tuple(dict.fromkeys(wanted))
 
 
 def _reference(job: _Task) -> tuple[Result | None, str]:
     """The motion by projection at the finest tolerance that gets through singular positions, and what it is."""
     why = "the tolerances asked for are as fine"
+    usual = _choice(job, "projection")
     for rtol in FINE:
-        if rtol < job.options.rtol:
-            result, why = _motion(job, job.base, replace(job.options, rtol=rtol, atol=0.1 * rtol))
+        if rtol < usual.rtol:
+            result, why = _motion(job, job.base, replace(usual, rtol=rtol, atol=0.1 * rtol))
             if not why:
                 return result, f"projection at rtol = {rtol:g}"
     return None, f"none: {why}"
@@ -192,7 +173,7 @@ def _start(job: _Task, way: Way) -> Start:
     """
     a, rows = job.base.assembly, len(job.base.assembly.compiled.structure.rows)
     if way.coordinates == "joint":
-        made = begin(job.model, job.span[0], job.parameters, job.before, "joint")
+        made = begin(job.model, job.span[0], job.asked.parameters, job.asked.start, "joint")
         if not made.assembly.compiled.structure.tree:
             raise AnalysisError(f"there are no joint coordinates: {made.coordinates.removeprefix('absolute: ')}")
         return made
@@ -205,12 +186,12 @@ def _start(job: _Task, way: Way) -> Start:
             "some body has no inertia about some axis, so that M has no inverse; the coupled matrix is factored in an "
             "order that needs one"
         )
-    c = compiled(job.model, parameters=job.parameters, coupled=True)
+    c = compiled(job.model, parameters=job.asked.parameters, coupled=True)
     c.z = a.compiled.z.copy()
     return replace(job.base, assembly=replace(a, compiled=c))
 
 
-def _motion(job: _Task, start: Start, o: Options) -> tuple[Result | None, str]:
+def _motion(job: _Task, start: Start, o: Integration) -> tuple[Result | None, str]:
     """The motion, as far as it goes, and why it goes no further."""
     clock, rows, _ = _run(job, start, o, job.times)
     try:
@@ -219,7 +200,7 @@ def _motion(job: _Task, start: Start, o: Options) -> tuple[Result | None, str]:
         return stopped.result, str(stopped).partition(" The motion up to")[0]  # type: ignore[return-value]
 
 
-def _run(job: _Task, start: Start, o: Options, times: np.ndarray) -> tuple[ex.Clock, np.ndarray, float]:
+def _run(job: _Task, start: Start, o: Integration, times: np.ndarray) -> tuple[ex.Clock, np.ndarray, float]:
     """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s])."""
     W = start.assembly.compiled.work
     W.info[:] = 0
@@ -229,7 +210,7 @@ def _run(job: _Task, start: Start, o: Options, times: np.ndarray) -> tuple[ex.Cl
     start.since = time.perf_counter()
     clock = clock_for(start, *job.span, times, o)
     begun = time.thread_time()
-    rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), None, INTEGRATE)
+    rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), unwatched, INTEGRATE)
     taken = time.thread_time() - begun
     if interrupted:
         raise KeyboardInterrupt
@@ -256,9 +237,8 @@ def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) 
     return f
 
 
-def _choice(job: _Task, name: str) -> Options:
-    way = WAYS[name]
-    return replace(job.options, stabilization=way.stabilization, coordinates=way.coordinates)
+def _choice(job: _Task, name: str) -> Integration:
+    return job.asked.integration(WAYS[name], job.max_steps)
 
 
 def _state(c: Compiled, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -297,11 +277,13 @@ def _difference(own: Compiled, truth: Result, c: Compiled, result: Result) -> fl
     return worst
 
 
-def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], repeats: int) -> None:
+def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tell: Tell) -> None:
     """Run those that reached the end again without outputs on the way, one after the other, for their cost."""
     end = job.times[-1:] * 0.0 + job.span[1]
     spent: dict[str, list[float]] = {f.name: [] for f in rows if f.success}
-    for _ in range(repeats):
+    repeats = job.asked.repeats
+    for k in range(repeats):
+        tell(0.5 + 0.5 * k / repeats, "costs")
         for f in rows:
             if f.name not in spent or sum(spent[f.name]) > BUDGET:
                 continue

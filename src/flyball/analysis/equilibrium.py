@@ -8,11 +8,11 @@ it comes to rest (Kelley and Keyes 1998). It goes the way that the forces push, 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError, NotConverged
-from ..model.expressions import number
 from ..model.model import Model
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from ..tables.names import velocity_names
@@ -27,6 +27,7 @@ from .linear.stability import GROWTH, stability
 from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
+from .options import Options
 
 NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
@@ -38,60 +39,51 @@ SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where d
 SHOWN = 6
 
 
-def equilibrium(
-    model: Model,
-    *,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    start: Equilibrium | None = None,
-    stable: bool = False,
-    preload: Sequence[str] = (),
-    turning: Sequence[str] = (),
-) -> Equilibrium:
-    """A static equilibrium near the mechanism as described, or a steady motion.
+@dataclass(frozen=True, kw_only=True)
+class EquilibriumOptions(Options):
+    """What `Mechanism.equilibrium` is asked."""
 
-    Drivers hold their coordinates where they are at ``t``; velocities, dampers and inertia play no part at rest.
+    t: float
+    parameters: Mapping[str, float] | None
+    start: Equilibrium | None
+    stable: bool
+    preload: tuple[str, ...]
+    turning: tuple[str, ...]
 
-    Parameters
-    ----------
-    t : float [s]
-        Time at which laws of forces and drivers are taken.
-    parameters : mapping, optional
-        Values in SI units in place of the model's.
-    start : Equilibrium, optional
-        Guess in place of the described positions: an equilibrium of the same mechanism. Described speeds stay.
-    stable : bool
-        Go on from an unstable equilibrium to a stable one. Not with ``preload`` or ``turning``.
-    preload : sequence of str
-        Forces, by the names that `linearize` takes for inputs: find what has to be added to them for the mechanism to
-        be in equilibrium where it is drawn. Not with ``turning``.
-    turning : sequence of str
-        Joints' coordinates that turn evenly while all others stand still, such as the spindle of a governor: a steady
-        motion is found. Speeds stay as described where nothing else decides them.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.stable and self.turning:
+            raise ModelError(
+                "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
+                "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
+            )
+        if self.stable and self.preload:
+            raise ModelError(
+                "preload= holds the mechanism where it is drawn, stable=True moves it elsewhere; give one of the two"
+            )
+        if self.preload and self.turning:
+            raise ModelError(
+                "preload= holds a mechanism at rest, turning= asks for a motion; give one of the two. The effort of a "
+                "driver tells what a steady motion needs along its coordinate"
+            )
 
-    Returns
-    -------
-    Equilibrium
 
-    Raises
-    ------
-    AssemblyError
-        If the mechanism cannot be assembled.
-    ModelError
-        If a name does not exist, or options say nothing beside each other.
-    NotConverged
-        If none is found: the message says what is left unbalanced, ``residuals`` the force or torque by name.
-    SingularityError
-        If it is found where a force jumps, or has a kink whose sides leave its stability open.
-    """
-    _refuse_together(stable, preload, turning)
-    a = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
-    begin = _begun(a, start)
-    if turning:
-        return _steady(begin, a, turning)
-    if preload:
-        return _finished(*preloaded(begin, preload), "preload")
-    return _searched(Rest.at(a.compiled, a.t, begin.q), stable)
+def resting(
+    t: float, parameters: Mapping[str, float] | None, start: Equilibrium | None = None, stable: bool = False
+) -> EquilibriumOptions:
+    """What other analyses ask: where it rests."""
+    return EquilibriumOptions(t=t, parameters=parameters, start=start, stable=stable, preload=(), turning=())
+
+
+def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
+    """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    a = assemble(model, t=o.t, parameters=o.parameters)
+    begin = _begun(a, o.start)
+    if o.turning:
+        return _steady(begin, a, o.turning)
+    if o.preload:
+        return _finished(*preloaded(begin, o.preload), "preload")
+    return _searched(Rest.at(a.compiled, a.t, begin.q), o.stable)
 
 
 def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:
@@ -103,24 +95,6 @@ def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:
         raise ModelError(f"start must be an equilibrium of {s.model.name!r}, or of one with the same bodies")
     q, _ = a.compiled.take(start.assembly.compiled, start.assembly.t, start.assembly.q, start.assembly.v)
     return Assembly(a.compiled, a.t, q, np.zeros(s.nv))
-
-
-def _refuse_together(stable: bool, preload: Sequence[str], turning: Sequence[str]) -> None:
-    """Refuse options that say nothing beside each other."""
-    if stable and turning:
-        raise ModelError(
-            "stable=True goes downhill from an unstable equilibrium; a steady motion has no hill to go down. Leave "
-            "stable= out and begin nearer to the motion that is wanted: by described positions, or start="
-        )
-    if stable and preload:
-        raise ModelError(
-            "preload= holds the mechanism where it is drawn, stable=True moves it elsewhere; give one of the two"
-        )
-    if preload and turning:
-        raise ModelError(
-            "preload= holds a mechanism at rest, turning= asks for a motion; give one of the two. The effort of a "
-            "driver tells what a steady motion needs along its coordinate"
-        )
 
 
 def _searched(x: Rest, stable: bool) -> Equilibrium:

@@ -8,6 +8,7 @@ many answers; what is common to all of them is told apart by the self-stresses o
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -20,64 +21,32 @@ from ..model.table import Table
 from ..results.inverse import Drive, InverseDynamics
 from ..results.result import Result
 from .freedom.determinacy import determinacy
-from .kinematics import Times, kinematics, wanted_times
+from .kinematics import KinematicsOptions, kinematics, wanted_times
 
 FEWEST = 4  # samples that make a curve with two continuous derivatives
 
 
-def inverse_dynamics(
-    model: Model,
-    times: Times = 501,
-    motion: Mapping[str, Any] | None = None,
-    *,
-    t_end: float | str | None = None,
-    t_start: float | str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-) -> InverseDynamics:
-    """Forces and torques of drives, and reactions of all joints, for a given motion.
+@dataclass(frozen=True, kw_only=True)
+class InverseDynamicsOptions(KinematicsOptions):
+    """What `Mechanism.inverse_dynamics` is asked."""
 
-    Parameters
-    ----------
-    model : Model
-        Its drivers prescribe the motion, with ``motion`` if that is given. Its forces act: motors too, so that a
-        drive has to do what they leave to be done.
-    times : int or sequence of float
-        Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times [s] themselves.
-    motion : mapping, optional
-        Coordinate (``"A.angle"``, ``"slider.x"``) or sensor of one -> how it moves [rad] or [m]: an expression such
-        as ``"0.3*sin(2*t)"``; samples at ``times``; or a pair (times of samples [s], samples). Through samples goes a
-        cubic spline, whose second derivative is continuous. Initial conditions then play no part.
-    t_end, t_start : float [s]
-        As for `kinematics`; with samples the motion begins with the first one.
-    parameters : mapping, optional
-        Values of parameters in SI units, in place of the model's.
-    coordinates : ``"auto"``, ``"absolute"`` or ``"joint"``
+    motion: Mapping[str, Any] | None
 
-    Returns
-    -------
-    InverseDynamics
 
-    Raises
-    ------
-    ModelError
-        If the motion names what does not exist or cannot be driven, or its samples make no curve.
-    MobilityError, SingularityError, AssemblyError, SimulationError
-        As for `kinematics`.
-    """
+def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
+    """Forces and torques of drives, and reactions, for a given motion: see `Mechanism.inverse_dynamics`."""
     model = model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
-    if motion:
-        outputs, begin = wanted_times(times, t_start, t_end)
+    if o.motion:
+        outputs, begin = wanted_times(o.times, o.t_start, o.t_end)
         model.initial = []
-        for label, how in motion.items():
+        for label, how in o.motion.items():
             first = _add(model, label, how, outputs, labels)
-            begin = max(begin, first) if t_start is None else begin
-        t_start = begin
-        if isinstance(times, (int, np.integer)) and outputs[0] < begin:
-            outputs = np.linspace(begin, outputs[-1], int(times))
-        times, t_end = outputs.tolist(), None
-    result = kinematics(model, times, t_end=t_end, t_start=t_start, parameters=parameters, coordinates=coordinates)
+            begin = max(begin, first) if o.t_start is None else begin
+        if isinstance(o.times, (int, np.integer)) and outputs[0] < begin:
+            outputs = np.linspace(begin, outputs[-1], int(o.times))
+        o = replace(o, t_start=begin, times=outputs.tolist(), t_end=None)
+    result = kinematics(model, o)
     drives = {labels[d.name]: _drive(result, d) for d in model.drivers}
     return InverseDynamics(result, drives, determinacy(result))
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
-from ..model.expressions import number
 from ..model.model import Model
 from ..results.result import Result
 from .assemble import assemble
@@ -23,11 +23,12 @@ from .assembly.start import Assembly
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
 from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
-from .motion.options import Options, output_times
+from .motion.options import output_times, projected
 from .motion.start import Start, begin_at
+from .options import Options
+from .progress import shown
 from .simulate import moved
 
-TOLERANCES = {"rtol": 1e-10, "atol": 1e-12}
 NARROW = 1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position
 PART = 1e-2  # elements with less than this part of the largest share in a dependency are not named
 NAMED = 8
@@ -35,66 +36,36 @@ NAMED = 8
 Times = int | Sequence[float]
 
 
-def kinematics(
-    model: Model,
-    times: Times = 501,
-    *,
-    t_end: float | str | None = None,
-    t_start: float | str | None = None,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-    progress: Callable[[float], None] | None = None,
-) -> Result:
-    """Positions, velocities and accelerations of a mechanism whose drivers leave no freedom.
+@dataclass(frozen=True, kw_only=True)
+class KinematicsOptions(Options):
+    """What `Mechanism.kinematics` is asked."""
 
-    Parameters
-    ----------
-    model : Model
-    times : int or sequence of float
-        Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times [s] themselves.
-    t_end : float [s]
-        Needed if ``times`` is a number.
-    t_start : float [s]
-        When the mechanism is assembled as drawn; it is followed from there, so that it stays on its branch and whole
-        turns count. 0 if not given, or the first time where that is earlier.
-    parameters : mapping, optional
-        Values of parameters in SI units, in place of the model's.
-    coordinates : ``"auto"``, ``"absolute"`` or ``"joint"``
-    progress : callable, optional
-        Called with the fraction done about twenty times a second.
+    times: Times
+    t_end: float | None
+    t_start: float | None
+    parameters: Mapping[str, float] | None
+    coordinates: str
+    progress: bool | Callable[[float], None]
 
-    Returns
-    -------
-    Result
 
-    Raises
-    ------
-    MobilityError
-        If drivers leave a freedom (``free`` names it), or prescribe what is prescribed already (``redundant`` names
-        the drivers).
-    SingularityError
-        If the mechanism locks, or begins where drivers do not decide its motion; ``where`` is the time, ``elements``
-        those whose constraints lose their independence, ``result`` holds the motion up to there.
-    AssemblyError
-        If no position fulfils all constraints at the start.
-    SimulationError
-        If a law cannot be followed, for instance because it jumps; its ``result`` holds the motion up to there.
-    """
+def kinematics(model: Model, o: KinematicsOptions) -> Result:
+    """Positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
     started = time.perf_counter()
-    outputs, begin = wanted_times(times, t_start, t_end)
+    outputs, begin = wanted_times(o.times, o.t_start, o.t_end)
     model = model.snapshot()
-    base = driven(model, begin, parameters)
-    start = begin_at(base, parameters, coordinates)
+    base = driven(model, begin, o.parameters)
+    start = begin_at(base, o.parameters, o.coordinates)
     start.since = started
-    chosen = Options(**TOLERANCES, coordinates=coordinates)  # type: ignore[arg-type]
     holonomic = all(r.holonomic for r in base.compiled.structure.rows)
-    try:
-        return moved(start, float(outputs[-1]), outputs, chosen, FOLLOW if holonomic else INTEGRATE, progress)
-    except SimulationError as error:
-        raise _locked(start, error) or error from None
+    with shown(o.progress, "following the drivers") as tell:
+        try:
+            task = FOLLOW if holonomic else INTEGRATE
+            return moved(start, float(outputs[-1]), outputs, projected(o.coordinates, 1e-10, 1e-12), task, tell)
+        except SimulationError as error:
+            raise _locked(start, error) or error from None
 
 
-def wanted_times(times: Times, t_start: float | str | None, t_end: float | str | None) -> tuple[np.ndarray, float]:
+def wanted_times(times: Times, first: float | None, last: float | None) -> tuple[np.ndarray, float]:
     """Ascending output times, and when the motion begins.
 
     Raises
@@ -102,8 +73,6 @@ def wanted_times(times: Times, t_start: float | str | None, t_end: float | str |
     ModelError
         If they do not say when.
     """
-    first = None if t_start is None else float(number(t_start, {}, "s", "t_start"))
-    last = None if t_end is None else float(number(t_end, {}, "s", "t_end"))
     if isinstance(times, (int, np.integer)):
         if last is None:
             raise ModelError(f"{times} times until when? Give t_end [s], or the times themselves")

@@ -8,14 +8,16 @@ accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import one
+from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel
+from ..results.result import Result
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State, by_prescription
@@ -28,78 +30,55 @@ from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
+from .options import Options
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
 
 
-def linearize(
-    model: Model,
-    inputs: Sequence[str] = (),
-    outputs: Sequence[str] = (),
-    *,
-    about: Any = None,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-    frozen: bool = False,
-) -> LinearModel:
-    """Linear equations about an equilibrium or a steady motion.
+@dataclass(frozen=True, kw_only=True)
+class InstantOptions(Options):
+    """Where the mechanism is, that small motions are asked of."""
 
-    Exact: the stiffness includes what reactions, inertia and gyroscopic terms do when positions change, constraints are
-    taken out without loss, and the derivatives are complex steps through the formulas of the simulation. A steady
-    motion (a turning governor, a conical pendulum, a rolling wheel) is seen from the evenly turning frame in which it
-    is steady.
+    about: Result | Equilibrium | None
+    t: float | None
+    parameters: Mapping[str, float] | None
+    coordinates: str
+    frozen: bool
 
-    Parameters
-    ----------
-    model : Model
-    inputs : sequence of str
-        Forces, torques and motors that have a law (``"push.x"`` where it has components): what is added to it;
-        drivers: what is added to their law; parameters.
-    outputs : sequence of str
-        Sensors, or curves of a result: ``"A.angle"``, ``"slider.vx"``, ``"A.fx"``, ``"energy.kinetic"``.
-    about : Result or Equilibrium, optional
-        Where: the end of a motion, or an equilibrium; else as described and assembled at ``t``.
-    t : float [s]
-    parameters : mapping, optional
-        Values in SI units in place of the model's.
-    coordinates : str
-        ``"auto"``, ``"absolute"`` or ``"joint"``: those that the states are changes of.
-    frozen : bool
-        The equations of this very instant, of a motion that need not be steady: their eigenvalues tell little.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.about is not None and self.t is not None:
+            raise ModelError("about has its own time: leave out t")
 
-    Returns
-    -------
-    LinearModel
+    def state(self, model: Model, coordinates: str | None = None) -> State:
+        """The state there, in coordinates of these or of others."""
+        return instant(
+            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=coordinates or self.coordinates
+        )[0]
 
-    Raises
-    ------
-    AnalysisError
-        If the state is neither an equilibrium nor a steady motion, or an output follows the rate of an input.
-    SingularityError
-        At a singular position, or where a force has a kink or jumps.
-    ModelError
-        If a name does not exist, something moves without inertia, or redundancy leaves an output undetermined.
-    """
-    _refuse_names(model, inputs, outputs)
-    x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
-    model, named = with_inputs(x.c.structure.model, inputs)
+
+@dataclass(frozen=True, kw_only=True)
+class LinearizeOptions(InstantOptions):
+    """What `Mechanism.linearize` is asked."""
+
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+
+def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
+    """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    for name in o.outputs:
+        one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
+    x = o.state(model)
+    model, named = with_inputs(x.c.structure.model, o.inputs)
     if named:
         x = _in_copy(model, x)
-    e, f, frame = _about(x, frozen, to=[i.name for i in named if i.name == i.parameter])
+    e, f, frame = _about(x, o.frozen, to=[i.name for i in named if i.name == i.parameter])
     r = reduced(e, f, frame, _effects(e, f, named))
-    if frame.turning.any() and (named or outputs):
-        _refuse_turning(e, f, r, frame, named, outputs)
-    return _model(e, f, r, frame, named, outputs)
-
-
-def _refuse_names(model: Model, inputs: Sequence[str], outputs: Sequence[str]) -> None:
-    """Refuse outputs that do not exist; inputs are looked up where they are added."""
-    if isinstance(inputs, str) or isinstance(outputs, str):
-        raise ModelError("inputs and outputs are lists of names, for instance inputs=['motor']")
-    for name in outputs:
-        one(model, name)
+    if frame.turning.any() and (named or o.outputs):
+        _refuse_turning(e, f, r, frame, named, o.outputs)
+    return _model(e, f, r, frame, named, o.outputs)
 
 
 def _refuse_turning(

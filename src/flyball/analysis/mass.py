@@ -14,6 +14,7 @@ from ..results.records import Records
 from ..tables.structure import structure
 from ..tables.values import Values, values
 from .assemble import assemble
+from .options import Options
 
 ROUNDING = 1e-12
 ALIGNED = 1e-9  # a principal axis that differs by less from an axis of the body is that axis
@@ -114,31 +115,21 @@ class MassReport:
         return "\n".join([x.rstrip() for x in lines] + below)
 
 
-def mass_properties(model: Model, *, drawn: bool = False, parameters: Mapping[str, float] | None = None) -> MassReport:
-    """Mass, centre of mass, inertia, principal moments and axes of every body and of all together.
+@dataclass(frozen=True, kw_only=True)
+class MassOptions(Options):
+    """What `Mechanism.mass_properties` is asked."""
 
-    Parameters
-    ----------
-    model : Model
-    drawn : bool
-        Where bodies are: as drawn, or (if false) after assembly at t = 0.
-    parameters : mapping, optional
-        Parameters with other values, in SI units.
+    drawn: bool
+    parameters: Mapping[str, float] | None
 
-    Returns
-    -------
-    MassReport
 
-    Raises
-    ------
-    AssemblyError
-        If it cannot be assembled; as drawn it can be looked at all the same.
-    """
-    if drawn:
+def mass_properties(model: Model, o: MassOptions) -> MassReport:
+    """Mass properties of every body and of all together: see `Mechanism.mass_properties`."""
+    if o.drawn:
         model = model.snapshot()
-        x = values(structure(model), model.environment(parameters))
+        x = values(structure(model), model.environment(o.parameters))
         return report(model, x, x.q)
-    a = assemble(model, parameters=parameters)
+    a = assemble(model, parameters=o.parameters)
     return report(model, a.compiled.values, a.q)
 
 

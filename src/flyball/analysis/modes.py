@@ -6,22 +6,22 @@ iterations with shift and invert (Ericsson and Ruhe 1980): nothing is reduced, s
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError
+from ..errors import AnalysisError
 from ..model.model import Model
 from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import Equations, State
-from .linear.instant import instant
 from .linear.kinks import refuse_kinks
 from .linear.spectrum import EQUAL, spectrum
 from .linear.steady import balanced
-from .linearize import without_inputs
+from .linearize import InstantOptions, without_inputs
+from .options import count as at_least
 
 DENSE = 600  # velocities up to which all modes are found
 RIGID = 1e-6  # shift, of the largest stiffness over the largest mass
@@ -32,39 +32,24 @@ TINY = 1e-7  # directions of random motions below this part of the largest are n
 REFINED = 2  # times that a solution is improved: rows may be redundant
 
 
-def modes(
-    model: Model,
-    *,
-    about: Any = None,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    coordinates: str = "auto",
-    count: int | None = None,
-    frozen: bool = False,
-) -> Modes:
-    """Natural motions about an equilibrium or a steady motion.
+@dataclass(frozen=True, kw_only=True)
+class ModesOptions(InstantOptions):
+    """What `Mechanism.modes` is asked."""
 
-    Parameters
-    ----------
-    model, about, t, parameters, coordinates, frozen
-        As for `flyball.analysis.linearize.linearize`.
-    count : int, optional
-        How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
+    count: int | None
 
-    Returns
-    -------
-    Modes
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.count is not None:
+            at_least(self.count, "count")
 
-    Raises
-    ------
-    AnalysisError, SingularityError, ModelError
-        As for `linearize`.
-    """
-    if count is not None and count < 1:
-        raise ModelError(f"count must be at least 1, got {count!r}")
-    x, _ = instant(model, about, t=t, parameters=parameters, coordinates=coordinates)
+
+def modes(model: Model, o: ModesOptions) -> Modes:
+    """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    count, frozen = o.count, o.frozen
+    x = o.state(model)
     if len(x.v) > DENSE and x.c.structure.tree:
-        x, _ = instant(model, about, t=t, parameters=parameters, coordinates="absolute")
+        x = o.state(model, "absolute")
     if len(x.v) > DENSE and not np.abs(x.v).max() > 0.0:
         return _sparse(x, count or FEW, frozen)
     f, frame, r = without_inputs(x, frozen)

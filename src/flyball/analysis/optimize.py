@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,10 @@ from ..errors import AnalysisError, ModelError
 from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.optimum import Optimum
-from .sensitivity import sensitivity
+from .options import count as at_least
+from .options import positive
+from .progress import Tell, shown
+from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
 
 STEP = 1e-6  # of the quantities, for the slope of a function that the user gives
 REFUSED = 1e3  # times the first cost: what parameters cost with which the mechanism cannot be assembled
@@ -19,92 +23,68 @@ REFUSED = 1e3  # times the first cost: what parameters cost with which the mecha
 Bounds = Mapping[str, tuple[float | str | None, float | str | None]]
 
 
-def optimize(
-    model: Model,
-    of: Sequence[str],
-    to: Sequence[str] | Bounds,
-    *,
-    target: Any = None,
-    minimize: Callable[[np.ndarray], float] | None = None,
-    weights: Any = 1.0,
-    analysis: str = "instant",
-    parameters: Mapping[str, float] | None = None,
-    evaluations: int = 200,
-    tolerance: float = 1e-10,
-    **options: Any,
-) -> Optimum:
-    """Find parameters for which quantities come nearest to a target, or a function of them is smallest.
+@dataclass(frozen=True, kw_only=True)
+class OptimizeOptions(DerivativeOptions):
+    """What `Mechanism.optimize` is asked."""
 
-    Least squares by a trust region with the exact Jacobian (Branch, Coleman and Li 1999), minimisation by L-BFGS-B
-    (Byrd et al. 1995), both SciPy's; derivatives as in `sensitivity`.
+    of: tuple[str, ...]
+    to: Sequence[str] | Bounds
+    target: Any
+    minimize: Callable[[np.ndarray], float] | None
+    weights: Any
+    evaluations: int
+    tolerance: float
+    progress: bool | Callable[[float], None]
 
-    Parameters
-    ----------
-    model : Model
-    of : sequence of str
-        Quantities, as in `sensitivity`; for modes none.
-    to : sequence of str, or mapping of str to (lowest, highest)
-        Parameters to be changed, with their bounds (None: none).
-    target : array
-        What the quantities should be, in SI units or with units: one number each, or (times, quantities) of a motion.
-        Eigenvalues [1/s] in any order, one of each complex pair.
-    minimize : callable, in place of ``target``
-        A smooth function of the quantities (times, of) that is to be smallest.
-    weights : float or array
-        Multiply the differences from the target.
-    analysis, options
-        As in `sensitivity`: ``analysis="motion"``, ``t_end=``, ``outputs=`` and so on.
-    parameters : mapping, optional
-        Values to begin with, in place of the model's.
-    evaluations : int
-        Most analyses to be made.
-    tolerance : float
-        Relative changes of cost and parameters below which the search ends.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.to, str) or not self.to:
+            raise ModelError("to names the parameters, for instance to=['crank'] or to={'crank': (0.1, '30 cm')}")
+        if (self.target is None) == (self.minimize is None):
+            raise ModelError("give either a target or a function to minimize")
+        if self.minimize is not None and not (np.ndim(self.weights) == 0 and self.weights == 1.0):
+            raise ModelError("weights are of the differences from a target; with minimize they do nothing")
+        at_least(self.evaluations, "evaluations")
+        positive(self.tolerance, "tolerance")
 
-    Returns
-    -------
-    Optimum
+    def sensitivity(self, parameters: Mapping[str, float]) -> SensitivityOptions:
+        """What is asked at other values of the parameters."""
+        return SensitivityOptions(
+            of=self.of,
+            to=tuple(self.to),
+            analysis=self.analysis,
+            t=self.t,
+            t_end=self.t_end,
+            outputs=self.outputs,
+            parameters={**(self.parameters or {}), **parameters},
+            about=self.about,
+            rtol=self.rtol,
+            atol=self.atol,
+            verify=False,
+        )
 
-    Raises
-    ------
-    ModelError
-        If a quantity, parameter or option does not exist, or a bound is not met at the start.
-    AnalysisError
-        If the mechanism cannot be analysed at the start.
-    """
-    if (target is None) == (minimize is None):
-        raise ModelError("give either a target or a function to minimize")
-    search = Search(model, tuple(of), to, analysis, dict(parameters or {}), options)
-    if minimize is not None:
-        return search.minimum(minimize, evaluations, tolerance)
-    return search.fit(target, weights, evaluations, tolerance)
+
+def optimize(model: Model, o: OptimizeOptions) -> Optimum:
+    """Find parameters that serve best: see `Mechanism.optimize`."""
+    with shown(o.progress, "optimizing") as tell:
+        search = Search(model, o, tell)
+        return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)
 
 
 class Search:
     """Quantities and their derivatives as functions of scaled parameters."""
 
-    def __init__(
-        self,
-        model: Model,
-        of: tuple[str, ...],
-        to: Sequence[str] | Bounds,
-        analysis: str,
-        parameters: dict[str, float],
-        options: dict[str, Any],
-    ) -> None:
-        env = model.environment(parameters)
-        if isinstance(to, str) or not to:
-            raise ModelError("to names the parameters, for instance to=['crank'] or to={'crank': (0.1, '30 cm')}")
-        for name in to:
+    def __init__(self, model: Model, o: OptimizeOptions, tell: Tell) -> None:
+        env = model.environment(o.parameters)
+        for name in o.to:
             if name not in env:
                 raise ModelError(
                     f"{model.name!r} has no parameter {name!r}{suggest(name, list(env))}; {listing(list(env))}"
                 )
-        self.model, self.of, self.names, self.analysis = model, of, tuple(to), analysis
-        self.parameters, self.options = parameters, options
+        self.model, self.asked, self.names, self.tell = model, o, tuple(o.to), tell
         self.start = np.array([env[name] for name in self.names])
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
-        self.low, self.high = (self._bounds(to, k) for k in (0, 1))
+        self.low, self.high = (self._bounds(o.to, k) for k in (0, 1))
         self._known: tuple[np.ndarray, Any] | None = None
         self.count = 0
 
@@ -129,24 +109,18 @@ class Search:
         if self._known is None or not np.array_equal(self._known[0], x):
             values = dict(zip(self.names, (x * self.scale).tolist(), strict=True))
             self.count += 1
-            found = sensitivity(
-                self.model,
-                self.of,
-                self.names,
-                analysis=self.analysis,
-                parameters=self.parameters | values,
-                **self.options,
-            )
+            found = sensitivity(self.model, self.asked.sensitivity(values))
+            self.tell(self.count / self.asked.evaluations, f"{self.count} of at most {self.asked.evaluations} analyses")
             self._known = x.copy(), found
         return self._known[1]
 
-    def fit(self, target: Any, weights: Any, evaluations: int, tolerance: float) -> Optimum:
+    def fit(self, target: Any, weights: Any) -> Optimum:
         """Least squares."""
         from scipy.optimize import least_squares
 
         x0 = self.start / self.scale
         first = self.at(x0)
-        goal = _goal(target, first.values, self.of or first.of, self.analysis)
+        goal = _goal(target, first.values, self.asked.of or first.of, self.asked.analysis)
 
         def split(r: np.ndarray) -> np.ndarray:
             return r if np.isrealobj(r) else np.concatenate([r.real, r.imag])
@@ -169,12 +143,12 @@ class Search:
             return np.array([split(J[..., k].ravel()) for k in range(len(x))]).T * self.scale
 
         r = least_squares(
-            residual, x0, jacobian, bounds=(self.low, self.high), xtol=tolerance, ftol=tolerance, gtol=1e-15,
-            max_nfev=evaluations,
+            residual, x0, jacobian, bounds=(self.low, self.high), xtol=self.asked.tolerance,
+            ftol=self.asked.tolerance, gtol=1e-15, max_nfev=self.asked.evaluations,
         )  # fmt: skip
         return self._optimum(r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, r.message)
 
-    def minimum(self, function: Callable[[np.ndarray], float], evaluations: int, tolerance: float) -> Optimum:
+    def minimum(self, function: Callable[[np.ndarray], float]) -> Optimum:
         """Minimisation of a function of the quantities."""
         from scipy.optimize import minimize
 
@@ -192,7 +166,8 @@ class Search:
             ).real * self.scale
 
         bounds = list(zip(self.low, self.high, strict=True))
-        options = {"maxfun": evaluations, "ftol": tolerance, "gtol": tolerance}
+        tolerance = self.asked.tolerance
+        options = {"maxfun": self.asked.evaluations, "ftol": tolerance, "gtol": tolerance}
         r = minimize(cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
         return self._optimum(r.x, float(r.fun), first, bool(r.success), str(r.message))
 
@@ -204,7 +179,7 @@ class Search:
             n for n, b in zip(self.names, (x - self.low < near) | (self.high - x < near), strict=True) if b
         )
         return Optimum(
-            best, start, cost, first, success, message.rstrip("."), self.count, self.of or found.of, found.t,
+            best, start, cost, first, success, message.rstrip("."), self.count, self.asked.of or found.of, found.t,
             found.values, at_bound,
         )  # fmt: skip
 

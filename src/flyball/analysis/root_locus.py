@@ -2,94 +2,100 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
+from ..results.equilibrium import Equilibrium
 from ..results.linear import follow
 from ..results.root_locus import Crossing, RootLocus
-from .linearize import linearize
-from .series import checked, equilibria, stopped
+from .linearize import InstantOptions, LinearizeOptions, linearize
+from .progress import shown
+from .series import EquilibriaOptions, checked, equilibria, stopped
 
 TOUCHING = 1e-6  # real parts below this part of the largest eigenvalue are none
 EXACT = 1e-12  # of the stretch between two values
 
 
-def root_locus(
-    model: Model,
-    parameter: str,
-    values: Sequence[float],
-    *,
-    equilibrium: bool = False,
-    parameters: Mapping[str, float] | None = None,
-    **options: Any,
-) -> RootLocus:
-    """Eigenvalues over values of a parameter, as branches.
+@dataclass(frozen=True, kw_only=True)
+class RootLocusOptions(InstantOptions):
+    """What `Mechanism.root_locus` is asked."""
 
-    Parameters
-    ----------
-    model : Model
-    parameter : str
-    values : sequence of float
-        In SI units.
-    equilibrium : bool
-        About the equilibrium at each value, each following from the one before; else as described at each value.
-    parameters : mapping, optional
-        Values in SI units in place of the model's.
-    **options
-        As for `flyball.analysis.linearize.linearize`: ``t``, ``coordinates``, ``frozen``; ``about`` may be a result.
+    parameter: str
+    values: Sequence[float] | np.ndarray
+    equilibrium: bool
+    progress: bool | Callable[[float], None]
 
-    Returns
-    -------
-    RootLocus
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if isinstance(self.about, Equilibrium):
+            raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
+        if self.about is not None and self.equilibrium:
+            raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
 
-    Raises
-    ------
-    NotConverged
-        If the mechanism cannot be linearised at a value; ``series`` holds what was found before.
-    ModelError
-        If there is no such parameter, or ``about`` is an equilibrium, which is one of other values.
-    """
-    if options.get("about") is not None and hasattr(options["about"], "stability"):
-        raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
-    points = checked(model, parameter, values)
-    base = dict(parameters or {})
-    times = {"t": options.pop("t", 0.0)}
-    along = equilibria(model, parameter, points, parameters=base, **times) if equilibrium else None
+    def linear(self, value: float, about: Equilibrium | None) -> LinearizeOptions:
+        """What is asked at a value: linear equations there, about an equilibrium if that is given."""
+        t, parameters = self.t, dict(self.parameters or {})
+        if self.parameter == "t":
+            t = value
+        else:
+            parameters[self.parameter] = float(value)
+        return LinearizeOptions(
+            inputs=(),
+            outputs=(),
+            about=self.about if about is None else about,
+            t=t if about is None else None,
+            parameters=parameters,
+            coordinates=self.coordinates,
+            frozen=self.frozen,
+        )
+
+    def rest(self, values: Sequence[float] | np.ndarray, start: Equilibrium | None = None) -> EquilibriaOptions:
+        """What is asked for the equilibria at values."""
+        return EquilibriaOptions(
+            parameter=self.parameter,
+            values=values,
+            t=self.t or 0.0,
+            parameters=self.parameters,
+            start=start,
+            stable=False,
+            progress=False,
+        )
+
+
+def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
+    """Eigenvalues over values of a parameter, as branches: see `Mechanism.root_locus`."""
+    points = checked(model, o.parameter, o.values)
+    along = equilibria(model, o.rest(points)) if o.equilibrium else None
 
     def at(value: float, near: int) -> np.ndarray:
-        given = dict(times, parameters=base)
-        if parameter == "t":
-            given["t"] = value
-        else:
-            given["parameters"] = {**base, parameter: float(value)}
-        own = dict(options)
+        about = None
         if along is not None:
-            same = along.values[near] == value
-            own["about"] = along[near] if same else _near(model, parameter, value, along, near, base, times)
-        return np.linalg.eigvals(linearize(model, **given, **own).A)
+            about = along[near]
+            if along.values[near] != value:  # between those of the series
+                about = equilibria(model, o.rest([along.values[near], value], about))[1]
+        return np.linalg.eigvals(linearize(model, o.linear(value, about)).A)
 
-    done = RootLocus(model.name, parameter, points[:0], np.zeros((0, 0), complex))
-    for k, value in enumerate(points):
-        try:
-            w = at(value, k)
-            if k and len(w) != done.eigenvalues.shape[1]:
-                raise AnalysisError(f"there are {len(w)} states, and {done.eigenvalues.shape[1]} at the values before")
-        except AnalysisError as error:
-            raise stopped(done, value, error) from error
-        rows = [*done.eigenvalues, w] if k else [w[np.lexsort((w.real, w.imag))]]
-        done.eigenvalues, done.values = follow(np.array(rows)), points[: k + 1]
-    done.crossings = _crossings(done, at)
+    done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
+    with shown(o.progress, f"eigenvalues over {o.parameter}") as tell:
+        for k, value in enumerate(points):
+            try:
+                w = at(value, k)
+                if k and len(w) != done.eigenvalues.shape[1]:
+                    raise AnalysisError(
+                        f"there are {len(w)} states, and {done.eigenvalues.shape[1]} at the values before"
+                    )
+            except AnalysisError as error:
+                raise stopped(done, value, error) from error
+            rows = [*done.eigenvalues, w] if k else [w[np.lexsort((w.real, w.imag))]]
+            done.eigenvalues, done.values = follow(np.array(rows)), points[: k + 1]
+            tell((k + 1) / len(points), f"{value:.6g}")
+        done.crossings = _crossings(done, at)
     return done
-
-
-def _near(model: Model, parameter: str, value: float, along: Any, k: int, base: dict, times: dict) -> Any:
-    """The equilibrium at a value between those of a series."""
-    return equilibria(model, parameter, [along.values[k], value], parameters=base, start=along[k], **times)[1]
 
 
 def _crossings(locus: RootLocus, at: Callable[[float, int], np.ndarray]) -> list[Crossing]:

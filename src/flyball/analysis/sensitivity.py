@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError, SingularityError
-from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..model.quantities import one
 from ..results.linear import follow
+from ..results.result import Result
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
-from .equilibrium import equilibrium
+from .equilibrium import equilibrium, resting
 from .linear.begun import held, start_tangents
 from .linear.curves import slopes, snapshot
 from .linear.derivatives import Equations, State
@@ -29,10 +29,65 @@ from .linear.tangent import Direction, Linear, Tangent, closed
 from .linear.undetermined import refuse_undetermined
 from .linear.variation import Variation
 from .linearize import without_inputs
-from .motion.options import output_times
-from .simulate import simulate
+from .motion.options import output_times, projected
+from .options import Options, positive
+from .simulate import SimulateOptions, simulate
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
+
+
+USUAL = {"outputs": 51, "rtol": 1e-9, "atol": 1e-11}  # of a motion, where they are not given
+
+
+@dataclass(frozen=True, kw_only=True)
+class DerivativeOptions(Options):
+    """What derivatives are asked of: quantities, parameters, and the analysis that makes the ones of the others."""
+
+    analysis: str
+    t: float
+    t_end: float | None
+    outputs: int | Sequence[float] | None
+    parameters: Mapping[str, float] | None
+    about: str | None
+    rtol: float | None
+    atol: float | None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.analysis not in ANALYSES:
+            known = list(ANALYSES)
+            raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, known)}; {listing(known)}")
+        for name in ("t_end", "outputs", "rtol", "atol"):
+            if getattr(self, name) is not None and self.analysis != "motion":
+                raise ModelError(f"{name} is of a motion; with analysis={self.analysis!r} it does nothing")
+        if self.analysis == "motion" and self.t_end is None:
+            raise ModelError("sensitivity of a motion: give t_end")
+        for name in ("rtol", "atol"):
+            if getattr(self, name) is not None:
+                positive(getattr(self, name), name)
+        if self.about is not None and self.analysis != "modes":
+            raise ModelError(f"about is for modes; with analysis={self.analysis!r} it does nothing")
+        if self.about not in (None, "equilibrium"):
+            raise ModelError(f"about must be 'equilibrium' or nothing, got {_what(self.about)}")
+
+    def of_motion(self, name: str) -> Any:
+        """An option of a motion, or what is usual."""
+        value = getattr(self, name)
+        return USUAL[name] if value is None else value
+
+
+@dataclass(frozen=True, kw_only=True)
+class SensitivityOptions(DerivativeOptions):
+    """What `Mechanism.sensitivity` is asked."""
+
+    of: tuple[str, ...]
+    to: tuple[str, ...]
+    verify: bool
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if not self.of and self.analysis != "modes":
+            raise ModelError("say which quantities: of=['slider.x'], for instance")
 
 
 @dataclass
@@ -44,72 +99,27 @@ class Question:
     to: tuple[str, ...]
     t: float
     parameters: dict[str, float]
-    times: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    about: Any = None
-    rtol: float = 1e-9
-    atol: float = 1e-11
+    times: np.ndarray
+    about: str | None
+    rtol: float
+    atol: float
 
 
-def sensitivity(
-    model: Model,
-    of: Sequence[str] = (),
-    to: Sequence[str] = (),
-    *,
-    analysis: str = "instant",
-    t: float | str = 0.0,
-    t_end: float | str | None = None,
-    outputs: int | Sequence[float] = 51,
-    parameters: Mapping[str, float] | None = None,
-    about: Any = None,
-    verify: bool = False,
-    rtol: float = 1e-9,
-    atol: float = 1e-11,
-) -> Sensitivity:
-    """Derivatives of quantities with respect to parameters.
-
-    Exact: complex steps through the formulas, along the change that the linearised equations prescribe. How the matrix
-    behind eigenvalues changes, and a start that assembly had to find, comes from differences of sixth order.
-
-    Parameters
-    ----------
-    of : sequence of str
-        Sensors, or curves of a result (``"slider.x"``). For ``"modes"`` none: all eigenvalues.
-    to : sequence of str
-        Parameters; all of the model's if none is named.
-    analysis : str
-        ``"instant"`` (at ``t``), ``"motion"`` (from ``t`` to ``t_end``), ``"equilibrium"``, ``"modes"`` (eigenvalues).
-    t, t_end : float [s]
-    outputs : int or sequence of float
-        Number of times of a motion, or the times [s].
-    parameters : mapping, optional
-        Values in SI units in place of the model's.
-    about : ``"equilibrium"`` or None
-        For modes: about the static equilibrium, or where the mechanism is drawn.
-    verify : bool
-        Also by central differences of the whole analysis.
-    rtol, atol : float
-
-    Returns
-    -------
-    Sensitivity
-
-    Raises
-    ------
-    ModelError
-        If a name does not exist, a reaction is left undetermined by redundancy, or a law jumps during a motion.
-    SingularityError
-        If what is asked has no derivative there: at a kink of a force, for instance.
-    """
-    _refuse(model, of, to, analysis, parameters)
-    env, start = model.environment(parameters), number(t, {}, "s", "t")
-    a = Question(model.snapshot(), tuple(of), tuple(to or env), start, dict(parameters or {}), about=about)
-    if analysis == "motion":
-        if t_end is None:
-            raise ModelError("sensitivity of a motion: give t_end")
-        a.times, a.rtol, a.atol = output_times(start, number(t_end, {}, "s", "t_end"), outputs), rtol, atol
-    out = ANALYSES[analysis][0](a)
+def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
+    """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
+    env = model.environment(o.parameters)
+    for name in o.to:
+        if name not in env:
+            known = list(env)
+            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+    for name in o.of if o.analysis != "modes" else ():
+        one(model, name)
+    times = np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs"))
+    rtol, atol = o.of_motion("rtol"), o.of_motion("atol")
+    a = Question(model.snapshot(), o.of, o.to or tuple(env), o.t, dict(o.parameters or {}), times, o.about, rtol, atol)
+    out = ANALYSES[o.analysis][0](a)
     out.parameters = {name: env[name] for name in a.to}
-    return _verified(a, analysis, out) if verify else out
+    return _verified(a, o.analysis, out) if o.verify else out
 
 
 def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
@@ -118,22 +128,6 @@ def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
     parts = [check(a.model, a.parameters, name, again) for name in a.to]
     out.verification = np.stack([x.reshape(out.values.shape) for x in parts], axis=-1)
     return out
-
-
-def _refuse(model: Model, of: Sequence[str], to: Sequence[str], analysis: str, parameters: Any) -> None:
-    """Refuse names that do not exist."""
-    if not len(of) and analysis != "modes":
-        raise ModelError("say which quantities: of=['slider.x'], for instance")
-    if isinstance(of, str) or isinstance(to, str):
-        raise ModelError("of and to are lists of names, for instance of=['slider.x'], to=['crank']")
-    if analysis not in ANALYSES:
-        raise ModelError(f"unknown analysis {analysis!r}{suggest(analysis, list(ANALYSES))}; {listing(list(ANALYSES))}")
-    for name in of if analysis != "modes" else ():
-        one(model, name)
-    known = list(model.environment(parameters))
-    for name in to:
-        if name not in known:
-            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
 
 
 def _what(value: Any) -> str:
@@ -212,7 +206,7 @@ def _driven(
     a: Question, x: State, directions: Sequence[Direction], times: np.ndarray
 ) -> Iterator[tuple[State, list[Tangent]]]:
     """States and tangents of a motion that drivers prescribe: the constraints alone decide both."""
-    r = simulate(a.model, times[-1], t_start=a.t, outputs=list(times), parameters=a.parameters, coordinates="absolute")
+    r = _simulated(a, times, a.parameters, "absolute", 1e-8, 1e-10)
     still = np.zeros(len(x.v))
     for k, t in enumerate(times.tolist()):
         x.c.z[:] = r.states[k]
@@ -221,18 +215,32 @@ def _driven(
         yield state, [closed(d, state, lin, still, still) for d in directions]
 
 
+def _simulated(
+    a: Question, times: np.ndarray, parameters: Mapping[str, float], coordinates: str, rtol: float, atol: float
+) -> Result:
+    """The motion at times."""
+    asked = SimulateOptions(
+        t_end=float(times[-1]),
+        t_start=a.t,
+        outputs=times.tolist(),
+        parameters=parameters,
+        start=None,
+        progress=False,
+        **projected(coordinates, rtol, atol).choices(),
+    )
+    return simulate(a.model, asked)
+
+
 def _at_motion(a: Question) -> Found:
     def found(parameters: Mapping[str, float]) -> np.ndarray:
-        r = simulate(
-            a.model, a.times[-1], t_start=a.t, outputs=list(a.times), parameters=parameters, rtol=1e-12, atol=1e-13
-        )
+        r = _simulated(a, a.times, parameters, "auto", 1e-12, 1e-13)
         return np.stack([r.curve(name)[1] for name in a.of], axis=1)
 
     return found
 
 
 def _equilibrium(a: Question) -> Sensitivity:
-    found = equilibrium(a.model, t=a.t, parameters=a.parameters)
+    found = equilibrium(a.model, resting(a.t, a.parameters))
     if abs(found.least) < FLAT:
         weak = ", ".join(found.weakest)
         raise SingularityError(
@@ -258,10 +266,10 @@ def _equilibrium(a: Question) -> Sensitivity:
 
 
 def _at_rest(a: Question) -> Found:
-    begin = equilibrium(a.model, t=a.t, parameters=a.parameters)
+    begin = equilibrium(a.model, resting(a.t, a.parameters))
 
     def found(parameters: Mapping[str, float]) -> np.ndarray:
-        b = equilibrium(a.model, t=a.t, parameters=parameters, start=begin)
+        b = equilibrium(a.model, resting(a.t, parameters, begin))
         return _row(State.resting(b.assembly.compiled, a.t, b.assembly.q, b.result.multipliers[0]), a.of)
 
     return found
@@ -286,14 +294,12 @@ def _modes(a: Question) -> Sensitivity:
 
 def _states(a: Question) -> Callable[[Mapping[str, float]], State]:
     """The state that eigenvalues are of, for any parameters: where it is drawn, or the equilibrium near the first."""
-    if a.about not in (None, "equilibrium"):
-        raise ModelError(f"about must be 'equilibrium' or nothing, got {_what(a.about)}")
     begin: list[Any] = []
 
     def state(parameters: Mapping[str, float]) -> State:
         about = None
         if a.about == "equilibrium":
-            about = equilibrium(a.model, t=a.t, parameters=parameters, start=begin[0] if begin else None)
+            about = equilibrium(a.model, resting(a.t, parameters, begin[0] if begin else None))
             begin.append(about)
         return instant(a.model, about, t=a.t, parameters=parameters, coordinates="absolute")[0]
 

@@ -14,15 +14,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError, ModelError, NotConverged
-from ..model.expressions import number
 from ..model.model import Model, listing, suggest
 from ..results.equilibrium import UNSTABLE, Equilibrium
 from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
-from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed
+from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, resting
 from .equilibrium import equilibrium as single
 from .linear.rest import Rest
 from .linear.stability import stability
+from .options import Options
+from .progress import shown
 
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
@@ -31,63 +32,41 @@ PUSH = 1e-2  # in radians or parts of the length
 TINY = 1e-7  # steps, in radians or parts of the length, that rounding may keep from becoming shorter
 
 
-def equilibria(
-    model: Model,
-    parameter: str,
-    values: Sequence[float] | np.ndarray,
-    *,
-    t: float | str = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    start: Equilibrium | None = None,
-    stable: bool = False,
-) -> EquilibriumSeries:
-    """Equilibria over values of a parameter, each following from the one before.
+@dataclass(frozen=True, kw_only=True)
+class EquilibriaOptions(Options):
+    """What `Mechanism.equilibria` is asked."""
 
-    Where the branch ends, the series goes on from where the forces then lead; such jumps are told.
+    parameter: str
+    values: Sequence[float] | np.ndarray
+    t: float
+    parameters: Mapping[str, float] | None
+    start: Equilibrium | None
+    stable: bool
+    progress: bool | Callable[[float], None]
 
-    Parameters
-    ----------
-    model : Model
-    parameter : str
-        A parameter of the model, or ``"t"``: drivers and forces then change as their laws say.
-    values : sequence of float
-        In SI units, in the order in which they are gone through.
-    t, parameters, start
-        As for `flyball.analysis.equilibrium.equilibrium`; ``start`` is for the first value.
-    stable : bool
-        Leave a branch where it becomes unstable; else it is followed on.
 
-    Returns
-    -------
-    EquilibriumSeries
-
-    Raises
-    ------
-    NotConverged
-        If no equilibrium can be found at a value, or none that is stable; ``series`` holds those before.
-    ModelError
-        If there is no such parameter, or a value is not finite.
-    AssemblyError
-        If the mechanism cannot be assembled at the first value.
-    """
-    points = checked(model, parameter, values)
-    way = _Way(model, parameter, number(t, {}, "s", "t"), dict(parameters or {}), stable)
-    done = EquilibriumSeries(model.name, parameter, points[:0], [], way.jumps)
+def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
+    """Equilibria over values of a parameter, each following from the one before: see `Mechanism.equilibria`."""
+    points = checked(model, o.parameter, o.values)
+    way = _Way(model, o.parameter, o.t, dict(o.parameters or {}), o.stable)
+    done = EquilibriumSeries(model.name, o.parameter, points[:0], [], way.jumps)
     x: Rest | None = None
-    for k, value in enumerate(points):
-        before = len(way.jumps)
-        try:
-            if x is None:
-                first = single(model, start=start, stable=stable, **way.given(value))
-                x = way.rest(first)
-                done.equilibria.append(first)
-            else:
-                x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
-                how = "following" if len(way.jumps) == before else "descent"
-                done.equilibria.append(_finished(x, {}, how))
-        except NotConverged as error:
-            raise stopped(done, value, error) from error
-        done.values = points[: k + 1]
+    with shown(o.progress, f"equilibria over {o.parameter}") as tell:
+        for k, value in enumerate(points):
+            before = len(way.jumps)
+            try:
+                if x is None:
+                    first = single(model, resting(*way.given(value), o.start, o.stable))
+                    x = way.rest(first)
+                    done.equilibria.append(first)
+                else:
+                    x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
+                    how = "following" if len(way.jumps) == before else "descent"
+                    done.equilibria.append(_finished(x, {}, how))
+            except NotConverged as error:
+                raise stopped(done, value, error) from error
+            done.values = points[: k + 1]
+            tell((k + 1) / len(points), f"{value:.6g}")
     return done
 
 
@@ -124,11 +103,11 @@ class _Way:
     stable: bool
     jumps: list[Jump] = field(default_factory=list)
 
-    def given(self, value: float) -> dict[str, Any]:
+    def given(self, value: float) -> tuple[float, dict[str, float]]:
         """Time and parameters at a value."""
         if self.parameter == "t":
-            return {"t": value, "parameters": self.parameters}
-        return {"t": self.t, "parameters": {**self.parameters, self.parameter: float(value)}}
+            return float(value), self.parameters
+        return self.t, {**self.parameters, self.parameter: float(value)}
 
     def rest(self, e: Equilibrium) -> Rest:
         """An equilibrium as a place to go on from."""
@@ -137,10 +116,10 @@ class _Way:
 
     def at(self, x: Rest, value: float) -> Rest:
         """The same place under another value."""
-        given = self.given(value)
-        c = compiled(self.model, parameters=given["parameters"])
+        t, parameters = self.given(value)
+        c = compiled(self.model, parameters=parameters)
         q, _ = c.take(x.c, x.t, x.q, np.zeros(len(x.scale)))
-        return Rest(c, given["t"], q, x.lam)
+        return Rest(c, t, q, x.lam)
 
     def follow(self, x: Rest, here: float, there: float, halvings: int) -> Rest:
         """On from one value to another, along the branch or by a jump."""

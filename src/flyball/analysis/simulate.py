@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,7 +13,6 @@ import numpy as np
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..errors import StartWarning
 from ..laws.functions import forget, interrupts_kept
-from ..model.expressions import number
 from ..model.model import Model
 from ..numerics.integrators import explicit as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
@@ -22,73 +22,48 @@ from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
-from .motion.options import STABILIZATION, Options, options_from, output_times
+from .motion.options import STABILIZATION, Integration, output_times
 from .motion.outcome import outcome
-from .motion.start import Start, begin
+from .motion.start import Start, begin, start_time
+from .progress import Tell, shown
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
-def simulate(
-    model: Model,
-    t_end: float,
-    *,
-    t_start: float = 0.0,
-    outputs: int | Sequence[float] = 501,
-    parameters: Mapping[str, float] | None = None,
-    start: Result | None = None,
-    progress: Callable[[float], None] | None = None,
-    **options: object,
-) -> Result:
-    """Integrate the equations of motion from ``t_start`` to ``t_end``.
+@dataclass(frozen=True, kw_only=True)
+class SimulateOptions(Integration):
+    """What `Mechanism.simulate` is asked."""
 
-    Parameters
-    ----------
-    model : Model
-    t_end, t_start : float [s]
-    outputs : int or sequence of float
-        Number of evenly spaced output times, or the times [s] themselves.
-    parameters : mapping, optional
-        Values of parameters in SI units, in place of the model's.
-    start : Result, optional
-        Go on from where this result ended; its last time is then ``t_start``.
-    progress : callable, optional
-        Called with the fraction done about twenty times a second.
-    **options
-        Fields of `Options`.
+    t_end: float
+    t_start: float | None
+    outputs: int | Sequence[float]
+    parameters: Mapping[str, float] | None
+    start: Result | None
+    progress: bool | Callable[[float], None]
 
-    Returns
-    -------
-    Result
 
-    Raises
-    ------
-    AssemblyError
-        If the start cannot be made consistent.
-    SimulationError
-        If the integration cannot go on; its ``result`` holds the motion up to then.
-    """
-    chosen = options_from(options)
+def simulate(model: Model, o: SimulateOptions) -> Result:
+    """Integrate the equations of motion: see `Mechanism.simulate`."""
     started = time.perf_counter()
     model = model.snapshot()
-    t_start = number(t_start, {}, "s", "t_start") if start is None else start.final[0]
-    t_end = number(t_end, {}, "s", "t_end")
-    times = output_times(t_start, t_end, outputs)
-    begun = begin(model, t_start, parameters, start, chosen.coordinates)
+    t_start = start_time(o.t_start, o.start)
+    times = output_times(t_start, o.t_end, o.outputs)
+    begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     for d in changed_velocities(begun.base.departures):
         warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
-    follow = chosen.stabilization == "projection" and leaves_no_freedom(begun)
-    return moved(begun, t_end, times, chosen, FOLLOW if follow else INTEGRATE, progress)
+    follow = o.stabilization == "projection" and leaves_no_freedom(begun)
+    with shown(o.progress, "simulating") as tell:
+        return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
 
 
 def moved(
     begun: Start,
     t_end: float,
     times: np.ndarray,
-    o: Options,
+    o: Integration,
     task: int,
-    progress: Callable[[float], None] | None = None,
+    tell: Tell,
 ) -> Result:
     """The motion from where it begins, integrated (task INTEGRATE) or as drivers prescribe it (FOLLOW).
 
@@ -100,7 +75,7 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
-    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), progress, task)
+    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -108,7 +83,7 @@ def moved(
     return outcome(begun.base.compiled.structure.model, begun, clock, rows, o, interrupted, owed)
 
 
-def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Options) -> ex.Clock:
+def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
     s, W = a.compiled.structure, a.compiled.work
@@ -124,7 +99,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Option
     Y = np.zeros((3, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
-    W.option[ALPHA], W.option[BETA] = o.alpha, o.beta
+    W.option[ALPHA], W.option[BETA] = o.alpha or 0.0, o.beta or 0.0
     loose = o.atol + o.rtol * a.compiled.values.length
     W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
     W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
@@ -145,15 +120,14 @@ def _energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
-def run_clock(
-    a: Assembly, clock: ex.Clock, method: Tableau, progress: Callable | None, task: int
-) -> tuple[np.ndarray, bool]:
+def run_clock(a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
     width = 1 + len(a.y) + s.nv + len(S.row_i) + len(s.prescribed)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
+    span = clock.real[ex.T_END] - first or 1.0
     forget(W.stack)
     try:
         while True:
@@ -162,8 +136,7 @@ def run_clock(
             with interrupts_kept(s.functions):
                 used = motion_kernel(S, W, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
-            if progress is not None:
-                progress((clock.real[ex.T] - first) / (clock.real[ex.T_END] - first))
+            tell((clock.real[ex.T] - first) / span)
             if clock.count[ex.STATUS] != ex.RUNNING:
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin

@@ -7,6 +7,7 @@ slider-crank); theory of branching after H. B. Keller (1977).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model
 from ..results.singularities import Branch, Singularities
+from .options import Options, positive
+from .options import count as at_least
 from .singular.branches import Curve, crossing
 from .singular.classify import point
 from .singular.closure import Place
@@ -25,61 +28,28 @@ NEAR = 1e-4  # a start this near to a singular position is drawn there [1]
 EDGE = 1e-9  # of the range: how far beyond its ends a singular position may lie
 
 
-def singularities(
-    model: Model,
-    driver: str,
-    range: Sequence[float | str],
-    *,
-    t: float = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    branch: Branch | int | None = None,
-    step: float = 0.1,
-    steps: int = 5000,
-) -> Singularities:
-    """Follow a driven motion and find every position where the driven Jacobian loses rank.
+@dataclass(frozen=True, kw_only=True)
+class SingularitiesOptions(Options):
+    """What `Mechanism.singularities` is asked."""
 
-    From the assembled position the curve of positions is followed by arc length, both ways, with the driver's law
-    replaced by a value a of its coordinate, until a leaves the range or the curve closes. Where the driver locks up
-    the curve turns back, and is followed on the other side. Other drivers stay at what they ask for at time t.
+    driver: str
+    range: Sequence[float | str]
+    t: float
+    parameters: Mapping[str, float] | None
+    branch: Branch | int | None
+    step: float
+    steps: int
 
-    Parameters
-    ----------
-    model : Model
-    driver : str
-        Name of the driver whose coordinate is varied.
-    range : (a0, a1)
-        Of the driver's coordinate [rad] or [m], or with a unit: ``("0 deg", "360 deg")``.
-    t : float
-        Time at which the laws are taken [s].
-    parameters : mapping, optional
-        Values in SI units in place of the model's own.
-    branch : Branch or int, optional
-        Start from the singular position that this branch was found at, along it; where the mechanism is drawn in a
-        singular position, the number of its branch to follow (the first if not told).
-    step : float
-        The longest step along the curve [1]: radians, and lengths as parts of the mechanism's.
-    steps : int
-        The most steps in each direction.
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        positive(self.step, "step")
+        at_least(self.steps, "steps")
 
-    Returns
-    -------
-    Singularities
 
-    Raises
-    ------
-    ModelError
-        If there is no such driver, no such branch, the range is none, or constraints restrain velocities only.
-    AssemblyError
-        If the mechanism cannot be assembled as described.
-    MobilityError
-        If freedoms are left besides the driver, or none is left to it.
-    SingularityError
-        If the range is not reached, saying where the mechanism locks up.
-    NotConverged
-        If the curve cannot be followed.
-    """
-    f = freed(model, driver, t, parameters)
-    return _followed(f, Tracer(f.closure, step), _range(f, range, parameters), branch, steps)
+def singularities(model: Model, o: SingularitiesOptions) -> Singularities:
+    """Follow a driven motion through its singular positions: see `Mechanism.singularities`."""
+    f = freed(model, o.driver, o.t, o.parameters)
+    return _followed(f, Tracer(f.closure, o.step), _range(f, o.range, o.parameters), o.branch, o.steps)
 
 
 def _followed(

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from .common import Json, Model, app, print_json, reported, table
-from .loading import load_mechanism
-from .progress import announce_compiling
+from ..methods.freedom import Freedom
+from .asking import Asked, command
 
 
-@app.command()
-def check(model: Model, as_json: Json = False) -> None:
-    """Freedoms, redundant joints, assembly, mass properties and warnings, without simulating."""
-    with reported(as_json):
-        mechanism = load_mechanism(model)
-        announce_compiling(not as_json)
-        report = mechanism.check()
-        if as_json:
-            print_json(report.as_dict())
-        else:
-            table(report.lines())
+@command(Freedom.check)
+def check(asked: Asked) -> None:
+    """Print the report."""
+    asked.say(asked.answer())

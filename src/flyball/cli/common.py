@@ -28,8 +28,16 @@ app = typer.Typer(
 
 Model = Annotated[Path, typer.Argument(help="A model file: .toml, or .py that defines m, mechanism or mechanism().")]
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object and nothing else.")]
-Time = Annotated[str, typer.Option("--t", help='Time at which laws of drivers and forces are taken, e.g. "0.5 s".')]
 Resting = Annotated[bool, typer.Option("--equilibrium", help="About the equilibrium next to the mechanism as drawn.")]
+Turning = Annotated[
+    list[str] | None,
+    typer.Option(help="About the steady motion in which this joint's coordinate turns evenly; may be repeated."),
+]
+Plot = Annotated[Path | None, typer.Option(help="Write a picture to a PNG, SVG or PDF file.")]
+Page = Annotated[Path | None, typer.Option("--out", "-o", help="Write a page (.html) that shows it.")]
+Out = Annotated[
+    Path | None, typer.Option("--out", "-o", help="Folder for the results; by default named after the model.")
+]
 Changes = Annotated[list[str] | None, typer.Option("--set", help='Set a parameter: --set speed="120 rpm".')]
 
 
@@ -85,10 +93,3 @@ def make_folder(folder: Path) -> None:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise ModelError(f"cannot make the folder {str(folder)!r}: {error.strerror}") from None
-
-
-def seconds(text: str, option: str = "--t-end") -> float:
-    """A time from the command line."""
-    from ..model.expressions import number
-
-    return float(number(text, {}, "s", option))

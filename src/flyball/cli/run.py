@@ -9,22 +9,10 @@ from typing import TYPE_CHECKING, Annotated, cast
 import typer
 
 from ..errors import SimulationError
-from .common import (
-    FAILED,
-    INTERRUPTED,
-    Changes,
-    Json,
-    Model,
-    app,
-    fail,
-    make_folder,
-    print_json,
-    reported,
-    seconds,
-    table,
-)
-from .loading import load_mechanism, set_parameters
-from .progress import progress_bar
+from ..methods.motion import Motions
+from .asking import Asked, command
+from .common import FAILED, INTERRUPTED, Out, fail, make_folder, print_json, table
+from .flags import Flag
 
 if TYPE_CHECKING:
     from ..results.result import Result
@@ -32,45 +20,30 @@ if TYPE_CHECKING:
 CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
 
 
-@app.command()
+@command(Motions.simulate, name="run", own={"t_end": Flag(default="10")})
 def run(
-    model: Model,
-    t_end: Annotated[str, typer.Option(help='End of the motion, e.g. 10 or "500 ms".')] = "10",
-    out: Annotated[Path | None, typer.Option(help="Folder for the results; by default named after the model.")] = None,
-    outputs: Annotated[int, typer.Option(help="Number of output times.")] = 501,
-    rtol: Annotated[float | None, typer.Option(help="Relative tolerance.")] = None,
-    atol: Annotated[float | None, typer.Option(help="Absolute tolerance.")] = None,
-    method: Annotated[str | None, typer.Option(help="Integration method.")] = None,
-    coordinates: Annotated[str, typer.Option(help="absolute, joint, or auto: those that cost less.")] = "auto",
-    change: Changes = None,
+    asked: Asked,
+    *,
+    out: Out = None,
     no_plots: Annotated[bool, typer.Option("--no-plots", help="Write no pictures.")] = False,
     no_animation: Annotated[bool, typer.Option("--no-animation", help="Write no animation page.")] = False,
     report: Annotated[
         bool | None, typer.Option(help="Write the report; by default unless there is to be no animation.")
     ] = None,
-    as_json: Json = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")] = False,
 ) -> None:
-    """Simulate a mechanism and write its motion: report.html, animation.html, plots, result.csv and result.nc."""
-    with reported(as_json):
-        mechanism = load_mechanism(model)
-        set_parameters(mechanism, change or [])
-        end = seconds(t_end)
-        folder = out if out is not None else Path(f"{model.stem}-result")
-        chosen = {"rtol": rtol, "atol": atol, "method": method, "coordinates": coordinates}
-        options = {k: v for k, v in chosen.items() if v is not None}
-        talk = not (as_json or quiet)
-        error = None
-        try:
-            with progress_bar(talk) as progress:
-                result = mechanism.simulate(end, outputs=outputs, progress=progress, **options)
-        except SimulationError as stopped:
-            if stopped.result is None:
-                raise
-            result, error = cast("Result", stopped.result), stopped
-        pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
-        files, notes = _write(result, folder, not no_plots, [name for name, wanted in pages.items() if wanted])
-        _conclude(result, error, files, notes, as_json, talk)
+    """Write report.html, animation.html, plots, result.csv and result.nc."""
+    talk, error = not (asked.as_json or quiet), None
+    try:
+        result = asked.answer(progress=talk)
+    except SimulationError as stopped:
+        if stopped.result is None:
+            raise
+        result, error = cast("Result", stopped.result), stopped
+    pages = {"report.html": not no_animation if report is None else report, "animation.html": not no_animation}
+    folder = out if out is not None else Path(f"{asked.source.stem}-result")
+    files, notes = _write(result, folder, not no_plots, [name for name, wanted in pages.items() if wanted])
+    _conclude(result, error, files, notes, asked.as_json, talk)
 
 
 def _conclude(

@@ -75,4 +75,4 @@ def _register() -> None:
     def choose(address, stack, row):
         if isinstance(stack.dtype, types.Complex):
             return lambda address, stack, row: None
-        return lambda address, stack, row: jump(address, stack, row)
+        return lambda address, stack, row: jump(address, stack, row)  # type: ignore[call-arg]

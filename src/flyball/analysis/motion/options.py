@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ...equations import motion
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
+from ..options import Options, count, positive, seconds
 from .layer import known as known_coordinates
 
 STABILIZATION = {
@@ -22,36 +24,32 @@ STABILIZATION = {
     "velocities": motion.VELOCITIES,
     "partitioning": motion.PARTITIONING,
 }
+MOST = 10_000_000  # steps
+RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
 
 
-@dataclass(frozen=True)
-class Options:
-    """Choices of a simulation, as kept in the result.
+@dataclass(frozen=True, kw_only=True)
+class Integration(Options):
+    """How a motion is integrated, as kept in the result; the meanings stand with `Mechanism.simulate`."""
 
-    ``coordinates``: ``absolute``, ``joint``, or ``auto`` for those in which a right-hand side costs less; the result's
-    health says which and why. ``method``: an explicit Runge-Kutta pair. ``stabilization``: ``projection`` (states and
-    stages are kept on the constraints), ``projection-steps`` (states only), ``positions`` or ``velocities`` (only these
-    are kept), ``partitioning`` (dependent coordinates are solved for the independent ones), ``baumgarte`` with its two
-    rates [1/s], or ``none``; `Mechanism.compare` shows what they do. ``max_step`` [s]: give it where a law acts for a
-    short time only; what is shorter than a step can go unseen.
-    """
-
-    rtol: float = 1e-8
-    atol: float = 1e-10
-    method: str = "dop853"
-    coordinates: str = "auto"
-    stabilization: str = "projection"
-    alpha: float = 10.0
-    beta: float = 10.0
-    max_step: float = np.inf
-    max_steps: int = 10_000_000
+    coordinates: str
+    method: str
+    rtol: float
+    atol: float
+    max_step: float
+    max_steps: int
+    stabilization: str
+    alpha: float | None
+    beta: float | None
 
     def __post_init__(self) -> None:
-        for name in ("rtol", "atol", "max_step", "max_steps", "alpha", "beta"):
-            value = getattr(self, name)
-            if not isinstance(value, (int, float, np.number)) or not value > 0:
-                raise ModelError(f"{name} must be greater than 0, got {value!r}")
+        super().__post_init__()
+        if isinstance(self.max_step, str):
+            object.__setattr__(self, "max_step", seconds(self.max_step, "max_step"))
+        for name in ("rtol", "atol", "max_step"):
+            positive(getattr(self, name), name)
+        count(self.max_steps, "max_steps")
         if self.rtol < FINEST:
             raise ModelError(
                 f"rtol must not be smaller than {FINEST:g}, got {self.rtol!r}: rounding is larger than that"
@@ -60,19 +58,42 @@ class Options:
         if self.stabilization not in STABILIZATION:
             known = ", ".join(STABILIZATION)
             raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
+        self._rates()
         try:
             tableau(self.method)
         except ValueError as error:
             raise ModelError(str(error)) from None
 
+    def _rates(self) -> None:
+        """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""
+        for name in ("alpha", "beta"):
+            value = getattr(self, name)
+            if self.stabilization == "baumgarte":
+                value = RATE if value is None else value
+                positive(value, name)
+                object.__setattr__(self, name, value)
+            elif value is not None:
+                raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it does "
+                                 f"nothing")  # fmt: skip
 
-def options_from(options: Mapping[str, object]) -> Options:
-    """Options from keyword arguments; unknown ones are refused."""
-    known = [f.name for f in dataclasses.fields(Options)]
-    for name in options:
-        if name not in known:
-            raise ModelError(f"simulate has no option {name!r}; it has {', '.join(known)}")
-    return Options(**options)  # type: ignore[arg-type]
+    def choices(self) -> dict[str, Any]:
+        """The choices of the integration by name, without what else was asked."""
+        return {f.name: getattr(self, f.name) for f in dataclasses.fields(Integration)}
+
+
+def projected(coordinates: str, rtol: float, atol: float, max_steps: int = MOST) -> Integration:
+    """An integration as other analyses want it: by the usual method, kept on the constraints."""
+    return Integration(
+        coordinates=coordinates,
+        method="dop853",
+        rtol=rtol,
+        atol=atol,
+        max_step=np.inf,
+        max_steps=max_steps,
+        stabilization="projection",
+        alpha=None,
+        beta=None,
+    )
 
 
 def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -> np.ndarray:

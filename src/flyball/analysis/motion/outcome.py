@@ -16,7 +16,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
-from .options import Options
+from .options import Integration
 from .reasons import reason, remarks
 from .residual import acceleration_violation
 from .start import Start
@@ -27,7 +27,7 @@ def outcome(
     start: Start,
     clock: ex.Clock,
     rows: np.ndarray,
-    o: Options,
+    o: Integration,
     interrupted: bool = False,
     owed: Owed | None = None,
 ) -> Result:
@@ -67,7 +67,7 @@ def outcome(
     return result
 
 
-def _health(start: Start, clock: ex.Clock, o: Options) -> Health:
+def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
     """Figures of a run."""
     W = start.assembly.compiled.work
     return Health(
@@ -80,7 +80,7 @@ def _health(start: Start, clock: ex.Clock, o: Options) -> Health:
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
-        options={k: getattr(o, k) for k in o.__dataclass_fields__},
+        options=o.choices(),
         remarks=(*map(not_allowed, changed_velocities(start.base.departures)), *remarks(start.assembly)),
         departures=start.base.departures,
         coordinates=start.coordinates,

@@ -31,6 +31,23 @@ class Start:
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 
+def start_time(t_start: float | None, before: Result | None) -> float:
+    """When a motion begins.
+
+    Raises
+    ------
+    ModelError
+        If an earlier result and a time both say when, or that is no result.
+    """
+    if before is None:
+        return 0.0 if t_start is None else t_start
+    if not isinstance(before, Result):
+        raise ModelError(f"start is a result of simulate, not {type(before).__name__}")
+    if t_start is not None:
+        raise ModelError("a motion that goes on from a result starts where that ended: leave out t_start, or start")
+    return before.final[0]
+
+
 def begin(
     model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None, coordinates: str
 ) -> Start:

@@ -1,0 +1,114 @@
+"""What an analysis is asked: the frozen object of its options, made by the method of `Mechanism` and checked here.
+
+An analysis declares the fields of its own class, one for each argument of its method. Defaults and meanings stand with
+the method alone (`flyball.methods`); ``tests/program/test_options.py`` holds the two together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from numbers import Number
+from typing import Any, Self
+
+from ..errors import ModelError
+from ..model.expressions import number
+
+TIMES = ("t", "t_start", "t_end")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of an analysis. Times are numbers [s], lists of names are tuples, whatever they were given as."""
+
+    @classmethod
+    def asked(cls, given: Mapping[str, Any]) -> Self:
+        """From the arguments of a method: its ``locals()``."""
+        return cls(**{f.name: given[f.name] for f in fields(cls)})
+
+    def __post_init__(self) -> None:
+        for f in fields(self):
+            value = getattr(self, f.name)
+            if f.name in TIMES and value is not None:
+                value = seconds(value, f.name)
+            elif f.type == "tuple[str, ...]":
+                value = names(value, f.name)
+            elif f.type == "bool" and not isinstance(value, bool):
+                raise ModelError(f"{f.name} is True or False, not {value!r}")
+            elif f.name == "parameters" and value is not None and not isinstance(value, Mapping):
+                raise ModelError(f"parameters maps names to values, for instance {{'mass': 2}}; {value!r} does not")
+            elif f.name == "progress" and not (isinstance(value, bool) or callable(value)):
+                raise ModelError(f"progress is True, False or a function of the fraction done, not {value!r}")
+            else:
+                continue
+            object.__setattr__(self, f.name, value)
+
+
+@dataclass(frozen=True, kw_only=True)
+class AssembleOptions(Options):
+    """What `Mechanism.assemble` is asked."""
+
+    t: float
+    parameters: Mapping[str, float] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class MobilityOptions(AssembleOptions):
+    """What `Mechanism.mobility` is asked."""
+
+    inertia: bool
+
+
+def seconds(value: Any, name: str) -> float:
+    """A time from a number or a quantity such as ``"5 ms"``.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    found = number(value, {}, "s", name)
+    if isinstance(found, complex) or not isinstance(found, Number):
+        raise ModelError(f"{name} is a time [s], not {value!r}")
+    return float(found)  # type: ignore[arg-type]
+
+
+def names(value: Any, name: str) -> tuple[str, ...]:
+    """A sequence of names; a single text is refused, which Python would take letter by letter.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    if not isinstance(value, (str, bytes)) and isinstance(value, (Sequence, Mapping, set)):
+        found = tuple(value)
+        if all(isinstance(x, str) for x in found):
+            return found
+    raise ModelError(f"{name} is a list of names, for instance {name}=['slider.x'], not {value!r}")
+
+
+def positive(value: Any, name: str) -> None:
+    """Refuse what is no number greater than 0.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    if isinstance(value, bool) or not isinstance(value, Number) or isinstance(value, complex) or not value > 0:  # type: ignore[operator]
+        raise ModelError(f"{name} must be greater than 0, got {value!r}")
+
+
+def count(value: Any, name: str, least: int = 1) -> None:
+    """Refuse what is no whole number of at least ``least``.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    if isinstance(value, bool) or not hasattr(value, "__index__"):
+        raise ModelError(f"{name} must be a whole number, not {value!r}")
+    if value < least:
+        raise ModelError(f"{name} must be at least {least}, got {value!r}")

@@ -1,0 +1,265 @@
+"""Motions: simulated, compared by formulation, prescribed by drivers, and what drives must do for them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+    from ..results.comparison import Comparison
+    from ..results.inverse import InverseDynamics
+    from ..results.result import Result
+else:
+    Model = object  # a mechanism is one; signatures alone load nothing
+
+
+class Motions(Model):
+    """Motions of a mechanism."""
+
+    def simulate(
+        self,
+        t_end: float | str,
+        *,
+        t_start: float | str | None = None,
+        outputs: int | Sequence[float] = 501,
+        parameters: Mapping[str, float | str] | None = None,
+        start: Result | None = None,
+        coordinates: str = "auto",
+        method: str = "dop853",
+        rtol: float = 1e-8,
+        atol: float = 1e-10,
+        max_step: float | str = math.inf,
+        max_steps: int = 10_000_000,
+        stabilization: str = "projection",
+        alpha: float | None = None,
+        beta: float | None = None,
+        progress: bool | Callable[[float], None] = True,
+    ) -> Result:
+        """Integrate the equations of motion.
+
+        Parameters
+        ----------
+        t_end : float or str [s]
+            End of the motion, such as ``10`` or ``"500 ms"``.
+        t_start : float or str [s], optional
+            Its start: 0 if not given; where ``start`` ended if that is.
+        outputs : int or sequence of float [s]
+            Number of evenly spaced output times, or the times themselves.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+        start : Result, optional
+            Go on from where this result ended.
+        coordinates : {"auto", "absolute", "joint"}
+            Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
+        method : {"dop853", "rk45"}
+            Explicit Runge-Kutta pair, of order 8 or 5.
+        rtol : float [1]
+            Tolerance of the error of a step relative to the state; 1e-13 at least.
+        atol : float [m, rad, m/s, rad/s]
+            Tolerance of the error of a step where the state is small.
+        max_step : float or str [s]
+            Longest step. What acts for less than a step can go unseen: give it where a law has a short pulse.
+        max_steps : int
+            Steps after which the integration gives up.
+        stabilization : str
+            How states are kept on the constraints: ``projection`` (in every stage), ``projection-steps`` (after every
+            step), ``positions`` or ``velocities`` (only these), ``partitioning`` (dependent coordinates are solved
+            for), ``baumgarte``, or ``none``. `compare` shows what they do.
+        alpha : float [1/s], optional
+            First rate of Baumgarte's method, 10 if not given.
+        beta : float [1/s], optional
+            Second rate of Baumgarte's method, 10 if not given.
+        progress : bool or callable
+            A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
+            times a second.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        ModelError
+            If an option makes no sense, or has no effect beside the others.
+        AssemblyError
+            If the start cannot be made consistent.
+        SimulationError
+            If the integration cannot go on; its ``result`` holds the motion up to then.
+        """
+        from ..analysis.simulate import SimulateOptions, simulate
+
+        return simulate(self, SimulateOptions.asked(locals()))
+
+    def compare(
+        self,
+        t_end: float | str,
+        *,
+        t_start: float | str | None = None,
+        outputs: int | Sequence[float] = 201,
+        formulations: Sequence[str] | None = None,
+        repeats: int = 5,
+        parameters: Mapping[str, float | str] | None = None,
+        start: Result | None = None,
+        method: str = "dop853",
+        rtol: float = 1e-8,
+        atol: float = 1e-10,
+        max_step: float | str = math.inf,
+        max_steps: int | None = None,
+        alpha: float = 10.0,
+        beta: float = 10.0,
+        progress: bool | Callable[[float], None] = True,
+    ) -> Comparison:
+        """Integrate the same motion by several formulations: drift, energy and cost of each.
+
+        All start from the same consistent state, with the same integrator and the same tolerances, in absolute
+        coordinates unless their name says otherwise. Drivers are followed by integration here, also where they leave
+        no freedom. Where states are not projected they are reported as they are.
+
+        Parameters
+        ----------
+        t_end : float or str [s]
+            End of the motion.
+        t_start : float or str [s], optional
+            Its start: 0 if not given; where ``start`` ended if that is.
+        outputs : int or sequence of float [s]
+            Number of times at which drift and energy are looked at, or the times themselves.
+        formulations : sequence of str, optional
+            Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
+            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default.
+        repeats : int
+            Times that each is run for its cost, fewer where that takes long; 0 for none.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+        start : Result, optional
+            Go on from where this result ended.
+        method : {"dop853", "rk45"}
+            Explicit Runge-Kutta pair, of order 8 or 5.
+        rtol : float [1]
+            Tolerance of the error of a step relative to the state.
+        atol : float [m, rad, m/s, rad/s]
+            Tolerance of the error of a step where the state is small.
+        max_step : float or str [s]
+            Longest step.
+        max_steps : int, optional
+            Steps after which a formulation is given up; twenty times those of the reference if not given.
+        alpha : float [1/s]
+            First rate of Baumgarte's method.
+        beta : float [1/s]
+            Second rate of Baumgarte's method.
+        progress : bool or callable
+            As for `simulate`.
+
+        Returns
+        -------
+        Comparison
+            A formulation that fails is in it too, with its message and the motion up to then.
+
+        Raises
+        ------
+        AssemblyError, ModelError
+            If the start cannot be made consistent; for formulations or options that do not exist.
+        """
+        from ..analysis.compare import CompareOptions, compare
+
+        return compare(self, CompareOptions.asked(locals()))
+
+    def kinematics(
+        self,
+        times: int | Sequence[float] = 501,
+        *,
+        t_end: float | str | None = None,
+        t_start: float | str | None = None,
+        parameters: Mapping[str, float | str] | None = None,
+        coordinates: str = "auto",
+        progress: bool | Callable[[float], None] = True,
+    ) -> Result:
+        """Positions, velocities and accelerations of a mechanism whose drivers leave no freedom.
+
+        Parameters
+        ----------
+        times : int or sequence of float [s]
+            Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times themselves.
+        t_end : float or str [s], optional
+            End of the motion; needed if ``times`` is a number.
+        t_start : float or str [s], optional
+            When the mechanism is assembled as drawn; it is followed from there, so that it stays on its branch and
+            whole turns count. 0 if not given, or the first time where that is earlier.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+        coordinates : {"auto", "absolute", "joint"}
+            Those of the equations; auto: those in which a right-hand side costs less.
+        progress : bool or callable
+            As for `simulate`.
+
+        Returns
+        -------
+        Result
+
+        Raises
+        ------
+        MobilityError
+            If drivers leave a freedom (``free`` names it), or prescribe what is prescribed already (``redundant``
+            names the drivers).
+        SingularityError
+            If the mechanism locks, or begins where drivers do not decide its motion; ``where`` is the time,
+            ``elements`` those whose constraints lose their independence, ``result`` holds the motion up to there.
+        AssemblyError
+            If no position fulfils all constraints at the start.
+        SimulationError
+            If a law cannot be followed, for instance because it jumps; its ``result`` holds the motion up to there.
+        """
+        from ..analysis.kinematics import KinematicsOptions, kinematics
+
+        return kinematics(self, KinematicsOptions.asked(locals()))
+
+    def inverse_dynamics(
+        self,
+        times: int | Sequence[float] = 501,
+        motion: Mapping[str, Any] | None = None,
+        *,
+        t_end: float | str | None = None,
+        t_start: float | str | None = None,
+        parameters: Mapping[str, float | str] | None = None,
+        coordinates: str = "auto",
+        progress: bool | Callable[[float], None] = True,
+    ) -> InverseDynamics:
+        """Forces and torques of drives, and reactions of all joints, for a given motion.
+
+        Drivers prescribe it, with ``motion`` if that is given. Forces act: motors too, so that a drive has to do what
+        they leave to be done.
+
+        Parameters
+        ----------
+        times : int or sequence of float [s]
+            Number of evenly spaced times from ``t_start`` to ``t_end``, or ascending times themselves.
+        motion : mapping, optional
+            Coordinate (``"A.angle"``, ``"slider.x"``) or sensor of one -> how it moves [rad] or [m]: an expression such
+            as ``"0.3*sin(2*t)"``; samples at ``times``; or a pair (times of samples [s], samples). Through samples goes
+            a cubic spline, whose second derivative is continuous. Initial conditions then play no part.
+        t_end : float or str [s], optional
+            End of the motion; needed if ``times`` is a number.
+        t_start : float or str [s], optional
+            As for `kinematics`; with samples the motion begins with the first one.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+        coordinates : {"auto", "absolute", "joint"}
+            Those of the equations; auto: those in which a right-hand side costs less.
+        progress : bool or callable
+            As for `simulate`.
+
+        Returns
+        -------
+        InverseDynamics
+
+        Raises
+        ------
+        ModelError
+            If the motion names what does not exist or cannot be driven, or its samples make no curve.
+        MobilityError, SingularityError, AssemblyError, SimulationError
+            As for `kinematics`.
+        """
+        from ..analysis.inverse_dynamics import InverseDynamicsOptions, inverse_dynamics
+
+        return inverse_dynamics(self, InverseDynamicsOptions.asked(locals()))
