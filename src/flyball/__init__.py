@@ -63,7 +63,6 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .analysis.assemble import Assembly as Assembly
     from .analysis.check import Report as Report
     from .analysis.mass import MassReport as MassReport
-    from .analysis.mobility import Mobility as Mobility
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -94,6 +93,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
+    from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
     from .results.result import Result as Result
@@ -132,7 +132,7 @@ _HOME = {
     "NotConverged": "errors",
     "Assembly": "analysis.assemble",
     "MassReport": "analysis.mass",
-    "Mobility": "analysis.mobility",
+    "Mobility": "results.mobility",
     "Report": "analysis.check",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",

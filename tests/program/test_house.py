@@ -97,7 +97,6 @@ def test_imports_point_one_way(path):
 MODULES = {".".join(p.relative_to(PACKAGE).with_suffix("").parts).removesuffix(".__init__"): p for p in FILES}
 OWED = (  # circles of today; this list only ever gets shorter
     {"results.modes", "view.modes"},
-    {"analysis.mobility", *(f"analysis.freedom.{x}" for x in ("cures", "freedoms", "geometry", "redundancy"))},
 )
 
 
@@ -141,7 +140,6 @@ def test_imports_make_no_circle():
 
 OWED_NAMES = {
     *(("analysis.series", f"_{x}") for x in ("descent", "failure", "finished", "newton", "pushed", "stability")),
-    ("analysis.freedom.determinacy", "_null_space"),
 }
 
 

@@ -180,9 +180,10 @@ def compiled(
     held: Mapping[str, complex] | None = None,
     tree: Sequence[str] = (),
     coupled: bool = False,
+    solved: bool = True,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled)
+    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled, solved=solved)
     x = values(s, parameters, held)
     w = work(s, x.system)
     w.option[STABILIZE] = NONE

@@ -17,12 +17,14 @@ from ..equations.engine import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
 from ..model.model import Model
+from ..results.mobility import Mobility
 from ..results.result import Result
 from .assemble import assemble
 from .assembly.start import Assembly
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
-from .mobility import DENSE, Mobility, mobility, motions_of, rank_of, scaled_jacobian
+from .freedom.jacobian import DENSE, rank_of, scaled_jacobian
+from .mobility import mobility
 from .motion.options import output_times, projected
 from .motion.start import Start, begin_at
 from .options import Options
@@ -171,7 +173,7 @@ def _contradiction(model: Model, t: float, error: AssemblyError) -> MobilityErro
 
 def _singular_start(found: Mobility) -> SingularityError | None:
     """The error for a start where drivers do not decide the motion, though next to it they do."""
-    a = found.found.assembly  # type: ignore[union-attr]
+    a = found.there.assembly
     c = a.compiled
     if not c.structure.model.drivers or not found.redundancy or not found.freedoms:
         return None
@@ -179,9 +181,9 @@ def _singular_start(found: Mobility) -> SingularityError | None:
     free.drivers = []
     loose = compiled(free, parameters=c.values.told)
     loose.follow(c.hints)
-    there = mobility(free, Assembly(loose, a.t, a.q, a.v))
+    released = mobility(free, Assembly(loose, a.t, a.q, a.v))
     ranks = []
-    for q in positions_nearby(there.found.assembly, motions_of(there.found)):  # type: ignore[union-attr, arg-type]
+    for q in positions_nearby(released.there.assembly, released.there.velocities):
         c.at(a.t, q, a.v)
         ranks.append(rank_of(c))
     c.at(a.t, a.q, a.v)

@@ -38,3 +38,5 @@ class Cylindrical(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "cylindrical"
+    replaceable: ClassVar[bool] = True
+    stand_in: ClassVar[float] = 1.0

@@ -25,3 +25,5 @@ class Fixed(Joint):
     blocks: ClassVar = COMMON_POINT + SAME_AXES
     chain: ClassVar = ()
     drawn: ClassVar[str] = "fixed"
+    replaceable: ClassVar[bool] = True
+    omission: ClassVar[float] = 1.5

@@ -40,3 +40,4 @@ class Planar(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "planar"
+    replaceable: ClassVar[bool] = True

@@ -32,3 +32,4 @@ class PointInPlane(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "point_in_plane"
+    stand_in: ClassVar[float] = 2.2

@@ -34,6 +34,9 @@ class PointOnLine(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     drawn: ClassVar[str] = "point_on_line"
+    replaceable: ClassVar[bool] = True
+    stand_in: ClassVar[float] = 2.1
+    called: ClassVar[str] = "a ball in a groove (PointOnLine)"
 
 
 @element
@@ -55,3 +58,5 @@ class PinInSlot(PointOnLine):
     }
     spatial: ClassVar[bool] = False
     in_space: ClassVar[str] = "PointOnLine"
+    stand_in: ClassVar[float] = 1.1
+    called: ClassVar[str] = "a pin in a slot (PinInSlot)"

@@ -34,3 +34,4 @@ class Prismatic(Joint):
     needs_axis: ClassVar[bool] = True
     planar_normal: ClassVar[str] = "y"
     drawn: ClassVar[str] = "prismatic"
+    replaceable: ClassVar[bool] = True

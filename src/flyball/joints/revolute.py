@@ -33,3 +33,5 @@ class Revolute(Joint):
     chain: ClassVar = (Primitive("R", coordinate="angle"),)
     needs_axis: ClassVar[bool] = True
     drawn: ClassVar[str] = "revolute"
+    replaceable: ClassVar[bool] = True
+    stand_in: ClassVar[float] = 1.0

@@ -26,3 +26,5 @@ class Spherical(Joint):
     chain: ClassVar = (Primitive("S"),)
     planar_normal: ClassVar[str] = ""
     drawn: ClassVar[str] = "spherical"
+    replaceable: ClassVar[bool] = True
+    stand_in: ClassVar[float] = 1.0

@@ -46,6 +46,8 @@ class Universal(Joint):
     planar_normal: ClassVar[str] = ""
     axisless: ClassVar[bool] = True
     drawn: ClassVar[str] = "universal"
+    replaceable: ClassVar[bool] = True
+    stand_in: ClassVar[float] = 1.0
 
     def world_frames(self, n: SimpleNamespace, planar: bool) -> tuple[WorldFrame, WorldFrame]:
         """F has the first axis as z and the second as x; M the other way round."""

@@ -9,8 +9,8 @@ if TYPE_CHECKING:
     from ..analysis.assembly.start import Assembly
     from ..analysis.check import Report
     from ..analysis.mass import MassReport
-    from ..analysis.mobility import Mobility
     from ..model.model import Model
+    from ..results.mobility import Mobility
     from ..results.singularities import Branch, Singularities
 else:
     Model = object  # a mechanism is one; signatures alone load nothing

@@ -202,6 +202,7 @@ class Driver(Element):
     law: Law = field(kw_only=False)
 
     category: ClassVar[str] = "drivers"
+    omission: ClassVar[float] = 0.5  # what it costs to leave it out where rows are too many
 
 
 @element

@@ -22,6 +22,7 @@ class Coupling(Element):
     """
 
     category: ClassVar[str] = "couplings"
+    omission: ClassVar[float] = 2.0  # what it costs to leave it out where rows are too many
     drawn: ClassVar[str] = "coupler"
     dimensions: ClassVar[dict[str, tuple[str, ...]]] = {}  # field -> units that its numbers may have
 

@@ -74,6 +74,10 @@ class Joint(Element):
     needs_axis: ClassVar[bool] = False
     axisless: ClassVar[bool] = False  # no axis of that name is its own
     drawn: ClassVar[str] = "fixed"  # symbol in pictures
+    replaceable: ClassVar[bool] = False  # whether a joint that holds less may take its place where rows are too many
+    stand_in: ClassVar[float] = 0.0  # what it costs to put it in such a place; 0: it is never proposed
+    omission: ClassVar[float] = 3.5  # what it costs to leave it out
+    called: ClassVar[str] = ""  # by proposals, if not by its kind
 
     def ends(self) -> dict[str, str]:
         """Role of each of its frames -> body or frame that it is on."""

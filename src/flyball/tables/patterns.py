@@ -10,8 +10,8 @@ from .specs import Structure, ints
 from .system import BODY_LAW, COUPLED, SCHUR, SOLVER
 
 
-def patterns(s: Structure) -> None:
-    """Entries of G, of the matrix that is factored, and who adds to them."""
+def patterns(s: Structure, solved: bool = True) -> None:
+    """Entries of G, of the matrix that is factored (if something is ``solved``), and who adds to them."""
     body_i = s.tables["body_i"]
     chains = _chains(body_i)
     touched = _touched(s, chains)
@@ -41,7 +41,9 @@ def patterns(s: Structure) -> None:
         "load_i": ints(load_i, 2),
     }
     solver = s.tables["kinds"][SOLVER]
-    if solver == SCHUR:
+    if not solved:
+        _nothing(s)
+    elif solver == SCHUR:
         _schur(s)
     elif solver == COUPLED:
         _coupled(s, chains)

@@ -26,6 +26,7 @@ def structure(
     holds: Sequence[Initial] = (),
     tree: Sequence[str] = (),
     coupled: bool = False,
+    solved: bool = True,
 ) -> Structure:
     """Decide the tables of a mechanism.
 
@@ -42,6 +43,8 @@ def structure(
         Names of joints that become tree joints instead of rows.
     coupled : bool
         Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
+    solved : bool
+        Whether accelerations are asked for; if not, no matrix is made ready to be factored.
 
     Raises
     ------
@@ -64,6 +67,6 @@ def structure(
         if (joint := getattr(e, "joint", "")) in s.tree_joints:
             raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
     terms.sort(s)
-    patterns.patterns(s)
+    patterns.patterns(s, solved)
     s.tables["code"] = np.array(s.code or [0], np.int64)
     return s

@@ -6,10 +6,12 @@ import numpy as np
 
 from ...model.body import Driver
 from ...model.coupling import Coupling
+from ...numerics.rank import parts
 from ...results.result import Result
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
-from ..mobility import CHANGED, DENSE, TOLERANCE, _null_space, lengths, self_stresses
+from .jacobian import DENSE, lengths, scaled_jacobian, sparse_null_space
+from .stresses import CHANGED, self_stresses
 
 LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
 
@@ -68,18 +70,15 @@ def _dependencies(c: Compiled) -> tuple[np.ndarray, float]:
     S = c.values.system
     nr, nv = len(S.row_i), c.structure.nv
     if max(nr, nv) > DENSE:
-        from ..mobility import scaled_jacobian
-
         G, size, _ = scaled_jacobian(c)
-        return _null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None], 1.0
+        return sparse_null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None], 1.0
     row_p = S.row_p[: nr + 1]
     G = np.zeros((nr, nv))
     np.add.at(G, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[: row_p[-1]]), c.work.G[: row_p[-1]])
     G *= lengths(c)
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    U, d, _ = np.linalg.svd(G / size[:, None], full_matrices=True)
-    rank = int((d > TOLERANCE * d.max(initial=1e-300)).sum())
-    return U[:, rank:] / size[:, None], float(d[rank - 1] / d[0]) if rank else 1.0
+    p = parts(G / size[:, None])
+    return p.dependencies / size[:, None], float(p.values[-1] / p.values[0]) if p.rank else 1.0
 
 
 def _stresses(a: Assembly, lam: np.ndarray, out: Determinacy, k: int) -> dict[str, np.ndarray]:

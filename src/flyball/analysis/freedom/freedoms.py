@@ -2,60 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...model.body import Body, Initial
 from ...model.joint import Joint
+from ...results.freedoms import FreeMotion
 from ...tables.system import NV, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
-from ..mobility import lengths
+from .jacobian import lengths
 from .supports import irreducible
 
 STILL = 1e-7  # part of a motion's largest velocity below which something stands still
 CLEAR = 1e-2  # part of it that a coordinate must have to name the motion
-NAMED = 12  # bodies that a line names
-
-
-@dataclass(frozen=True)
-class FreeMotion:
-    """One way in which a mechanism can move, with nothing else free moving.
-
-    Attributes
-    ----------
-    name : str
-        What stands for it: a coordinate such as ``"A.angle"``, or words such as ``"coupler turns about (1, 0, 0)"``.
-    coordinate : str
-        The coordinate, whose rate in ``velocity`` is 1; "" if the motion has none of a joint or a body.
-    bodies : tuple of str
-        Those that move.
-    velocity : ndarray (nv,)
-        Of the mechanism in absolute coordinates [m/s], [rad/s].
-    """
-
-    name: str
-    coordinate: str
-    bodies: tuple[str, ...]
-    velocity: np.ndarray
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        more = f" and {len(self.bodies) - NAMED} more" if len(self.bodies) > NAMED else ""
-        moving = f"{', '.join(self.bodies[:NAMED])}{more} {'moves' if len(self.bodies) == 1 else 'move'}"
-        return f"{self.name}: {moving}" if self.coordinate else self.name
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "name": self.name,
-            "coordinate": self.coordinate,
-            "bodies": list(self.bodies),
-            "velocity": self.velocity.tolist(),
-        }
 
 
 def free_motions(a: Assembly, motions: np.ndarray) -> tuple[FreeMotion, ...]:

@@ -8,22 +8,22 @@ only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ...equations.scratch import work
 from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
+from ...results.freedoms import Geometry
 from ...tables.system import NQ, Q0
 from ..assembly.positions import closed_near
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
-from ..mobility import lengths, motions_of, rank_of
+from .jacobian import Found, lengths, rank_of
 
 if TYPE_CHECKING:
-    from ..mobility import Mobility
+    from ...results.mobility import Mobility
 
 SHAKEN = 0.03  # how far frames are shaken: part of the mechanism's length, and radians
 STEP = 0.04  # how far the mechanism is moved: the same
@@ -31,88 +31,12 @@ TRIES = 6
 MOVED = 0.2  # part of a step that must be left of it when the mechanism is closed again
 
 
-@dataclass(frozen=True)
-class Geometry:
-    """What freedoms rest on.
-
-    Attributes
-    ----------
-    here : int
-        Freedoms by rank at this position.
-    nearby : int
-        Freedoms by rank next to it, in positions that the mechanism can move to: those of its true motion.
-    generic : int
-        Freedoms that joints of the same kinds have with general dimensions.
-    gruebler : int
-        Freedoms by counting.
-    positions : list of ndarray
-        Positions next to this one in which it was looked at.
-    """
-
-    here: int
-    nearby: int
-    generic: int
-    gruebler: int
-    positions: list[np.ndarray] = field(default_factory=list, compare=False, repr=False)
-
-    @property
-    def singular(self) -> bool:
-        """Whether the rank is smaller here than next to it."""
-        return self.nearby < self.here
-
-    @property
-    def special(self) -> bool:
-        """Whether some of the true freedom rests on special dimensions."""
-        return self.generic < self.nearby
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        said = []
-        if self.singular and self.nearby == 0 and not self.positions:
-            said.append(
-                f"{_freedoms(self.here)} for the moment only: it can shake, but not move, from this singular position"
-            )
-        elif self.singular:
-            said.append(f"singular position: {_freedoms(self.here)} here, {self.nearby} next to it")
-        if self.special:
-            true = "true freedom" if self.nearby == 1 else "true freedoms"
-            said.append(
-                f"rests on special dimensions: Gruebler's count is {self.gruebler}, the {true} {self.nearby}; the same "
-                f"joints with general dimensions would leave {self.generic}"
-            )
-        if not said:
-            said.append(
-                "no freedom is left"
-                if self.here == 0
-                else "general: no freedom rests on special dimensions or on this position"
-            )
-        return "; ".join(said)
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "here": self.here,
-            "nearby": self.nearby,
-            "generic": self.generic,
-            "singular": self.singular,
-            "special_dimensions": self.special,
-            "text": self.text,
-        }
-
-
-def _freedoms(n: int) -> str:
-    return f"{n} freedom{'' if n == 1 else 's'}"
-
-
-def geometry(m: Mobility) -> Geometry:
+def geometry(m: Mobility, there: Found) -> Geometry:
     """What the freedoms of a count rest on."""
-    there = m.found
-    assert there is not None
     if m.freedoms == 0:
         return Geometry(0, 0, 0, m.gruebler)
     a = there.assembly
-    positions = positions_nearby(a, motions_of(there))
+    positions = positions_nearby(a, there.velocities)
     c = a.compiled
     still = np.zeros(c.structure.nv)
     ranks = []

@@ -2,93 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
-
 import numpy as np
 
 from ...model.body import Driver
+from ...numerics.rank import rank
+from ...results.freedoms import RedundantSet
 from ...tables.system import G_VALUE, NU
-from ..mobility import SHOWN as MANY
-from ..mobility import TOLERANCE, scaled_jacobian, undetermined
-from .cures import Cure, cures
+from .cures import cures
+from .jacobian import SHOWN, Found, scaled_jacobian
+from .stresses import undetermined
 from .supports import irreducible
 
-if TYPE_CHECKING:
-    from ..mobility import Found
-
 WRONG = 1e-8  # a dependency of unit size that adds up to more than this part of the mechanism's length contradicts
-SHOWN = 12  # elements that a line names
-KINDS = {"position": "positions", "velocity": "velocities"}
-
-
-@dataclass(frozen=True)
-class RedundantSet:
-    """Elements whose constraints depend on one another; without any one of them the others would not.
-
-    Attributes
-    ----------
-    elements : tuple of str
-    count : int
-        Constraints too many.
-    contradiction : str
-        "" where they say the same twice; else what they disagree on, ``"position"`` or ``"velocity"``.
-    gap : float
-        By how much they disagree, seen at one of them if all others are fulfilled: [m], or radians times the
-        mechanism's length; or that a second.
-    here_only : bool
-        Whether they depend on one another in this singular position only, and not next to it.
-    undetermined : dict
-        Joint -> reaction components (world axes, on ``body_j``) that this leaves undetermined.
-    cure : Cure or None
-        What to replace or leave out.
-    """
-
-    elements: tuple[str, ...]
-    count: int
-    contradiction: str = ""
-    gap: float = 0.0
-    here_only: bool = False
-    undetermined: dict[str, tuple[str, ...]] = field(default_factory=dict)
-    cure: Cure | None = None
-    drivers: tuple[str, ...] = ()
-
-    @property
-    def text(self) -> str:
-        """In words."""
-        names = ", ".join(self.elements[:SHOWN])
-        names += f" and {len(self.elements) - SHOWN} more" if len(self.elements) > SHOWN else ""
-        how = "constraint" if self.count == 1 else "constraints"
-        if self.contradiction:
-            unit = "m" if self.contradiction == "position" else "m/s"
-            return f"contradictory: {names} cannot agree on {KINDS[self.contradiction]}, {self.gap:.3g} {unit} apart"
-        where = ", in this singular position only" if self.here_only else ""
-        return f"{self.count} {how} too many among {names}{where}"
-
-    @property
-    def advice(self) -> str:
-        """What to do about it."""
-        if self.cure is not None:
-            return f"cure: {self.cure.text}"
-        if self.contradiction and self.drivers:
-            return f"cure: leave out one of {', '.join(self.drivers)}, or make their laws agree with the rest"
-        if self.here_only:
-            return "cure: another position or other dimensions; it is no joint's fault"
-        if self.contradiction:
-            return "cure: correct the lengths, the points or the laws of these, so that all can be fulfilled"
-        return "no cure by another joint was found"
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {
-            "elements": list(self.elements),
-            "count": self.count,
-            "contradiction": self.contradiction,
-            "gap": self.gap,
-            "here_only": self.here_only,
-            "undetermined": {k: list(v) for k, v in self.undetermined.items()},
-            "cure": None if self.cure is None else self.cure.as_dict(),
-        }
 
 
 def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tuple[RedundantSet, ...]:
@@ -112,7 +37,7 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
     those = [tuple(names[e] for e in elements) for elements, _ in found]
     tried = cures(there, those, positions)
     out = []
-    for elements, (numbers, basis), (cure, here_only) in zip(those, found, tried, strict=True):
+    for elements, (numbers, basis), (cure, here_only, cut) in zip(those, found, tried, strict=True):
         what, gap = _contradiction(basis, g, nu, c.values.length)
         loose = undetermined(a, basis / size[:, None], list(elements))
         drivers = tuple(n for n in elements if isinstance(s.model[n], Driver))
@@ -120,10 +45,10 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
         here_only = not what and (here_only or shaky)
         cure = None if what or here_only else cure
         count = basis.shape[1]
-        if lam.shape[1] == MANY:  # of a large mechanism not all dependencies are there; those of a set's own rows are
+        if lam.shape[1] == SHOWN:  # of a large mechanism not all dependencies are there; those of a set's own rows are
             own = G[np.concatenate([groups[e] for e in numbers])].toarray()
-            count = len(own) - int(np.linalg.matrix_rank(own, tol=TOLERANCE * np.linalg.norm(own, 2)))
-        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers))
+            count = len(own) - rank(own)
+        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut))
     return tuple(out)
 
 

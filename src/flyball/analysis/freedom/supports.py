@@ -11,7 +11,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...numerics.rank import null_space, parts, span
+
 SMALL = 1e-8  # singular values below this are rounding; bases are orthonormal
+NEW = 1e-6  # those above this are of something new
 
 
 def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[int], np.ndarray]]:
@@ -31,7 +34,7 @@ def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[
     """
     out: list[tuple[list[int], np.ndarray]] = []
     for part in _parts(N, groups):
-        basis = orthonormal(part)
+        basis = span(part)
         blocks = [basis[g] for g in groups]
         touched = [e for e, b in enumerate(blocks) if len(b) and np.abs(b).max() > SMALL]
         if basis.shape[1] == 1:
@@ -43,24 +46,8 @@ def irreducible(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[tuple[list[
             new = _beyond(found, P)
             carriers = [e for e in touched if np.abs(blocks[e] @ P).max(initial=0.0) > SMALL]
             out.append((carriers, basis @ new))
-            found = orthonormal(np.hstack([found, new]))
+            found = span(np.hstack([found, new]))
     return out
-
-
-def orthonormal(A: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of what the columns span."""
-    if not A.shape[1]:
-        return A
-    U, d, _ = np.linalg.svd(A, full_matrices=False)
-    return U[:, d > SMALL * d.max(initial=1e-300)]
-
-
-def null_space(A: np.ndarray) -> np.ndarray:
-    """An orthonormal basis of the vectors that A takes to nothing; A is of unit size."""
-    if not len(A):
-        return np.eye(A.shape[1])
-    _, d, Vt = np.linalg.svd(A, full_matrices=True)
-    return Vt[int((d > SMALL).sum()) :].T
 
 
 def _parts(N: np.ndarray, groups: Sequence[np.ndarray]) -> list[np.ndarray]:
@@ -89,7 +76,7 @@ def _smallest(blocks: list[np.ndarray], order: list[int], found: np.ndarray) -> 
         B = blocks[e] @ P
         if np.abs(B).max(initial=0.0) <= SMALL:
             continue
-        Q = P @ null_space(B)
+        Q = P @ null_space(B, SMALL, 1.0)
         if Q.shape[1] and _beyond(found, Q).shape[1]:
             P = Q
     return P
@@ -100,8 +87,7 @@ def _beyond(found: np.ndarray, P: np.ndarray) -> np.ndarray:
     if not found.shape[1]:
         return P
     rest = P - found @ (found.T @ P)
-    U, d, Vt = np.linalg.svd(rest, full_matrices=False)
-    return P @ Vt[d > 1e-6].T
+    return P @ parts(rest, NEW, 1.0).seen
 
 
 def _weight(blocks: list[np.ndarray]):

@@ -12,12 +12,13 @@ import numpy as np
 
 from ...equations.tree import retract
 from ...results.health import Health
+from ...results.mobility import Mobility
 from ...results.result import Result
 from ...tables.system import G_VALUE, NU, V0
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import compiled
-from ..mobility import Mobility, mobility
+from ..mobility import mobility
 from .derivatives import STEP, State
 
 

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import ModelError
-from ..mobility import CHANGED, TOLERANCE, lengths
+from ...numerics.rank import parts
+from ..freedom.jacobian import lengths
+from ..freedom.stresses import CHANGED
 from .curves import slopes, snapshot
 from .derivatives import State
 from .free import prescribed
@@ -33,8 +35,7 @@ def refuse_undetermined(x: State, names: Sequence[str]) -> None:
     x.c.at(x.t, x.q, x.v)
     G = np.vstack([x.c.jacobian(), prescribed(x.c)]) * lengths(x.c)
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    U, d, _ = np.linalg.svd(G / size[:, None])
-    free = (U[:, int((d > TOLERANCE * d.max(initial=1e-300)).sum()) :] / size[:, None]).T
+    free = (parts(G / size[:, None]).dependencies / size[:, None]).T
     if not len(free):
         return
     still = np.zeros((len(free), s.nv))

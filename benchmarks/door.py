@@ -1,0 +1,69 @@
+"""The engine called by address: what a loop of one's own costs to compile, and a right-hand side through the door.
+
+    python benchmarks/door.py
+
+Prints CPU seconds to compile the engine and the loop in a cache of their own, then microseconds for a right-hand side
+of Andrews' mechanism through the door, and inside a kernel that contains it (which compiles for as long as the engine).
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+os.environ.setdefault("NUMBA_CACHE_DIR", tempfile.mkdtemp())
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import timing  # noqa: F401  isort: skip  (before numpy: it fixes the thread counts)
+
+from tests.program.test_engine import classical_kernel, desk
+
+import flyball as fb
+from flyball.compiler.held import held
+from flyball.compiler.jit import formula, kernel
+from flyball.equations.engine import MOTION, engine, motion_kernel
+from flyball.equations.motion import derivative
+from flyball.numerics.integrators.explicit import T
+
+CALLS = 100_000
+
+
+@formula
+def again(S, W, clock, n):
+    """Right-hand sides, contained."""
+    for _ in range(n):
+        derivative(clock.real[T], clock.y[0], clock.K[0], S, W)
+
+
+@kernel
+def contained_kernel(S, W, clock, n):
+    again(held(S), held(W), held(clock), n)
+
+
+def spent(work) -> float:
+    """CPU seconds."""
+    began = time.process_time()
+    work()
+    return time.process_time() - began
+
+
+def main() -> None:
+    began = time.process_time()
+    _, S, W, R, clock, sheet = desk(fb.load("examples/andrews.toml"), "absolute")  # assembling asks the engine
+    motion_kernel(S, W, R, clock, sheet.rows, MOTION)
+    print(f"engine compiled and called   {time.process_time() - began:8.2f} s")
+    address = engine.address(S, W, R, clock, sheet)
+    loop = lambda n: classical_kernel(address, S, W, R, clock, sheet, 1e-9, n)  # noqa: E731
+    print(f"loop through the door        {spent(lambda: loop(1)):8.2f} s")
+    print(f"loop that contains it        {spent(lambda: contained_kernel(S, W, clock, 1)):8.2f} s")
+    for _ in range(3):
+        through = spent(lambda: loop(CALLS // 4)) / CALLS * 1e6
+        inside = spent(lambda: contained_kernel(S, W, clock, CALLS)) / CALLS * 1e6
+        print(f"a right-hand side            {through:8.2f} us through the door, {inside:8.2f} us contained")
+
+
+if __name__ == "__main__":
+    main()

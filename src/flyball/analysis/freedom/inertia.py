@@ -1,0 +1,48 @@
+"""Motions without inertia: the constraints allow them and no mass resists, so that nothing determines them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...errors import ModelError
+from ...model.model import Model
+from ..assembly.start import Assembly
+from .jacobian import sparse_null_space
+
+
+def massless(a: Assembly, G: Any, scale: np.ndarray) -> np.ndarray:
+    """Motions (nv, k) that the constraints allow and no mass resists, from M + G^T G."""
+    import scipy.sparse as sp
+
+    M = sp.diags(scale) @ a.compiled.mass() @ sp.diags(scale)
+    return sparse_null_space(M / M.diagonal().max() + G.T @ G)[1] * scale[:, None]
+
+
+def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
+    """Refuse motions that no mass resists.
+
+    Raises
+    ------
+    ModelError
+        Naming the body that could move without inertia.
+    """
+    if not motions.shape[1]:
+        return
+    K = motions.T @ (a.compiled.mass() @ motions)
+    w, V = np.linalg.eigh(K)
+    if w[0] > 1e-9 * max(w[-1], 1e-300):
+        return
+    motion = motions @ V[:, 0]
+    body_i = a.compiled.values.system.body_i
+    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True)]
+    b = int(np.argmax(size))
+    name = next(k for k, v in a.compiled.structure.place.items() if v == b)
+    v0, n = int(body_i[b, 3]), int(body_i[b, 5])
+    turns = motion[v0 + (2 if n == 3 else 3) : v0 + n]
+    about = "turn" if n == 3 else f"turn about ({', '.join(f'{x:.3g}' for x in turns / np.linalg.norm(turns))})"
+    raise ModelError(
+        f"body {name!r} can {about} (its own axes) without any inertia resisting it, so its motion is not determined. "
+        f"Give it a moment of inertia, or joints that prevent this motion"
+    )

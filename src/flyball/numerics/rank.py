@@ -1,0 +1,65 @@
+"""Rank of a matrix and what goes with it, by singular values: the one place where it is decided what counts as zero."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+TOLERANCE = 1e-8  # singular values below this part of the largest count as zero; rows scaled to unit length
+
+
+class Parts(NamedTuple):
+    """Orthonormal bases of the four spaces of a matrix A (n, m) of rank r."""
+
+    span: np.ndarray  # (n, r): what A makes of vectors
+    dependencies: np.ndarray  # (n, n - r): y with y A = 0
+    seen: np.ndarray  # (m, r): what its rows span
+    null: np.ndarray  # (m, m - r): x with A x = 0
+    values: np.ndarray  # the singular values that count, (r,)
+
+    @property
+    def rank(self) -> int:
+        """How many rows are independent."""
+        return len(self.values)
+
+
+def parts(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> Parts:
+    """A matrix taken apart.
+
+    Parameters
+    ----------
+    A : ndarray (n, m)
+    tolerance : float
+        Singular values below this part of ``size`` count as zero.
+    size : float, optional
+        The largest singular value if not given.
+    """
+    n, m = A.shape
+    if not A.size:
+        return Parts(np.zeros((n, 0)), np.eye(n), np.zeros((m, 0)), np.eye(m), np.zeros(0))
+    U, d, Vt = np.linalg.svd(A, full_matrices=True)
+    r = _counted(d, tolerance, size)
+    return Parts(U[:, :r], U[:, r:], Vt[:r].T, Vt[r:].T, d[:r])
+
+
+def rank(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> int:
+    """How many rows (and columns) are independent; as for `parts`."""
+    return _counted(np.linalg.svd(A, compute_uv=False), tolerance, size) if A.size else 0
+
+
+def span(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> np.ndarray:
+    """An orthonormal basis (n, r) of what the columns span; as for `parts`, for few columns."""
+    if not A.size:
+        return A[:, :0]
+    U, d, _ = np.linalg.svd(A, full_matrices=False)
+    return U[:, : _counted(d, tolerance, size)]
+
+
+def null_space(A: np.ndarray, tolerance: float = TOLERANCE, size: float | None = None) -> np.ndarray:
+    """An orthonormal basis (m, m - r) of the vectors that A takes to nothing; as for `parts`."""
+    return parts(A, tolerance, size).null
+
+
+def _counted(d: np.ndarray, tolerance: float, size: float | None) -> int:
+    return int((d > tolerance * max(d[0] if size is None else size, 1e-300)).sum())
