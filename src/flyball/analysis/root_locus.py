@@ -13,9 +13,9 @@ from ..model.model import Model
 from ..results.equilibrium import Equilibrium
 from ..results.linear import follow
 from ..results.root_locus import Crossing, RootLocus
+from .equilibria import EquilibriaOptions, checked, equilibria, stopped
 from .linearize import InstantOptions, LinearizeOptions, linearize
 from .progress import shown
-from .series import EquilibriaOptions, checked, equilibria, stopped
 
 TOUCHING = 1e-6  # real parts below this part of the largest eigenvalue are none
 EXACT = 1e-12  # of the stretch between two values
