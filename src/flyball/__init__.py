@@ -61,8 +61,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assemble import Assembly as Assembly
-    from .analysis.check import Report as Report
-    from .analysis.mass import MassReport as MassReport
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -89,11 +87,13 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.sensor import Sensor as Sensor
     from .model.shapes import *
     from .model.table import Table as Table
+    from .results.check import Report as Report
     from .results.comparison import Comparison as Comparison
     from .results.equilibria import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
+    from .results.mass import MassReport as MassReport
     from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
@@ -131,9 +131,9 @@ _HOME = {
     "SingularityError": "errors",
     "NotConverged": "errors",
     "Assembly": "analysis.assemble",
-    "MassReport": "analysis.mass",
+    "MassReport": "results.mass",
     "Mobility": "results.mobility",
-    "Report": "analysis.check",
+    "Report": "results.check",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.equilibria",

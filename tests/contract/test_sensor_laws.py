@@ -18,8 +18,8 @@ SENSORS = {"speed": 2, "height": 0}  # column 1 is another law's
 H = 1e-30
 TABLES = {
     "curve": Table("curve", x=np.linspace(-2, 6, 17), y=np.sin(np.linspace(-2, 6, 17))),
-    "ramp": Table("ramp", x=(0, 1, 3), y=(1, 2, 0.5), interpolation="linear", outside="hold"),
-    "wave": Table("wave", x=(0, 0.5, 1.5, 2), y=(0, 1, -1, 0), outside="periodic", interpolation="monotone"),
+    "ramp": Table("ramp", x=(0, 1, 3), y=(1, 2, 0.5), interpolation="linear", beyond="hold"),
+    "wave": Table("wave", x=(0, 0.5, 1.5, 2), y=(0, 1, -1, 0), beyond="repeat", interpolation="monotone"),
 }
 LAWS = [
     "speed",

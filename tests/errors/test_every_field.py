@@ -70,7 +70,7 @@ CASES = {f"{where} {name}": (one, where, name) for where, name in zoo.CASES}
 CASES |= {f"forces in the {w}": (lambda w: all_of(with_forces(w), Force), w) for w in ("space", "plane")}
 CASES |= {"others": (lambda: all_of(others()),), "bodies": (lambda: all_of(bodies()),)}
 TEXTS = ("body", "body_i", "body_j", "bodies", "coordinate", "coordinates", "joint", "of", "frame")
-NO_NUMBERS = ("name", "color", "shape", "interpolation", "outside", "axes", "x_unit", "y_unit")
+NO_NUMBERS = ("name", "color", "shape", "interpolation", "beyond", "axes", "x_unit", "y_unit")
 LATER = {("JointFriction", "radius")}  # decides what the friction is about, and the joint has no such coordinate
 
 

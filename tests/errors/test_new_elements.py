@@ -161,9 +161,9 @@ PLANAR = {
     "Table name": ({"x": [0, 1], "y": [0, 1], "name": "my lift"}, "use letters, digits and _ only"),
     "Table sin": ({"x": [0, 1], "y": [0, 1], "name": "sin"}, "has a meaning in expressions; call it 'sin_curve'"),
     "Table as parameter": ({"x": [0, 1], "y": [0, 1], "name": "r"}, "the name 'r' is a parameter's"),
-    "Table period": ({"x": [0, 1], "y": [0, 1], "outside": "periodic"}, "a periodic table ends where it starts"),
+    "Table period": ({"x": [0, 1], "y": [0, 1], "beyond": "repeat"}, "a table that repeats ends where it starts"),
     "Table kind": ({"x": [0, 1], "y": [0, 1], "interpolation": "spline"}, "'cubic', 'monotone' or 'linear'.*'spline'"),
-    "Table outside": ({"x": [0, 1], "y": [0, 1], "outside": "zero"}, "'linear', 'hold' or 'periodic'.*'zero'"),
+    "Table beyond": ({"x": [0, 1], "y": [0, 1], "beyond": "zero"}, "'refuse', 'hold', 'line' or 'repeat'.*'zero'"),
     "Table unit": ({"x": [0, 1], "y": [0, 1], "x_unit": "furlongg"}, "x_unit: .*unknown unit 'furlongg'"),
     "Table text": ({"x": [0, "1 mm"], "y": [0, 1]}, "field 'x' must be a number"),
     # drivers

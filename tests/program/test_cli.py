@@ -132,6 +132,11 @@ def test_an_assembly_that_fails_ends_with_3(here: Path) -> None:
         (["run", "crank.toml", "--set", "speed"], "write name=value"),
         (["run", "crank.toml", "--set", "k=-1"], "stiffness is -1 N/m; it must be zero or greater"),
         (["run", "crank.toml", "--set", "k=1 furlog"], "unknown unit 'furlog'"),
+        (
+            ["run", "crank.toml", "--set", "speed=2 kg"],
+            "parameter 'speed' of 'slider/crank' is '60 rpm'; '2 kg': expected",
+        ),
+        (["run", "crank.toml", "--set", "speed=2 Hz"], "--set 'speed=2 Hz'"),
         (["run", "crank.toml", "--t-end", "-1"], "the end time -1 s must be later"),
         (["run", "crank.toml", "--t-end", "1 m"], "--t-end: '1 m': expected a time"),
         (["run", "crank.toml", "--outputs", "1"], "at least 2"),

@@ -110,6 +110,10 @@ def test_what_a_method_does_not_have_is_refused_by_name():
         (lambda m: m.simulate(1j), "t_end is a time"),
         (lambda m: m.simulate("1 m"), "t_end: '1 m': expected a time"),
         (lambda m: m.simulate(1, parameters=5), "parameters maps names to values"),
+        (
+            lambda m: m.simulate(1, parameters={"k": "2 kg"}),
+            "parameter 'k' of 'oscillator' is '100 N/m'; '2 kg': expected",
+        ),
         (lambda m: m.simulate(1, progress="yes"), "progress is True, False or a function"),
         (lambda m: m.simulate(1, start=3), "start is a result"),
         (lambda m: m.simulate(1, start=m.simulate(0.1), t_start=0), "leave out t_start"),

@@ -83,7 +83,7 @@ def close(d: Dice, m: fb.Mechanism, case: Case, count: int, kinds=None) -> None:
 def dress(d: Dice, m: fb.Mechanism, case: Case, *, most: int = 3, stiff: bool = False, kinds=None) -> None:
     """Sensors, a table, forces of any kind."""
     if d.chance(0.5):
-        case.add(lambda: fb.Table("curve", x=(-1, 0, 0.5, 2), y=(0, 1, 0.3, -1), outside=d.pick(["hold", "linear"])))
+        case.add(lambda: fb.Table("curve", x=(-1, 0, 0.5, 2), y=(0, 1, 0.3, -1), beyond=d.pick(["hold", "line"])))
     for k, c in enumerate(d.random.sample(coordinates(m), min(2, len(coordinates(m))))):
         case.add(lambda k=k, c=c: fb.Sensor(f"s{k}", c))
     names = ["ground", *(b.name for b in m.bodies)]

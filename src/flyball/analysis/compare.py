@@ -20,6 +20,7 @@ from ..results.result import Result
 from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU, SEMIDEFINITE, WORST_G, WORST_V
 from .compiled import Compiled, compiled
 from .motion import partition
+from .motion.ahead import refuse_missing
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
@@ -117,6 +118,7 @@ def compare(model: Model, o: CompareOptions) -> Comparison:
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     base = begin(model, t_start, o.parameters, o.start, "absolute")
+    refuse_missing(base.base, o.t_end)
     job = _Task(model, o, (t_start, o.t_end), times, base)
     with shown(o.progress, "comparing") as tell:
         truth, told = _reference(job)

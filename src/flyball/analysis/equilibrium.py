@@ -18,10 +18,10 @@ from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.search import LONGEST, descent, failure, newton, pushed
 from .linear.stability import GROWTH, stability
-from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
 from .options import Options
+from .steps import tangent_step
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -21,6 +21,7 @@ from ..results.result import Result
 from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assembly.start import Assembly
 from .motion import partition
+from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.options import STABILIZATION, Integration, output_times
 from .motion.outcome import outcome
@@ -69,9 +70,12 @@ def moved(
 
     Raises
     ------
+    ModelError
+        If a table of time ends before the motion does, or the start lies beyond the ends of a table.
     SimulationError
         If it cannot go on; its ``result`` holds the motion up to then.
     """
+    refuse_missing(begun.base, float(t_end))
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)

@@ -78,9 +78,14 @@ def set_parameters(mechanism: Mechanism, changes: Sequence[str]) -> None:
             problem = f"{mechanism.name!r} has no parameter {name!r}{suggest(name, known)}"
             raise ModelError(f"--set {text!r}: {problem}; {listing(known) if known else 'it has none'}")
         try:
-            mechanism.parameters[name] = float(value)
+            new: float | str = float(value)
         except ValueError:
-            mechanism.parameters[name] = value
+            new = value
+        try:
+            mechanism.environment({name: new})
+        except ModelError as error:
+            raise type(error)(f"--set {text!r}: {error}") from None
+        mechanism.parameters[name] = new
     if changes:
         env = mechanism.environment()
         for e in mechanism.elements():

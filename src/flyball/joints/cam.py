@@ -140,11 +140,11 @@ def _chords(points: tuple, closed: bool) -> np.ndarray:
 @lru_cache(maxsize=64)
 def _splines(points: tuple, closed: bool) -> tuple[list[float], list[float]]:
     s = tuple(_chords(points, closed).tolist())
-    outside: Any = "periodic" if closed else "linear"
+    beyond: Any = "repeat" if closed else "line"
     if np.iscomplexobj(s):
         real = _splines(tuple(tuple(x.real for x in p) for p in points), closed)
         at, columns = np.array(s), _closing(points, closed).T
-        steps = (packed(at, c, complex_cubic(at, c, closed), outside).imag for c in columns)
+        steps = (packed(at, c, complex_cubic(at, c, closed), beyond).imag for c in columns)
         return tuple((np.array(r) + 1j * d).tolist() for r, d in zip(real, steps, strict=True))  # type: ignore[return-value]
     x, y = (tuple(c) for c in _closing(points, closed).T.tolist())
-    return tuple(Table(k, x=s, y=c, outside=outside).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]
+    return tuple(Table(k, x=s, y=c, beyond=beyond).data() for k, c in (("px", x), ("py", y)))  # type: ignore[return-value]

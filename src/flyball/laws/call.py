@@ -1,4 +1,4 @@
-"""Calls of Python functions from laws: machine code reached by its address, and the record of what went wrong.
+"""Calls from laws: Python functions, as machine code reached by its address; and the record of what went wrong.
 
 Such a code reads its arguments from the first column of the stack, one a row, and writes its value into the second
 column of the first of these rows, where nan stands before: whatever fails inside leaves nan. The addresses stand in
@@ -15,7 +15,10 @@ from ..compiler.jit import formula, on_numba
 from .opcodes import ADDRESS, COUNT, INDEX
 
 STACK_RESERVE = 3
-"""Last rows of the stack, kept for a fault: (index + 1, arguments given, value), then up to six arguments."""
+"""Last rows of the stack, kept for a fault: (index + 1, arguments given, value), then up to six arguments.
+
+Of a table that has no value: (start of the law + 1, -1, place of the table in const), then (argument, time).
+"""
 
 NATIVE: WeakValueDictionary[int, Any] = WeakValueDictionary()
 """What stands at an address, as long as it does: the `native.Native`."""
@@ -51,6 +54,17 @@ def called(code, at, stack, row):
             for k in range(count):
                 stack[last + 1 + k // 3, k % 3] = stack[row + k, 0]
     return value
+
+
+@formula
+def note_missed(stack, law, table, x, t):
+    """Record that a law asked a table for its value at x, where it has none."""
+    last = stack.shape[0] - STACK_RESERVE
+    stack[last, 0] = law + 1.0
+    stack[last, 1] = -1.0
+    stack[last, 2] = table
+    stack[last + 1, 0] = x
+    stack[last + 1, 1] = t
 
 
 @on_numba

@@ -37,7 +37,7 @@ from ..math.scalar import (
     tanh,
 )
 from ..math.spline import spline
-from .call import called
+from .call import called, note_missed
 from .opcodes import (
     ABS,
     ACOS,
@@ -84,9 +84,12 @@ from .opcodes import (
 def evaluate(code, const, at, stack, x, sensed):
     """Value of the law that starts at `at`; `stack` is scratch.
 
-    The inputs x = (t, ...) are all of one type, and `sensed` holds the values of the sensors in its first row.
+    The inputs x = (t, ...) are all of one type, and `sensed` holds the values of the sensors in its first row. A table
+    without a value that leaves the law without one is noted in the stack.
     """
     top = -1
+    missed = -1
+    beyond = 0.0 * x[0]
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
         operand = code[i + 1]
@@ -104,7 +107,10 @@ def evaluate(code, const, at, stack, x, sensed):
         elif operation == WHOLE_POWER:
             stack[top, 0] = integer_power(stack[top, 0], operand)
         elif operation == TABLE:
-            stack[top, 0] = spline(const, operand, stack[top, 0])[0]
+            place = stack[top, 0]
+            stack[top, 0] = spline(const, operand, place)[0]
+            if stack[top, 0] - stack[top, 0] != 0.0 and place - place == 0.0:
+                missed, beyond = operand, place
         elif operation == FUNCTION:
             top += 1 - code[operand + COUNT]
             stack[top, 0] = called(code, operand, stack, top)
@@ -114,6 +120,8 @@ def evaluate(code, const, at, stack, x, sensed):
         elif operation >= ADD:
             top -= 1
             stack[top, 0] = combined(operation, stack[top, 0], stack[top + 1, 0])
+    if missed >= 0 and stack[0, 0] - stack[0, 0] != 0.0:
+        note_missed(stack, at, missed, beyond, x[0])
     return stack[0, 0]
 
 
@@ -126,6 +134,8 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
     alone.
     """
     top = -1
+    missed = -1
+    beyond = 0.0 * t
     for i in range(at + 2, at + 2 + 2 * code[at], 2):
         operation = code[i]
         operand = code[i + 1]
@@ -145,6 +155,8 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
             v = stack[top, 0]
             if operation == TABLE:
                 f, f1, f2 = spline(const, operand, v)
+                if f - f != 0.0 and v - v == 0.0:
+                    missed, beyond = operand, v
             elif operation == CALL:
                 f = value(operand, v)
                 f1, f2 = slopes(operand, v, f)
@@ -164,6 +176,8 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
         else:
             top -= 1
             combine_jets(operation, stack, top)
+    if missed >= 0 and stack[0, 0] - stack[0, 0] != 0.0:
+        note_missed(stack, at, missed, beyond, t)
     return stack[0, 0], stack[0, 1], stack[0, 2]
 
 

@@ -1,18 +1,21 @@
-"""Python functions as laws call them, and what is left of a call that failed."""
+"""Python functions as laws call them, and what is left of a call that failed, or of a table asked beyond its ends."""
 
 from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..errors import ExpressionError
 from .call import STACK_RESERVE
 from .native import Native
+
+if TYPE_CHECKING:
+    from ..model.table import Table
 
 
 class Called(NamedTuple):
@@ -50,8 +53,39 @@ class Fault(NamedTuple):
         return f"{self.function.title} raises {type(self.exception).__name__}{at}: {self.exception}"
 
 
+class Missed(NamedTuple):
+    """A table that a law asked for a value that it has not."""
+
+    where: str  # what it is the law of
+    table: Table
+    x: float
+    t: float
+    exception: None = None
+
+    @property
+    def message(self) -> str:
+        """What happened, in words."""
+        return f"{self.where}: at t = {self.t:.6g} s {self.table.told_beyond(self.x)}"
+
+
+def missed(stack: np.ndarray, laws: Mapping[int, str], tables: Mapping[int, Table]) -> Missed | None:
+    """The last law that a table left without a value, or None.
+
+    Parameters
+    ----------
+    stack : array
+        Scratch of the laws after a run; its last `STACK_RESERVE` rows hold the record.
+    laws, tables : mapping
+        What each law is the law of, by its start in the code; tables by their place among the constants.
+    """
+    record = np.real(stack[-STACK_RESERVE:])
+    if not (record[0, 0] > 0.0 and record[0, 1] < 0.0):
+        return None
+    return Missed(laws[int(record[0, 0]) - 1], tables[int(record[0, 2])], float(record[1, 0]), float(record[1, 1]))
+
+
 def fault(stack: np.ndarray, functions: Sequence[Called], overcome: bool = False) -> Fault | None:
-    """The last call that gave no finite number, or None.
+    """The last call of a Python function that gave no finite number, or None.
 
     The Python function is run again with the same arguments, for the exception that compiled code does not tell. A
     function with a memory may not raise it again; then it is the one that it raised last, if that is known.
@@ -67,7 +101,7 @@ def fault(stack: np.ndarray, functions: Sequence[Called], overcome: bool = False
     """
     record = np.real(stack[-STACK_RESERVE:])
     at = -record[0, 0] if overcome else record[0, 0]
-    if not at > 0.0:
+    if not at > 0.0 or record[0, 1] < 0.0:
         return None
     function = functions[int(at) - 1]
     arguments = tuple(record[1:].ravel()[: int(record[0, 1])].tolist())

@@ -8,6 +8,8 @@ with four coefficients c0 c1 c2 c3 a piece, f = c0 + c1 s + c2 s^2 + c3 s^3. Pie
 break[k], and s = x - break[k-1]; piece 0 extends the spline before the first break (there s = x - break[0]), piece m
 behind the last one. A break belongs to the piece behind it, the last one to the piece before it, so that the ends of a
 table count as inside. A period greater than zero says that x is first brought into [break[0], break[0] + period).
+Where a spline must not be asked beyond its ends, the outer pieces are nan, and begin so little farther out that
+rounding does not reach them (`GRACE`).
 """
 
 from __future__ import annotations
@@ -19,6 +21,7 @@ import numpy as np
 
 from ..compiler.jit import formula, on_numba
 
+GRACE = 1e-9  # part of a table's width by which rounding may go beyond its ends
 BREAKS = 2  # place of the first break
 PIECE = 4  # numbers a piece
 
@@ -100,15 +103,29 @@ def complex_cubic(x: np.ndarray, y: np.ndarray, periodic: bool) -> np.ndarray:
     return np.column_stack([y[:-1], left, (3.0 * d - 2.0 * left - right) / h, (left + right - 2.0 * d) / h**2])
 
 
-def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, outside: str) -> np.ndarray:
-    """The flat list of numbers: ``pieces`` between the points, and behind the ends what ``outside`` says."""
-    slopes: Any = 0.0, 0.0
-    if outside != "hold":
-        width = x[-1] - x[-2]
-        slopes = pieces[0, 1], pieces[-1, 1] + width * (2.0 * pieces[-1, 2] + 3.0 * width * pieces[-1, 3])
-    ends = [(y[0], slopes[0], 0.0, 0.0), (y[-1], slopes[1], 0.0, 0.0)]
-    period = x[-1] - x[0] if outside == "periodic" else 0.0
-    return np.r_[period, len(x), x, np.vstack([ends[:1], pieces, ends[1:]]).ravel()]
+def packed(x: np.ndarray, y: np.ndarray, pieces: np.ndarray, beyond: str) -> np.ndarray:
+    """The flat list of numbers: ``pieces`` between the points, and behind the ends what ``beyond`` says.
+
+    "hold", "line" (straight on), "repeat", or "refuse": nan.
+    """
+    behind = [y[-1], *_moved(pieces[-1], x[-1] - x[-2])[1:]]
+    if beyond == "refuse":
+        more = max(GRACE * (x[-1] - x[0]), 4.0 * np.spacing(np.abs(x).max()))
+        first = _moved(pieces[0], -more)
+        x = np.r_[x[0] - more, x, x[-1] + more]
+        pieces = np.vstack([first, pieces, behind])
+        before = behind = [np.nan] * PIECE
+    else:
+        slopes = (0.0, 0.0) if beyond == "hold" else (pieces[0, 1], behind[1])
+        before, behind = ([f, slope, 0.0, 0.0] for f, slope in zip((y[0], y[-1]), slopes, strict=True))
+    period = x[-1] - x[0] if beyond == "repeat" else 0.0
+    return np.r_[period, len(x), x, np.vstack([before, pieces, behind]).ravel()]
+
+
+def _moved(piece: np.ndarray, by: float) -> list[float]:
+    """A cubic counted from another place."""
+    c0, c1, c2, c3 = piece
+    return [c0 + by * (c1 + by * (c2 + by * c3)), c1 + by * (2.0 * c2 + 3.0 * by * c3), c2 + 3.0 * by * c3, c3]
 
 
 def symbolic(data: Any, at: int, x: Any) -> Any:
@@ -125,7 +142,8 @@ def symbolic(data: Any, at: int, x: Any) -> Any:
         c0, c1, c2, c3 = (float(c) for c in data[start : start + PIECE])
         s = x - breaks[max(k - 1, 0)]
         inside = sympy.true if k == count else x <= breaks[k] if k == count - 1 else x < breaks[k]
-        pieces.append((c0 + s * (c1 + s * (c2 + s * c3)), inside))
+        value = c0 + s * (c1 + s * (c2 + s * c3)) if math.isfinite(c0) else sympy.nan
+        pieces.append((value, inside))
     return sympy.Piecewise(*pieces)
 
 

@@ -24,6 +24,7 @@ from .references import check_references
 from .sensor import IMU, Sensor
 from .summary import summary
 from .table import Table
+from .units import same_kind
 from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
 from .words import listing as listing
 from .words import suggest as suggest
@@ -88,12 +89,16 @@ class Model:
         Raises
         ------
         ModelError
-            If a changed parameter does not exist.
+            If a changed parameter does not exist, or has a unit of another kind.
         """
         for name in changed or {}:
             if name not in self.parameters:
                 known = list(self.parameters)
                 raise ModelError(f"{self.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+        for name, value in (changed or {}).items():
+            old = self.parameters[name]
+            if isinstance(old, str) and isinstance(value, str):
+                same_kind(old, value, f"parameter {name!r} of {self.name!r}")
         if changed:
             return resolve_parameters({**self.parameters, **changed})
         if self._resolved is None or self._resolved[0] != self.parameters:

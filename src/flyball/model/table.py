@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import keyword
+import math
 from functools import cached_property
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
@@ -11,7 +12,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError, UnitError
-from ..math.spline import packed, spline, symbolic
+from ..math.spline import BREAKS, packed, spline, symbolic
 from .element import Element, element, limited, plain
 from .grammar import CONSTANTS, FUNCTIONS
 from .units import to_si
@@ -34,9 +35,10 @@ class Table(Element):
         swing beyond the points. Monotone: one continuous derivative and never beyond the points (Fritsch and Butland,
         A method for constructing local monotone piecewise cubic interpolants, SIAM J. Sci. Stat. Comput. 5, 1984).
         Linear: straight between the points, with kinks.
-    outside : ``"linear"``, ``"hold"`` or ``"periodic"``
-        Beyond the points: straight on with the slope of the end, the value of the end, or again and again from the
-        start (the last y must then be the first; cubic is smooth across the seam too).
+    beyond : ``"refuse"``, ``"hold"``, ``"line"`` or ``"repeat"``
+        Beyond the points: nothing is known, and a motion that gets there stops; the value of the end; straight on with
+        the slope of the end; or again and again from the start (the last y must then be the first; cubic is smooth
+        across the seam too).
     x_unit, y_unit : str
         Units that x and y are written in, such as ``"mm"`` and ``"kN"``; SI if not given.
     """
@@ -44,11 +46,14 @@ class Table(Element):
     x: Column
     y: Column
     interpolation: Literal["cubic", "monotone", "linear"] = "cubic"
-    outside: Literal["linear", "hold", "periodic"] = "linear"
+    beyond: Literal["refuse", "hold", "line", "repeat"] = "refuse"
     x_unit: str = ""
     y_unit: str = ""
 
     category: ClassVar[str] = "tables"
+    hints: ClassVar[dict[str, str]] = {
+        "outside": "it is called beyond, and is 'hold', 'line' (once 'linear') or 'repeat' (once 'periodic')"
+    }
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse points that make no curve, and a name that no expression could use."""
@@ -69,7 +74,10 @@ class Table(Element):
         return list(self._list)
 
     def values(self, x: Any) -> tuple[Any, Any, Any]:
-        """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array."""
+        """Value, first and second derivative at ``x`` [SI], a number (real or complex) or an array.
+
+        They are nan beyond the ends of a table that says nothing of what is there.
+        """
         return spline(self._array if isinstance(x, np.ndarray | np.generic) else self._list, 0, x)
 
     def value(self, x: Any) -> Any:
@@ -77,6 +85,25 @@ class Table(Element):
         if isinstance(x, float | int | complex | np.ndarray | np.generic):
             return self.values(x)[0]
         return symbolic(self._array, 0, x)
+
+    def ends(self) -> tuple[float, float]:
+        """The first and the last x [SI] that it has a value for: all, unless ``beyond`` is ``"refuse"``."""
+        if self.beyond != "refuse":
+            return -math.inf, math.inf
+        count = int(self._array[1])
+        return float(self._array[BREAKS]), float(self._array[BREAKS + count - 1])
+
+    def told_beyond(self, x: float) -> str:
+        """Why it has no value at ``x`` [SI], and what to do."""
+        unit = f" {self.x_unit}" if self.x_unit else ""
+        written = x / (to_si(f"1 {self.x_unit}", None) if self.x_unit else 1.0)
+        at = f"for x = {written:.6g}{unit}"
+        if any(f"{end:.6g}" == f"{written:.6g}" for end in (self.x[0], self.x[-1])):
+            at = f"for what is just beyond x = {written:.6g}{unit}"
+        return (
+            f"{self.title} is asked {at}, and its points go from {self.x[0]:g} to {self.x[-1]:g}{unit}; give it more "
+            f"points, or say what is beyond them: beyond='hold', 'line' or 'repeat'"
+        )
 
     @cached_property
     def _list(self) -> list[float]:
@@ -86,7 +113,7 @@ class Table(Element):
     def _array(self) -> np.ndarray:
         x, y = self._points()
         with np.errstate(all="ignore"):
-            return packed(x, y, _MAKERS[self.interpolation](x, y, self.outside == "periodic"), self.outside)
+            return packed(x, y, _MAKERS[self.interpolation](x, y, self.beyond == "repeat"), self.beyond)
 
     def _points(self) -> tuple[np.ndarray, np.ndarray]:
         """The points in SI units, checked."""
@@ -106,11 +133,11 @@ class Table(Element):
         if not np.isfinite(slopes).all():
             k = int(np.argmax(slopes))
             raise ModelError(f"{self.title}: x[{k}] and x[{k + 1}] are too close, the slope between them is no number")
-        if self.outside == "periodic":
+        if self.beyond == "repeat":
             if abs(y[-1] - y[0]) > 1e-9 * np.ptp(y):
                 raise ModelError(
-                    f"{self.title}: a periodic table ends where it starts, but y[0] = {self.y[0]:g} and "
-                    f"y[{len(y) - 1}] = {self.y[-1]:g}; add the point that closes the period, or choose another outside"
+                    f"{self.title}: a table that repeats ends where it starts, but y[0] = {self.y[0]:g} and "
+                    f"y[{len(y) - 1}] = {self.y[-1]:g}; add the point that closes the period, or choose another beyond="
                 )
             y[-1] = y[0]
         return x, y

@@ -87,6 +87,22 @@ def to_si(text: str, dimension: str | None) -> float:
     return value
 
 
+def same_kind(old: str, new: str, where: str) -> None:
+    """Refuse a quantity in place of one of another kind; what has no unit is in SI and says nothing.
+
+    Raises
+    ------
+    UnitError
+        If their units measure different things.
+    """
+    was, now = split_quantity(old), split_quantity(new)
+    if was is not None and now is not None and was[1] and now[1]:
+        try:
+            to_si(new, was[1])
+        except UnitError as error:
+            raise UnitError(f"{where} is {old!r}; {error}") from None
+
+
 def is_unit(text: str) -> bool:
     """Whether the text is a unit that is known ("mm", "kN/m")."""
     try:

@@ -1,15 +1,18 @@
 """Results as labelled datasets, tables and files; `flyball.results.reading` reads them back.
 
 A result file is NetCDF 4. Its root holds the labelled quantities, for other programs; its group ``flyball`` holds what
-the motion was computed with, bit for bit, from which the result is rebuilt without simulating.
+the motion was computed with, bit for bit, from which the result is rebuilt without simulating, and a checksum of it.
+Behind the end of what NetCDF reads stands a checksum of the whole file, so that nothing reads a damaged file: HDF5 may
+then not come back. A program that writes the file anew drops that one and keeps the other.
 """
 
 from __future__ import annotations
 
 import csv
+import hashlib
 import json
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +29,8 @@ if TYPE_CHECKING:
     from .result import Result
 
 GROUP = "flyball"
-FORMAT = 2  # 1: before joint coordinates
+SEAL = b"\nflyball SHA-256 "
+FORMAT = 3  # 1: before joint coordinates, 2: before checksums
 ARRAYS = {
     "t": ("time",),
     "q": ("time", "nq"),
@@ -88,7 +92,12 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
 
 def save(result: Result, path: str | os.PathLike) -> None:
     """Write everything, the model included, to one NetCDF file."""
-    _replaced(path, lambda part: _write(result, part))
+
+    def write(part: Path) -> None:
+        _write(result, part)
+        seal(part)
+
+    _replaced(path, write)
 
 
 def _replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
@@ -129,6 +138,47 @@ def _text_type() -> Any:
     return h5py.string_dtype()
 
 
+def seal(path: Path) -> None:
+    """Write the checksum of a file behind its end."""
+    text = SEAL + file_hash(path, path.stat().st_size).encode()
+    with open(path, "ab") as file:
+        file.write(text)
+
+
+def sealed(path: Path) -> bool | None:
+    """Whether a file is as it was written; None if it has no checksum behind its end."""
+    size = path.stat().st_size - len(SEAL) - 64
+    if size < 0:
+        return None
+    with open(path, "rb") as file:
+        file.seek(size)
+        found = file.read()
+    return found[len(SEAL) :] == file_hash(path, size).encode() if found.startswith(SEAL) else None
+
+
+def file_hash(path: Path, size: int) -> str:
+    """SHA-256 of the first bytes of a file."""
+    digest = hashlib.sha256()
+    with open(path, "rb") as file:
+        while size > 0 and (part := file.read(min(size, 1 << 20))):
+            digest.update(part)
+            size -= len(part)
+    return digest.hexdigest()
+
+
+def checksum(stored: Mapping[str, Any]) -> str:
+    """SHA-256 of texts and arrays by name, in an order and with bytes that do not depend on the machine."""
+    digest = hashlib.sha256(str(FORMAT).encode())
+    for name in sorted(stored):
+        value = stored[name]
+        shape, data = "text", str(value).encode()
+        if not isinstance(value, str):
+            numbers = np.ascontiguousarray(value, "<f8")
+            shape, data = str(numbers.shape), numbers.tobytes()
+        digest.update(f"{name} {shape} {len(data)}\n".encode() + data)
+    return digest.hexdigest()
+
+
 def _safe(name: str) -> str:
     return name.replace("/", SLASH).strip() or "_"
 
@@ -163,3 +213,4 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
     for name, values in numbers.items():
         group.dimensions[f"n_{name}"] = len(values)
         group.create_variable(name, (f"n_{name}",), data=np.array(values, float))
+    group.attrs["checksum"] = checksum(texts | {name: getattr(result, name) for name in ARRAYS} | numbers)

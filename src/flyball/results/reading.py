@@ -1,9 +1,14 @@
-"""Results read back from the files that `flyball.results.files` writes; nothing is simulated."""
+"""Results read back from the files that `flyball.results.files` writes; nothing is simulated.
+
+A file that was changed after it was written (a copy that broke off, a failing disk) is refused: its checksums do not
+fit, whatever else may be wrong with it.
+"""
 
 from __future__ import annotations
 
 import json
 import os
+import re
 from dataclasses import fields
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +19,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model, suggest
 from .departure import Departure
-from .files import ARRAYS, FORMAT, GROUP
+from .files import ARRAYS, FORMAT, GROUP, checksum, sealed
 from .health import Health
 from .result import Result
 
@@ -27,31 +32,78 @@ def load_result(path: str | os.PathLike, cls: type[M]) -> Result:
     Raises
     ------
     ModelError
-        If there is no such file, or it is no result of flyball.
+        If there is no such file, it is no result of flyball, or it is damaged.
     """
     path = Path(path)
     if not path.is_file():
         there = [p.name for p in path.parent.glob("*.nc")] if path.parent.is_dir() else []
         raise ModelError(f"there is no file {os.fspath(path)!r}{suggest(path.name, there)}")
-    stored = _stored(path)
-    return _rebuilt(stored, cls, os.fspath(path))
+    stored, kind = _stored(path)
+    where = os.fspath(path)
+    try:
+        result = _rebuilt(stored, cls, where)
+    except ModelError:
+        raise
+    except Exception as error:  # whatever a file may hold
+        raise _damaged(where, f"{type(error).__name__}: {error}") from None
+    if kind < 3:
+        late: dict[str, Any] = result.health.late
+        note = f"{path.name} was written before result files had checksums: whether it is damaged cannot be told"
+        late["warnings"] = (*result.health.warnings, note)
+    return result
 
 
-def _stored(path: Path) -> dict[str, Any]:
-    """Texts and arrays of the file's own group."""
+REMEDY = "give a file that Result.save or 'flyball run' wrote"
+
+
+def _damaged(where: str, what: str) -> ModelError:
+    return ModelError(f"{where} is damaged: {what}. Take another copy of it, or simulate again")
+
+
+def _stored(path: Path) -> tuple[dict[str, Any], int]:
+    """Texts and arrays of the file's own group, and their format."""
     import h5netcdf
 
-    remedy = "give a file that Result.save or 'flyball run' wrote"
     try:
+        if sealed(path) is False:
+            raise _damaged(os.fspath(path), "what it holds does not fit the checksum at its end")
         with h5netcdf.File(path, "r") as file:
             if GROUP not in file.groups:
-                raise ModelError(f"{path} is no result of flyball (it holds no group {GROUP!r}); {remedy}")
+                raise ModelError(f"{path} is no result of flyball (it holds no group {GROUP!r}); {REMEDY}")
             group = file.groups[GROUP]
-            if int(group.attrs["format"]) > FORMAT:
+            kind, written = int(group.attrs["format"]), group.attrs.get("checksum")
+            if kind > FORMAT:
                 raise ModelError(f"{path} was written by flyball {group.attrs['version']}, a later version than this")
-            return {k: _read(v) for k, v in group.variables.items()}
-    except (OSError, KeyError) as error:
-        raise ModelError(f"{path} cannot be read as a NetCDF result ({error}); {remedy}") from None
+            stored = {k: _read(v) for k, v in group.variables.items()}
+    except ModelError:
+        raise
+    except Exception as error:  # HDF5 and its wrappers fail in many ways on what is no such file, or no longer
+        raise ModelError(f"{path} cannot be read as a NetCDF result ({_first_line(error)}); {REMEDY}") from None
+    if written is None and kind >= 3:
+        raise _damaged(os.fspath(path), "its checksum is missing")
+    if written is not None and written != checksum(stored):
+        raise _damaged(os.fspath(path), "what it holds does not fit its checksum")
+    if kind < 3 and "model" in stored:
+        stored["model"] = _of_now(stored["model"])
+    return stored, kind
+
+
+def _first_line(error: Exception) -> str:
+    """What an error says, in one line."""
+    return next(iter(str(error).splitlines()), "") or type(error).__name__
+
+
+def _of_now(model: str) -> str:
+    """The text of a model written when tables went on straight unless ``outside`` said something else."""
+    parts = re.split(r"(?m)^(?=\[)", model)
+    names = {"linear": "line", "hold": "hold", "periodic": "repeat"}
+    for k, part in enumerate(parts):
+        if part.startswith("[[tables]]"):
+            given = re.search(r'(?m)^outside = "(\w+)"\n', part)
+            rest = part.replace(given[0], "") if given else part
+            beyond = f'beyond = "{names[given[1]] if given else "line"}"'
+            parts[k] = rest.replace("[[tables]]\n", f"[[tables]]\n{beyond}\n", 1)
+    return "".join(parts)
 
 
 def _read(variable: Any) -> Any:
@@ -78,15 +130,17 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
         final = stored["final"]
         health = _health(json.loads(stored["health"]))
     except KeyError as error:
-        raise ModelError(f"{where} is no complete result of flyball: {error} is missing") from None
+        raise ModelError(f"{where} is no complete result of flyball: {error} is missing; {REMEDY}") from None
     s = x.structure
-    wanted = {"q": s.nq, "v": s.nv, "multipliers": len(s.rows) + len(s.prescribed)}
+    wanted = {"q": s.nq, "v": s.nv, "vdot": s.nv, "multipliers": len(s.rows) + len(s.prescribed)}
     wanted["states"] = len(s.states)
     for name, n in wanted.items():
-        if arrays[name].shape[1] != n:
-            raise ModelError(
-                f"{where}: its model has {n} {name}, its motion {arrays[name].shape[1]}; the file is damaged"
+        if arrays[name].shape != (len(arrays["t"]), n):
+            raise _damaged(
+                where, f"its model has {n} {name} at {len(arrays['t'])} times, its motion {arrays[name].shape}"
             )
+    if not (np.diff(arrays["t"]) >= 0.0).all():
+        raise _damaged(where, "its times do not ascend")
     result = Result(model, x, health=health, **arrays)
     result.final = (float(final[0]), final[1:])
     result.wound = json.loads(stored.get("wound", "{}"))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.blocks import Row
+from ..laws.functions import Missed, missed
 from ..laws.program import compile_law
 from ..model.element import Element
 from ..model.expressions import Expression
@@ -85,6 +86,7 @@ class Structure:
     code: list[int] = field(default_factory=list)
     const: list[float] = field(default_factory=list)
     table_at: dict[str, int] = field(default_factory=dict)  # table or joint's curve -> its place in const
+    laws: dict[int, str] = field(default_factory=dict)  # start of each law in the code -> what it is the law of
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1
     ldl: Pattern = None  # type: ignore[assignment]
@@ -122,7 +124,12 @@ class Structure:
             derivatives=derivatives,
         )
         self.depth = max(self.depth, depth)
+        self.laws[at] = law.where
         return at
+
+    def missed(self, stack: np.ndarray) -> Missed | None:
+        """The last law that a table left without a value, if one is on record in the laws' scratch."""
+        return missed(stack, self.laws, {self.table_at[x.name]: x for x in self.model.tables})
 
 
 def frame(s: Structure, e: Any, role: str, coordinate: str = "") -> int:

@@ -23,8 +23,10 @@ def disagreement(c: Compiled, best: Any) -> AssemblyError:
     name = c.structure.model.name
     lawless = [r.element for r, x in zip(c.structure.rows, g, strict=True) if r.law >= 0 and not np.isfinite(x)]
     if lawless:
+        missed = c.structure.missed(c.work.stack)
         return AssemblyError(
             f"{name!r} cannot be assembled at t = {t:g} s: the law of {lawless[0].title} has no finite value there"
+            f"{f': {missed.message}' if missed else ''}"
         )
     gaps: dict[str, tuple[float, float]] = {}
     for element, rows in c.structure.slices.items():

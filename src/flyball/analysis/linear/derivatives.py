@@ -176,14 +176,19 @@ class Equations:
         except ZeroDivisionError:  # complex numbers know no infinity
             out[:] = np.nan
         if not np.isfinite(out.view(float)).all():
-            raise self._not_finite()
+            raise self._not_finite(W.stack)
         return out
 
-    def _not_finite(self) -> AnalysisError:
-        """The error that names what is no number."""
+    def _not_finite(self, stack: np.ndarray) -> AnalysisError:
+        """The error that names what is no number; ``stack`` is the laws' scratch."""
         x = self.state
         x.c.at(x.t, x.q, x.v, MOTION)
-        why = broken_force(x.c, x.t) or "look for a law that divides by zero or leaves its range"
+        missed = x.c.structure.missed(stack)
+        why = (
+            missed.message
+            if missed
+            else broken_force(x.c, x.t) or "look for a law that divides by zero or leaves its range"
+        )
         return AnalysisError(
             f"the equations of {x.c.structure.model.name!r}, or their derivatives, are not finite at t = {x.t:.6g} s: "
             f"{why}"

@@ -63,7 +63,8 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
     if clock.count[ex.STATUS] == ex.TOO_MANY:
         return f"{name!r}: {_too_many(a, clock)}. {kept}", None
-    found = fault(a.compiled.work.stack, a.compiled.structure.functions)
+    stack = a.compiled.work.stack
+    found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
     text = (
