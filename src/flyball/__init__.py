@@ -49,6 +49,7 @@ Read a result
 When something is wrong
     FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
     AssemblyError, SimulationError, MobilityError, SingularityError, NotConverged and AnalysisError for what was asked.
+    StartWarning tells what of a described start could not be kept.
 
 Orientations by themselves: ``help(fb.rotations)``. From a shell: ``flyball --help``.
 """
@@ -73,6 +74,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import SingularityError as SingularityError
     from .errors import SingularOrientationError as SingularOrientationError
     from .errors import SingularOrientationWarning as SingularOrientationWarning
+    from .errors import StartWarning as StartWarning
     from .errors import UnitError as UnitError
     from .files import load as load
     from .files import load_result as load_result

@@ -9,6 +9,7 @@ import numpy as np
 
 from .departure import Departure, summary
 from .mass import directions, letters
+from .numbers import tuple_of
 
 EQUAL = 1e-9  # moments that differ by less than this part are the same
 
@@ -24,9 +25,9 @@ class BodyReport:
 
     def line(self) -> str:
         """What a reader wants to see."""
-        com = ", ".join(f"{x:.4g}" for x in self.com)
+        com = tuple_of(self.com)
         moments = ", ".join(f"{x:.4g}" for x in self.moments)
-        text = f"{self.mass:.4g} kg, centre of mass ({com}) m, "
+        text = f"{self.mass:.4g} kg, centre of mass {com} m, "
         if not self.axes:
             return text + f"inertia {moments} kg m^2"
         if self.moments[-1] - self.moments[0] <= EQUAL * self.moments[-1]:
@@ -83,8 +84,7 @@ class Report:
         if len(self.bodies) > 30:
             out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
         if len(self.bodies) > 1:
-            com = ", ".join(f"{x:.4g}" for x in self.com)
-            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at ({com}) m"))
+            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at {tuple_of(self.com)} m"))
         return out + [("warning", w) for w in self.warnings]
 
     def _freedoms(self) -> str:

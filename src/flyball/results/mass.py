@@ -9,8 +9,8 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.words import listing, suggest
+from .numbers import tuple_of
 
-ROUNDING = 1e-12
 ALIGNED = 1e-9  # a principal axis that differs by less from an axis of the body is that axis
 
 
@@ -129,7 +129,7 @@ def directions(axes: np.ndarray) -> str:
 
 def _tuple(p: np.ndarray) -> str:
     """Components in brackets; what is only rounding beside the others is 0."""
-    return f"({_list(np.where(np.abs(p) < ROUNDING * np.abs(p).max(), 0.0, p))})"
+    return tuple_of(p, 5)
 
 
 def _list(p: np.ndarray) -> str:

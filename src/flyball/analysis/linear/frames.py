@@ -16,6 +16,7 @@ import numpy as np
 
 from ...equations.tree import quaternion_at, rates
 from ...numerics.rank import parts
+from ...results.numbers import tuple_of
 from ...results.records import Records
 from ...tables.system import NV, V0
 from .derivatives import State
@@ -74,7 +75,7 @@ def told(x: State, frame: Frame, frozen: bool) -> str:
         return "the coordinates of this very instant"
     if not frame.turning.any():
         return "the ground"
-    return f"a frame that turns with ({', '.join(f'{w:.4g}' for w in frame.turning)}) rad/s"
+    return f"a frame that turns with {tuple_of(frame.turning)} rad/s"
 
 
 def generator(x: State, turning: np.ndarray) -> np.ndarray:
