@@ -49,6 +49,7 @@ Read a result
 When something is wrong
     FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
     AssemblyError, SimulationError, MobilityError, SingularityError, NotConverged and AnalysisError for what was asked.
+    StartWarning tells what of a described start could not be kept.
 
 Orientations by themselves: ``help(fb.rotations)``. From a shell: ``flyball --help``.
 """
@@ -61,8 +62,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assemble import Assembly as Assembly
-    from .analysis.check import Report as Report
-    from .analysis.mass import MassReport as MassReport
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -75,6 +74,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import SingularityError as SingularityError
     from .errors import SingularOrientationError as SingularOrientationError
     from .errors import SingularOrientationWarning as SingularOrientationWarning
+    from .errors import StartWarning as StartWarning
     from .errors import UnitError as UnitError
     from .files import load as load
     from .files import load_result as load_result
@@ -89,10 +89,12 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.sensor import Sensor as Sensor
     from .model.shapes import *
     from .model.table import Table as Table
+    from .results.check import Report as Report
     from .results.comparison import Comparison as Comparison
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
+    from .results.mass import MassReport as MassReport
     from .results.mobility import Mobility as Mobility
     from .results.modes import Modes as Modes
     from .results.optimum import Optimum as Optimum
@@ -131,9 +133,9 @@ _HOME = {
     "SingularityError": "errors",
     "NotConverged": "errors",
     "Assembly": "analysis.assemble",
-    "MassReport": "analysis.mass",
+    "MassReport": "results.mass",
     "Mobility": "results.mobility",
-    "Report": "analysis.check",
+    "Report": "results.check",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.series",

@@ -205,7 +205,7 @@ def test_reports_never_show_what_is_undetermined(tmp_path):
     head, first, *_ = csv.reader((tmp_path / "r.csv").open())
     assert first[head.index("upper.fz [N]")] == ""
     assert float(first[head.index("upper.angle [N*m]")]) == pytest.approx(found.efforts["upper.angle"][0])
-    assert "upper: tz 0 to 0 N m; undetermined: fx, fy, fz, tx, ty" in str(found)
+    assert "upper: tz 0 N m; undetermined: fx, fy, fz, tx, ty" in str(found)
     figure = found.plot()
     assert "not drawn: upper fx, fy, fz, tx, ty; lower fx" in figure.get_supxlabel()
     for ax in figure.axes:

@@ -13,6 +13,7 @@ import flyball as fb
 from flyball.cli import compiling
 from flyball.view.frequencies import frequencies, phase
 from flyball.view.linear import _ratio
+from tests.analyses.classical import bicycle, stand
 from tests.program.test_cli import Said
 
 K, M, C = 100.0, 2.0, 3.0
@@ -261,3 +262,17 @@ def test_each_kernel_has_its_notice(monkeypatch: pytest.MonkeyPatch, capsys: pyt
     compiling.announce_compiling(True)
     compiling.announce_compiling(False, "residual_kernel")
     assert capsys.readouterr().err == ""
+
+
+def test_a_linear_model_has_a_plot(tmp_path) -> None:
+    """Eigenvalues, and of one input and output the zeros."""
+    linear = stand(0.0).linearize()
+    (ax,) = linear.plot().axes
+    assert sorted(ax.lines[0].get_xdata()) == pytest.approx(sorted(linear.eigenvalues.real))
+    assert "2-fold" in [t.get_text() for t in ax.texts]
+    linear.plot(tmp_path / "poles.png")
+    assert (tmp_path / "poles.png").stat().st_size > 5000
+    assert linear.as_dict()["seen_from"] == ""
+    text = str(bicycle().linearize())
+    assert "seen from: the ground" in text
+    assert "e-1" not in text  # no rounding

@@ -8,6 +8,7 @@ from scipy.linalg import eigh
 from scipy.special import jn_zeros
 
 import flyball as fb
+from tests.analyses.classical import AT_FIVE, bicycle, foucault
 from tests.analyses.made import G, chain, chain_matrices, rod
 
 
@@ -113,3 +114,90 @@ def test_no_freedom_no_modes():
     found = m.modes()
     assert len(found) == 0
     assert "no freedom" in repr(found)
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_the_bicycle_at_five_metres_a_second(layer):
+    """Published eigenvalues (Meijaard et al. 2007), six zeros; the weave moves nothing forwards and turns no wheel."""
+    m = bicycle()
+    L, found = m.linearize(coordinates=layer), m.modes(coordinates=layer)
+    own = [w for w in found.eigenvalues if w]
+    assert sorted(own, key=lambda w: w.real) == pytest.approx(sorted(AT_FIVE, key=lambda w: w.real), rel=1e-10)
+    w, V = np.linalg.eig(L.A)
+    assert np.abs(L.A @ V - V * w).max() < 1e-11  # no entry of 1e-29 leads the solver astray
+    assert found.residual < 1e-12
+    rigid = np.array(found.kinds) == "rigid"
+    assert (found.multiplicity[rigid] == 6).all()
+    assert (found.geometric_multiplicity[rigid] == 4).all()
+    assert rigid.sum() == 4  # x, y and two wheels; heading and speed move on
+    assert "the eigenvalue is 6-fold, with 4 shapes only: defective" in str(found)
+    assert "seen from the ground" in str(found)
+    weave = int(np.argmax(found.eigenvalues.imag))
+    shape = dict(zip(found.names, found.shapes[:, weave], strict=True))
+    for name, size in shape.items():
+        if name.endswith((".x", ".z", "hub.angle", "turn y")):
+            assert abs(size) < 1e-9, name
+
+
+def test_shapes_are_the_same_in_both_layers():
+    """The weave and the capsize as motions of the bodies."""
+    found = [bicycle().modes(coordinates=layer) for layer in ("absolute", "joint")]
+    for kind in ("oscillation", "decay"):
+        k, n = (f.kinds.index(kind) for f in found)
+        a, b = (f.motion(i, 1e-3, 21)["front wheel"] for f, i in zip(found, (k, n), strict=True))
+        size = [np.ptp(x.position[:, 1]) for x in (a, b)]
+        for now in ("position", "rotation"):
+            p, q = (getattr(x, now) - getattr(x, now)[0] for x in (a, b))
+            assert p / size[0] == pytest.approx(q / size[1], abs=3e-3)
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_a_foucault_pendulum_is_seen_from_the_ground(layer):
+    """It is steady from the ground and from the table; what stands still is taken: omega0 twice, in both layers."""
+    found = foucault(1.0).modes(coordinates=layer)
+    assert found.omega == pytest.approx(np.sqrt([G, G]), rel=1e-5)
+    assert found.seen_from == "the ground"
+    assert (found.turning == 0.0).all()
+    assert foucault(1.0).linearize(coordinates=layer).seen_from == "the ground"
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_repeated_and_defective_eigenvalues_are_told(layer):
+    """Two masses on equal springs: twice the same, two shapes. One nothing holds: zero twice, one shape."""
+    m = fb.Mechanism("three", planar=True)
+    for k in range(3):
+        m.add(fb.Body(f"mass {k}", mass=1, inertia=1, position=(1, k)))
+        m.add(fb.Prismatic(f"rail {k}", "ground", f"mass {k}", at=(1, k), axis=(1, 0)))
+    for k in range(2):
+        m.add(fb.SpringDamper(f"spring {k}", "ground", f"mass {k}", at=((0, k), (1, k)), stiffness=9))
+    found = m.modes(coordinates=layer)
+    assert found.eigenvalues.tolist() == pytest.approx([0, 3j, 3j])
+    assert found.multiplicity.tolist() == [2, 2, 2]
+    assert found.geometric_multiplicity.tolist() == [1, 2, 2]
+    assert np.linalg.matrix_rank(found.shapes) == 3
+    assert "mode 0: the eigenvalue is 2-fold, with 1 shape only: defective" in str(found)
+    assert "modes 1 to 2: the eigenvalue is 2-fold, with 2 shapes" in str(found)
+    assert found.as_dict()["modes"][0]["multiplicity"] == 2
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_critical_damping_is_defective(layer):
+    """theta'' + 2 w theta' + w^2 theta = 0: -w twice, one shape, and no pair that rounding makes."""
+    w = np.sqrt(1.5 * G)
+    m = rod(damping=2 * w / 3)
+    m.add(fb.TorsionalSpringDamper("damper", joint="A", damping="damping"))
+    found = m.modes(coordinates=layer)
+    assert found.eigenvalues == pytest.approx([-w], rel=1e-10)
+    assert (found.eigenvalues.imag == 0.0).all()
+    assert (found.multiplicity[0], found.geometric_multiplicity[0]) == (2, 1)
+    assert "defective" in str(found)
+
+
+def test_what_is_undamped_shows_no_rounding():
+    """Real parts of 1e-16 are none; a small damping stays."""
+    found = chain(5).modes()
+    assert (found.eigenvalues.real == 0.0).all()
+    assert (found.shapes.imag == 0.0).all()
+    m = rod(damping=1e-9)
+    m.add(fb.TorsionalSpringDamper("damper", joint="A", damping="damping"))
+    assert m.modes().eigenvalues.real == pytest.approx([-1.5e-9], rel=1e-3)

@@ -206,7 +206,8 @@ def test_where_stability_changes_is_found_exactly() -> None:
     m.add(fb.Body("rod", mass=1, inertia=1 / 12, position=(0, 0.5)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
     m.add(fb.CoordinateSpring("s", "A.angle", stiffness="k", damping=0.5))
     locus = m.root_locus("k", np.linspace(0, 10, 6))
-    ((value, eigenvalue),) = locus.crossings
+    ((value, eigenvalue, kind, change),) = locus.crossings
+    assert (kind, change) == ("divergence", -1)
     assert value == pytest.approx(4.905, rel=1e-9)
     assert eigenvalue == pytest.approx(0.0, abs=1e-9)
     assert locus.unstable.tolist() == [1, 1, 1, 0, 0, 0]

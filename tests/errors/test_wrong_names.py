@@ -54,7 +54,7 @@ CASES = {
         r"is a whole part .*; name one of slider.x, slider.y",
     ),
     "a vector": (lambda: crank().sensitivity(["slider.position"]), r"has 2 components; name one: slider.x, slider.y"),
-    "no text": (lambda: crank().sensitivity([3], ["rod"]), r"a quantity is named by a text, .* not 3"),
+    "no text": (lambda: crank().sensitivity([3], ["rod"]), r"of is a list of names, .* not"),
     "to a parameter": (lambda: crank().sensitivity(["slider.x"], ["rodd"]), ROD),
     "about a thing": (
         lambda: crank().sensitivity([], ["rod"], analysis="modes", about=crank()),

@@ -1,34 +1,51 @@
-"""What the steps of an integration look at, and what they put right."""
+"""The step between two positions undoes ``retract``, in both coordinate layers, and half a turn is no division by zero."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-import flyball as fb
-from tests.layers import both_layers
-
-pytestmark = both_layers
-
-
-def test_counted_turns_do_not_drift():
-    """At a loose tolerance too the states that count turns are the angles of the poses, to rounding."""
-    m = fb.Mechanism("wheel")
-    m.add(fb.Body("wheel", mass=1, inertia=(1, 1, 1), position=(0, 0, 0)))
-    m.add(fb.Revolute("A", "ground", "wheel", at=(0, 0, 0), axis=(1, 2, 2)))
-    m.add(fb.Motor("motor", "A", torque="20*sin(3*t)"), fb.CoordinateSpring("s", "A.angle", stiffness=0.1))
-    r = m.simulate(5.0, outputs=11, rtol=1e-3, atol=1e-3)
-    turned = r.states[:, r.values.structure.state_at["A.angle"]]
-    assert np.abs(r["A"].angle).max() > 10.0
-    assert turned == pytest.approx(r["A"].angle, abs=1e-12)
+from flyball.analysis.compiled import compiled
+from flyball.analysis.steps import tangent_rate, tangent_step
+from flyball.equations.tree import retract
+from flyball.numerics.rank import null_space, parts, rank, span
+from tests.mechanisms import example, four_bar, free_body
 
 
-def test_steps_follow_the_works_of_a_driven_part():
-    """A cart that is driven evenly, against a force that changes fast: nothing but the work asks for short steps."""
-    m = fb.Mechanism("cart", planar=True)
-    m.add(fb.Body("cart", mass=1, inertia=1, position=(0, 0)), fb.Body("idle", mass=1, inertia=1, position=(0, 5)))
-    m.add(fb.Prismatic("track", "ground", "cart", at=(0, 0), axis=(1, 0)))
-    m.add(fb.Driver("drive", "track.displacement", "2*t"), fb.PointForce("push", "cart", force=("30*cos(40*t)", 0)))
-    r = m.simulate(3.0, outputs=31)
-    work = r.states[:, r.values.structure.state_at["push.work"]]
-    assert work == pytest.approx(2 * 30 / 40 * np.sin(40 * r.t), abs=1e-5)
+@pytest.mark.parametrize("make", [free_body, four_bar, lambda: example("heavy_top.toml")])
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_a_step_leads_from_one_position_to_another(make, layer):
+    m = make()
+    c = compiled(m, tree=[j.name for j in m.joints][:1] if layer == "joint" else ())
+    random = np.random.default_rng(0)
+    for _ in range(5):
+        q, d = c.values.q.copy(), 0.7 * random.normal(size=c.structure.nv)
+        retract(c.values.system, q, 0.5 * random.normal(size=len(d)))
+        other = q.copy()
+        retract(c.values.system, other, d)
+        assert tangent_step(c, q, other) == pytest.approx(d, abs=1e-12)
+        near = q.copy()
+        retract(c.values.system, near, 1e-7 * d)
+        assert tangent_rate(c, q, (near - q) / 1e-7) == pytest.approx(d, abs=1e-5)
+
+
+def test_half_a_turn_is_a_step_with_an_end():
+    c = compiled(free_body())
+    q, other = np.array([0, 0, 0, 1.0, 0, 0, 0]), np.array([0, 0, 0, 0, 0, 0, 1.0])
+    d = tangent_step(c, q, other)
+    assert np.isfinite(d).all()
+    assert d[5] > 1e3
+
+
+def test_rank_and_its_spaces():
+    """A product of known rank; nothing at all; what counts as zero is relative unless a size is given."""
+    random = np.random.default_rng(1)
+    A = random.normal(size=(7, 3)) @ random.normal(size=(3, 5))
+    p = parts(A)
+    assert (p.rank, p.dependencies.shape, p.null.shape) == (3, (7, 4), (5, 2))
+    assert np.abs(p.dependencies.T @ A).max() < 1e-13
+    assert np.abs(A @ p.null).max() < 1e-13
+    assert np.allclose(p.span @ np.diag(p.values) @ p.seen.T, A)
+    assert span(A).shape == (7, 3)
+    assert (rank(np.zeros((0, 4))), null_space(np.zeros((0, 4))).shape, rank(np.zeros((2, 2)))) == (0, (4, 4), 0)
+    assert (rank(1e-12 * A), rank(1e-12 * A, size=1.0)) == (3, 0)

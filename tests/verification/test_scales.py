@@ -30,7 +30,7 @@ def scaled(base, length=1.0, mass=1.0, shift=None):
                 mass=mass * d.mass,
                 inertia=J,
                 position=point(given.position),
-                velocity=point(given.velocity, moves=False),
+                velocity=None if given.velocity is None else point(given.velocity, moves=False),
             )
         )
     for j in base.joints:

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -13,106 +11,18 @@ from ..model.body import GROUND
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
 from ..model.model import Model
-from ..results.departure import Departure, changed_velocities, not_allowed, summary
+from ..results.check import BodyReport, Report
+from ..results.departure import changed_velocities, not_allowed
+from ..results.mass import MassProperties
 from ..tables.values import Values
 from .assemble import assemble
 from .assembly.start import Assembly
-from .mass import MassProperties, directions, letters, report
+from .mass import report
 from .mobility import mobility
 from .motion.ahead import missed_at_start
 
 FAR = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
-EQUAL = 1e-9  # moments that differ by less than this part are the same
 BARELY = 1e-3  # slack of the triangle inequality, as part of the largest moment, below which a body is all but flat
-
-
-@dataclass(frozen=True)
-class BodyReport:
-    """Mass properties of a body as used."""
-
-    mass: float  # [kg]
-    com: tuple[float, ...]  # centre of mass in the reference frame [m]
-    moments: tuple[float, ...]  # principal moments about the centre of mass [kg m^2], ascending; planar: one
-    axes: tuple[tuple[float, ...], ...]  # their axes: three vectors in body axes; planar: none
-
-    def line(self) -> str:
-        """What a reader wants to see."""
-        com = ", ".join(f"{x:.4g}" for x in self.com)
-        moments = ", ".join(f"{x:.4g}" for x in self.moments)
-        text = f"{self.mass:.4g} kg, centre of mass ({com}) m, "
-        if not self.axes:
-            return text + f"inertia {moments} kg m^2"
-        if self.moments[-1] - self.moments[0] <= EQUAL * self.moments[-1]:
-            return text + f"inertia {self.moments[0]:.4g} kg m^2 about every axis"
-        axes = np.array(self.axes).T
-        if names := letters(axes):
-            return text + f"inertia {moments} kg m^2 about {names}"
-        return text + f"principal moments {moments} kg m^2 about {directions(axes)}"
-
-
-@dataclass(frozen=True)
-class Report:
-    """What `Mechanism.check` found out."""
-
-    name: str
-    planar: bool
-    bodies: dict[str, BodyReport]
-    joints: int
-    forces: int
-    drivers: int
-    gruebler: int  # freedoms by counting
-    freedoms: int  # freedoms by rank
-    redundant: tuple[str, ...]  # elements whose constraints depend on one another
-    redundancy: int  # how many rows say nothing new
-    undetermined: dict[str, tuple[str, ...]]  # joint -> reaction components
-    moved: dict[str, float]  # body -> how far assembly moved its centre of mass [m]
-    departures: tuple[Departure, ...]  # what of the description the assembled start does not have
-    mass: float  # of all bodies together [kg]
-    com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
-    warnings: tuple[str, ...] = field(default=())
-
-    def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return asdict(self) | {"departures": [d.as_dict() for d in self.departures]}
-
-    def lines(self) -> list[tuple[str, str]]:
-        """Label and text of what a reader wants to see first."""
-        plane = "planar" if self.planar else "spatial"
-        counts = f"{_count(len(self.bodies), 'body', 'bodies')}, {_count(self.joints, 'joint')}"
-        counts += f", {_count(self.forces, 'force')}, {_count(self.drivers, 'driver')}"
-        out = [("mechanism", f"{self.name} ({plane}): {counts}"), ("freedoms", self._freedoms())]
-        if self.redundant:
-            names = ", ".join(self.redundant[:12]) + (", ..." if len(self.redundant) > 12 else "")
-            out.append(("redundant", f"{_count(self.redundancy, 'constraint')} too many, among {names}"))
-        if self.undetermined:
-            first = list(self.undetermined.items())[:12]
-            text = "; ".join(f"{k}: {', '.join(v)}" for k, v in first) + (
-                "; ..." if len(self.undetermined) > 12 else ""
-            )
-            out.append(("reactions not determined", text))
-        out.append(("assembly", summary(self.departures)))
-        for name, b in list(self.bodies.items())[:30]:
-            out.append((f"body {name}", b.line()))
-        if len(self.bodies) > 30:
-            out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
-        if len(self.bodies) > 1:
-            com = ", ".join(f"{x:.4g}" for x in self.com)
-            out.append(("all together", f"{self.mass:.4g} kg, centre of mass at ({com}) m"))
-        return out + [("warning", w) for w in self.warnings]
-
-    def _freedoms(self) -> str:
-        text = f"{self.freedoms} at this position"
-        if self.gruebler != self.freedoms:
-            text += f" (counting gives {self.gruebler})"
-        return text
-
-    def __str__(self) -> str:
-        width = max(len(k) for k, _ in self.lines())
-        return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
-
-
-def _count(n: int, one: str, many: str = "") -> str:
-    return f"{n} {one if n == 1 else many or one + 's'}"
 
 
 def check(model: Model) -> Report:

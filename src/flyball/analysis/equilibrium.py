@@ -24,10 +24,10 @@ from .linear.kinks import kinks
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.stability import GROWTH, stability
-from .linear.tangent import tangent_step
 from .linear.turning import turning as turn
 from .linearize import without_inputs
 from .options import Options
+from .steps import tangent_step
 
 NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more

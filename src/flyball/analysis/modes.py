@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import AnalysisError
 from ..model.model import Model
+from ..numerics.rank import span
 from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
@@ -169,8 +170,8 @@ def _few(invert: Any, K: Any, M: Any, most: int) -> tuple[np.ndarray | None, np.
     random = np.random.default_rng(1).standard_normal((K.shape[0], most))
     found = np.array([invert(M @ x) for x in random.T]).T
     found /= np.linalg.norm(found, axis=0)
-    U, d, _ = np.linalg.svd(found, full_matrices=False)
-    rank = int((d > TINY * d[0]).sum())
+    U = span(found, TINY)
+    rank = U.shape[1]
     if rank == most:
         return None, found
     Z = np.array([invert(M @ x) for x in U[:, :rank].T]).T

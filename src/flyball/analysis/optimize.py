@@ -146,14 +146,17 @@ class Search:
             residual, x0, jacobian, bounds=(self.low, self.high), xtol=self.asked.tolerance,
             ftol=self.asked.tolerance, gtol=1e-15, max_nfev=self.asked.evaluations,
         )  # fmt: skip
-        return self._optimum(r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, r.message)
+        out = self._optimum(r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, r.message)
+        out.start_values, out.target = first.values, np.broadcast_to(goal, first.values.shape)
+        return out
 
     def minimum(self, function: Callable[[np.ndarray], float]) -> Optimum:
         """Minimisation of a function of the quantities."""
         from scipy.optimize import minimize
 
         x0 = self.start / self.scale
-        first = float(function(self.at(x0).values))
+        begin = self.at(x0).values
+        first = float(function(begin))
 
         def cost(x: np.ndarray) -> tuple[float, np.ndarray]:
             try:
@@ -169,7 +172,9 @@ class Search:
         tolerance = self.asked.tolerance
         options = {"maxfun": self.asked.evaluations, "ftol": tolerance, "gtol": tolerance}
         r = minimize(cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-        return self._optimum(r.x, float(r.fun), first, bool(r.success), str(r.message))
+        out = self._optimum(r.x, float(r.fun), first, bool(r.success), str(r.message))
+        out.start_values = begin
+        return out
 
     def _optimum(self, x: np.ndarray, cost: float, first: float, success: bool, message: str) -> Optimum:
         found = self.at(x)
@@ -180,7 +185,7 @@ class Search:
         )
         return Optimum(
             best, start, cost, first, success, message.rstrip("."), self.count, self.asked.of or found.of, found.t,
-            found.values, at_bound,
+            found.values, at_bound, found.units,
         )  # fmt: skip
 
 

@@ -11,14 +11,17 @@ import numpy as np
 from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..results.equilibrium import Equilibrium
-from ..results.linear import follow
 from ..results.root_locus import Crossing, RootLocus
-from .linearize import InstantOptions, LinearizeOptions, linearize
-from .progress import shown
+from .linear.crossings import Event, Search
+from .linear.sample import Sample, match, sample
+from .linearize import InstantOptions, without_inputs
+from .progress import Tell, shown
 from .series import EquilibriaOptions, checked, equilibria, stopped
 
-TOUCHING = 1e-6  # real parts below this part of the largest eigenvalue are none
-EXACT = 1e-12  # of the stretch between two values
+SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
+ROUNDED = 1e-13  # of the largest value: what is none
+ASIDE = (0.25, 0.0625, 0.015625, 0.00390625)  # of the way to the next value: samples beside where branches meet
+MEETINGS = 16  # places where branches meet that are shown finely
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,16 +40,14 @@ class RootLocusOptions(InstantOptions):
         if self.about is not None and self.equilibrium:
             raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
 
-    def linear(self, value: float, about: Equilibrium | None) -> LinearizeOptions:
-        """What is asked at a value: linear equations there, about an equilibrium if that is given."""
+    def here(self, value: float, about: Equilibrium | None) -> InstantOptions:
+        """Where the mechanism is at a value; at an equilibrium if that is given."""
         t, parameters = self.t, dict(self.parameters or {})
         if self.parameter == "t":
             t = value
         else:
             parameters[self.parameter] = float(value)
-        return LinearizeOptions(
-            inputs=(),
-            outputs=(),
+        return InstantOptions(
             about=self.about if about is None else about,
             t=t if about is None else None,
             parameters=parameters,
@@ -68,66 +69,123 @@ class RootLocusOptions(InstantOptions):
 
 
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
-    """Eigenvalues over values of a parameter, as branches: see `Mechanism.root_locus`."""
+    """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
     points = checked(model, o.parameter, o.values)
     along = equilibria(model, o.rest(points)) if o.equilibrium else None
 
-    def at(value: float, near: int) -> np.ndarray:
+    def at(place: float) -> Sample:
+        value = float(np.interp(place, np.arange(len(points)), points))
         about = None
         if along is not None:
-            about = along[near]
-            if along.values[near] != value:  # between those of the series
-                about = equilibria(model, o.rest([along.values[near], value], about))[1]
-        return np.linalg.eigvals(linearize(model, o.linear(value, about)).A)
+            about = along[int(place)]
+            if place != int(place):  # between those of the series
+                about = equilibria(model, o.rest([along.values[int(place)], value], about))[1]
+        return sample(place, value, *without_inputs(o.here(value, about).state(model), o.frozen))
 
     done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
     with shown(o.progress, f"eigenvalues over {o.parameter}") as tell:
-        for k, value in enumerate(points):
-            try:
-                w = at(value, k)
-                if k and len(w) != done.eigenvalues.shape[1]:
-                    raise AnalysisError(
-                        f"there are {len(w)} states, and {done.eigenvalues.shape[1]} at the values before"
-                    )
-            except AnalysisError as error:
-                raise stopped(done, value, error) from error
-            rows = [*done.eigenvalues, w] if k else [w[np.lexsort((w.real, w.imag))]]
-            done.eigenvalues, done.values = follow(np.array(rows)), points[: k + 1]
-            tell((k + 1) / len(points), f"{value:.6g}")
-        done.crossings = _crossings(done, at)
+        return _traced(done, points, at, tell)
+
+
+def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], tell: Tell) -> RootLocus:
+    """The locus at the values, then between them."""
+    taken: list[Sample] = []
+    for k, value in enumerate(points):
+        try:
+            taken.append(at(float(k)))
+            if len(taken[k].w) != len(taken[0].w):
+                raise AnalysisError(f"there are {len(taken[k].w)} states, and {len(taken[0].w)} at the values before")
+        except AnalysisError as error:
+            raise stopped(done, value, error) from error
+        _told(done, taken)
+        tell(0.5 * (k + 1) / len(points), f"{value:.6g}")
+    search = Search(at, min(x.counts.get("zero", 0) for x in taken))
+    search.taken = list(taken)
+    events = _events(search, taken, tell)
+    done.crossings = _crossings(events, taken)
+    _refined(search, [e for e in events if "meet" in e.what or "part" in e.what], taken)
+    _told(done, search.taken)
     return done
 
 
-def _crossings(locus: RootLocus, at: Callable[[float, int], np.ndarray]) -> list[Crossing]:
-    """Values where branches pass through the imaginary axis."""
-    least = TOUCHING * np.abs(locus.eigenvalues).max(initial=0.0)
-    found: list[Crossing] = []
-    for branch in locus.eigenvalues.T:
-        off = np.flatnonzero(np.abs(branch.real) > least)
-        for i, j in pairwise(off):
-            if branch[i].real * branch[j].real > 0.0 or max(branch[i].imag, branch[j].imag) < -least:
+def _told(done: RootLocus, taken: Sequence[Sample]) -> None:
+    """Write samples as branches."""
+    order = sorted(taken, key=lambda x: x.place)
+    first = np.lexsort((order[0].w.real, order[0].w.imag))
+    rows, last = [order[0].w[first]], first
+    for a, b in pairwise(order):
+        last = match(a, b)[last]
+        rows.append(b.w[last])
+    done.path, done.path_values = np.array(rows), np.array([x.value for x in order])
+    given = [k for k, x in enumerate(order) if x.place == int(x.place)]
+    done.values, done.eigenvalues = done.path_values[given], done.path[given]
+    done.seen_from = tuple(dict.fromkeys(x.told for x in order if x.told))
+
+
+def _events(search: Search, taken: Sequence[Sample], tell: Tell) -> list[Event]:
+    """Events between the given values; those that lie on an event are passed over."""
+    kept = [taken[0]]
+    for k, x in enumerate(taken[1:], 1):
+        if k == len(taken) - 1 or not _on_event(search, kept[-1], x, taken[k + 1]):
+            kept.append(x)
+    _heading(search, kept)
+    found = []
+    for a, b in pairwise(kept):
+        found += search.between(a, b)
+        tell(0.5 + 0.5 * b.place / len(taken), "where stability changes")
+    return found
+
+
+def _on_event(search: Search, a: Sample, x: Sample, b: Sample) -> bool:
+    """Whether a sample lies where something happens: at zero, or on the axis, as neither beside it does."""
+    zero, axis = (k.counts.get("zero", 0) for k in (a, x, b)), [k.counts.get("axis", 0) for k in (a, x, b)]
+    before, here, after = zero
+    return here > max(before, after) or (axis[1] > max(axis[0], axis[2]) and axis[0] == axis[2])
+
+
+def _heading(search: Search, kept: list[Sample]) -> None:
+    """Add samples where a parabola through three real parts of a branch turns on the other side of the axis."""
+    more = []
+    for a, b, c in zip(kept, kept[1:], kept[2:], strict=False):
+        if not a.counts == b.counts == c.counts:
+            continue
+        to, on = match(b, a), match(b, c)
+        for k in range(len(b.w)):
+            y = [a.w[to[k]].real, b.w[k].real, c.w[on[k]].real]
+            if 0.0 in y:
                 continue
-            c = _crossed(locus, branch, int(i), int(j), at)
-            if not any(abs(c.eigenvalue - f.eigenvalue) + abs(c.value - f.value) <= least for f in found):
-                found.append(c)
-    return sorted(found)
+            bend = np.polyfit([a.place - b.place, 0.0, c.place - b.place], y, 2)
+            turn = -bend[1] / (2.0 * bend[0]) if bend[0] else np.inf
+            if a.place < b.place + turn < c.place and np.polyval(bend, turn) * y[1] < 0.0:
+                more.append(b.place + turn)
+    for place in dict.fromkeys(more):
+        kept.append(search.at(float(place)))
+    kept.sort(key=lambda x: x.place)
 
 
-def _crossed(locus: RootLocus, branch: np.ndarray, i: int, j: int, at: Callable[[float, int], np.ndarray]) -> Crossing:
-    """Between two values: the zero of the real part of the eigenvalue that lies between those on both sides."""
-    from scipy.optimize import brentq
+def _crossings(events: Sequence[Event], taken: Sequence[Sample]) -> list[Crossing]:
+    """Changes of stability, those at one place and eigenvalue as one."""
+    fastest = max(float(np.abs(x.w).max(initial=0.0)) for x in taken)
+    least = ROUNDED * max(abs(x.value) for x in taken)
+    found: list[tuple[float, Crossing]] = []
+    for e in sorted(events, key=lambda e: e.at.place):
+        if not e.change:
+            continue
+        kind = "flutter" if e.eigenvalue.imag > 0.0 else "divergence"
+        own = Crossing(e.at.value if abs(e.at.value) > least else 0.0, e.eigenvalue, kind, e.change)
+        if found:
+            place, other = found[-1]
+            if e.at.place - place <= SAME and abs(other.eigenvalue - own.eigenvalue) <= SAME * fastest:
+                found[-1] = place, other._replace(change=other.change + own.change)
+                continue
+        found.append((e.at.place, own))
+    return [c for _, c in found if c.change]
 
-    known = {float(locus.values[k]): complex(branch[k]) for k in (i, j)}
 
-    def real(value: float) -> float:
-        if value not in known:
-            low, high = max(k for k in known if k < value), min(k for k in known if k > value)
-            guess = known[low] + (value - low) / (high - low) * (known[high] - known[low])
-            w = at(value, i)
-            known[value] = complex(w[np.argmin(np.abs(w - guess))])
-        return known[value].real
-
-    ends = float(locus.values[i]), float(locus.values[j])
-    value = float(brentq(real, *ends, xtol=EXACT * (abs(ends[0]) + abs(ends[1])), rtol=EXACT))
-    real(value)
-    return Crossing(value, complex(0.0, abs(known[value].imag)))
+def _refined(search: Search, events: Sequence[Event], taken: Sequence[Sample]) -> None:
+    """Samples beside the places where branches meet: there they move as a square root does."""
+    for e in events[:MEETINGS]:
+        for side in (-1.0, 1.0):
+            end = np.floor(e.at.place) if side < 0.0 else np.floor(e.at.place) + 1.0
+            for part in ASIDE:
+                search.at(float(e.at.place + part * (min(end, len(taken) - 1.0) - e.at.place)))

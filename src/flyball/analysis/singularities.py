@@ -14,6 +14,7 @@ import numpy as np
 from ..errors import MobilityError, ModelError, SingularityError
 from ..model.expressions import number
 from ..model.model import Model
+from ..numerics.rank import null_space
 from ..results.singularities import Branch, Singularities
 from .options import Options, positive
 from .options import count as at_least
@@ -237,7 +238,7 @@ def _mobile(f: Freed, x: Place) -> None:
                 least, extra = free, near[1].V[:, c.columns - free :]
     if least == 1 or not extra.shape[1]:
         return
-    held = extra @ np.linalg.svd(extra[-1:])[2][1:].T  # those that leave the driver where it is
+    held = extra @ null_space(extra[-1:], 0.0)  # those that leave the driver where it is
     moving = np.max([np.abs(f.rates(x, d)) for d in held.T], axis=0)
     free_labels = [f.labels[k] for k in np.flatnonzero(moving > 1e-6 * moving.max())]
     joints = [k for k in free_labels if k.partition(".")[0] in {j.name for j in f.model.joints}]

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..analysis.assembly.start import Assembly
-    from ..analysis.check import Report
-    from ..analysis.mass import MassReport
     from ..model.model import Model
+    from ..results.check import Report
+    from ..results.mass import MassReport
     from ..results.mobility import Mobility
     from ..results.singularities import Branch, Singularities
 else:

@@ -226,6 +226,10 @@ class Statics(Model):
     ) -> RootLocus:
         """Eigenvalues over values of a parameter, as branches, and where stability changes.
 
+        Between two values every change of where eigenvalues lie (in the left or right half plane, on an axis, at zero)
+        is bracketed and found to rounding; where branches meet, values are added. What leaves a half plane and comes
+        back between two values goes unseen, unless the branch heads for the axis: give more values.
+
         Parameters
         ----------
         parameter : str

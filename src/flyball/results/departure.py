@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from .numbers import number, tuple_of
+
 NAMED = 4  # elements that a line names
 WRITTEN = 1e-5  # part by which numbers written with some digits are off
 VELOCITIES = ("velocity", "angular_velocity")
@@ -66,9 +68,7 @@ class Departure:
 
 def _numbers(values: Sequence[float]) -> str:
     """Components in brackets, one number bare; rounding beside the others is 0."""
-    small = 1e-12 * max(map(abs, values), default=0.0)
-    texts = [f"{x if abs(x) > small else 0.0:.6g}" for x in values]
-    return texts[0] if len(texts) == 1 else f"({', '.join(texts)})"
+    return number(values[0]) if len(values) == 1 else tuple_of(values, 6)
 
 
 def changed_velocities(departures: Sequence[Departure]) -> list[Departure]:

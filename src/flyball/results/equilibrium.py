@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from .numbers import number
+
 if TYPE_CHECKING:
     from .result import Result
 
@@ -86,8 +88,11 @@ class Equilibrium:
     def _positions(self) -> list[str]:
         axes = ("x", "y", "angle") if self.result.planar else ("x", "y", "z")
         bodies = [b.name for b in self.result.model.bodies]
+        length = self.result.values.length
+        size = {a: 1.0 if a == "angle" else length for a in axes}
         return [
-            f"{b}: " + ", ".join(f"{a} {self[f'{b}.{a}']:.6g} {'rad' if a == 'angle' else 'm'}" for a in axes)
+            f"{b}: "
+            + ", ".join(f"{a} {number(self[f'{b}.{a}'], size[a])} {'rad' if a == 'angle' else 'm'}" for a in axes)
             for b in bodies[:12]
         ] + ([f"and {len(bodies) - 12} more bodies"] if len(bodies) > 12 else [])
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,13 +15,13 @@ from ..math.vec import cross, sub
 from ..model.coupling import Coupling
 from ..model.joint import Joint
 from ..model.model import listing, suggest
+from .numbers import number, span
 
 if TYPE_CHECKING:
     from .result import Result
 
 TOUCHED = 1e-6  # part of the largest self-stress below which a component is left alone
 NEAR = 1e-4  # singular values below this part of their usual size are those of a singular position
-ROUNDING = 1e-12  # part of a joint's largest reaction that is printed as nothing
 SPATIAL, PLANE = ("fx", "fy", "fz", "tx", "ty", "tz"), ("fx", "fy", "torque")
 INDEX = {"fx": 0, "fy": 1, "fz": 2, "tx": 3, "ty": 4, "tz": 5, "torque": 5}
 
@@ -73,7 +74,7 @@ class Wrench:
     one: np.ndarray
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class InverseDynamics:
     """Efforts and reactions of a motion; ``inverse["crank"]`` and the like read its `Result`.
 
@@ -202,8 +203,10 @@ class InverseDynamics:
             if np.isnan(x).all():
                 out.append(("drive", f"{name}: undetermined"))
                 continue
-            effort = f"{np.nanmin(x):.4g} to {np.nanmax(x):.4g} {unit}, rms {np.sqrt(np.nanmean(x**2)):.4g} {unit}"
-            out.append(("drive", f"{name}: {effort}, power {d.power.min():.4g} to {d.power.max():.4g} W"))
+            size = self._size("t" if d.unit == "N*m" else "f")
+            rms = number(float(np.sqrt(np.nanmean(x**2))), size, 4)
+            power = span(d.power, size=size * np.abs(d.rate).max(initial=0.0))
+            out.append(("drive", f"{name}: {span(x, size=size)} {unit}, rms {rms} {unit}, power {power} W"))
         for e in self.result.model.joints:
             out.append(("reaction", self._line(e.name)))
         if (near := self.near_singular).any():
@@ -224,16 +227,26 @@ class InverseDynamics:
         fewest = d.count.min(initial=np.iinfo(np.int64).max)
         return (d.count > fewest) | (d.least < NEAR * usual)
 
+    def _size(self, kind: str) -> float:
+        """The largest force (``"f"``) or torque (``"t"``) of any joint or drive, a torque by the length."""
+        (force, torque), length = self._sizes, self.result.values.length
+        return max(force, torque / length) if kind == "f" else max(torque, force * length)
+
+    @cached_property
+    def _sizes(self) -> tuple[float, float]:
+        parts = [self.reaction(j.name).one for j in self.result.model.joints]
+        out = [float(max((np.abs(w[:, k : k + 3]).max(initial=0.0) for w in parts), default=0.0)) for k in (0, 3)]
+        for name, x in self.efforts.items():
+            turning = self.drives[name].unit == "N*m"
+            out[turning] = max(out[turning], float(np.nanmax(np.abs(x), initial=0.0)))
+        return out[0], out[1]
+
     def _line(self, joint: str) -> str:
         w = self.reaction(joint)
         both, free = np.hstack([w.force, w.torque]), w.undetermined
         names = PLANE if self.result.planar else SPATIAL
-        rounding = ROUNDING * np.abs(w.one).max(initial=0.0)
-        both = np.where(np.abs(both) < rounding, 0.0, both)
         known = [(x, both[:, INDEX[x]]) for x in names if not free[:, INDEX[x]].all()]
-        text = ", ".join(
-            f"{x} {np.nanmin(v):.4g} to {np.nanmax(v):.4g} {'N' if x[0] == 'f' else 'N m'}" for x, v in known
-        )
+        text = ", ".join(f"{x} {span(v, size=self._size(x[0]))} {'N' if x[0] == 'f' else 'N m'}" for x, v in known)
         never = [x for x in names if free[:, INDEX[x]].all()]
         at_times = [x for x in names if free[:, INDEX[x]].any() and x not in never]
         said = [text] if text else []
@@ -272,5 +285,5 @@ class InverseDynamics:
 
         return plot_efforts(self, path=path)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         return "\n".join(f"{k:<9}  {v}" for k, v in self.lines())

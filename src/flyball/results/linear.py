@@ -15,6 +15,8 @@ from ..model.model import listing, suggest
 if TYPE_CHECKING:
     from .result import Result
 
+ROUNDED = 1e-12  # part of a number below which its real or imaginary part is rounding
+
 
 @dataclass(repr=False)
 class LinearModel:
@@ -142,6 +144,15 @@ class LinearModel:
 
         return bode(self, input, output, omega, path)
 
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """Eigenvalues in the complex plane, of a single input and output the zeros too; returns the Matplotlib figure.
+
+        With ``path`` it is written instead, as PNG, SVG or PDF.
+        """
+        from ..view.poles import poles
+
+        return poles(self, path)
+
     def plot_root_locus(
         self,
         gains: Sequence[float],
@@ -214,10 +225,10 @@ def _plain(name: str) -> str:
 
 
 def _written(w: complex) -> str:
-    """A number, or a complex pair."""
-    size = abs(w)
-    real = 0.0 if abs(w.real) < 1e-12 * size else w.real
-    return f"{real:.6g}" if abs(w.imag) < 1e-12 * size or not size else f"{real:.6g} +- {w.imag:.6g} i"
+    """A number, or a complex pair; parts that are rounding beside the other are left out."""
+    least = ROUNDED * abs(w)
+    real, imag = (part if abs(part) > least else 0.0 for part in (w.real, w.imag))
+    return f"{real:.6g} +- {imag:.6g} i" if imag else f"{real:.6g}"
 
 
 def follow(roots: np.ndarray) -> np.ndarray:

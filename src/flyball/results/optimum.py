@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+
+from .numbers import plain
 
 
 @dataclass
@@ -26,8 +29,13 @@ class Optimum:
         Why the search ended.
     evaluations : int
         Analyses that were made.
-    values : ndarray (n, of)
-        The quantities at the optimum.
+    of, units : tuple of str
+        The quantities, and their units.
+    t : ndarray (n,) [s]
+    values, start_values : ndarray (n, of)
+        The quantities at the optimum, and where the search began.
+    target : ndarray (n, of) or None
+        What they should be; None where a function was minimised.
     at_bound : tuple of str
         Parameters that ended at one of their bounds.
     """
@@ -43,6 +51,9 @@ class Optimum:
     t: np.ndarray
     values: np.ndarray = field(repr=False)
     at_bound: tuple[str, ...] = ()
+    units: tuple[str, ...] = ()
+    start_values: np.ndarray | None = field(default=None, repr=False)
+    target: np.ndarray | None = field(default=None, repr=False)
 
     def lines(self) -> list[tuple[str, str]]:
         """A table for people."""
@@ -56,7 +67,18 @@ class Optimum:
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names."""
         kept = ("parameters", "start", "cost", "start_cost", "success", "message", "evaluations")
-        return {k: getattr(self, k) for k in kept} | {"at_bound": list(self.at_bound)}
+        out = {k: getattr(self, k) for k in kept} | {"at_bound": list(self.at_bound), "t": self.t.tolist()}
+        parts = {"values": self.values, "start_values": self.start_values, "target": self.target}
+        columns = {
+            k: None if v is None else {n: plain(v[:, i]) for i, n in enumerate(self.of)} for k, v in parts.items()
+        }
+        return out | {"units": dict(zip(self.of, self.units, strict=False))} | columns
+
+    def plot(self, path: str | os.PathLike | None = None) -> Any:
+        """The quantities where the search began, at the optimum, and the target; the figure, or written to ``path``."""
+        from ..view.optimum import optimum
+
+        return optimum(self, path)
 
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())

@@ -16,10 +16,13 @@ from ..tables.values import Values
 from .energy import Energy
 from .health import Health
 from .measured import Measured
+from .numbers import span
 from .reactions import Reactions
 from .records import Records
 from .views import view
+from .views.base import Curves
 
+TOLD = 12  # curves in a text
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
@@ -187,6 +190,26 @@ class Result:
         if list(own.place) != list(other.place) or own.states != other.states or list(own.slices) != list(other.slices):
             raise ModelError(f"the result of {self.model.name!r} cannot be gone on with: the mechanism is another one")
         return self.final[1].copy()
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: times, what the health says, and between which values the first curves stay."""
+        over = f"{self.t[0]:g} to {self.t[-1]:g} s, {len(self.t)} times" if len(self.t) else "no times"
+        out = [("motion", f"{self.model.name}, {over}"), *self.health.lines()]
+        return out + [(name, f"{span(v)} {unit.replace('*', ' ')}") for name, (unit, v) in self._telling().items()]
+
+    def _telling(self) -> Curves:
+        """At most a dozen curves that say most: what sensors measure, efforts of drivers, coordinates of joints."""
+        m, planar = self.model, self.planar
+        names = [f"{s.name}.value" for s in m.sensors if "value" in quantities(m, s.name)]
+        names += [f"{d.name}.effort" for d in m.drivers]
+        names += [f"{j.name}.{what}" for j in m.joints for what in j.measured(planar)]
+        names += [f"{b.name}.{a}" for b in m.bodies for a in (("x", "y", "angle") if planar else "xyz")]
+        return {name: self.channel(name) for name in names[:TOLD]} if len(self.t) else {}
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names: times, all curves with their units, and the health."""
+        curves = {k: {"unit": unit, "values": np.asarray(v).tolist()} for k, (unit, v) in self.channels().items()}
+        return {"name": self.model.name, "t": self.t.tolist(), "curves": curves, "health": self.health.as_dict()}
 
     def to_xarray(self) -> xarray.Dataset:
         """All curves as a labelled dataset with units."""

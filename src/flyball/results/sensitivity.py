@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import listing, suggest
+from .numbers import clean, plain
 
 
 @dataclass
@@ -96,13 +97,13 @@ class Sensitivity:
             "quantities": {
                 name: {
                     "unit": self.units[i],
-                    "value": _plain(self.values[:, i]),
-                    "derivatives": {p: _plain(self.derivatives[:, i, k]) for k, p in enumerate(self.to)},
+                    "value": plain(self.values[:, i]),
+                    "derivatives": {p: plain(self.derivatives[:, i, k]) for k, p in enumerate(self.to)},
                 }
                 | (
                     {}
                     if checked is None
-                    else {"differences": {p: _plain(checked[:, i, k]) for k, p in enumerate(self.to)}}
+                    else {"differences": {p: plain(checked[:, i, k]) for k, p in enumerate(self.to)}}
                 )
                 for i, name in enumerate(self.of)
             },
@@ -119,8 +120,7 @@ class Sensitivity:
 
 
 def _text(x: Any) -> str:
-    return f"{x:.8g}" if np.isrealobj(x) else f"{x.real:.6g}{x.imag:+.6g}j"
-
-
-def _plain(x: np.ndarray) -> list:
-    return x.tolist() if np.isrealobj(x) else [[float(z.real), float(z.imag)] for z in x]
+    if np.isrealobj(x):
+        return f"{x:.8g}"
+    real, imaginary = clean([x.real, x.imag])
+    return f"{real:.6g}{imaginary:+.6g}j"

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .equilibrium import UNSTABLE, Equilibrium
+from .numbers import number
 
 
 @dataclass(frozen=True)
@@ -76,9 +77,10 @@ class EquilibriumSeries:
         """A table for people."""
         names = self.telling()
         head = " ".join(f"{n:>16}" for n in names)
+        sizes = {n: max((abs(e[n]) for e in self.equilibria), default=0.0) for n in names}
         out = [(self.parameter, f"{'stability':<9} {'least stiffness':>16} {head}")]
         for value, e in zip(self.values, self.equilibria, strict=True):
-            parts = " ".join(f"{e[n]:16.8g}" for n in names)
+            parts = " ".join(f"{number(e[n], sizes[n], 8):>16}" for n in names)
             out.append((f"{value:.6g}", f"{e.stability:<9} {e.least:16.4g} {parts}"))
         for j in self.jumps:
             why = "becomes unstable" if j.before.stability == UNSTABLE else "ends"

@@ -145,7 +145,7 @@ class Singularity:
         }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Singularities:
     """The driven motion over a range of the driver's coordinate, and the singular positions on it.
 
@@ -249,7 +249,7 @@ class Singularities:
 
         return singular_plot(self, path, coordinate)
 
-    def __str__(self) -> str:
+    def __repr__(self) -> str:
         width = max(len(k) for k, _ in self.lines())
         return "\n".join(f"{k:<{width}}  {v}" for k, v in self.lines())
 

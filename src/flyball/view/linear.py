@@ -137,7 +137,7 @@ def root_locus(
     title : str
     path : path, optional
         Write a PNG, SVG or PDF file instead of returning the figure.
-    known : sequence of (value, eigenvalue), optional
+    known : sequence of Crossing, optional
         The crossings, where they need not be interpolated.
     """
     roots, values = np.asarray(roots), np.asarray(gains, float)
@@ -152,13 +152,13 @@ def root_locus(
         _bounded(ax, roots)
         if known is None:
             _crossings(ax, roots, values, parameter_name)
-        for value, at in known or ():
-            _ringed(ax, at, f"{parameter_name} = {value:.5g}")
+        for c in known or ():
+            _ringed(ax, c.eigenvalue, f"{parameter_name} = {c.value:.5g}")
         for mark, own in (("x", values[:1]), ("o", values[-1:])):
             for g in own:
                 ax.plot([], [], mark, color="#555555", label=f"{parameter_name} = {g:.4g}")
         ax.legend(**BESIDE)
-        _plane(ax)
+        plane(ax)
         headed(drawing, title)
         return handed_out(drawing, path)
 
@@ -180,10 +180,10 @@ def _bounded(ax: Axes, roots: np.ndarray) -> None:
     near = every[np.abs(every) <= usual] if every.size else np.zeros(1, complex)
     if len(near) < len(every):
         ax.set_title("branches that leave the picture go on")
-    _framed(ax, near)
+    framed(ax, near)
 
 
-def _framed(ax: Axes, points: np.ndarray) -> None:
+def framed(ax: Axes, points: np.ndarray) -> None:
     """Limits around points and the imaginary axis; lines have some width even where all lie on one of them."""
     size = float(np.abs(points).max(initial=0.0)) or 1.0
     wide = float(np.abs(points.real).max(initial=0.0))
@@ -196,7 +196,7 @@ def _framed(ax: Axes, points: np.ndarray) -> None:
     ax.set_ylim(y0 - room[1], y1 + room[1])
 
 
-def _plane(ax: Axes) -> None:
+def plane(ax: Axes) -> None:
     """The complex plane's axes, and the half of it where motions die away."""
     low, high = ax.get_xlim()
     ax.axvspan(low, 0.0, color=STABLE, zorder=0, linewidth=0)
@@ -251,7 +251,7 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
         drawing = new_figure(5.4)
         ax = drawing.subplots()
         near = _telling(w, kinds)
-        _framed(ax, w[near])
+        framed(ax, w[near])
         _rays(ax)
         for kind, (mark, color, fill) in looks.items():
             own = w[near & (kinds == kind)]
@@ -263,7 +263,7 @@ def eigenvalues(modes: Modes, path: str | os.PathLike | None = None) -> Any:
         ax.set_title("one of each complex pair; numbers as in the table of modes; rays: damping ratio" + _far(w[~near]))
         if len(w):
             ax.legend(**BESIDE)
-        _plane(ax)
+        plane(ax)
         headed(drawing, f"{modes.point.model.name}: eigenvalues")
         return handed_out(drawing, path)
 

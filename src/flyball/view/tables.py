@@ -10,6 +10,7 @@ import numpy as np
 
 from ..model.element import written
 from ..model.joint import Joint
+from ..results.numbers import tuple_of
 from .facts import between
 
 if TYPE_CHECKING:
@@ -58,7 +59,7 @@ def fixed(x: Any) -> str:
 
 def triple(a: Any, planar: bool) -> str:
     """A point or vector."""
-    return "(" + ", ".join(fixed(0.0 if abs(x) < 1e-15 else x) for x in np.asarray(a).real[: 2 if planar else 3]) + ")"
+    return tuple_of(np.asarray(a).real[: 2 if planar else 3])
 
 
 def health(result: Result) -> Table:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...tables.system import G_VALUE
+from ...tables.system import G_VALUE, NV, V0
 from ..compiled import Compiled
 
 CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed rows may be off
@@ -46,7 +46,7 @@ def inverse_weights(c: Compiled) -> np.ndarray:
     """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
     body_i = c.structure.tables["body_i"]
     w = np.ones(c.structure.nv)
-    for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True):
+    for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True):
         k = {3: 2, 6: 3}.get(int(n), 0)
         w[v0 + k : v0 + n] = 1.0 / c.values.length**2
     return w * movable(c)

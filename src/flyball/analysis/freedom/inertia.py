@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ...model.model import Model
+from ...tables.system import NV, V0
 from ..assembly.start import Assembly
 from .jacobian import sparse_null_space
 
@@ -36,10 +37,10 @@ def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
         return
     motion = motions @ V[:, 0]
     body_i = a.compiled.values.system.body_i
-    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(body_i[:, 3], body_i[:, 5], strict=True)]
+    size = [np.abs(motion[v0 : v0 + n]).max() for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True)]
     b = int(np.argmax(size))
     name = next(k for k, v in a.compiled.structure.place.items() if v == b)
-    v0, n = int(body_i[b, 3]), int(body_i[b, 5])
+    v0, n = int(body_i[b, V0]), int(body_i[b, NV])
     turns = motion[v0 + (2 if n == 3 else 3) : v0 + n]
     about = "turn" if n == 3 else f"turn about ({', '.join(f'{x:.3g}' for x in turns / np.linalg.norm(turns))})"
     raise ModelError(

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...equations.tree import retract
 from ...model.model import Model
+from ...numerics.rank import TOLERANCE
 from ...tables.system import NU
 from ..assemble import assemble
 from ..assembly.described import described, deviation
@@ -21,11 +22,11 @@ from ..assembly.start import Assembly
 from ..assembly.velocities import Wanted
 from ..motion.driven import leaves_no_freedom
 from ..motion.start import Start
+from ..steps import tangent_rate, tangent_step
 from .derivatives import State
 from .differences import derivative
-from .free import TOLERANCE
 from .loads import STEP
-from .tangent import Direction, Linear, Tangent, closed, tangent_rate, tangent_step
+from .tangent import Direction, Linear, Tangent, closed
 
 ROUNDED = 1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
 

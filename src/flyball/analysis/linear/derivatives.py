@@ -127,13 +127,6 @@ class Equations:
         """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
         return by_reactions(self.state, *self._system)
 
-    @cached_property
-    def by_time(self) -> np.ndarray:
-        """Derivatives by time, (width,)."""
-        steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
-        steps[0, -1] = 1j * STEP
-        return self._run(steps)[0].imag / STEP
-
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model, (width,), the state's numbers held."""
         return self.by_values(self.stepped(name))

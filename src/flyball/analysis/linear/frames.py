@@ -15,6 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations.tree import quaternion_at, rates
+from ...numerics.rank import parts
+from ...results.numbers import tuple_of
 from ...results.records import Records
 from ...tables.system import NV, V0
 from .derivatives import State
@@ -52,10 +54,8 @@ def frames(x: State) -> list[Frame]:
     length = c.values.length
     A = np.vstack([-_skew(u) for u in [*(v / length), *w]])
     right = np.r_[(a / length).ravel(), alpha.ravel()]
-    U, d, Vt = np.linalg.svd(A)
-    known = d > UNDECIDED * d[0]
-    least = Vt[known].T @ ((U[:, : len(d)][:, known].T @ right) / d[known])
-    open_ = Vt[~known]
+    p = parts(A, UNDECIDED)
+    least, open_ = p.seen @ ((p.span.T @ right) / p.values), p.null.T
     turns = [least]
     for spin in w:
         other = least + open_.T @ (open_ @ (spin - least))
@@ -75,7 +75,7 @@ def told(x: State, frame: Frame, frozen: bool) -> str:
         return "the coordinates of this very instant"
     if not frame.turning.any():
         return "the ground"
-    return f"a frame that turns with ({', '.join(f'{w:.4g}' for w in frame.turning)}) rad/s"
+    return f"a frame that turns with {tuple_of(frame.turning)} rad/s"
 
 
 def generator(x: State, turning: np.ndarray) -> np.ndarray:

@@ -14,12 +14,12 @@ import numpy as np
 
 from ...equations.tree import retract
 from ...errors import SingularityError
+from ...numerics.rank import TOLERANCE, null_space, parts
 from ...tables.names import Named, velocity_names
 from ...tables.system import BODY_LAW, G_VALUE, V0
 from ..compiled import Compiled
 from .derivatives import Equations
 
-TOLERANCE = 1e-8  # singular values below this part of the largest count as none; rows scaled to unit length
 ROUNDED = 1e-14  # entries of a basis below this are none, where its largest are about 1
 CLOSED = 1e-10  # of the mechanism's length
 PASSES = 20
@@ -109,13 +109,14 @@ def rank(G: np.ndarray, scale: np.ndarray) -> int:
 
 def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Orthonormal basis of the scaled motions that rows allow."""
+    return null_space(_compared(G, scale))
+
+
+def _compared(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Rows of unit size, turns counted in lengths."""
     A = G * scale
     size = np.sqrt((A * A).sum(axis=1))
-    A = A[size > 0.0] / size[size > 0.0, None]
-    if not len(A):
-        return np.eye(len(scale))
-    _, d, Vt = np.linalg.svd(A)
-    return Vt[int((d > TOLERANCE * d[0]).sum()) :].T
+    return A / np.where(size > 0.0, size, 1.0)[:, None]
 
 
 def _basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -186,10 +187,7 @@ def _nearby(c: Compiled, t: float, q: np.ndarray, step: np.ndarray, scale: np.nd
 
 def _lost(f: Free, G: np.ndarray, c: Compiled) -> tuple[str, ...]:
     """Elements whose rows take part in dependencies that are not there nearby."""
-    A, B = (X * f.scale for X in (f.holonomic, G))
-    U, d, _ = np.linalg.svd(A)
-    here = U[:, int((d > TOLERANCE * d[0]).sum()) :]
-    there = np.linalg.svd(B)[0][:, : rank(G, f.scale)]
+    here, there = parts(_compared(f.holonomic, f.scale)).dependencies, parts(_compared(G, f.scale)).span
     part = np.abs(here @ (here.T @ there)).max(axis=1)
     of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
     return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))

@@ -13,6 +13,7 @@ import numpy as np
 from ...equations.residual import residual_kernel
 from ...equations.scratch import work
 from ...errors import ModelError
+from ...numerics.rank import parts
 from ...tables.specs import Structure
 from ...tables.system import TERM_ROW, System, Work
 from ..compiled import Compiled
@@ -87,8 +88,7 @@ def refuse_undetermined(s: Structure, G: np.ndarray, F: np.ndarray) -> None:
         Naming the frictions.
     """
     size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    U, d, _ = np.linalg.svd(G / size[:, None])
-    free = U[:, int((d > FREE * d.max(initial=1e-300)).sum()) :] / size[:, None]
+    free = parts(G / size[:, None], FREE).dependencies / size[:, None]
     if not free.size or not np.abs(F @ free).max(initial=0.0) > FREE * np.abs(F).max() * np.abs(free).max():
         return
     names = [e.name for e in s.loads if np.abs(free[s.slices[e.joint]]).max(initial=0.0) > FREE * np.abs(free).max()]  # type: ignore[attr-defined]

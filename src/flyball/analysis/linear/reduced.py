@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...numerics.rank import span
 from .derivatives import Equations
-from .free import TOLERANCE, Free
+from .free import Free
 from .loads import refuse_undetermined
 from .rounding import Doubt, Terms, without_rounding
 
@@ -153,7 +154,6 @@ def _left(e: Equations, f: Free) -> np.ndarray:
     F[:, : e.block("n").size] = e.by_reactions
     refuse_undetermined(e.state.c.structure, (f.rows * f.scale)[: e.block("n").size], e.by_reactions)
     R = f.scale[:, None] * (F - f.rows.T)
-    U, d, _ = np.linalg.svd((f.rows * f.scale).T, full_matrices=False)
-    C = U[:, d > TOLERANCE * d.max(initial=1e-300)]
+    C = span((f.rows * f.scale).T)
     Z = f.Zv / f.scale[:, None]
     return f.scale[:, None] * (Z - C @ (Z.T @ R @ np.linalg.pinv(C.T @ R, rcond=1e-12)).T)

@@ -80,17 +80,43 @@ def spectrum(A: np.ndarray, doubt: Doubt | None = None) -> Spectrum:
     angle = np.abs((left.conj() * right).sum(axis=0))
     blur = sum((np.abs(left.conj().T @ L) * (X @ np.abs(right)).T).sum(axis=1) for L, X in E)
     blur = np.minimum(blur / np.maximum(angle, 1e-300), WIDEST * size)
-    out = Spectrum(w, w.copy(), right.copy(), equal(w, blur), np.ones(n, int), np.ones(n, int), residual)
-    for group in out.groups:
-        if len(group) > 1:
-            mean, blurred, X = _together(B, E, w[group])
-            out.values[group], blur[group] = mean, blurred
-            out.vectors[:, group[: X.shape[1]]] = X
-            out.multiplicity[group], out.geometric[group] = len(group), X.shape[1]
+    out = Spectrum(w, w.copy(), right.copy(), [], np.ones(n, int), np.ones(n, int), residual)
+    for group in equal(w, blur):
+        _told_apart(out, group, B, E, blur)
+    out.groups.sort()
     out.values = _clean(out.values, blur)
     out.vectors = scale[:, None] * out.vectors
     out.vectors /= np.maximum(np.abs(out.vectors).max(axis=0), 1e-300)
     return out
+
+
+def _told_apart(
+    out: Spectrum, group: list[int], B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], blur: np.ndarray
+) -> None:
+    """Replace eigenvalues that are one by their mean; those that are not leave the group, one after the other."""
+    w = out.raw
+    while len(group) > 1:
+        mean, blurred, X, squares = _together(B, E, w[group])
+        total, power = w[group].sum(), (w[group] ** 2).sum()
+        far = group[int(np.argmax(np.abs(w[group] - mean)))]
+        if X is not None and blurred < abs(mean.real) and abs(power - total**2) <= squares:
+            out.values[far], blur[far] = total.real, len(group) * blurred  # one beside others that are zero
+            mean, blurred, X, _ = _together(B, E, w[group], 0j)
+            group.remove(far)
+            out.groups.append([far])
+        if X is not None:
+            X = X[:, : len(group)]
+            out.values[group], blur[group] = mean, blurred
+            out.vectors[:, group[: X.shape[1]]] = X
+            out.multiplicity[group], out.geometric[group] = len(group), X.shape[1]
+            break
+        group.remove(far)
+        out.groups.append([far])
+        blur[far] = min(blur[far], squares / abs(w[far] - mean))
+    else:
+        others = np.abs(np.delete(w, group) - w[group[0]])
+        blur[group] = np.minimum(blur[group], 0.5 * others.min(initial=np.inf))
+    out.groups.append(group)
 
 
 def _pairs(A: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]:
@@ -138,22 +164,31 @@ def equal(w: np.ndarray, blur: np.ndarray) -> list[list[int]]:
 
 
 def _together(
-    B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], w: np.ndarray
-) -> tuple[complex, float, np.ndarray]:
-    """Of eigenvalues that are one: their mean, what it is uncertain by, and the eigenvectors that they have."""
+    B: np.ndarray, E: Sequence[tuple[np.ndarray, np.ndarray]], w: np.ndarray, centre: complex | None = None
+) -> tuple[complex, float, np.ndarray | None, float]:
+    """Of eigenvalues that may be one: mean, what it is uncertain by, eigenvectors; what squares are uncertain by.
+
+    There are no vectors if they are not one: the sum of squared distances from the mean is found as exactly as the
+    matrix is known, however ill-conditioned each of them is by itself. With ``centre`` it is known that all but one are
+    that, which is then returned for the mean.
+    """
     V, W = subspace(B, w), subspace(B.conj().T, w.conj())
-    inner = np.linalg.inv(W.conj().T @ V) @ W.conj().T
-    mean = complex(w.mean())
+    inner = np.linalg.pinv(W.conj().T @ V) @ W.conj().T
+    mean = complex(w.mean()) if centre is None else centre
     doubt = sum(np.abs(inner @ L) @ X @ np.abs(V) for L, X in E)
     blur = float(np.trace(doubt)) / len(w)
     if abs(mean.imag) <= blur:
         mean = complex(mean.real)
-    _, d, Vh = np.linalg.svd(inner @ B @ V - mean * np.eye(len(w)))
+    N = inner @ B @ V - mean * np.eye(len(w))
+    squares = 2.0 * float(np.abs(N * doubt.T).sum()) + float((doubt * doubt.T).sum())
+    if centre is None and abs(((w - mean) ** 2).sum()) > squares + len(w) * (EQUAL * abs(mean)) ** 2:
+        return mean, blur, None, squares
+    _, d, Vh = np.linalg.svd(N)
     count = max(1, int((d <= max(100.0 * doubt.max(), NULL * d[0], EQUAL * abs(mean))).sum()))
     X = V @ Vh[len(w) - count :].conj().T
     if mean.imag == 0.0:
         X = np.linalg.svd(np.hstack([X.real, X.imag]))[0][:, :count]
-    return mean, blur, X
+    return mean, blur, X, squares
 
 
 def subspace(B: np.ndarray, values: np.ndarray) -> np.ndarray:

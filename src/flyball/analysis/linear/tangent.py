@@ -17,13 +17,10 @@ import numpy as np
 
 from ...equations.residual import residual_kernel
 from ...equations.scratch import work
-from ...equations.tree import lengths, quaternion_at
+from ...numerics.rank import TOLERANCE
 from ...tables.names import velocity_names
-from ...tables.system import Q0, V0
 from ...tables.values import Values
-from ..compiled import Compiled
 from .derivatives import Equations, State
-from .free import TOLERANCE
 from .loads import STEP, as_complex, by_reactions, complex_tables, refuse_undetermined
 
 
@@ -122,35 +119,3 @@ def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) 
     dv = dv + lin.motion(-d.along(x, dq, dv)[at["n"]])
     left = d.along(x, dq, dv)
     return Tangent(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))
-
-
-def tangent_rate(c: Compiled, q: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """The change along the velocities that changes of the coordinates are, (nv,)."""
-    S = c.values.system
-    out = np.zeros(c.structure.nv)
-    for b in range(len(S.body_i)):
-        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
-        n = lengths(S, b)
-        out[v0 : v0 + n] = dq[q0 : q0 + n]
-        k, w = quaternion_at(S, b)
-        if k >= 0:
-            (a, *u), (e, *p) = q[k : k + 4], dq[k : k + 4]
-            out[w : w + 3] = 2.0 * (a * np.array(p) - e * np.array(u) - np.cross(u, p))
-    return out
-
-
-def tangent_step(c: Compiled, q: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """The step along the velocities that leads from one position to another nearby, (nv,)."""
-    S = c.values.system
-    out = np.zeros(c.structure.nv)
-    for b in range(len(S.body_i)):
-        q0, v0 = int(S.body_i[b, Q0]), int(S.body_i[b, V0])
-        n = lengths(S, b)
-        out[v0 : v0 + n] = other[q0 : q0 + n] - q[q0 : q0 + n]
-        k, w = quaternion_at(S, b)
-        if k >= 0:
-            (a, *u), (e, *p) = q[k : k + 4], other[k : k + 4]
-            turn = a * np.array(p) - e * np.array(u) - np.cross(u, p)
-            cosine = a * e + np.dot(u, p)
-            out[w : w + 3] = 2.0 * turn / cosine  # the Cayley step
-    return out

@@ -12,12 +12,11 @@ from ...errors import AnalysisError, ModelError
 from ...results.doubts import open_loads
 from ...tables.cost import cost
 from ...tables.spanning import spanning
-from ...tables.system import COUPLED, NV, SEMIDEFINITE, SOLVER, V0
+from ...tables.system import COUPLED, MASS, NV, SEMIDEFINITE, SOLVER, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import mobility
 
-CURE = "or replace one of these by a joint that holds less, such as Spherical"
 COORDINATES = ("auto", "absolute", "joint")
 THIN = 1e-7  # inertia of a coordinate, as part of that of the mechanism's mass at its length, that is none
 MOST = 8  # joints that are taken out of the forest, one after the other, before it is given up
@@ -128,8 +127,9 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)
     M = np.zeros((s.nv, s.nv))
-    M[S.mass_i[:, 0], S.mass_i[:, 1]] = c.work.M
-    size = S.body_x[:, 0].sum()
+    row, column, _ = S.mass_i.T
+    M[row, column] = c.work.M
+    size = S.body_x[:, MASS].sum()
     for name, t in s.tree_joints.items():
         at = [int(S.body_i[k, V0]) + i for k in t.links for i in range(int(S.body_i[k, NV]))]
         scale = np.array(

@@ -15,8 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...equations.tree import quaternion_at, retract
-from ...tables.system import G_VALUE, GAMMA, Q0, V0
+from ...tables.system import G_VALUE, GAMMA, V0
 from ..compiled import Compiled
+from ..steps import tangent_step
 
 CLOSED = 1e-11  # what Newton's method may leave of F
 PASSES = 30
@@ -156,17 +157,12 @@ class Closure:
     def way(self, x: Place, y: Place) -> np.ndarray:
         """The step from x to y; whole turns do not count."""
         S = self.c.values.system
-        d = np.zeros(self.columns)
+        d = np.append(tangent_step(self.c, x.q, y.q), y.a - x.a)
         for b in range(len(S.body_i)):
-            q0, v0 = S.body_i[b, Q0], S.body_i[b, V0]
-            k, w = quaternion_at(S, b)
-            d[v0 : v0 + 3] = y.q[q0 : q0 + 3] - x.q[q0 : q0 + 3]
-            if k >= 0:
-                d[w : w + 3] = _turn(x.q[k : k + 4], y.q[k : k + 4])
-            else:
-                d[v0 + 2] = np.arctan2(np.sin(d[v0 + 2]), np.cos(d[v0 + 2]))
+            if quaternion_at(S, b)[0] < 0:
+                turn = S.body_i[b, V0] + 2
+                d[turn] = np.arctan2(np.sin(d[turn]), np.cos(d[turn]))
         d[:-1] /= self.scale
-        d[-1] = y.a - x.a
         if self.turning:
             d[-1] = np.arctan2(np.sin(d[-1]), np.cos(d[-1]))
         d[-1] /= self.unit
@@ -181,10 +177,3 @@ def _to_powers(n: int) -> np.ndarray:
         T[1:, k] = 2.0 * T[:-1, k - 1]
         T[:, k] -= T[:, k - 2]
     return T
-
-
-def _turn(p: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """The step of three that turns quaternion p to q (Cayley's, as ``retract`` takes it)."""
-    w = p[0] * q[0] + p[1:] @ q[1:]
-    v = p[0] * q[1:] - q[0] * p[1:] - np.cross(p[1:], q[1:])
-    return 2.0 * v / w if abs(w) > 1e-3 else 2e3 * v

@@ -10,7 +10,7 @@ from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_M
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_M
 from ..records import coordinate_frames, turned
 from .base import Curves, View
 
@@ -25,10 +25,10 @@ class ForceView(View):
         """(inputs, force on M, torque on M) over time, of a force between frames."""
         e, r, S = self.element, self._result.records, self._x.system
         k = self._index()
-        F, M = r.frame(int(S.force_i[k, 0])), r.frame(int(S.force_i[k, 1]))
+        F, M = r.frame(int(S.force_i[k, FORCE_F])), r.frame(int(S.force_i[k, FORCE_M]))
         par = wide(S.force_x, k)
         a, b = (np.broadcast_to(i, (r.n,)) for i in e.inputs(par, F, M))
-        laws = tuple(self._law(int(S.force_i[k, 2 + i]), a, b) for i in range(3))
+        laws = tuple(self._law(int(S.force_i[k, FORCE_LAW + i]), a, b) for i in range(3))
         force, torque = e.wrench(par, F, M, laws, (a, b))
         self._frames = F, M, par
         return (a, b), force, torque
@@ -49,12 +49,12 @@ class ForceView(View):
         """(value, rate, effort) over time, of a force along a measured quantity."""
         e, S = self.element, self._x.system
         k = self._index()
-        x, rate = self._result.measured.quantity(int(S.force_i[k, 0]))
-        laws = (self._law(int(S.force_i[k, 2]), x, rate), 0.0 * x, 0.0 * x)
+        x, rate = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))
+        laws = (self._law(int(S.force_i[k, FORCE_LAW]), x, rate), 0.0 * x, 0.0 * x)
         load = 0.0 * x
         if hasattr(e, "load"):
             force, torque = self._result.reactions.of(e.joint)
-            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, 1])), force, torque)
+            load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, FORCE_M])), force, torque)
         return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
