@@ -29,9 +29,9 @@ def load(path: str | os.PathLike) -> Mechanism:
     except TypeError:
         raise ModelError(f"the path of a model file is a text or a path, not {path!r}") from None
     if given.suffix.lower() == ".py":
-        from .python_file import load_python
+        from .model.python_file import load_python
 
-        return load_python(given)
+        return load_python(given, Mechanism)
     from .model.io import load
 
     return load(given, Mechanism)

@@ -6,14 +6,17 @@ import os
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
+from typing import TypeVar
 
-from .errors import FlyballError, ModelError
-from .mechanism import Mechanism
-from .model.words import suggest
+from ..errors import FlyballError, ModelError
+from .model import Model
+from .words import suggest
+
+M = TypeVar("M", bound=Model)
 
 
-def load_python(path: Path) -> Mechanism:
-    """The mechanism of a Python file: it is run, and defines ``m``, ``mechanism`` or ``mechanism()``.
+def load_python(path: Path, cls: type[M]) -> M:
+    """The mechanism, of class ``cls``, of a Python file: it is run, and defines ``m``, ``mechanism`` or ``mechanism()``.
 
     What it prints goes to stderr.
 
@@ -32,7 +35,7 @@ def load_python(path: Path) -> Mechanism:
         with redirect_stdout(sys.stderr):
             names = runpy.run_path(str(path))
             found = [names.get(k) for k in ("m", "mechanism")]
-            made = [x if isinstance(x, Mechanism) else x() for x in found if isinstance(x, Mechanism) or callable(x)]
+            made = [x if isinstance(x, cls) else x() for x in found if isinstance(x, cls) or callable(x)]
     except ModelError as error:
         raise type(error)(f"{path}{_line_in(path, error)}: {error}") from None
     except FlyballError:
@@ -42,7 +45,7 @@ def load_python(path: Path) -> Mechanism:
     finally:
         sys.path.pop(0)
     for m in made:
-        if isinstance(m, Mechanism):
+        if isinstance(m, cls):
             return m
     raise ModelError(f"{path} defines no mechanism: name one m or mechanism, or define a function mechanism()")
 
