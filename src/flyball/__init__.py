@@ -61,7 +61,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
-    from .analysis.assemble import Assembly as Assembly
+    from .analysis.assembly.start import Assembly as Assembly
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError

@@ -353,3 +353,19 @@ def test_the_command(tmp_path):
     assert data["sets"][0]["elements"] == list(ALL)
     said = CliRunner().invoke(app, ["mobility", str(path), "--set", "x=1"])
     assert said.exit_code == 2
+
+
+def test_gaps_of_drivers_are_in_their_own_units():
+    """Two drivers of one crank, 1 rad/s apart, in a mechanism of any size; of a slide, 0.5 m/s."""
+    for size in (0.01, 100.0):
+        m = fb.Mechanism("crank", planar=True)
+        m.add(fb.Body("a", mass=1, inertia=1, position=(size, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+        m.add(fb.Driver("one", "A.angle", "2*t"), fb.Driver("two", "A.angle", "3*t"))
+        (only,) = m.mobility().sets
+        assert (only.gap, only.unit) == (pytest.approx(1.0, rel=1e-9), "rad/s")
+        assert "1 rad/s apart" in only.text
+    m = fb.Mechanism("slide", planar=True)
+    m.add(fb.Body("a", mass=1, inertia=1), fb.Translational("P", "ground", "a", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("one", "P.displacement", "2*t"), fb.Driver("two", "P.displacement", "1.5*t"))
+    (only,) = m.mobility().sets
+    assert (only.gap, only.unit) == (pytest.approx(0.5, rel=1e-9), "m/s")

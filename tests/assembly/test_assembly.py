@@ -1,5 +1,7 @@
 """Assembly: what is closed stays as it is, what is open closes, what is fixed stays fixed, what cannot be is said."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -393,3 +395,29 @@ def test_a_law_without_a_value_at_the_start_is_named():
     with pytest.raises(fb.AssemblyError, match="the law of Driver 'motor' has no finite value there"):
         m.assemble()
     assert m.assemble(t=0.75).q[2] == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("away", [1e4, 1e8, 1e11])
+def test_far_from_the_origin_closed_is_what_rounding_allows(away):
+    """The planar four-bar by lengths only, its pivots that far away: coordinates there have eps times as much left."""
+    near = rough_four_bar()
+    m = fb.Mechanism("far", planar=True)
+    for e in near.elements():
+        if isinstance(e, fb.Body) or (isinstance(e, fb.Frame) and e.body == "ground"):
+            e = replace(e, position=(e.position[0] + away, e.position[1]))
+        m.add(e)
+    a = m.assemble()
+    a.compiled.at(0.0, a.q, a.v)
+    assert np.abs(a.compiled.work.row[G_VALUE]).max() < 1e-10 + 16 * np.finfo(float).eps * away
+
+
+@pytest.mark.parametrize("size", [1e-6, 1e3])
+def test_closed_is_relative_to_the_size(size):
+    """The same a million times smaller, or larger: closed to the same part of its length."""
+    near = rough_four_bar()
+    m = fb.Mechanism("scaled", planar=True)
+    for e in near.elements():
+        m.add(replace(e, position=tuple(size * x for x in e.position)) if isinstance(e, (fb.Body, fb.Frame)) else e)
+    a = m.assemble()
+    a.compiled.at(0.0, a.q, a.v)
+    assert np.abs(a.compiled.work.row[G_VALUE]).max() < 1e-10 * size

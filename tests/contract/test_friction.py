@@ -220,3 +220,37 @@ def test_frictions_that_load_one_another(seed):
         assert r[f"f {name}"].friction == pytest.approx(expected, rel=1e-8, abs=1e-9)
     total = 2.0 * (r["a"].acceleration @ n)
     assert total == pytest.approx(2.0 * 3.0 + r["f slide"].friction, rel=1e-8)
+
+
+@pytest.mark.parametrize("rubbing", ["left", "right"])
+def test_friction_in_one_of_two_hinges_on_one_axis(rubbing):
+    """What each carries is a choice; it is made once, whichever coordinates cost less, and refused where it cannot be.
+
+    Of the same size, each carries half: the wheel slows down by mu (m g / 2) r / J.
+    """
+    m = fb.Mechanism("wheel", gravity=(0, 0, -G))
+    m.add(fb.Body("wheel", mass=3.0, inertia=(0.03, 0.05, 0.03), angular_velocity=(0, 6.0, 0)))
+    for name, y in (("left", -0.1), ("right", 0.1)):
+        m.add(fb.Revolute(name, "ground", "wheel", at=(0, y, 0), axis=(0, 1, 0)))
+    m.add(fb.JointFriction("f", joint=rubbing, static=0.1, radius=0.02))
+    slowing = 0.1 * 1.5 * G * 0.02 / 0.05
+    for coordinates in ("auto", "absolute"):
+        r = m.simulate(0.5, outputs=3, coordinates=coordinates)
+        assert r[rubbing].rate == pytest.approx(6.0 - slowing * r.t, rel=1e-6)
+        assert r.health.coordinates.startswith("absolute")
+        assert any("one choice of many" in w for w in r.health.warnings)
+    with pytest.raises(fb.AnalysisError, match=r"JointFriction 'f' follows reactions .* left, right leave open"):
+        m.simulate(0.5, coordinates="joint")
+
+
+def test_friction_that_counts_no_moments_does_not_mind_those_left_open():
+    """A block kept from turning twice: which of both does it is open, but friction leaves moments out."""
+    m = fb.Mechanism("block", gravity=(0, 0, -G))
+    m.add(fb.Body("block", mass=2.0, inertia=(0.1, 0.1, 0.1), velocity=(1, 0, 0)))
+    m.add(fb.Prismatic("slide", "ground", "block", at=(0, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.Orientation("square", "ground", "block", at=(0, 0, 0)))
+    m.add(fb.JointFriction("f", joint="slide", static=0.1))
+    for coordinates in ("absolute", "joint"):
+        r = m.simulate(0.1, outputs=3, coordinates=coordinates)
+        assert r["slide"].acceleration == pytest.approx(np.full(3, -0.1 * G), rel=1e-8)
+        assert r.health.warnings == ()

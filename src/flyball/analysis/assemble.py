@@ -11,6 +11,7 @@ from collections.abc import Mapping
 
 from ..model.model import Model
 from .assembly.start import Assembly, assembled
+from .freedom.contradiction import story
 
 
 def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
@@ -34,4 +35,4 @@ def assemble(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | 
         If no closed position, or no consistent velocity, is found; the message names the joints that disagree, by how
         much, and why.
     """
-    return assembled(model, t=t, parameters=parameters)
+    return assembled(model, t=t, parameters=parameters, why=story)

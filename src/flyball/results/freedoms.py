@@ -179,8 +179,7 @@ class RedundantSet:
     contradiction : str
         "" where they say the same twice; else what they disagree on, ``"position"`` or ``"velocity"``.
     gap : float
-        By how much they disagree, seen at one of them if all others are fulfilled: [m], or radians times the
-        mechanism's length; or that a second.
+        By how much they disagree, seen at one of them (a driver, if there is one) if all others are fulfilled [unit].
     here_only : bool
         Whether they depend on one another in this singular position only, and not next to it.
     undetermined : dict
@@ -189,6 +188,8 @@ class RedundantSet:
         What to replace or leave out; those of the sets before are taken as done.
     cut : str
         Where none was found: how far the search went, if there is more that could be tried.
+    unit : str
+        Of the gap: ``"m"``, ``"rad"``, ``"m/s"`` or ``"rad/s"``.
     """
 
     elements: tuple[str, ...]
@@ -200,6 +201,7 @@ class RedundantSet:
     cure: Cure | None = None
     drivers: tuple[str, ...] = ()
     cut: str = ""
+    unit: str = ""
 
     @property
     def text(self) -> str:
@@ -208,8 +210,8 @@ class RedundantSet:
         names += f" and {len(self.elements) - SHOWN} more" if len(self.elements) > SHOWN else ""
         how = "constraint" if self.count == 1 else "constraints"
         if self.contradiction:
-            unit = "m" if self.contradiction == "position" else "m/s"
-            return f"contradictory: {names} cannot agree on {KINDS[self.contradiction]}, {self.gap:.3g} {unit} apart"
+            what = KINDS[self.contradiction]
+            return f"contradictory: {names} cannot agree on {what}, {self.gap:.3g} {self.unit} apart"
         where = ", in this singular position only" if self.here_only else ""
         return f"{self.count} {how} too many among {names}{where}"
 
@@ -233,6 +235,7 @@ class RedundantSet:
             "count": self.count,
             "contradiction": self.contradiction,
             "gap": self.gap,
+            "unit": self.unit,
             "here_only": self.here_only,
             "undetermined": {k: list(v) for k, v in self.undetermined.items()},
             "cure": None if self.cure is None else self.cure.as_dict(),

@@ -60,13 +60,15 @@ def no_rate(c: Compiled, t: float) -> AssemblyError | None:
     return None
 
 
-def contradictory_velocities(c: Compiled, gaps: Mapping[str, float], best: Any) -> AssemblyError:
+def contradictory_velocities(c: Compiled, gaps: Mapping[str, float], best: Any, why: str = "") -> AssemblyError:
     """The error for constraints that no velocities fulfil together; ``gaps``: of the nearest [m/s or rad/s]."""
+    begin = f"{c.structure.model.name!r}: no velocities fulfil all constraints at t = {best.t:g} s"
+    if why:
+        return AssemblyError(f"{begin}: {why}", gaps=dict(gaps), best=best)
     listed = ", ".join(f"{k} by {x:.4g} {rate_unit(c, k)}" for k, x in list(gaps.items())[:SHOWN])
     more = f" and {len(gaps) - SHOWN} more" if len(gaps) > SHOWN else ""
     return AssemblyError(
-        f"{c.structure.model.name!r}: no velocities fulfil all constraints at t = {best.t:g} s; the nearest miss "
-        f"{listed}{more}. Check drivers, initial rates and bodies with as_drawn=True",
+        f"{begin}; the nearest miss {listed}{more}. Check drivers, initial rates and bodies with as_drawn=True",
         gaps=dict(gaps),
         best=best,
     )

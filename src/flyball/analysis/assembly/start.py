@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -37,7 +37,13 @@ class Assembly:
         return np.r_[self.q, self.v, self.compiled.z]
 
 
-def assembled(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None) -> Assembly:
+Why = Callable[[Compiled, float, np.ndarray, np.ndarray, np.ndarray], str]
+"""(mechanism, t, q, v, right-hand sides of its rows) -> why no velocities fulfil these; "" if that is not known."""
+
+
+def assembled(
+    model: Model, *, t: float = 0.0, parameters: Mapping[str, float] | None = None, why: Why | None = None
+) -> Assembly:
     """Find positions and velocities that fulfil all constraints at time t, near those described.
 
     Raises
@@ -60,7 +66,8 @@ def assembled(model: Model, *, t: float = 0.0, parameters: Mapping[str, float] |
         raise error
     v, wanted, c = consistent(model, plain, parameters, t, q, rates)
     if gaps := contradiction(wanted, v):
-        raise contradictory_velocities(c, gaps, Assembly(plain, t, q, v))
+        said = why(c, t, q, v, wanted.nu) if why is not None and not wanted.held else ""
+        raise contradictory_velocities(c, gaps, Assembly(plain, t, q, v), said)
     plain.at(t, q, v)
     near = rounding(plain)
     departures = (*_repositioned(plain, drawn, q, near), *not_kept(plain, q, v))

@@ -8,12 +8,15 @@ from ...model.body import Driver
 from ...numerics.rank import rank
 from ...results.freedoms import RedundantSet
 from ...tables.system import G_VALUE, NU
+from ..compiled import Compiled
 from .cures import cures
 from .jacobian import SHOWN, Found, scaled_jacobian
 from .stresses import undetermined
 from .supports import irreducible
 
 WRONG = 1e-8  # a dependency of unit size that adds up to more than this part of the mechanism's length contradicts
+
+SHARE = 1e-3  # part of the largest share in a dependency that a driver must have for the gap to be seen at it
 
 
 def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tuple[RedundantSet, ...]:
@@ -38,7 +41,7 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
     tried = cures(there, those, positions)
     out = []
     for elements, (numbers, basis), (cure, here_only, cut) in zip(those, found, tried, strict=True):
-        what, gap = _contradiction(basis, g, nu, c.values.length)
+        what, gap, unit = _contradiction(basis, g, nu, size, c)
         loose = undetermined(a, basis / size[:, None], list(elements))
         drivers = tuple(n for n in elements if isinstance(s.model[n], Driver))
         loose = {k: v for k, v in loose.items() if k not in drivers}
@@ -48,17 +51,27 @@ def redundant_sets(there: Found, positions: list[np.ndarray], shaky: bool) -> tu
         if lam.shape[1] == SHOWN:  # of a large mechanism not all dependencies are there; those of a set's own rows are
             own = G[np.concatenate([groups[e] for e in numbers])].toarray()
             count = len(own) - rank(own)
-        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut))
+        out.append(RedundantSet(elements, count, what, gap, here_only, loose, cure, drivers, cut, unit))
     return tuple(out)
 
 
-def _contradiction(basis: np.ndarray, g: np.ndarray, nu: np.ndarray, length: float) -> tuple[str, float]:
-    """What the rows of a dependency disagree on, and by how much."""
-    unit = basis / np.abs(basis).max(axis=0)
-    gap = float(np.abs(unit.T @ g).max())
-    if gap > WRONG * length:
-        return "position", gap
-    gap = float(np.abs(unit.T @ nu).max())
-    if gap > WRONG * max(length, float(np.abs(nu).max(initial=0.0))):
-        return "velocity", gap
-    return "", 0.0
+def _contradiction(
+    basis: np.ndarray, g: np.ndarray, nu: np.ndarray, size: np.ndarray, c: Compiled
+) -> tuple[str, float, str]:
+    """What the rows of a dependency disagree on, by how much, and the unit of that.
+
+    Seen at the first driver among them, or at the row with the largest share.
+    """
+    unit, length = basis / np.abs(basis).max(axis=0), c.values.length
+    for what, off, scale, per in (
+        ("position", g, length, ""),
+        ("velocity", nu, max(length, float(np.abs(nu).max(initial=0.0))), "/s"),
+    ):
+        gaps = np.abs(unit.T @ off)
+        if gaps.max() > WRONG * scale:
+            j = int(gaps.argmax())
+            share = np.abs(unit[:, j])
+            driven = np.array([isinstance(r.element, Driver) for r in c.structure.rows]) & (share > SHARE)
+            k = int(np.argmax(driven)) if driven.any() else int(share.argmax())
+            return what, float(gaps[j] / share[k] * size[k]), ("m" if c.metric[k] else "rad") + per
+    return "", 0.0, ""

@@ -38,6 +38,8 @@ from ...tables.system import (
 )
 from ..assembly.start import Assembly
 from ..compiled import Compiled
+from ..freedom.contradiction import story
+from .residual import missed
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
@@ -201,16 +203,15 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
     if not np.isfinite(x).all():
         return ""
-    G, gamma = c.sparse_jacobian(), c.work.row[GAMMA]
-    gap = np.abs(G @ x - gamma)
-    if not gap.max() > LOCKED * (np.abs(gamma).max() + 1e-9):
+    gap, largest = missed(c, v, x, c.sizes)
+    if not gap.max() > LOCKED * largest:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
-    return (
-        f"at t = {clock.real[ex.T]:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: "
-        f"in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
-        f"than its links allow), or it is drawn in a singular position with velocities that it cannot have"
+    why = story(c, t, q, v, c.work.row[GAMMA].copy(), "/s^2") or (
+        "in this position they leave no way on for these velocities. The mechanism locks (a driver may ask for more "
+        "than its links allow), or it is drawn in a singular position with velocities that it cannot have"
     )
+    return f"at t = {t:.6g} s no accelerations fulfil the constraints of {', '.join(names[:8])} together: {why}"
 
 
 def _jammed(a: Assembly, clock: ex.Clock) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -41,7 +42,8 @@ def acceleration_violation(result: Result) -> float:
         if c is not own:
             q, v = c.take(own, result.t[k], q, v)
         c.at(result.t[k], q, v, MOTION)
-        worst = max(worst, _part(c, v, accelerations[k], sizes, result.health.options))
+        gap, largest = missed(c, v, accelerations[k], sizes, result.health.options)
+        worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
     return worst
 
 
@@ -58,20 +60,22 @@ def _accelerations(result: Result, c: Compiled) -> np.ndarray:
     return out
 
 
-def _part(c: Compiled, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: dict) -> float:
-    """The largest row that the accelerations x miss, as part of the largest sum of terms, at the state in c's scratch.
+def missed(
+    c: Compiled, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
+) -> tuple[np.ndarray, float]:
+    """How far the accelerations x are off each row, (nr,), and the largest sum of a row's terms.
 
-    Rows in metres count as parts of the mechanism's length.
+    Rows in metres count as parts of the mechanism's length. The state (velocities v) is the one in c's scratch,
+    evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
     G, gamma = c.sparse_jacobian(), c.work.row[GAMMA].copy()
-    if o.get("stabilization") == "baumgarte":
+    if o is not None and o.get("stabilization") == "baumgarte":
         gamma -= 2 * o["alpha"] * (G @ v - c.work.row[NU]) + o["beta"] ** 2 * c.work.row[G_VALUE]
     rates = (np.abs(v) / sizes)[G.indices]
     turning = np.array([rates[i:j].max(initial=0.0) for i, j in pairwise(G.indptr)])
     size = abs(G) @ (np.abs(x) + np.abs(_unconstrained(c))) + np.abs(gamma) + (abs(G) @ np.abs(v)) * turning
     metre = np.where(c.metric, c.values.length, 1.0)
-    worst, largest = (float((np.abs(a) / metre).max()) for a in (G @ x - gamma, size))
-    return worst / largest if largest > 0.0 else 0.0
+    return np.abs(G @ x - gamma) / metre, float((size / metre).max())
 
 
 def _unconstrained(c: Compiled) -> np.ndarray:
