@@ -6,7 +6,7 @@ import os
 import sys
 from contextlib import redirect_stdout
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from ..errors import FlyballError, ModelError
 from .model import Model
@@ -16,7 +16,7 @@ M = TypeVar("M", bound=Model)
 
 
 def load_python(path: Path, cls: type[M]) -> M:
-    """The mechanism, of class ``cls``, of a Python file: it is run, and defines ``m``, ``mechanism`` or ``mechanism()``.
+    """The mechanism of class ``cls`` that a Python file defines as ``m``, ``mechanism`` or ``mechanism()``; it is run.
 
     What it prints goes to stderr.
 
@@ -34,7 +34,7 @@ def load_python(path: Path, cls: type[M]) -> M:
     try:
         with redirect_stdout(sys.stderr):
             names = runpy.run_path(str(path))
-            found = [names.get(k) for k in ("m", "mechanism")]
+            found: list[Any] = [names.get(k) for k in ("m", "mechanism")]
             made = [x if isinstance(x, cls) else x() for x in found if isinstance(x, cls) or callable(x)]
     except ModelError as error:
         raise type(error)(f"{path}{_line_in(path, error)}: {error}") from None
