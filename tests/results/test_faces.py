@@ -15,7 +15,7 @@ import flyball as fb
 from flyball.results.numbers import clean, number, span, tuple_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-OWED: set[str] = {"Assembly", "LinearModel", "MassReport", "Mobility", "Report", "RootLocus"}
+OWED = {"Assembly", "MassReport", "Mobility", "Report"}  # have no picture yet
 
 
 def crank() -> fb.Mechanism:
@@ -64,7 +64,7 @@ def test_every_class_of_results_is_tried():
 @pytest.mark.parametrize("name", MADE)
 def test_a_result_has_a_text_plain_data_and_a_picture(name, tmp_path):
     if name in OWED:
-        pytest.skip("to come")
+        pytest.skip("has no picture yet")
     r = MADE[name]()
     assert type(r).__name__ == name
     lines = list(r.lines())
