@@ -91,6 +91,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.table import Table as Table
     from .results.check import Report as Report
     from .results.comparison import Comparison as Comparison
+    from .results.equilibria import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Equilibrium as Equilibrium
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
@@ -101,7 +102,6 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.result import Result as Result
     from .results.root_locus import RootLocus as RootLocus
     from .results.sensitivity import Sensitivity as Sensitivity
-    from .results.series import EquilibriumSeries as EquilibriumSeries
     from .results.singularities import Singularities as Singularities
 
 __version__ = "0.4.0"
@@ -138,7 +138,7 @@ _HOME = {
     "Report": "results.check",
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
-    "EquilibriumSeries": "results.series",
+    "EquilibriumSeries": "results.equilibria",
     "InverseDynamics": "results.inverse",
     "LinearModel": "results.linear",
     "Modes": "results.modes",

@@ -75,7 +75,7 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     if named:
         x = _in_copy(model, x)
     e, f, frame = _about(x, o.frozen, to=[i.name for i in named if i.name == i.parameter])
-    r = _reduced(e, f, frame, _effects(e, f, named))
+    r = reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or o.outputs):
         _refuse_turning(e, f, r, frame, named, o.outputs)
     return _model(e, f, r, frame, named, o.outputs)
@@ -86,7 +86,7 @@ def _refuse_turning(
 ) -> None:
     """Refuse inputs and outputs that do not turn with the mechanism: their coefficients would change with time."""
     then, g, own = moved_on(e.state, f, frame)
-    later = _reduced(then, g, own, _effects(then, g, inputs))
+    later = reduced(then, g, own, _effects(then, g, inputs))
     n = len(r.rate)
     for what, names, now, other in (
         ("output", outputs, _outputs(e, r, inputs, outputs), _outputs(then, later, inputs, outputs)),
@@ -106,7 +106,7 @@ def _refuse_turning(
 def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> tuple[Free, Frame, Reduced]:
     """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
     e, f, frame = _about(x, frozen, like)
-    return f, frame, _reduced(e, f, frame, None)
+    return f, frame, reduced(e, f, frame, None)
 
 
 def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = ()) -> tuple[Equations, Free, Frame]:
@@ -119,18 +119,6 @@ def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] =
     frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
     frame.told = told(x, frame, frozen)
     return e, f, frame
-
-
-def _reduced(e: Equations, f: Free, frame: Frame, inputs: Inputs | None) -> Reduced:
-    try:
-        return reduced(e, f, frame, inputs)
-    except np.linalg.LinAlgError:
-        M = f.Zv.T @ e.by_acceleration[e.at["r"]] @ f.Zv
-        k = int(np.argmin(np.abs(np.diag(M))))
-        raise ModelError(
-            f"nothing with inertia moves along {f.names[f.chosen_v[k]].name}: there is no linear equation of motion; "
-            f"give it a mass or a moment of inertia"
-        ) from None
 
 
 def _in_copy(model: Model, x: State) -> State:

@@ -12,11 +12,11 @@ from ..errors import AnalysisError, ModelError
 from ..model.model import Model
 from ..results.equilibrium import Equilibrium
 from ..results.root_locus import Crossing, RootLocus
+from .equilibria import EquilibriaOptions, checked, equilibria, stopped
 from .linear.crossings import Event, Search
 from .linear.sample import Sample, match, sample
 from .linearize import InstantOptions, without_inputs
 from .progress import Tell, shown
-from .series import EquilibriaOptions, checked, equilibria, stopped
 
 SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
 ROUNDED = 1e-13  # of the largest value: what is none

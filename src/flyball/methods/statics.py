@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from ..model.model import Model
+    from ..results.equilibria import EquilibriumSeries
     from ..results.equilibrium import Equilibrium
     from ..results.linear import LinearModel
     from ..results.modes import Modes
     from ..results.result import Result
     from ..results.root_locus import RootLocus
-    from ..results.series import EquilibriumSeries
 else:
     Model = object  # a mechanism is one; signatures alone load nothing
 
@@ -115,7 +115,7 @@ class Statics(Model):
         AssemblyError
             If the mechanism cannot be assembled at the first value.
         """
-        from ..analysis.series import EquilibriaOptions, equilibria
+        from ..analysis.equilibria import EquilibriaOptions, equilibria
 
         return equilibria(self, EquilibriaOptions.asked(locals()))
 

@@ -105,12 +105,22 @@ class Equilibrium:
         return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}
 
     def html(self) -> str:
-        """The mechanism where it is, as the animation page's text."""
-        return self.result.html()
+        """The mechanism where it is with the verdict beside it, as a page's text."""
+        from ..view.equilibrium import resting
+
+        return resting(self)
 
     def to_html(self, path: str | os.PathLike) -> None:
-        """Write the page that shows the mechanism where it is."""
-        self.result.to_html(path)
+        """Write the page that shows the mechanism where it is, and the verdict."""
+        from ..view.writing import write
+
+        write(path, self.html())
+
+    def _repr_html_(self) -> str:
+        """The page, in a notebook."""
+        from ..view.notebook import iframe
+
+        return iframe(self.html())
 
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())

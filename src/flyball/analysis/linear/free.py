@@ -21,6 +21,7 @@ from ..compiled import Compiled
 from .derivatives import Equations
 
 ROUNDED = 1e-14  # entries of a basis below this are none, where its largest are about 1
+NOTHING = 1e-13  # part of the largest that rounding makes of no force, or no constraint
 CLOSED = 1e-10  # of the mechanism's length
 PASSES = 20
 STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
@@ -38,7 +39,8 @@ class Free:
         Constraints on positions (n, nv), and those on velocities, which they are among (m, nv); prescribed coordinates
         are constraints here.
     Z, Zv : ndarray (nv, f), (nv, fv)
-        Bases of what they allow: the identity in the rows ``chosen`` and ``chosen_v``.
+        Bases of what they allow, turns that mean nothing (`void`) left out: the identity in the rows ``chosen`` and
+        ``chosen_v``.
     """
 
     names: list[Named]
@@ -86,10 +88,26 @@ def free(e: Equations, like: Free | None = None) -> Free:
     which = np.array([r.holonomic for r in s.rows], bool)
     given = prescribed(c)
     holonomic, rows = np.vstack([G[which], given]), np.vstack([G, given])
-    Z, chosen = _basis(holonomic, scale, None if like is None else like.chosen)
-    Zv, chosen_v = (Z, chosen) if which.all() else _basis(rows, scale, None if like is None else like.chosen_v)
+    still = np.eye(s.nv)[void(e)]
+    Z, chosen = _basis(np.vstack([holonomic, still]), scale, None if like is None else like.chosen)
+    Zv, chosen_v = Z, chosen
+    if not which.all():
+        Zv, chosen_v = _basis(np.vstack([rows, still]), scale, None if like is None else like.chosen_v)
     left, left_v, on_positions = np.eye(s.nv)[chosen], np.eye(s.nv)[chosen_v], np.r_[which, np.ones(len(given), bool)]
     return Free(names, holonomic, rows, Z, Zv, chosen, chosen_v, scale, left, left_v, on_positions)
+
+
+def void(e: Equations) -> np.ndarray:
+    """Velocities that mean nothing: turns of point masses, which have no inertia and on which nothing acts."""
+    M, D, K = (X[e.at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    none = np.flatnonzero(M.diagonal() == 0.0)
+    if not len(none):
+        return none
+    size, G = e.state.c.sizes, e.by_velocity[e.at["n"]]
+    force = abs(D) + abs(K)
+    acts = np.maximum((force @ size) * size, size * (force.T @ size))
+    held = (abs(G).T @ np.ones(G.shape[0])) * size
+    return np.array([d for d in none if all(x[d] <= NOTHING * x.max(initial=0.0) for x in (acts, held))], int)
 
 
 def prescribed(c: Compiled) -> np.ndarray:

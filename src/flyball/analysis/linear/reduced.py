@@ -19,6 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import ModelError
 from ...numerics.rank import span
 from .derivatives import Equations
 from .free import Free
@@ -100,7 +101,7 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
 
     Raises
     ------
-    numpy.linalg.LinAlgError
+    ModelError
         If something free moves without inertia.
     """
     r, nv = e.at["r"], len(f.scale)
@@ -131,7 +132,10 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     size = abs(M @ H) @ abs(u) + abs(D) @ abs(u) + abs(K) @ abs(x) + abs(M) @ abs(known)
     terms = Terms(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, Y, M)
     forces = Y.T @ (M @ known + others)
-    doubt = without_rounding(terms, a_dot, forces, e, f)
+    try:
+        doubt = without_rounding(terms, a_dot, forces, e, f)
+    except np.linalg.LinAlgError:
+        raise _without_inertia(terms.mass, f) from None
     b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else a_dot[:0]
     acceleration = f.Zv @ b_dot + known + H @ u
     left = M @ (acceleration - H @ u) + others
@@ -143,6 +147,15 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
         out.D = Y.T @ (M @ turned + (M @ H + D) @ f.Z)
         out.K = Y.T @ ((M @ H + D) @ turned + K @ f.Z)
     return out
+
+
+def _without_inertia(M: np.ndarray, f: Free) -> ModelError:
+    """The error that names what moves without inertia."""
+    name = f.names[f.chosen_v[int(np.argmin(np.abs(np.diag(M))))]].name
+    return ModelError(
+        f"nothing with inertia moves along {name}: there is no linear equation of motion; give it a mass or a moment "
+        f"of inertia"
+    )
 
 
 def _left(e: Equations, f: Free) -> np.ndarray:

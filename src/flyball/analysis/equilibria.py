@@ -15,12 +15,14 @@ import numpy as np
 
 from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.model import Model, listing, suggest
+from ..results.equilibria import EquilibriumSeries, Jump
 from ..results.equilibrium import UNSTABLE, Equilibrium
-from ..results.series import EquilibriumSeries, Jump
 from .compiled import compiled
-from .equilibrium import BALANCED, CLOSED, LONGEST, NEWTON, _descent, _failure, _finished, _newton, _pushed, resting
 from .equilibrium import equilibrium as single
+from .equilibrium import resting
+from .linear.found import finished
 from .linear.rest import Rest
+from .linear.search import BALANCED, CLOSED, LONGEST, NEWTON, descent, failure, newton, pushed
 from .linear.stability import stability
 from .options import Options
 from .progress import shown
@@ -62,7 +64,7 @@ def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
                 else:
                     x = way.settled(way.follow(x, points[k - 1], value, HALVINGS), value)
                     how = "following" if len(way.jumps) == before else "descent"
-                    done.equilibria.append(_finished(x, {}, how))
+                    done.equilibria.append(finished(x, {}, how))
             except NotConverged as error:
                 raise stopped(done, value, error) from error
             done.values = points[: k + 1]
@@ -134,17 +136,17 @@ class _Way:
     def settled(self, x: Rest, value: float) -> Rest:
         """The place itself, or where it leads where it must be stable and is not."""
         if self.stable and stability(x).kind == UNSTABLE:
-            return self.jump(x, value, lambda: _pushed(x))
+            return self.jump(x, value, lambda: pushed(x))
         return x
 
     def jump(self, x: Rest, value: float, begin: Callable[[], Rest]) -> Rest:
         """Where the forces lead from an equilibrium that has ceased to be."""
-        downhill = _descent(begin())
-        y = None if downhill is None else _newton(downhill)
+        downhill = descent(begin())
+        y = None if downhill is None else newton(downhill)
         if y is None:
-            raise _failure(downhill or x)
+            raise failure(downhill or x)
         if _apart(x, y) > NEAR:
-            self.jumps.append(Jump(float(value), _finished(x, {}, "following"), _finished(y, {}, "descent")))
+            self.jumps.append(Jump(float(value), finished(x, {}, "following"), finished(y, {}, "descent")))
         return y
 
 

@@ -15,8 +15,8 @@ from .figures import LABELS
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from ..results.equilibria import EquilibriumSeries
     from ..results.equilibrium import Equilibrium
-    from ..results.series import EquilibriumSeries
 
 UNSOUND = (0, (3.5, 2.5))
 JUMPED = (0, (1.0, 2.0))

@@ -107,7 +107,7 @@ class EquilibriumSeries:
 
     def plot(self, *names: str, path: str | os.PathLike | None = None) -> Any:
         """Curves over the parameter, unstable parts dashed; returns the figure, or writes it to ``path``."""
-        from ..view.series import series
+        from ..view.equilibria import series
 
         return series(self, *names, path=path)
 

@@ -1,0 +1,89 @@
+"""The search for positions at rest: Newton's method, and the way that the forces push.
+
+Newton's method on r(q, lam) = -f - G^T lam = 0, g(q) = 0 with the exact stiffness K (reactions turn with the bodies).
+Where it does not lead on, pseudo-transient continuation: a motion without inertia, evenly damped, whose steps grow as
+it comes to rest (Kelley and Keyes 1998). It goes the way that the forces push, so it ends in stable equilibria.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import NotConverged
+from ...tables.names import velocity_names
+from .kinks import kinks
+from .rest import Rest
+from .stability import stability
+
+NEWTON, DESCENT = 40, 400  # steps
+ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
+ARRIVED = 1e-7  # Newton's last step: the next one would be its square
+LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
+BALANCED = 1e-9  # forces left, of those that act
+CLOSED = 1e-10  # of the mechanism's length
+SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
+
+
+def newton(x: Rest) -> Rest | None:
+    """Newton's method with steps of limited length; None where it does not settle."""
+    for _ in range(NEWTON):
+        step, lam = x.step()
+        longest = np.abs(step).max(initial=0.0)
+        if not np.isfinite(longest):
+            return None
+        x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
+        if longest < ARRIVED and x.open() <= CLOSED:
+            best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
+            if best.settled(BALANCED):
+                return best
+    return None
+
+
+def pushed(x: Rest) -> Rest:
+    """A little way along the direction of least stiffness."""
+    direction = stability(x).direction
+    return x.moved(1e-2 * direction / np.abs(direction).max(), 0.0 * x.lam).closed()
+
+
+def descent(x: Rest) -> Rest | None:
+    """Pseudo-transient continuation on the constraints; None where it gets no further."""
+    x = x.closed()
+    damping, left, way = HARD, np.abs(x.r).max(initial=0.0), 0.0
+    for _ in range(DESCENT):
+        if damping < SOFT or x.settled(BALANCED):
+            return x
+        step, lam = x.step(damping)
+        longest = np.abs(step).max(initial=0.0)
+        along = float(step @ -x.r)
+        if not along > 0.0 or longest > LONGEST:  # against the forces, or too far
+            damping *= 4.0
+            if damping > STUCK:
+                return None
+            continue
+        way += longest
+        if way > ENDLESS:
+            return None
+        x = x.moved(step, lam).closed()
+        before, left = left, np.abs(x.r).max(initial=0.0)
+        damping *= float(np.clip(left / max(before, 1e-300), 0.3, 1.5)) * 0.7
+    return None
+
+
+def failure(x: Rest) -> NotConverged:
+    """What remains where the search ended."""
+    best = Rest.at(x.c, x.t, x.q)
+    names = velocity_names(x.c.structure)
+    left = best.equations.block("r")
+    residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    jumps = "; ".join(k.text for k in kinks(best.equations) if k.jump)
+    if jumps:
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: the search ended where {jumps}, and a jumping "
+            f"force is not balanced. Write what is smooth, for instance tanh(x/w) for sign(x)",
+            residuals,
+        )
+    return NotConverged(
+        f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, {best.pushed()} and "
+        f"nothing holds against it. Give a better guess, or add what has to hold it: a spring, a stop, a driver",
+        residuals,
+    )
