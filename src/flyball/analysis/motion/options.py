@@ -9,20 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ...equations import motion
+from ...equations import projection
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
 from ..options import Options, count, positive, seconds
 from .layer import known as known_coordinates
 
 STABILIZATION = {
-    "projection": motion.STAGES,
-    "projection-steps": motion.STEPS,
-    "baumgarte": motion.BAUMGARTE,
-    "none": motion.NONE,
-    "positions": motion.POSITIONS,
-    "velocities": motion.VELOCITIES,
-    "partitioning": motion.PARTITIONING,
+    "projection": projection.STAGES,
+    "projection-steps": projection.STEPS,
+    "baumgarte": projection.BAUMGARTE,
+    "none": projection.NONE,
+    "positions": projection.POSITIONS,
+    "velocities": projection.VELOCITIES,
+    "partitioning": projection.PARTITIONING,
 }
 MOST = 10_000_000  # steps
 MOST_OUTPUTS = 100_000_000  # times; beyond, a mechanism of one body alone takes tens of gigabytes
