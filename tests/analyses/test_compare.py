@@ -16,7 +16,7 @@ from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
 from flyball.analysis.motion import partition
 from flyball.cli import app
-from flyball.equations import motion
+from flyball.equations import projection
 from flyball.equations.engine import MOTION
 from flyball.tables.names import velocity_names
 from flyball.tables.system import (
@@ -212,11 +212,11 @@ def test_independent_coordinates_stay_as_they_are(make):
     random = np.random.default_rng(1)
     q = start.assembly.q + 1e-4 * random.standard_normal(nq)
     v = start.assembly.v + random.standard_normal(c.structure.nv)
-    W.option[[STABILIZE, TOL_G, TOL_V]] = motion.PARTITIONING, 1e-13, 1e-12
+    W.option[[STABILIZE, TOL_G, TOL_V]] = projection.PARTITIONING, 1e-13, 1e-12
     status, _ = c.at(0.0, q, v, MOTION)
     assert status == 0
     settled = W.y[0].copy()
-    W.option[STABILIZE] = motion.NONE
+    W.option[STABILIZE] = projection.NONE
     c.at(0.0, settled[:nq].copy(), settled[nq : nq + len(v)].copy())
     assert np.abs(W.row[G_VALUE]).max() < ROUNDING
     rows, moved = c.jacobian(), settled[nq : nq + len(v)]

@@ -144,3 +144,46 @@ def test_nothing_but_a_model_error_ever_comes_out(category: str, table: dict, ki
         text += f"[[{header}]]\n" + "".join(f"{k} = {_value(v)}\n" for k, v in fields.items())
     with contextlib.suppress(fb.ModelError):
         loads(text, fb.Mechanism, "m.toml")
+
+
+MODEL = 'import flyball as fb\n{} = fb.Mechanism("made", planar=True)\n'
+
+
+@pytest.mark.parametrize("ways", ["m", "mechanism", "def"])
+def test_a_python_file_is_loaded_as_the_command_does(ways: str, tmp_path: Path, capsys) -> None:
+    text = MODEL.format("m" if ways == "m" else "mechanism")
+    if ways == "def":
+        text = 'import flyball as fb\nprint("made")\ndef mechanism():\n    return fb.Mechanism("made")\n'
+    (tmp_path / "model.py").write_text(text)
+    assert fb.load(tmp_path / "model.py").name == "made"
+    assert fb.load(str(tmp_path / "model.py")).name == "made"
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("x = 1\n", "defines no mechanism: name one m or mechanism"),
+        ("x = 1\n1/0\n", r"model\.py, line 2: ZeroDivisionError"),
+        ("def f(:\n", r"model\.py, line 1: SyntaxError"),
+        (MODEL.format("m") + "m.add(fb.Body('b', mass=-1, inertia=1))\n", r"model\.py, line 3: Body 'b': mass is -1"),
+        ("raise SystemExit(3)\n", r"model\.py, line 1: SystemExit"),
+    ],
+)
+def test_a_wrong_python_file_is_answered_with_its_line(text: str, says: str, tmp_path: Path) -> None:
+    (tmp_path / "model.py").write_text(text)
+    with pytest.raises(fb.ModelError, match=says):
+        fb.load(tmp_path / "model.py")
+
+
+@pytest.mark.parametrize("path", [None, 5, 1j, [], object()])
+@pytest.mark.parametrize("load", [fb.load, fb.load_result])
+def test_what_is_no_path(load, path) -> None:
+    with pytest.raises(fb.ModelError, match="file is a text or a path, not"):
+        load(path)
+
+
+def test_a_misspelt_python_file(tmp_path: Path) -> None:
+    (tmp_path / "model.py").write_text("")
+    with pytest.raises(fb.ModelError, match=r"no file '.*modle\.py' \(did you mean 'model\.py'"):
+        fb.load(tmp_path / "modle.py")

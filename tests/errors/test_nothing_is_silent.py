@@ -84,3 +84,20 @@ def test_units_of_initial_conditions_and_times():
         block().simulate(1.0, rtol="x")
     with pytest.raises(fb.ModelError, match="outputs"):
         block().simulate(1.0, outputs="abc")
+
+
+@pytest.mark.parametrize("outputs", [10**12, 1, -5, 1j, None, "x", [], [[0.0, 1.0]], [float("nan")]])
+def test_outputs_that_cannot_be(outputs):
+    """A billion of them once ended in a MemoryError."""
+    with pytest.raises(fb.ModelError, match="output"):
+        block().simulate(1.0, outputs=outputs)
+
+
+def test_places_beyond_all_measure():
+    m = fb.Mechanism("far")
+    m.add(fb.Body("b", mass=1, inertia=(1, 1, 1)))
+    with pytest.raises(fb.ModelError, match=r"at of Revolute 'P': 1e\+160 m is beyond 1e\+50"):
+        m.add(fb.Revolute("P", "ground", "b", at=[1e160, 0, 0], axis=(1, 0, 0)))
+    for parameters in (5, "x", [1]):
+        with pytest.raises(fb.ModelError, match="maps names to values"):
+            fb.Mechanism("m", parameters=parameters)

@@ -9,9 +9,9 @@ import flyball as fb
 from flyball.analysis import simulate
 from flyball.analysis.assemble import assemble
 from flyball.analysis.compiled import compiled
-from flyball.equations import motion
+from flyball.equations import motion, projection
 from flyball.equations.engine import MOTION, motion_kernel
-from flyball.numerics.integrators import explicit
+from flyball.numerics.integrators import clock as explicit
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.tables.system import PASS, STABILIZE, TOL_G, TOL_V
 from tests.layers import both_layers, cached
@@ -54,8 +54,8 @@ def ready(name, stabilize):
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_compiled_is_plain_python(name):
     """The right-hand side, projection included, run as the plain function it is: the same numbers to 1e-12."""
-    c, y = ready(name, motion.STAGES)
-    plain, _ = ready(name, motion.STAGES)
+    c, y = ready(name, projection.STAGES)
+    plain, _ = ready(name, projection.STAGES)
     clock = explicit.Clock(
         np.r_[1e-3, np.zeros(9)],
         np.zeros(9, np.int64),
@@ -63,6 +63,7 @@ def test_compiled_is_plain_python(name):
         np.vstack([y, 0 * y, 0 * y]),
         np.zeros((1, len(y))),
         np.zeros(0, np.int64),
+        np.zeros((6, 0)),
     )
     status = motion_kernel(c.values.system, c.work, tableau("rk45"), clock, np.zeros((0, 0)), MOTION)
     dy = np.zeros(len(y))

@@ -9,7 +9,7 @@ from flyball.compiler.door import enter
 from flyball.compiler.held import held
 from flyball.compiler.jit import formula, kernel
 from flyball.equations.engine import ARRIVE, MOTION, REPORT, RESIDUAL, Sheet, engine, motion_kernel
-from flyball.numerics.integrators.explicit import Clock, T
+from flyball.numerics.integrators.clock import Clock, T
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.tables.system import LAM
 from tests.layers import LAYERS

@@ -13,7 +13,7 @@ from ..equations.engine import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
 from ..model.model import Model
 from ..model.words import listing, suggest
-from ..numerics.integrators import explicit as ex
+from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import tableau
 from ..results.comparison import Comparison, Formulation
 from ..results.result import Result

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..equations.engine import POSITION, evaluate
-from ..equations.motion import NONE
+from ..equations.projection import NONE
 from ..equations.records import load
 from ..equations.scratch import work
 from ..equations.velocities import turned_angles, velocities

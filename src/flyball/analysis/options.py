@@ -11,10 +11,13 @@ from dataclasses import dataclass, fields
 from numbers import Number
 from typing import Any, Self
 
+import numpy as np
+
 from ..errors import ModelError
 from ..model.expressions import number
 
 TIMES = ("t", "t_start", "t_end")
+_LISTS = (list, tuple, np.ndarray)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,12 +34,24 @@ class Options:
             value = getattr(self, f.name)
             if f.name in TIMES and value is not None:
                 value = seconds(value, f.name)
-            elif f.type == "tuple[str, ...]":
+            elif f.type == "tuple[str, ...]" or (f.type == "tuple[str, ...] | None" and value is not None):
                 value = names(value, f.name)
+            elif f.type == "str" and not isinstance(value, str):
+                raise ModelError(f"{f.name} is a text, not a {type(value).__name__}")
+            elif f.name == "values":
+                value = numbers(value, f.name)
+            elif f.type == "Sequence[float | str]" and (isinstance(value, str) or not isinstance(value, _LISTS)):
+                raise ModelError(f"{f.name} is a list of numbers or quantities, not {value!r}")
+            elif (
+                str(f.type).startswith("Callable") and not callable(value) and not (value is None and "None" in f.type)
+            ):
+                raise ModelError(f"{f.name} is a function, not {value!r}")
             elif f.type == "bool" and not isinstance(value, bool):
                 raise ModelError(f"{f.name} is True or False, not {value!r}")
             elif f.name == "parameters" and value is not None and not isinstance(value, Mapping):
                 raise ModelError(f"parameters maps names to values, for instance {{'mass': 2}}; {value!r} does not")
+            elif f.name != "parameters" and str(f.type).startswith("Mapping") and not isinstance(value, Mapping | None):
+                raise ModelError(f"{f.name} maps names to what is given for each, not {value!r}")
             elif f.name == "progress" and not (isinstance(value, bool) or callable(value)):
                 raise ModelError(f"progress is True, False or a function of the fraction done, not {value!r}")
             else:
@@ -86,6 +101,23 @@ def names(value: Any, name: str) -> tuple[str, ...]:
         if all(isinstance(x, str) for x in found):
             return found
     raise ModelError(f"{name} is a list of names, for instance {name}=['slider.x'], not {value!r}")
+
+
+def numbers(value: Any, name: str) -> np.ndarray:
+    """A sequence of finite numbers as an array; which there must be, the analysis says.
+
+    Raises
+    ------
+    ModelError
+        If it is none.
+    """
+    try:
+        found = np.array(value, float)
+    except (TypeError, ValueError):
+        found = np.array(np.nan)
+    if found.ndim != 1 or not np.isfinite(found).all():
+        raise ModelError(f"{name} are finite numbers, for instance {name}=[1.0, 2.0], not {value!r}")
+    return found
 
 
 def positive(value: Any, name: str) -> None:

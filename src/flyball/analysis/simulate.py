@@ -11,10 +11,12 @@ from functools import partial
 import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
+from ..equations.projection import TIGHT_G, TIGHT_V
+from ..equations.within import kept
 from ..errors import StartWarning
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
-from ..numerics.integrators import explicit as ex
+from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
@@ -28,6 +30,7 @@ from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
 from .progress import Tell, shown
 
+NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
@@ -91,8 +94,9 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
     s, W = a.compiled.structure, a.compiled.work
-    real, count = np.zeros(10), np.zeros(9, np.int64)
+    real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
+    real[ex.SPAN] = (t_end - t) or 1.0
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = _energy_size(start.base, (t_end - t) or 1.0)
@@ -100,17 +104,19 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
     count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq
-    Y = np.zeros((3, len(y)))
+    Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
     W.option[ALPHA], W.option[BETA] = o.alpha or 0.0, o.beta or 0.0
-    loose = o.atol + o.rtol * a.compiled.values.length
-    W.option[TOL_G] = min(1e-6, max(1e-12, 1e-2 * loose))
-    W.option[TOL_V] = min(1e-5, max(1e-11, 1e-1 * loose))
+    length = a.compiled.values.length
+    loose = o.atol + o.rtol * length
+    near = loose * min(1.0, loose / (NEARER * length))
+    W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
+    W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
-    K = np.zeros((len(tableau(o.method).c), len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64))
+    K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system))
 
 
 def _energy_size(a: Assembly, span: float) -> float:

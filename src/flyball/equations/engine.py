@@ -13,13 +13,16 @@ import numpy as np
 from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..numerics.integrators.explicit import Clock, T, advance
+from ..numerics.integrators.clock import COUNTS, REALS, STATES, Clock, T
+from ..numerics.integrators.explicit import advance
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..tables.system import COORDINATES, System, Work
 from .dispatch import remember
 from .follow import follow
-from .motion import arrive, derivative, move, place, report
+from .motion import arrive, derivative, report
+from .projection import move, place, tangent
 from .residual import residual
+from .within import ROWS, inspect
 
 POSITION, MOTION, INTEGRATE, FOLLOW, ARRIVE, REPORT, RESIDUAL = range(7)
 
@@ -51,7 +54,7 @@ def perform(S, W, R, clock, out, task):
             W.y[0, i] = y[i]
         residual(S, W, t, W.y[0], out[1], out[2], out[0])
         return 0
-    return advance(derivative, arrive, report, S, W, R, clock, out)
+    return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
 
 
 class Sheet(NamedTuple):
@@ -106,11 +109,12 @@ def evaluate(S: System, W: Work, t: float, y: np.ndarray, task: int) -> tuple[in
 
     With POSITION the turns and places in ``y`` are brought up to date.
     """
-    real = np.zeros(10)
+    real = np.zeros(REALS)
     real[T] = t
-    Y = np.zeros((3, len(y)))
+    Y = np.zeros((STATES, len(y)))
     Y[0] = y
-    clock = Clock(real, np.zeros(9, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), np.zeros(0, np.int64))
+    none = np.zeros(0, np.int64)
+    clock = Clock(real, np.zeros(COUNTS, np.int64), np.zeros(0), Y, np.zeros((1, len(y))), none, np.zeros((ROWS, 0)))
     status = motion_kernel(S, W, tableau("rk45"), clock, np.zeros((0, 0)), task)
     y[:] = Y[0]
     return status, clock.K[0]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..laws.evaluation import entire, evaluate_jet
 from ..math.scalar import atan2, cos, sin
-from ..numerics.integrators.explicit import (
+from ..numerics.integrators.clock import (
     ACCEPTED,
     DONE,
     GROW,

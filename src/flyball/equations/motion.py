@@ -17,22 +17,18 @@ from ..tables.system import (
     BODY_WORK,
     COORDINATES,
     EFFORT,
-    EVALUATIONS,
     F_APPLIED,
     G_VALUE,
     GAMMA,
     GIVEN,
-    GUILTY,
     LAM,
     LENGTH,
     NU,
     OFFSET,
     PARTED,
     PASS,
-    PROJECTIONS,
     Q0,
     R2,
-    RESIDUAL,
     REVOLUTE,
     ROW_WORK,
     SCHUR,
@@ -43,29 +39,36 @@ from ..tables.system import (
     TOL_V,
     TREE,
     V0,
-    V3,
     WORST_G,
     WORST_V,
     X_SOLVED,
 )
-from .dispatch import progress, remember, row_biases, row_values
+from .dispatch import progress, remember
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
-from .kinematics import motions, poses
 from .loads import efforts, forces, gather, inertial
 from .partition import exchange
+from .projection import (
+    BAUMGARTE,
+    HERE,
+    NEAR,
+    OLD,
+    STAGES,
+    STALE,
+    STEPS,
+    TIGHT_G,
+    TIGHT_V,
+    drift,
+    move,
+    place,
+    rounding,
+    settle,
+    violation,
+)
 from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
-from .tree import normalise, rates, retract
+from .tree import normalise, rates
 
-NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
-NOT_CLOSED, NOT_FINITE, JAMMED, SINGULAR = 2, 3, 4, 5
-OLD, NEAR, HERE = range(3)
-PASSES = 16
-CLOSED = 1e-9  # a projection that comes to rest above this has failed
-TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
-SLOW = 0.1  # a Newton step that gains less than this wants a new factor
-STALE = 10.0  # times the tolerance of the solve: a residual above this after refinement wants a new factor
-FAR = 1e3  # a state this far off is given up at once
+NOT_FINITE, JAMMED, SINGULAR = 3, 4, 5
 
 
 @formula
@@ -100,145 +103,6 @@ def astray(S, W, t, q, v):
             rate = magnitude(f1 - v[S.body_i[b, V0]]) / (size + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
-
-
-@formula
-def place(S, W, t, q, z):
-    """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
-    W.info[EVALUATIONS] += 1
-    poses(S, W, q)
-    row_values(S, W, t, z)
-
-
-@formula
-def move(S, W, t, v, z):
-    """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
-    motions(S, W, v)
-    row_biases(S, W, t, v, z)
-
-
-@formula
-def violation(W, out):
-    """Largest |g| (its row goes to W.info[GUILTY]) and -g into ``out``."""
-    worst = 0.0
-    for k in range(out.shape[0]):
-        g = W.row[G_VALUE, k]
-        out[k] = -g
-        size = magnitude(g)
-        if not size <= worst:
-            worst = size
-            W.info[GUILTY] = k
-    return worst
-
-
-@formula
-def drift(S, W, v, out):
-    """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
-    worst = 0.0
-    size = 0.0
-    for k in range(out.shape[0]):
-        r = W.row[NU, k]
-        for e in range(S.row_p[k], S.row_p[k + 1]):
-            p = W.G[e] * v[S.col_i[e]]
-            r -= p
-            size = max(size, magnitude(p))
-        out[k] = r
-        worst = max(worst, magnitude(r))
-    return worst, size
-
-
-@formula
-def settle(S, W, t, q, v, z, tol_g, tol_v):
-    """Put q on g = 0 and v on G v = nu, in place, and leave kinematics and rows there.
-
-    Along M^-1 G^T, or along dependent coordinates alone. Accepted states are taken down to rounding: near a singular
-    position a violation e, left standing at a distance s, is a mechanism with other lengths, whose motion leaves the
-    true one with the acceleration 2 e v^2 / s^3. One factor serves as long as it does.
-
-    Returns (0 or NOT_CLOSED, the violation found relative to the mechanism's size and speed, what the factor in W is:
-    OLD, of poses NEARby or of those HERE).
-    """
-    W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
-    place(S, W, t, q, z)
-    if S.row_i.shape[0] == 0:
-        move(S, W, t, v, z)
-        return 0, 0.0, OLD
-    status = 0
-    found = 0.0
-    lost = 0.0
-    factored = OLD
-    if W.option[STABILIZE] != VELOCITIES:
-        status, found, factored = close(S, W, t, q, z, tol_g)
-        if status != 0:
-            return status, found, OLD
-    if W.option[STABILIZE] != POSITIONS:
-        status, lost, factored = steer(S, W, v, tol_v, factored)
-        if status != 0:
-            return status, found, OLD
-    else:  # positions follow the violated velocities and are put back: that is no error of the step
-        found = 0.0
-    move(S, W, t, v, z)
-    return 0, max(found / S.glob[LENGTH], lost), factored
-
-
-@formula
-def close(S, W, t, q, z, tol_g):
-    """Put q on g = 0 by Newton, until |g| passes, or until it is as small as rounding lets it be.
-
-    Kinematics and rows are those of q, before and after. Returns (status, the violation found, what the factor is).
-    """
-    none = W.vel[F_APPLIED]
-    step = W.vel[V3]
-    r = W.row[R2]
-    worst = violation(W, r)
-    found = worst
-    last = 1e300
-    factored = OLD
-    for _ in range(PASSES):
-        if worst <= tol_g or (worst > 0.7 * last and worst <= CLOSED):
-            break
-        if not worst <= FAR:
-            return NOT_CLOSED, found, OLD
-        if factored == OLD or worst > SLOW * last:
-            if factor(S, W) != 0:
-                return NOT_CLOSED, found, OLD
-            factored = HERE
-        else:
-            reuse(S, W)
-        last = worst
-        left = solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
-        if factored == NEAR and left > SLOW:  # too far from where it was made to serve
-            if factor(S, W) != 0:
-                return NOT_CLOSED, found, OLD
-            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
-        factored = NEAR
-        retract(S, q, step)
-        place(S, W, t, q, z)
-        worst = violation(W, r)
-        W.info[PROJECTIONS] += 1
-    if not worst <= CLOSED and not worst <= tol_g:
-        return NOT_CLOSED, found, OLD
-    return 0, found, factored
-
-
-@formula
-def steer(S, W, v, tol_v, factored):
-    """Put v on G v = nu. Returns (status, the violation found relative to size and speed, what the factor is)."""
-    none = W.vel[F_APPLIED]
-    step = W.vel[V3]
-    r = W.row[R2]
-    worst, size = drift(S, W, v, r)
-    if worst > tol_v * (1.0 + size):
-        if factored == NEAR:
-            reuse(S, W)
-        if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
-            if factor(S, W) != 0:
-                return NOT_CLOSED, worst, OLD
-            factored = HERE
-            solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
-        for d in range(step.shape[0]):
-            v[d] += step[d]
-    return 0, worst / (S.glob[LENGTH] + size), factored
 
 
 @formula
@@ -354,6 +218,7 @@ def arrive(t, y, dy, S, W):
         if status != 0:
             W.info[STATUS] = status
             return status, found
+        found = max(0.0, found - rounding(W) / S.glob[LENGTH])
         if W.option[PARTED] > 0.0:
             exchange(S, W)
     else:

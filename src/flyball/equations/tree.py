@@ -251,6 +251,21 @@ def rates(S, q, v, dq):
 
 
 @formula
+def unrated(S, q, dq, v):
+    """V of every body from its qdot: the reverse of ``rates``."""
+    for b in range(S.body_i.shape[0]):
+        q0 = S.body_i[b, Q0]
+        v0 = S.body_i[b, V0]
+        for i in range(lengths(S, b)):
+            v[v0 + i] = dq[q0 + i]
+        k, w = quaternion_at(S, b)
+        if k >= 0:
+            d = quaternion_product((q[k], -q[k + 1], -q[k + 2], -q[k + 3]), (dq[k], dq[k + 1], dq[k + 2], dq[k + 3]))
+            for i in range(3):
+                v[w + i] = 2.0 * d[1 + i]
+
+
+@formula
 def retract(S, q, d):
     """Q (+) d: move every body by the finite step d along its velocities, in place."""
     for b in range(S.body_i.shape[0]):

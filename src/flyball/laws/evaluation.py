@@ -79,6 +79,8 @@ from .opcodes import (
     WHOLE_POWER,
 )
 
+LOW = 8  # powers up to this are no pulses
+
 
 @formula
 def evaluate(code, const, at, stack, x, sensed):
@@ -203,6 +205,29 @@ def entire(code, at):
         elif not (operation <= INPUT or operation == FREEZE or ADD <= operation <= MULTIPLY):
             return False
     return True
+
+
+@formula
+def brief(code, at):
+    """Whether a law can do much within a short time, or a short way.
+
+    Sums, products, low powers, sines and cosines cannot: a change of theirs is one that the error of a step shows.
+    """
+    for i in range(at + 2, at + 2 + 2 * code[at], 2):
+        operation = code[i]
+        operand = code[i + 1]
+        if operation == CALL:
+            if not (operand == SIN or operand == COS or operand == NEGATE):
+                return True
+        elif operation == WHOLE_POWER:
+            if not 0 <= operand <= LOW:
+                return True
+        elif operation == DIVIDE:
+            if code[i - 2] != CONSTANT:
+                return True
+        elif not (operation <= SENSOR or operation == FREEZE or ADD <= operation <= MULTIPLY):
+            return True
+    return False
 
 
 @formula

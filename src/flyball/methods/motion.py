@@ -60,7 +60,7 @@ class Motions(Model):
         atol : float [m, rad, m/s, rad/s]
             Tolerance of the error of a step where the state is small.
         max_step : float or str [s]
-            Longest step. What acts for less than a step can go unseen: give it where a law has a short pulse.
+            Longest step. What a law does for less than a 20 000th of the time span can go unseen: give it there.
         max_steps : int
             Steps after which the integration gives up.
         stabilization : str

@@ -60,6 +60,10 @@ class Model:
         self.name = name
         self.planar = bool(planar)
         self._resolved: tuple[dict, dict[str, float]] | None = None
+        if not isinstance(parameters, Mapping | None):
+            raise ModelError(
+                f"parameters of {name!r} maps names to values, for instance {{'mass': 2}}, not {parameters!r}"
+            )
         try:
             self.parameters = {k: plain(v) for k, v in (parameters or {}).items()}
             g = plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)

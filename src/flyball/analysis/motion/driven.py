@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...equations.engine import FOLLOW, motion_kernel
-from ...numerics.integrators import explicit as ex
+from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
 from ..assembly.start import Assembly
 from ..mobility import mobility
@@ -129,7 +129,8 @@ def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray
     S, W = a.compiled.values.system, a.compiled.work
     first = known[pieces[0]]
     times = 0.5 * (known[pieces, 0] + known[pieces + 1, 0])
-    own = ex.Clock(clock.real.copy(), clock.count.copy(), times, clock.y.copy(), clock.K.copy(), clock.accounts)
+    real, count, _, y, K, accounts, seen = clock
+    own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
     own.y[0] = first[1 : 1 + clock.y.shape[1]]
     own.real[[ex.T, ex.T_END]] = first[0], times[-1]
     own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0

@@ -9,22 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from ...equations import motion
+from ...equations import projection
 from ...errors import ModelError
 from ...numerics.integrators.tableaux import tableau
 from ..options import Options, count, positive, seconds
 from .layer import known as known_coordinates
 
 STABILIZATION = {
-    "projection": motion.STAGES,
-    "projection-steps": motion.STEPS,
-    "baumgarte": motion.BAUMGARTE,
-    "none": motion.NONE,
-    "positions": motion.POSITIONS,
-    "velocities": motion.VELOCITIES,
-    "partitioning": motion.PARTITIONING,
+    "projection": projection.STAGES,
+    "projection-steps": projection.STEPS,
+    "baumgarte": projection.BAUMGARTE,
+    "none": projection.NONE,
+    "positions": projection.POSITIONS,
+    "velocities": projection.VELOCITIES,
+    "partitioning": projection.PARTITIONING,
 }
 MOST = 10_000_000  # steps
+MOST_OUTPUTS = 100_000_000  # times; beyond, a mechanism of one body alone takes tens of gigabytes
 RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
 
@@ -111,12 +112,16 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
     if isinstance(outputs, (int, np.integer)):
         if outputs < 2:
             raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
+        if outputs > MOST_OUTPUTS:
+            raise ModelError(
+                f"outputs must not be more than {MOST_OUTPUTS:,}, got {outputs:,}: no memory holds so many states"
+            )
         return np.linspace(t_start, t_end, int(outputs))
     try:
         times = np.asarray(outputs, float)
     except (TypeError, ValueError):
         raise ModelError(f"outputs must be a number of times, or the times [s] themselves, not {outputs!r}") from None
-    if times.ndim != 1 or not len(times) or not (np.diff(times) > 0).all():
+    if times.ndim != 1 or not len(times) or not np.isfinite(times).all() or not (np.diff(times) > 0).all():
         raise ModelError("outputs must be a number of times, or times in ascending order")
     if times[0] < t_start or times[-1] > t_end:
         raise ModelError(f"output times must lie between {t_start:g} s and {t_end:g} s")

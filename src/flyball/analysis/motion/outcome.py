@@ -9,7 +9,7 @@ import numpy as np
 
 from ...errors import SimulationError
 from ...model.model import Model
-from ...numerics.integrators import explicit as ex
+from ...numerics.integrators import clock as ex
 from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
@@ -81,7 +81,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
         options=o.choices(),
-        remarks=(*map(not_allowed, changed_velocities(start.base.departures)), *remarks(start.assembly)),
+        remarks=(*map(not_allowed, changed_velocities(start.base.departures)), *remarks(start.assembly, clock)),
         departures=start.base.departures,
         coordinates=start.coordinates,
     )

@@ -16,7 +16,7 @@ from ...laws.functions import fault
 from ...laws.opcodes import BY_TIME
 from ...model.body import Driver
 from ...model.force import CoordinateForce
-from ...numerics.integrators import explicit as ex
+from ...numerics.integrators import clock as ex
 from ...tables.system import (
     BODY_LAW,
     FORCE_F,
@@ -45,6 +45,8 @@ NEAR = 1e-10  # part of the time span within which a law that jumps is looked fo
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
 PARTS = ("value", "rate", "second derivative")
+NOTABLE = 10.0  # times the tolerance: an error of a step from rounding that is told
+LATELY = 1e-3  # part of the time span within which rounding found to decide is why a run stopped
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
@@ -64,7 +66,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
     t = float(clock.real[ex.T])
     kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
     if clock.count[ex.STATUS] == ex.TOO_MANY:
-        return f"{name!r}: {_too_many(a, clock)}. {kept}", None
+        return f"{name!r}: {_too_many(a, clock)}{_rounded(clock)}. {kept}", None
     stack = a.compiled.work.stack
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
@@ -73,21 +75,65 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
         of_drivers(a, clock)
         or _not_finite(a, clock)
         or _jammed(a, clock)
+        or _at_rounding(clock)
         or _locked(a, base, clock)
         or _stuck(a, clock)
     )
     return f"{name!r}: {text}. {kept}", None
 
 
-def remarks(a: Assembly) -> tuple[str, ...]:
-    """What went wrong on the way and was overcome, for the health report."""
+def remarks(a: Assembly, clock: ex.Clock) -> tuple[str, ...]:
+    """What went wrong on the way and was overcome, and where rounding was the limit, for the health report."""
+    return tuple(text for text in (_overcome(a), _excess(clock), _far_off(a, clock)) if text)
+
+
+def _overcome(a: Assembly) -> str:
     found = fault(a.compiled.work.stack, a.compiled.structure.functions, overcome=True)
     if found is None:
-        return ()
+        return ""
     return (
         f"in a step that was then taken again, shorter, {found.message}. The motion kept does without it; if the "
-        f"function is at fault, mend it",
+        f"function is at fault, mend it"
     )
+
+
+def _excess(clock: ex.Clock) -> str:
+    excess = clock.real[ex.EXCESS]
+    if not excess > NOTABLE:
+        return ""
+    return (
+        f"rounding is the limit: near t = {clock.real[ex.EXCESS_AT]:.6g} s, where the mechanism is close to a singular "
+        f"position, the last digits of the state alone change a step by up to {excess:.2g} times what "
+        f"rtol = {clock.real[ex.RTOL]:g} allows. The step was accepted so; a larger rtol asks for what can be had"
+    )
+
+
+def _far_off(a: Assembly, clock: ex.Clock) -> str:
+    length = a.compiled.values.length
+    far = float(np.abs(a.compiled.work.FK[:, :3]).max(initial=0.0))
+    digit = float(np.spacing(far))
+    if not digit > clock.real[ex.ATOL] + clock.real[ex.RTOL] * length:
+        return ""
+    return (
+        f"rounding is the limit: positions {far:.3g} m from the origin are known to {digit:.1g} m, which is more than "
+        f"rtol = {clock.real[ex.RTOL]:g} of the mechanism's length of {length:.3g} m; describe it near the origin"
+    )
+
+
+def _rounded(clock: ex.Clock) -> str:
+    """The same of a run that stopped, if rounding was found to decide shortly before."""
+    if clock.real[ex.T] - clock.real[ex.BLURRED_AT] > LATELY * clock.real[ex.SPAN]:
+        return ""
+    return (
+        f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
+        f"more, as they do close to a singular position; rtol = {clock.real[ex.RTOL]:g} asks for more than can be had"
+    )
+
+
+def _at_rounding(clock: ex.Clock) -> str:
+    text = _rounded(clock)
+    t, h = clock.real[ex.T], clock.real[ex.H]
+    return f"the integration cannot go on at t = {t:.6g} s, the step width fell to {h:.3g} s{text}" if text else ""
 
 
 def of_drivers(a: Assembly, clock: ex.Clock) -> str:
@@ -203,8 +249,8 @@ def _locked(a: Assembly, base: Assembly, clock: ex.Clock) -> str:
     x = dy[c.structure.nq : c.structure.nq + c.structure.nv]
     if not np.isfinite(x).all():
         return ""
-    gap, largest = missed(c, v, x, c.sizes)
-    if not gap.max() > LOCKED * largest:
+    gap, _, asked = missed(c, v, x, c.sizes)
+    if not gap.max() > LOCKED * asked:
         return ""
     names = list(dict.fromkeys(c.structure.rows[k].element.name for k in np.argsort(-gap) if gap[k] > 1e-3 * gap.max()))
     why = story(c, t, q, v, c.work.row[GAMMA].copy(), "/s^2") or (

@@ -42,7 +42,7 @@ def acceleration_violation(result: Result) -> float:
         if c is not own:
             q, v = c.take(own, result.t[k], q, v)
         c.at(result.t[k], q, v, MOTION)
-        gap, largest = missed(c, v, accelerations[k], sizes, result.health.options)
+        gap, largest, _ = missed(c, v, accelerations[k], sizes, result.health.options)
         worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
     return worst
 
@@ -62,8 +62,8 @@ def _accelerations(result: Result, c: Compiled) -> np.ndarray:
 
 def missed(
     c: Compiled, v: np.ndarray, x: np.ndarray, sizes: np.ndarray, o: Mapping[str, Any] | None = None
-) -> tuple[np.ndarray, float]:
-    """How far the accelerations x are off each row, (nr,), and the largest sum of a row's terms.
+) -> tuple[np.ndarray, float, float]:
+    """How far the accelerations x are off each row, (nr,), the largest sum of a row's terms, and that without x's own.
 
     Rows in metres count as parts of the mechanism's length. The state (velocities v) is the one in c's scratch,
     evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
@@ -73,9 +73,10 @@ def missed(
         gamma -= 2 * o["alpha"] * (G @ v - c.work.row[NU]) + o["beta"] ** 2 * c.work.row[G_VALUE]
     rates = (np.abs(v) / sizes)[G.indices]
     turning = np.array([rates[i:j].max(initial=0.0) for i, j in pairwise(G.indptr)])
-    size = abs(G) @ (np.abs(x) + np.abs(_unconstrained(c))) + np.abs(gamma) + (abs(G) @ np.abs(v)) * turning
+    asked = abs(G) @ np.abs(_unconstrained(c)) + np.abs(gamma) + (abs(G) @ np.abs(v)) * turning
     metre = np.where(c.metric, c.values.length, 1.0)
-    return np.abs(G @ x - gamma) / metre, float((size / metre).max())
+    size = asked + abs(G) @ np.abs(x)
+    return np.abs(G @ x - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
 
 
 def _unconstrained(c: Compiled) -> np.ndarray:

@@ -1,0 +1,198 @@
+"""What laws do within a step: a pulse, a thin wall, a table's corner that no stage of the step has seen.
+
+Each law that can act briefly is sampled along the step, its inputs along the cubics through their values and rates at
+the ends. Where it is not what eight of its values let expect, the place is named; the integrator looks whether that
+matters. Samples are dense relative to the whole time span, so that their number is bounded: what is shorter than a
+`SAMPLES`-th of the span may fall between them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiler.jit import formula
+from ..laws.evaluation import brief, evaluate, evaluate_jet
+from ..math.scalar import cos
+from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, TO_RATE
+from ..tables.system import (
+    BODY_LAW,
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_KIND,
+    FORCE_LAW,
+    FORCE_M,
+    RATE,
+    ROW_LAW,
+    VALUE,
+)
+from .dispatch import inputs
+from .loads import wide
+from .records import load
+from .rows import BY_TIME, measured
+
+SAMPLES = 20000  # of a law over the whole time span, in steps that are wide
+LEAST = 8  # in any step
+NODES = 8  # values of a law that tell what to expect of it: at Chebyshev's points, ends included
+LAWS = 3  # of a force
+ODD = 1e-3  # part of a law's change over the step by which it may differ from what is expected
+BLURRED = 1e-9  # part of its size that is nothing
+# rows of Clock.seen: sensors within the step; (sensors and inputs of forces, and rates, at its start and end;) nodes
+WITHIN, EXPECTED, ROWS = 0, 5, 6
+
+
+def kept(S) -> np.ndarray:
+    """What `inspect` writes on: no columns, and nothing is inspected, where no law can act briefly."""
+    laws = np.r_[S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel(), S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW]]
+    if not any(brief(S.code, at) for at in laws[laws >= 0]):
+        return np.zeros((ROWS, 0))
+    return np.zeros((ROWS, max(2 * measured(S), measured(S) + len(S.force_i), NODES)))
+
+
+@formula
+def inspect(t, h, span, first, seen, S, W):
+    """The next place within a step at which a law does something unexpected: (where to go on from, place, how long).
+
+    Place and how long are parts of the step; the first is 0 where there is none. Each such law has two places: where
+    it departs most from its polynomial, and where most from its mean, as a node may have met the pulse itself. With
+    AT_START and AT_END the inputs of the laws, at the state in W, are kept.
+    """
+    if seen.shape[1] == 0:
+        return 0, 0.0, 0.0
+    if first == AT_START:
+        take_note(S, W, seen, FROM)
+        return 0, 0.0, 0.0
+    if first == AT_END:
+        take_note(S, W, seen, TO)
+        return 0, 0.0, 0.0
+    again = first % 2 == 1  # the law that was named last has another place to look at
+    for k in range(first // 2, LAWS * S.force_i.shape[0] + S.row_i.shape[0] + S.body_i.shape[0]):
+        law = law_at(S, k)
+        if law >= 0 and brief(S.code, law):
+            n = max(LEAST, int(SAMPLES * min(1.0, h / span)))
+            if again:
+                x, share = farthest(S, W, k, law, t, h, n, seen)
+                return 2 * k + 2, x, share
+            x, share = unexpected(S, W, k, law, t, h, n, seen)
+            if share > 0.0:
+                return 2 * k + 1, x, share
+        again = False
+    return 0, 0.0, 0.0
+
+
+@formula
+def law_at(S, k):
+    """Law number k, of forces, of rows, of prescribed coordinates; -1 if it has none."""
+    if k < LAWS * S.force_i.shape[0]:
+        return S.force_i[k // LAWS, FORCE_LAW + k % LAWS]
+    k -= LAWS * S.force_i.shape[0]
+    if k < S.row_i.shape[0]:
+        return S.row_i[k, ROW_LAW]
+    return S.body_i[k - S.row_i.shape[0], BODY_LAW]
+
+
+@formula
+def take_note(S, W, seen, row):
+    """Keep what laws depend on, and its rates, at the state in W."""
+    nm = measured(S)
+    for m in range(nm):
+        seen[row, m] = W.sensed[VALUE, m]
+        seen[row + 1, m] = W.sensed[RATE, m]
+    for f in range(S.force_i.shape[0]):
+        if S.force_i[f, FORCE_ALONG] == 1:
+            a, b = W.sensed[VALUE, S.force_i[f, FORCE_F]], W.sensed[RATE, S.force_i[f, FORCE_F]]
+        else:
+            F = load(W.FK, S.force_i[f, FORCE_F])
+            M = load(W.FK, S.force_i[f, FORCE_M])
+            a, b = inputs(S.force_i[f, FORCE_KIND], wide(S.force_x, f), F, M)
+        seen[row, nm + f] = a
+        seen[row + 1, nm + f] = b
+
+
+@formula
+def unexpected(S, W, k, law, t, h, n, seen):
+    """Where in the step, and for how long, a law is not what its values at the nodes let expect: parts of the step.
+
+    How long is 0 where it is as expected.
+    """
+    least = most = sample(S, W, k, law, t, h, 0.0, seen)
+    size = 0.0
+    for j in range(NODES):
+        f = sample(S, W, k, law, t, h, node(j), seen)
+        seen[EXPECTED, j] = f
+        least = min(least, f)
+        most = max(most, f)
+        size = max(size, abs(f))
+    allowed = ODD * (most - least) + BLURRED * size
+    worst = allowed
+    at = -1.0
+    total = 0.0
+    for i in range(n):
+        x = (i + 0.5) / n
+        gap = abs(sample(S, W, k, law, t, h, x, seen) - expected(seen, x))
+        total += gap
+        if gap > worst:
+            worst = gap
+            at = x
+    return at, (total / (n * worst) if at >= 0.0 else 0.0)
+
+
+@formula
+def farthest(S, W, k, law, t, h, n, seen):
+    """Where in the step a law is farthest from its mean, and for how long: parts of the step."""
+    mean = 0.0
+    for i in range(n):
+        mean += sample(S, W, k, law, t, h, (i + 0.5) / n, seen) / n
+    worst = 0.0
+    at = 0.5
+    total = 0.0
+    for i in range(n):
+        gap = abs(sample(S, W, k, law, t, h, (i + 0.5) / n, seen) - mean)
+        total += gap / n
+        if gap > worst:
+            worst = gap
+            at = (i + 0.5) / n
+    return at, (total / worst if worst > 0.0 else 0.0)
+
+
+@formula
+def node(j):
+    """Place of a node in the step."""
+    return 0.5 - 0.5 * cos(3.141592653589793 * j / (NODES - 1))
+
+
+@formula
+def expected(seen, x):
+    """The polynomial through the values at the nodes (barycentric form)."""
+    above = 0.0
+    below = 0.0
+    for j in range(NODES):
+        w = 0.5 if j == 0 or j == NODES - 1 else 1.0
+        d = x - node(j)
+        if d == 0.0:
+            return seen[EXPECTED, j]
+        w /= d if j % 2 == 0 else -d
+        above += w * seen[EXPECTED, j]
+        below += w
+    return above / below
+
+
+@formula
+def sample(S, W, k, law, t, h, x, seen):
+    """Value of a law at a place in the step; of drivers' the second derivative, which is what asks for force."""
+    nm = measured(S)
+    s = t + x * h
+    for m in range(nm):
+        seen[WITHIN, m], seen[WITHIN, nm + m] = between(seen, m, x, h)
+    if k >= LAWS * S.force_i.shape[0]:
+        return evaluate_jet(S.code, S.const, law, W.stack, s, seen, BY_TIME)[2]
+    a, b = between(seen, nm + k // LAWS, x, h)
+    return evaluate(S.code, S.const, law, W.stack, (s, a, b), seen)
+
+
+@formula
+def between(seen, m, x, h):
+    """Value and rate of column m at a place in the step: the cubic through value and rate at its ends."""
+    f, g, u, v = seen[FROM, m], seen[TO, m], seen[FROM_RATE, m] * h, seen[TO_RATE, m] * h
+    a = 2.0 * (f - g) + u + v
+    b = 3.0 * (g - f) - 2.0 * u - v
+    return f + x * (u + x * (b + x * a)), (u + x * (2.0 * b + 3.0 * x * a)) / (h if h > 0.0 else 1.0)

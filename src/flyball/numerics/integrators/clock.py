@@ -1,0 +1,37 @@
+"""Everything an interrupted integration needs to go on, and the names of its entries."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# entries of Clock.real
+T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER, SPAN = range(11)
+# (of the steps refused since the last accepted one: the last error, the least, its width; an error that is good enough)
+LAST, BEST, BEST_H, PARDON = range(11, 15)
+# (widest step of late; begin of the step before, and of the last that was taken back; largest error accepted, its time;
+# when an error was last found to be rounding)
+WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT, REALS = range(15, 22)
+# entries of Clock.count
+ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS, COUNTS = range(10)
+# rows of Clock.y: the state, the one in the making, the interpolated one; what a trial puts aside; the step before
+NOW, NEW, BETWEEN, ASIDE, ASIDE_RATE, OLD, OLD_RATE, STATES = range(8)
+# rows of Clock.seen that the integrator looks at: what is kept of the begin of a step, and of its end
+FROM, FROM_RATE, TO, TO_RATE = range(1, 5)
+AT_START, AT_END = -2, -1  # what ``inspect`` takes note of, in place of looking at law k
+LOOSER = 10.0  # accounts are held to this many times the relative tolerance
+RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
+NOTHING = np.zeros((6, 0))
+
+
+class Clock(NamedTuple):
+    """Everything an interrupted integration needs to go on."""
+
+    real: np.ndarray  # (REALS,)
+    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
+    times: np.ndarray  # output times, ascending
+    y: np.ndarray  # (STATES, ny)
+    K: np.ndarray  # (stages + 1, ny): derivatives of the stages, and one within the step
+    accounts: np.ndarray  # components that are integrals of the motion: works
+    seen: np.ndarray = NOTHING  # what the inspection of laws within a step keeps; no columns: nothing is inspected

@@ -1,0 +1,147 @@
+"""What follows a step that is refused: a shorter one, unless its error is rounding.
+
+Near a singular position of a mechanism rounding grows without bound: shorter steps lead into it, where it is larger.
+There the step is taken back and begun anew so that it ends elsewhere, or the place is passed by a wide one.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from .clock import (
+    ACCEPTED,
+    ASIDE,
+    ASIDE_RATE,
+    BACK,
+    BEFORE,
+    BEST,
+    BEST_H,
+    BLURRED_AT,
+    CONTROLLED,
+    EXCESS,
+    EXCESS_AT,
+    FROM,
+    FROM_RATE,
+    GROW,
+    LAST,
+    NEW,
+    NOW,
+    OLD,
+    OLD_RATE,
+    PARDON,
+    REJECTED,
+    RTOL,
+    TO,
+    TO_RATE,
+    WIDE,
+    H,
+    T,
+)
+from .step import attempt
+
+SAFETY = 0.85
+LARGE = 1e300  # the error of a step that was not tried
+DIGITS = 1e-14  # part of a state that its last digits are, once rounding has built up
+BLUR = 0.1  # an error that changes by more than this part of it with the state's last digits is rounding
+ROUGH = 1e-7  # a relative error of a step above which rounding is no excuse
+SLOWLY = 0.8  # what the width of wide steps falls by with each that is not
+SLIGHT = 10.0  # an error from rounding that is accepted before a step is taken back
+
+
+@formula
+def afresh(c):
+    """No step was refused since the last accepted one."""
+    c.real[LAST] = c.real[BEST] = LARGE
+    c.real[PARDON] = 0.0
+
+
+@formula
+def enter(R, c, t, h, error):
+    """Make the state in the making the present one, and choose the width of the next step."""
+    for i in range(c.y.shape[1]):
+        c.y[OLD, i] = c.y[NOW, i]
+        c.y[OLD_RATE, i] = c.K[0, i]
+        c.y[NOW, i] = c.y[NEW, i]
+        c.K[0, i] = c.K[R.order_i[1], i]
+    for i in range(c.seen.shape[1]):
+        c.seen[FROM, i] = c.seen[TO, i]
+        c.seen[FROM_RATE, i] = c.seen[TO_RATE, i]
+    c.real[BEFORE] = c.real[T]
+    if error > c.real[EXCESS]:
+        c.real[EXCESS] = error
+        c.real[EXCESS_AT] = c.real[T]
+    if c.real[GROW] > 1.0:
+        c.real[WIDE] = max(h, SLOWLY * c.real[WIDE])
+    grow = c.real[GROW]
+    c.real[H] = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
+    c.real[T] = t
+    c.real[GROW] = 6.0
+    c.count[ACCEPTED] += 1
+    afresh(c)
+
+
+@formula
+def shorten(c, h):
+    """Try a step of that width next, as the last was refused."""
+    c.count[REJECTED] += 1
+    c.real[GROW] = 1.0
+    c.real[H] = h
+
+
+@formula
+def refuse(derivative, arrive, tangent, S, W, R, c, h, status, error):
+    """Choose what to try after a step with that status and error."""
+    if status != 0 or not error < LARGE:
+        shorten(c, 0.25 * h)
+        return
+    shorten(c, h * max(0.2, SAFETY * error ** (-1.0 / R.order_i[0])))
+    first = c.real[LAST] == LARGE
+    c.real[LAST] = error
+    if error < c.real[BEST]:
+        c.real[BEST] = error
+        c.real[BEST_H] = h
+    if c.real[PARDON] > 0.0:
+        if h > c.real[BEST_H]:
+            c.real[H] = c.real[BEST_H]
+        return
+    wide = c.real[T] - c.real[BEFORE] > 0.5 * c.real[WIDE]
+    small = c.real[BEST] * c.real[RTOL] < ROUGH
+    back = wide and small and c.real[BEST] > SLIGHT and c.real[BACK] < c.real[BEFORE]
+    if first or not small or not blurred(derivative, arrive, tangent, S, W, R, c, h, error):
+        return
+    c.real[BLURRED_AT] = c.real[T]
+    if back:
+        take_back(c)
+    else:
+        c.real[PARDON] = max(SLIGHT, 2.0 * c.real[BEST])
+        c.real[H] = max(c.real[WIDE], c.real[BEST_H])
+
+
+@formula
+def take_back(c):
+    """Go back to where the last accepted step began, to end it elsewhere."""
+    c.count[ACCEPTED] -= 1
+    c.real[H] = 0.5 * (c.real[T] - c.real[BEFORE])
+    c.real[T] = c.real[BACK] = c.real[BEFORE]
+    for i in range(c.y.shape[1]):
+        c.y[NOW, i] = c.y[OLD, i]
+        c.K[0, i] = c.y[OLD_RATE, i]
+    afresh(c)
+
+
+@formula
+def blurred(derivative, arrive, tangent, S, W, R, c, h, error):
+    """Whether the error of a step is mostly rounding: another one from a state that differs in its last digits."""
+    y, kept = c.y[NOW], c.y[ASIDE]
+    for i in range(y.shape[0]):
+        kept[i] = y[i]
+        c.y[ASIDE_RATE, i] = c.K[0, i]
+        if i < c.count[CONTROLLED]:
+            y[i] += (DIGITS if i % 2 == 0 else -DIGITS) * max(abs(y[i]), 1.0)
+    status, _ = arrive(c.real[T], y, c.K[0], S, W)
+    other = error
+    if status == 0:
+        status, other = attempt(derivative, arrive, tangent, S, W, R, c, h)
+    for i in range(y.shape[0]):
+        y[i] = kept[i]
+        c.K[0, i] = c.y[ASIDE_RATE, i]
+    return status != 0 or not abs(other - error) < BLUR * max(other, error)
