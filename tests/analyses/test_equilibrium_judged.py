@@ -87,7 +87,7 @@ def test_forces_that_cancel_but_for_rounding():
         m.add(fb.Actuator(f"push {k}", "slide.displacement", force=force))
     assert m.equilibrium().stability == "marginal"
     for layer in ("absolute", "joint"):
-        assert m.modes(coordinates=layer).kinds == ("rigid", "rigid")
+        assert set(m.modes(coordinates=layer).kinds) == {"rigid"}
 
 
 def ziegler(load: float) -> fb.Mechanism:

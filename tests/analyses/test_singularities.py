@@ -160,7 +160,8 @@ def test_windows_of_rhombi():
     r = m.singularities("motor", ("-120 deg", "120 deg"))
     assert [p.a for p in r] == pytest.approx([-math.pi / 2, math.pi / 2], abs=1e-9)
     assert [p.lost for p in r] == [2, 2]
-    posts = [sorted(tuple(round(b.tangent[f"A{k}.angle"], 6) for k in range(3)) for b in p.branches) for p in r]
+    # left open by second order, such directions are found to 1e-5
+    posts = [sorted(tuple(round(b.tangent[f"A{k}.angle"], 5) for k in range(3)) for b in p.branches) for p in r]
     assert posts == [[(0, 0, 1), (0, 1, 1), (1, 1, 1)], [(1, 0, 0), (1, 1, 0), (1, 1, 1)]]
     assert kinds(r) == ["regular passage", "bifurcation"]
 

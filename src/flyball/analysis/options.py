@@ -36,8 +36,8 @@ class Options:
                 value = seconds(value, f.name)
             elif f.type == "tuple[str, ...]" or (f.type == "tuple[str, ...] | None" and value is not None):
                 value = names(value, f.name)
-            elif f.type in ("str", "str | None") and not (isinstance(value, str) or (value is None and "|" in f.type)):
-                raise ModelError(f"{f.name} is a text, not {value!r}")
+            elif f.type == "str" and not isinstance(value, str):
+                raise ModelError(f"{f.name} is a text, not a {type(value).__name__}")
             elif f.name == "values":
                 value = numbers(value, f.name)
             elif f.type == "Sequence[float | str]" and (isinstance(value, str) or not isinstance(value, _LISTS)):
