@@ -17,13 +17,20 @@ DIGITS = 16 * np.finfo(float).eps  # part of a coordinate that a few operations 
 NO_PART = 1e-10  # singular values below this part of the largest are taken for rounding
 
 
-def misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> float:
-    """The largest row at a position: radians, or parts of the mechanism's length and of what rounding leaves there."""
+def misfit(c: Compiled, t: float, q: np.ndarray, v: np.ndarray, near: float | None = None) -> float:
+    """The largest row at a position: radians, or parts of the mechanism's length and of what rounding leaves there.
+
+    ``near``: what rounding leaves [m], if that is told.
+    """
     c.at(t, q, v)
     g = np.abs(c.work.row[G_VALUE])
     if not np.isfinite(g).all():
         return np.inf
-    return float((g / np.where(c.metric, c.values.length + rounding(c) / CLOSED, 1.0)).max(initial=0.0))
+    return float(
+        (g / np.where(c.metric, c.values.length + (rounding(c) if near is None else near) / CLOSED, 1.0)).max(
+            initial=0.0
+        )
+    )
 
 
 def rounding(c: Compiled) -> float:

@@ -90,7 +90,7 @@ def _closed(
         near = compiled(model, parameters=parameters, positions=True, holds=holds, held=values)
         near.follow(plain.hints)
     count = 0
-    if misfit(near, t, q, v) > CLOSED or _by_frames(model):
+    if misfit(near, t, q, v, 0.0) > CLOSED or _by_frames(model):  # as near as rounding allows, not only within it
         far = compiled(model, parameters=parameters, far=True, holds=holds, held=values)
         far.follow(plain.hints)
         if misfit(far, t, q, v) > OPEN:
