@@ -43,7 +43,8 @@ Ask what a number changes
 Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
-    lines(), as_dict(), plot()    text, plain data and a picture of any result; run.to_html(path), run.to_report(path)
+    lines(), as_dict(), plot()    text, plain data and, of most results, a picture
+    run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
     run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray
 
 When something is wrong

@@ -111,3 +111,9 @@ def test_what_has_no_place_in_a_file_is_refused(tmp_path: Path) -> None:
         planar().save(tmp_path / "no" / "such" / "folder.toml")
     with pytest.raises(fb.ModelError, match="a text holds"):
         dumps(fb.Mechanism("\ud800"))
+
+
+def test_a_description_is_not_saved_as_a_program(tmp_path):
+    """It would be run as one when it is loaded."""
+    with pytest.raises(fb.ModelError, match=r"saved as TOML; name it '\*\.toml'"):
+        fb.Mechanism("crane").save(tmp_path / "crane.py")

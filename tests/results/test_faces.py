@@ -15,7 +15,7 @@ import flyball as fb
 from flyball.results.numbers import clean, number, span, tuple_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-OWED = {"Assembly", "MassReport", "Mobility", "Report"}  # have no picture yet
+OWED = {"Assembly", "MassReport", "Mobility", "Report"}  # tables of names and numbers: have no picture
 
 
 def crank() -> fb.Mechanism:
@@ -63,8 +63,6 @@ def test_every_class_of_results_is_tried():
 
 @pytest.mark.parametrize("name", MADE)
 def test_a_result_has_a_text_plain_data_and_a_picture(name, tmp_path):
-    if name in OWED:
-        pytest.skip("has no picture yet")
     r = MADE[name]()
     assert type(r).__name__ == name
     lines = list(r.lines())
@@ -76,6 +74,9 @@ def test_a_result_has_a_text_plain_data_and_a_picture(name, tmp_path):
         lines
     )
     assert json.loads(json.dumps(r.as_dict(), default=float))
+    if name in OWED:
+        assert len(repr(r)) < 4000
+        return
     if hasattr(r, "plot"):
         assert isinstance(r.plot(), matplotlib.figure.Figure)
         assert r.plot(path=tmp_path / "picture.svg") is None

@@ -44,6 +44,8 @@ def save(model: Model, path: str | os.PathLike) -> None:
     ModelError
         If the file cannot be written, or a value of the mechanism has no place in a file.
     """
+    if Path(path).suffix == ".py":
+        raise ModelError(f"cannot write {os.fspath(path)!r}: a description is saved as TOML; name it '*.toml'")
     data = dumps(model, Path(path).parent).encode()
     try:
         Path(path).write_bytes(data)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...model.model import Model
 from ...results.departure import Departure
+from ...results.numbers import tuple_of
+from ...tables.coordinates import BodyState
 from ...tables.system import NQ, Q0
 from ..compiled import Compiled, compiled
 from .described import not_kept
@@ -19,7 +22,7 @@ from .told import driven, told, turns, wind
 from .velocities import consistent, contradiction
 
 
-@dataclass
+@dataclass(repr=False)
 class Assembly:
     """A consistent start: the compiled mechanism, its state, and what of the description could not be kept."""
 
@@ -35,6 +38,34 @@ class Assembly:
     def y(self) -> np.ndarray:
         """State vector with work states zero."""
         return np.r_[self.q, self.v, self.compiled.z]
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: where every mass centre begins and how it moves, what could not be kept."""
+        length = self.compiled.values.length
+        out = [("assembled", f"{self.compiled.structure.model.name}, t = {self.t:g} s, {self.iterations} iterations")]
+        bodies = self._bodies()
+        fast, spin = (max(float(np.abs(x).max()) for x in (getattr(b, k) for b in bodies.values())) for k in "vw")
+        for name, b in bodies.items():
+            at, moves, spins = tuple_of(b.p, 6, length), tuple_of(b.v, 6, fast), tuple_of(b.w, 6, spin)
+            out.append((name, f"mass centre {at} m, velocity {moves} m/s, turning {spins} rad/s"))
+        out += [("moved", f"{name} by {way:.3g} m") for name, way in self.moved.items()]
+        return [*out, *(("not kept", d.text) for d in self.departures)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, world axes: the same."""
+        bodies = {
+            name: {"mass_centre": b.p.tolist(), "velocity": b.v.tolist(), "angular_velocity": b.w.tolist()}
+            for name, b in self._bodies().items()
+        }
+        gone = [d.as_dict() for d in self.departures]
+        return {"t": self.t, "iterations": self.iterations, "bodies": bodies, "moved": self.moved, "departures": gone}
+
+    def __repr__(self) -> str:
+        """The lines."""
+        return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
+
+    def _bodies(self) -> dict[str, BodyState]:
+        return self.compiled.moving(self.t, self.q, self.v)
 
 
 Why = Callable[[Compiled, float, np.ndarray, np.ndarray, np.ndarray], str]
