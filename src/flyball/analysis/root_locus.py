@@ -106,6 +106,7 @@ def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], 
     done.crossings = _crossings(events, taken)
     _refined(search, [e for e in events if "meet" in e.what or "part" in e.what], taken)
     _told(done, search.taken)
+    tell(1.0, "")
     return done
 
 

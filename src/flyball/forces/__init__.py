@@ -1,4 +1,4 @@
-"""Force elements: one file each, found by itself. A new force is a new file here and nothing else."""
+"""Force elements: one file each, found by itself. A new force is a new file here, and a line below for editors."""
 
 import importlib
 import pkgutil
@@ -34,7 +34,7 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
 INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench", "effort"))
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
-if TYPE_CHECKING:  # for editors; nothing else needs these lines
+if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .bushing import Bushing as Bushing
     from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring

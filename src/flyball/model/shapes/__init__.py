@@ -15,7 +15,7 @@ SHAPES.remove(Solid)
 
 globals().update({c.__name__: c for c in SHAPES})
 
-if TYPE_CHECKING:  # for editors; nothing else needs these lines
+if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .box import Box as Box
     from .capsule import Capsule as Capsule
     from .cone import Cone as Cone
