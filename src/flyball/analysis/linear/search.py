@@ -103,7 +103,7 @@ def failure(x: Rest) -> NotConverged:
         what = "their forces do not balance it" if x.open() <= CLOSED else "they do not close any more"
         return NotConverged(
             f"no equilibrium of {x.c.structure.model.name!r} was found: joints and drivers leave nothing free, and "
-            f"where the search ended {what}. Check lengths and drivers: the mechanism may be past a dead centre, or locked",
+            f"where the search ended {what}. Check lengths and drivers: it may be past a dead centre, or locked",
             residuals,
         )
     jumps = "; ".join(k.text for k in kinks(best.equations) if k.jump)
