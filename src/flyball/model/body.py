@@ -95,9 +95,10 @@ class Body(Element):
     velocity : vector [m/s]
         Velocity of the reference frame's origin at the start, world axes. It is kept where joints and drivers allow
         it; where they do not, the nearest is taken and said. If not given it is free: it follows from what is given
-        elsewhere, and is zero where nothing determines it.
+        elsewhere, and where nothing determines it the kinetic energy of the whole is the least, so that what is told
+        nothing rests; told ``angular_velocity`` only, a body on no joint turns about its mass centre.
     angular_velocity : number or vector [rad/s]
-        At the start, world axes; the same holds.
+        At the start, world axes; the same holds: give 0 if a body on no joint that is told ``velocity`` is not to turn.
     shape : shape or list of shapes
         What the body looks like and, unless ``inertia`` is given, what it weighs (see `Solid`).
     density : number [kg/m^3]

@@ -1,7 +1,7 @@
 """Velocities that the description gives: those of the state, and how far a state is from them.
 
 A body may be told the velocity of its reference frame's origin, its angular velocity, both or neither, along world
-axes. What it is not told is free.
+axes. What it is not told is free, and has the least kinetic energy.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 from ...math.vec import cross
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...results.departure import Departure
-from ...tables.system import NV, Q0, V0
+from ...tables.system import EXCESS, INERTIA, NV, Q0, V0
 from ...tables.values import Values
 from ..compiled import Compiled
 
@@ -44,32 +44,46 @@ class Given:
         return 2 if self.n == 3 else 3
 
 
-def given(c: Compiled) -> list[Given]:
+def given(x: Values) -> list[Given]:
     """Bodies that are told how they move; of a mechanism in absolute coordinates."""
     out = []
-    for b in c.structure.model.bodies:
+    for b in x.structure.model.bodies:
         origin, turning = b.velocity is not None, b.angular_velocity is not None
         if origin or turning:
-            row = c.values.system.body_i[c.structure.place[b.name]]
+            row = x.system.body_i[x.structure.place[b.name]]
             out.append(Given(b.name, int(row[V0]), int(row[NV]), origin, turning, b.as_drawn))
     return out
 
 
 def described(x: Values, q: np.ndarray) -> np.ndarray:
-    """Velocities (nv,) as described, at the pose q; zero where nothing is."""
+    """Velocities (nv,) of bodies alone at the pose q: those of the least kinetic energy that are as described.
+
+    Steps of least kinetic energy from here on to the constraints lead to the least of all.
+    """
     v = np.zeros(x.structure.nv, np.result_type(x.v, q))
-    for name, b in x.structure.place.items():
-        if b >= 0:
-            row = x.system.body_i[b]
-            v[row[V0] : row[V0] + row[NV]] = _own(x, name, q)
+    for g in given(x):
+        v[g.at : g.at + g.n] = _own(x, g, q)
     return v
 
 
-def _own(x: Values, name: str, q: np.ndarray) -> list[Any]:
-    """Velocities of one body as described."""
-    d, R = x.bodies[name], _rotation(x, name, q)
-    u = _origin(d) + _cross(d.w, R @ d.com)
-    return [u[0], u[1], d.w[2]] if x.structure.model.planar else [*u, *(R.T @ d.w)]
+def _own(x: Values, g: Given, q: np.ndarray) -> list[Any]:
+    """Velocities of one body as described: the mass centre of one that is told its turn only rests."""
+    d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    w = d.w if g.turning else R @ _blow(x, g, R.T @ _origin(d))
+    u = _origin(d) + _cross(w, R @ d.com) if g.origin else np.zeros(3)
+    return [u[0], u[1], w[2]] if g.n == 3 else [*u, *(R.T @ w)]
+
+
+def _blow(x: Values, g: Given, u: np.ndarray) -> np.ndarray:
+    """The turn that a blow at a body's origin gives it besides the velocity u of that origin, all in its axes.
+
+    The turn w of least m |u + w x c|^2 + w J w. Missing inertias have stand-ins.
+    """
+    d, row = x.bodies[g.name], x.system.body_x[x.structure.place[g.name]]
+    J = (row[INERTIA : INERTIA + 9] + row[EXCESS : EXCESS + 9]).reshape(3, 3)
+    about = J + d.mass * ((d.com @ d.com) * np.eye(3) - np.outer(d.com, d.com))
+    moment = d.mass * _cross(u, d.com)
+    return np.array([0.0, 0.0, moment[2] / about[2, 2]]) if g.n == 3 else np.linalg.solve(about, moment)
 
 
 def _cross(a: Any, b: Any) -> np.ndarray:
@@ -100,7 +114,7 @@ def deviation(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     d, R = x.bodies[g.name], _rotation(x, g.name, q)
     own = v[g.at : g.at + g.n]
     if g.whole:
-        return own - np.array(_own(x, g.name, q))
+        return own - np.array(_own(x, g, q))
     if g.origin:
         w = np.array([0.0, 0.0, own[2]]) if g.n == 3 else R @ own[3:]
         moved = np.r_[own[:2], 0.0] if g.n == 3 else own[:3]
@@ -124,7 +138,7 @@ def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
 def not_kept(c: Compiled, q: np.ndarray, v: np.ndarray) -> list[Departure]:
     """Given velocities that the state (q, v) does not have."""
     x, out = c.values, []
-    told, largest = given(c), float(np.abs(v / c.sizes).max(initial=0.0)) * x.length
+    told, largest = given(x), float(np.abs(v / c.sizes).max(initial=0.0)) * x.length
     for g in told:
         d, R = x.bodies[g.name], _rotation(x, g.name, q)
         own = v[g.at : g.at + g.n]

@@ -2,7 +2,8 @@
 
 In this order: the constraints are fulfilled, with what drivers and initial rates ask for; what is described is kept
 exactly where that allows it, else as nearly, measured by the kinetic energy of the difference; what is left free has
-the least kinetic energy, so that what nothing determines rests (Thomson's theorem: as blows would start it).
+the least kinetic energy of the whole, so that what nothing determines rests (Thomson's theorem: as blows would
+start it).
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ class Wanted:
         """At the position last evaluated, q, for rows with the right-hand sides nu."""
         import scipy.sparse as sp
 
-        told = given(c)
+        told = given(c.values)
         free = np.ones(c.structure.nv)
         for g in told:
             if g.as_drawn and g.whole:

@@ -14,6 +14,7 @@ from ...tables.names import velocity_names
 from .free import free
 from .kinks import kinks
 from .rest import Rest
+from .shaky import refuse_shaky
 from .stability import stability
 
 NEWTON, DESCENT = 40, 400  # steps
@@ -27,7 +28,13 @@ SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where d
 
 
 def newton(x: Rest) -> Rest | None:
-    """Newton's method with steps of limited length; None where it does not settle."""
+    """Newton's method with steps of limited length; None where it does not settle.
+
+    Raises
+    ------
+    SingularityError
+        If it ends in a position in which no finite reactions carry the load.
+    """
     for _ in range(NEWTON):
         step, lam = x.step()
         longest = np.abs(step).max(initial=0.0)
@@ -40,11 +47,20 @@ def newton(x: Rest) -> Rest | None:
 
 
 def arrived(x: Rest) -> Rest | None:
-    """The place itself if it is closed and all is balanced there; None if not."""
+    """The place itself if it is closed and all is balanced there; None if not.
+
+    Raises
+    ------
+    SingularityError
+        If no finite reactions carry the load there.
+    """
     if not x.open() <= CLOSED:
         return None
     best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
-    return best if best.settled(BALANCED) else None
+    if not best.settled(BALANCED):
+        return None
+    refuse_shaky(best)
+    return best
 
 
 def pushed(x: Rest, later: Rest | None = None) -> Rest:
