@@ -140,3 +140,46 @@ def test_the_page_of_an_equilibrium_tells_the_verdict():
     m.add(fb.Body("rod", mass=1, inertia=1 / 12, position=(0, 0.5)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
     (data,) = re.findall(r'id="recording"[^>]*>([^<]+)<', m.equilibrium().html())
     assert "unstable, found by Newton's method" in gzip.decompress(base64.b64decode(data)).decode("utf-8", "replace")
+
+
+@pytest.mark.parametrize(("law", "stability"), [("1 - 0.1*rate", "stable"), ("0.1*rate - 1", "unstable")])
+@pytest.mark.parametrize("turns", [True, False])
+def test_where_nothing_is_left_but_what_turns(law, stability, turns):
+    """A lone wheel, a lone block: the speed at which the force is none."""
+    m = fb.Mechanism("lone", planar=True, gravity=(0, 0))
+    start = {"angular_velocity": 3} if turns else {"velocity": (3, 0)}
+    m.add(fb.Body("body", mass=1, inertia=1, **start))
+    if turns:
+        m.add(fb.Revolute("j", "ground", "body", at=(0, 0)), fb.Motor("push", "j", torque=law))
+    else:
+        m.add(fb.Translational("j", "ground", "body", at=(0, 0), axis=(1, 0)))
+        m.add(fb.Actuator("push", "j.displacement", force=law))
+    name = "j.angle" if turns else "j.displacement"
+    found = m.equilibrium(turning=[name])
+    assert found.speeds == {name: pytest.approx(10.0, rel=1e-12)}
+    assert found.stability == stability
+
+
+def straight(size: float, gravity: tuple[float, float], lift: float = 0.0) -> fb.Mechanism:
+    """Two bars between two pivots, their hinge raised by a part of their length: none of them can move."""
+    m = fb.Mechanism("straight", planar=True, gravity=gravity)
+    for name, x in (("a", 0.5), ("b", 1.5)):
+        m.add(fb.Body(name, mass=1, inertia=size**2, position=(x * size, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(size, lift * size)))
+    m.add(fb.Revolute("C", "ground", "b", at=(2 * size, 0)))
+    return m
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3])
+def test_a_load_across_a_singular_position_is_carried_by_no_finite_reaction(size):
+    with pytest.raises(fb.SingularityError, match=r"'straight' has no equilibrium .* no finite reaction") as said:
+        straight(size, (0, -9.81)).equilibrium()
+    assert said.value.elements == ("A", "B", "C")
+    assert straight(size, (9.81, 0)).equilibrium().unbalanced < 1e-9  # along the bars: nothing shakes it
+
+
+@pytest.mark.parametrize("lift", [1e-2, 1e-4])
+def test_two_flat_bars_carry_a_load_as_a_three_hinged_arch(lift):
+    found = straight(1.0, (0, -9.81), lift).equilibrium()
+    assert found.stability == "stable"
+    assert found["A.fx"] == pytest.approx(9.81 / (2.0 * lift), rel=1e-6)  # half a weight at the hinge, twice

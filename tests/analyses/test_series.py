@@ -142,7 +142,7 @@ def test_where_nothing_holds_any_more_the_error_says_what_was_reached() -> None:
     [
         ("p", [1.0], r"'lever' has no parameter 'p' \(did you mean 'P'\?\)"),
         ("P", [], "must be finite numbers in SI units"),
-        ("P", [1.0, math.nan], "must be finite numbers in SI units"),
+        ("P", [1.0, math.nan], "values are finite numbers"),
     ],
 )
 def test_wrong_parameters(parameter: str, values: list[float], said: str) -> None:

@@ -246,3 +246,14 @@ def test_a_large_mechanism_keeps_and_shares_the_same(monkeypatch):
     sparse = contrary.assemble()
     assert sparse.v == pytest.approx(dense.v, abs=1e-10)
     assert len(sparse.departures) == len(dense.departures) > 30
+
+
+@pytest.mark.parametrize("angle", [1e-7, 10.0, 80.0, 179.0])
+def test_how_far_a_body_was_turned(angle):
+    """Moved by an initial condition in space: the angle of the turn itself, up to half a turn."""
+    m = fb.Mechanism("door")
+    m.add(fb.Body("leaf", mass=1.0, inertia=(1.0, 1.0, 1.0)))
+    m.add(fb.Revolute("hinge", "ground", "leaf", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(fb.Initial("hinge.angle", value=f"{angle} deg"))
+    turned = [d for d in m.simulate(0.01).health.departures if d.what == "orientation"]
+    assert [d.distance for d in turned] == [pytest.approx(np.radians(angle), rel=1e-6)] if angle > 1e-6 else True

@@ -11,7 +11,6 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.compiled import compiled
-from flyball.equations import tree as joints
 from flyball.equations.articulated import articulate, articulated_solve
 from flyball.equations.engine import MOTION
 from flyball.equations.mass import mass_entries
@@ -31,6 +30,7 @@ from flyball.tables.system import (
     PRISMATIC,
     REVOLUTE,
     SPHERICAL,
+    TREE_NV,
     V0,
     WELD,
 )
@@ -47,7 +47,7 @@ def scratch(nb, nv, dtype=float):
 
 def tables(parents, kinds):
     """A forest's tables without numbers in them."""
-    nv = np.array([joints.NV[k] for k in kinds])
+    nv = np.array([TREE_NV[k] for k in kinds])
     body_i = np.zeros((len(parents), 8), np.int64)
     body_i[:, :2] = np.transpose([parents, kinds])
     body_i[:, V0], body_i[:, NV], body_i[:, BODY_LAW:] = np.cumsum(nv) - nv, nv, -1

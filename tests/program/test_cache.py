@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from flyball.compiler import stamp
 from flyball.compiler.stamp import PACKAGE, stamped
 from flyball.equations.engine import engine
 from flyball.equations.residual import residual_kernel
@@ -56,6 +57,25 @@ def test_an_edit_of_one_loop_does_not_compile_the_others():
     assert "numerics/ldl.py" in of_engine & of_factor
     assert not of_factor & {"equations/rows.py", "forces/bushing.py"}
     assert not {x for x in of_engine if x.startswith(("model/", "analysis/", "joints/"))}
+
+
+def test_stamps_see_every_way_to_import(tmp_path, monkeypatch):
+    """By name, by folder, with a star, within a function; a loop of somebody else's holds all that could be in it."""
+    room = tmp_path / "math"
+    (tmp_path / "numerics").mkdir()
+    room.mkdir()
+    for name in ("a", "b", "c", "d", "e"):
+        (room / f"{name}.py").write_text("")
+    (tmp_path / "numerics" / "__init__.py").write_text("from ..math.e import x")
+    text = "from .b import *\nfrom . import c\nfrom .. import numerics\ndef f():\n    from .d import y\n"
+    (room / "a.py").write_text(text)
+    monkeypatch.setattr(stamp, "PACKAGE", tmp_path)
+    monkeypatch.setattr(stamp, "COMPILED", ("math", "numerics"))
+    names = {p.name for p in stamp.stamped(room / "a.py") if tmp_path in p.parents}
+    assert names == {"a.py", "b.py", "c.py", "d.py", "e.py", "__init__.py"}
+    elsewhere = tmp_path.parent / "loop.py"
+    elsewhere.write_text("")
+    assert stamp.compiled_files() < set(stamp.stamped(elsewhere))
 
 
 @pytest.mark.parametrize("damage", [b"", b"not a pickle", None])

@@ -41,7 +41,7 @@ def rates(_, y):
 @cached
 def motion(spin, t_end=8.0):
     chosen = {"spin": spin}
-    return example("rattleback.toml").simulate(t_end, rtol=1e-11, atol=1e-13, outputs=161, parameters=chosen)
+    return example("rattleback.toml").simulate(t_end, rtol=1e-12, atol=1e-14, outputs=161, parameters=chosen)
 
 
 def axes(r):

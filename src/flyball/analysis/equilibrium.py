@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, SingularityError
 from ..model.model import Model
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
@@ -84,8 +84,11 @@ def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:
 
 def _searched(x: Rest, stable: bool) -> Equilibrium:
     """By Newton's method, and by descent where that does not lead on or a stable one is wanted."""
-    way = "Newton's method"
-    arrived = newton(x)
+    way, arrived, shaky = "Newton's method", None, None
+    try:
+        arrived = newton(x)
+    except SingularityError as error:  # the forces may lead elsewhere
+        shaky = error
     unstable = arrived is not None and stability(arrived).kind == UNSTABLE
     if arrived is not None and unstable and not stable and _far(x, arrived):
         downhill = descent(x)  # Newton has led up a hill that the guess is not on
@@ -97,7 +100,7 @@ def _searched(x: Rest, stable: bool) -> Equilibrium:
         downhill = descent(x if arrived is None else pushed(arrived))
         arrived = None if downhill is None else newton(downhill)
         if arrived is None:
-            raise failure(downhill or x)
+            raise shaky or failure(downhill or x)
     return finished(arrived, {}, way)
 
 

@@ -14,6 +14,7 @@ from ..results.equilibrium import Equilibrium
 from ..results.root_locus import Crossing, RootLocus
 from .equilibria import EquilibriaOptions, checked, equilibria, stopped
 from .linear.crossings import Event, Search
+from .linear.passing import passing
 from .linear.sample import Sample, match, sample
 from .linearize import InstantOptions, without_inputs
 from .progress import Tell, shown
@@ -105,6 +106,7 @@ def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], 
     done.crossings = _crossings(events, taken)
     _refined(search, [e for e in events if "meet" in e.what or "part" in e.what], taken)
     _told(done, search.taken)
+    tell(1.0, "")
     return done
 
 
@@ -124,9 +126,10 @@ def _told(done: RootLocus, taken: Sequence[Sample]) -> None:
 
 def _events(search: Search, taken: Sequence[Sample], tell: Tell) -> list[Event]:
     """Events between the given values; those that lie on an event are passed over."""
+    on = passing(taken)
     kept = [taken[0]]
     for k, x in enumerate(taken[1:], 1):
-        if k == len(taken) - 1 or not _on_event(search, kept[-1], x, taken[k + 1]):
+        if k == len(taken) - 1 or not (on[k] or _at_zero(kept[-1], x, taken[k + 1])):
             kept.append(x)
     _heading(search, kept)
     found = []
@@ -136,11 +139,10 @@ def _events(search: Search, taken: Sequence[Sample], tell: Tell) -> list[Event]:
     return found
 
 
-def _on_event(search: Search, a: Sample, x: Sample, b: Sample) -> bool:
-    """Whether a sample lies where something happens: at zero, or on the axis, as neither beside it does."""
-    zero, axis = (k.counts.get("zero", 0) for k in (a, x, b)), [k.counts.get("axis", 0) for k in (a, x, b)]
-    before, here, after = zero
-    return here > max(before, after) or (axis[1] > max(axis[0], axis[2]) and axis[0] == axis[2])
+def _at_zero(a: Sample, x: Sample, b: Sample) -> bool:
+    """Whether more eigenvalues are zero at a sample than at either beside it."""
+    before, here, after = (k.counts.get("zero", 0) for k in (a, x, b))
+    return here > max(before, after)
 
 
 def _heading(search: Search, kept: list[Sample]) -> None:

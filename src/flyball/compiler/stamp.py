@@ -18,7 +18,7 @@ COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "n
 TEXTS: dict[str, str] = {}
 """Sources of formulas that were put together at import (`written`): module and name -> text."""
 
-_IMPORT = re.compile(r"^from (\.+)([\w.]*) import (\([^)]*\)|[\w ,]+)", re.MULTILINE)
+_IMPORT = re.compile(r"^[ \t]*from (\.+)([\w.]*) import (\([^)]*\)|[\w ,*]+)", re.MULTILINE)
 _SEARCH = re.compile(r"^import pkgutil$", re.MULTILINE)
 
 
@@ -32,8 +32,10 @@ def compiled_files() -> set[Path]:
 
 
 def stamped(file: Path) -> list[Path]:
-    """The source files that a kernel which stands in ``file`` is made of."""
+    """The source files that a kernel which stands in ``file`` is made of: all, where it is not one of ours."""
     known, seen, todo = compiled_files(), set[Path](), [file, *Path(__file__).parent.glob("*.py")]
+    if not file.is_relative_to(PACKAGE):
+        todo += known
     while todo:
         path = todo.pop()
         if path not in seen:
@@ -49,8 +51,10 @@ def _imported(path: Path) -> frozenset[Path]:
     out = set(path.parent.glob("*.py")) if _SEARCH.search(text) else set()
     for dots, module, names in _IMPORT.findall(text):
         base = path.parents[len(dots) - 1].joinpath(*module.split("."))
-        if base.is_dir():  # what is named may be files of it
-            out |= {base / "__init__.py", *(base / f"{n}.py" for n in re.findall(r"\w+", names))}
+        if base.is_dir():  # what is named may be files of it, or folders
+            named = [base / n for n in re.findall(r"\w+", names)]
+            out |= {base / "__init__.py", *(n.with_suffix(".py") for n in named), *(n / "__init__.py" for n in named)}
+            out |= set(base.glob("*.py")) if "*" in names else set()
         else:
             out.add(base.with_suffix(".py"))
     return frozenset(p for p in out if p.is_file())

@@ -41,7 +41,9 @@ class Departure:
         """How far apart these are [unit]; of orientations the angle of the turn between them [rad]."""
         a, b = np.array(self.given), np.array(self.got)
         if self.what == "orientation":
-            return float(2.0 * np.arctan2(min(np.linalg.norm(a - b), np.linalg.norm(a + b)) / 2.0, 1.0) * 2.0)
+            # |a - b| = 2 |sin(theta / 4)|, |a + b| = 2 |cos(theta / 4)|; b and -b are the same orientation
+            apart, opposite = sorted((float(np.linalg.norm(a - b)), float(np.linalg.norm(a + b))))
+            return float(4.0 * np.arctan2(apart, opposite))
         return float(np.linalg.norm(b - a))
 
     @property

@@ -23,15 +23,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .passing import SLOWER, passing
 from .sample import Sample, match
 
 EXACT = 1e-14  # of the stretch between two values, and of the value
 BISECTED = 48  # halvings after which what is left is taken for one event
 TRIED = 200  # evaluations between two values, after which only the change of stability is sought
 LEFT = 1e-6  # of what it is at the ends: what a smooth function may be at its zero
-UNEVEN = 0.4375  # where a stretch is parted: not where a round value is likely to lie
+UNEVEN = (0.4375, 0.609375, 0.234375)  # where a stretch is parted: not where a round value is likely to lie
 
-BESIDE = 1e-6  # part of a stretch that is next to its end
+BESIDE = (1e-6, 1e-3)  # parts of a stretch that are next to its end
+STEADY = 0.1  # by what part of itself the slope of a real part may differ between these
 WRONG = 6  # halvings in which eigenvalues that seem to change places with others are followed
 
 MEETINGS = {  # what happens -> change of counts, of how many eigenvalues with a positive real part
@@ -79,7 +81,20 @@ class Search:
 
     def between(self, a: Sample, b: Sample) -> list[Event]:
         """All events between two samples."""
-        return self._parted(a, b, len(self.taken), 0)
+        before = len(self.taken)
+        at_a, low = self._end(a, b)
+        at_b, high = self._end(b, a)
+        return at_a + (self._parted(low, high, before, 0) if low.place < high.place else []) + at_b
+
+    def _end(self, x: Sample, y: Sample) -> tuple[list[Event], Sample]:
+        """Events at the very end x of the stretch to y, and a sample beyond them."""
+        found = self._at_end(x, y)
+        more = abs(sum(e.change for e in found))
+        for part in (*BESIDE, *UNEVEN[::-1]) if found else ():
+            beyond = self.at(x.place + part * (y.place - x.place))
+            if beyond.growing == x.growing + more:
+                return found, beyond
+        return found, y if found else x
 
     def _parted(self, a: Sample, b: Sample, before: int, depth: int) -> list[Event]:
         through = _through(a, b)
@@ -88,14 +103,12 @@ class Search:
             return []
         if tired and a.growing == b.growing:
             return []
-        if depth == 0 and (at_end := self._at_end(a, b) or self._at_end(b, a)):
-            return at_end
         found = self._alone(a, b, through) if _explained(a, b, through) else self._met(a, b)
         if found:
             return found
         if depth == BISECTED or b.place - a.place <= EXACT * max(1.0, b.place):
             return [_left(a, b)] if a.growing != b.growing else []
-        middle = self.at(a.place + UNEVEN * (b.place - a.place))
+        middle = self._middle(a, b)
         if tired:
             near = (a, middle) if a.growing != middle.growing else (middle, b)
             return self._parted(*near, before, depth + 1)
@@ -106,11 +119,29 @@ class Search:
         there = np.isin(x.kinds, ("axis", "zero"))
         on = match(x, y)
         ones = np.flatnonzero(there & np.isin(y.kinds[on], ("+pair", "+real")))
-        if not len(ones) or self.at(x.place + BESIDE * (y.place - x.place)).counts != y.counts:
+        found = [(complex(0.0, abs(x.w[k].imag)), 2 if y.kinds[on[k]] == "+pair" else 1) for k in ones]
+        if not found or not self._leaves(x, y, ones, sum(n for _, n in found)):
             return []
         more = 1 if y.place > x.place else -1
-        found = [(complex(0.0, x.w[k].imag), 2 if y.kinds[on[k]] == "+pair" else 1) for k in ones]
         return [Event("at the end", x, w, n * more) for w, n in found]
+
+    def _leaves(self, x: Sample, y: Sample, ones: np.ndarray, growing: int) -> bool:
+        """Whether eigenvalues leave the axis at x: as many grow next to it, or their real parts change evenly."""
+        next_to, near = (self.at(x.place + part * (y.place - x.place)) for part in BESIDE)
+        if next_to.growing == x.growing + growing:
+            return True
+        at = [k.raw.real[match(x, k)[ones]] - x.raw.real[ones] for k in (next_to, near, y)]
+        slope, usual = at[0] / BESIDE[0], at[1] / BESIDE[1]
+        even = (usual > SLOWER * at[2]) & (np.abs(slope - usual) <= STEADY * usual)
+        return bool((even & (y.kinds[match(x, y)[ones]] == "+pair")).all())
+
+    def _middle(self, a: Sample, b: Sample) -> Sample:
+        """A sample between two, none of whose eigenvalues is on its way through the axis if that can be."""
+        for part in UNEVEN:
+            found = self.at(a.place + part * (b.place - a.place))
+            if not passing((a, found, b))[1]:
+                break
+        return found
 
     def _zero(self, of: Smooth, a: Sample, b: Sample) -> tuple[Sample, complex] | None:
         """Where a smooth function is zero, and the eigenvalue there; None if it has not the zero that it should."""
@@ -132,7 +163,7 @@ class Search:
             found = self._zero(self._followed({a.place: w0, b.place: w1}), a, b)
             if found is None:
                 return None
-            out.append(Event("through", *found, int(np.sign(w1.real)) * (2 if found[1].imag else 1)))
+            out.append(Event("through", *found, int(np.sign(w1.real)) * (2 if w1.imag else 1)))
         return out
 
     def _met(self, a: Sample, b: Sample) -> list[Event] | None:
@@ -235,6 +266,8 @@ def _between(known: dict[float, complex], place: float) -> complex:
 def _left(a: Sample, b: Sample) -> Event:
     """Several events that cannot be told apart, or one that is no zero of anything smooth."""
     more = a if a.growing > b.growing else b
-    ones = more.w[np.isin(more.kinds, ("+real", "+pair"))]
+    grows = ("+real", "+pair")
+    on = match(more, a if more is b else b)
+    ones = more.w[np.isin(more.kinds, grows) & ~np.isin((a if more is b else b).kinds[on], grows)]
     value = complex(ones[np.argmin(np.abs(ones.real))]) if len(ones) else 0j
     return Event("several", b, complex(0.0, value.imag), b.growing - a.growing)

@@ -57,6 +57,11 @@ class Sample:
         return np.where(w == 0.0, "zero", np.where(w.imag == 0.0, alone, np.where(w.imag > 0.0, pair, "")))
 
     @cached_property
+    def sides(self) -> np.ndarray:
+        """Which half plane each eigenvalue lies in, (n,): 1, -1, or 0 for the axis."""
+        return np.where(np.abs(self.w.real) > UNDAMPED * np.abs(self.w), np.sign(self.w.real), 0.0).astype(int)
+
+    @cached_property
     def counts(self) -> dict[str, int]:
         """How many eigenvalues, one of each pair, lie where."""
         names, n = np.unique(self.kinds[self.kinds != ""], return_counts=True)

@@ -13,6 +13,7 @@ from ...errors import NotConverged
 from ...tables.names import velocity_names
 from .kinks import kinks
 from .rest import Rest
+from .shaky import refuse_shaky
 from .stability import stability
 
 NEWTON, DESCENT = 40, 400  # steps
@@ -25,7 +26,13 @@ SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where d
 
 
 def newton(x: Rest) -> Rest | None:
-    """Newton's method with steps of limited length; None where it does not settle."""
+    """Newton's method with steps of limited length; None where it does not settle.
+
+    Raises
+    ------
+    SingularityError
+        If it ends in a position in which no finite reactions carry the load.
+    """
     for _ in range(NEWTON):
         step, lam = x.step()
         longest = np.abs(step).max(initial=0.0)
@@ -35,6 +42,7 @@ def newton(x: Rest) -> Rest | None:
         if longest < ARRIVED and x.open() <= CLOSED:
             best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
             if best.settled(BALANCED):
+                refuse_shaky(best)
                 return best
     return None
 

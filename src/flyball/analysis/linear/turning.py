@@ -113,8 +113,8 @@ def _step(x: State, at: list[int], free: list[int]) -> tuple[State, float]:
     scale = c.sizes
     e = Equations(x)
     A, left, size = _equations(e, moving, np.array(free, int), given, scale)
-    by_row = 1.0 / np.maximum(np.abs(A).max(axis=1), 1e-300)
-    by_column = 1.0 / np.maximum(np.abs(by_row[:, None] * A).max(axis=0), 1e-300)
+    by_row = 1.0 / np.maximum(np.abs(A).max(axis=1, initial=0.0), 1e-300)
+    by_column = 1.0 / np.maximum(np.abs(by_row[:, None] * A).max(axis=0, initial=0.0), 1e-300)
     step = by_column * np.linalg.lstsq(by_row[:, None] * A * by_column, -by_row * left, rcond=LEAST)[0]
     m, k, rows = len(moving), len(free), len(s.rows)
     longest = float(np.abs(step[: m + k]).max(initial=0.0))

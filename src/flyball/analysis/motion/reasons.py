@@ -75,7 +75,6 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
         of_drivers(a, clock)
         or _not_finite(a, clock)
         or _jammed(a, clock)
-        or _at_rounding(clock)
         or _locked(a, base, clock)
         or _stuck(a, clock)
     )
@@ -128,12 +127,6 @@ def _rounded(clock: ex.Clock) -> str:
         f". Rounding is the limit there: the last digits of the state change the error of a step by a tenth of it and "
         f"more, as they do close to a singular position; rtol = {clock.real[ex.RTOL]:g} asks for more than can be had"
     )
-
-
-def _at_rounding(clock: ex.Clock) -> str:
-    text = _rounded(clock)
-    t, h = clock.real[ex.T], clock.real[ex.H]
-    return f"the integration cannot go on at t = {t:.6g} s, the step width fell to {h:.3g} s{text}" if text else ""
 
 
 def of_drivers(a: Assembly, clock: ex.Clock) -> str:
@@ -281,6 +274,8 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
     t = f"t = {clock.real[ex.T]:.6g} s"
     begun = clock.count[ex.STARTED] != 0
     what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
+    if rounding := _rounded(clock):
+        return f"the integration cannot go on at {what}{rounding}"
     return (
         f"the integration cannot go on at {what}. The mechanism may lock there (a driver asks for more than its links "
         f"allow), pass a singular position that the tolerance asks to resolve (a looser rtol steps over it), or meet "
