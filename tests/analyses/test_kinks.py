@@ -167,3 +167,45 @@ def test_an_unstable_side_is_left_downhill():
     assert found.kinks == (f"Rope 'stay' has a kink at stay.length = {np.sqrt(2):.6g} m",)
     down = m.equilibrium(stable=True)
     assert down.stability == "stable"
+
+
+def pushed_together(law: str, names: str) -> fb.Mechanism:
+    """Blocks of 1 kg, each on a spring of 10 N/m and pushed by the same law of all their places."""
+    m = fb.Mechanism("blocks", planar=True, gravity=(0, 0))
+    for k, name in enumerate(names):
+        m.add(fb.Body(f"b{name}", mass=1, inertia=1, position=(0, k)))
+        m.add(fb.Translational(f"s{name}", "ground", f"b{name}", at=(0, k), axis=(1, 0)))
+        m.add(fb.Sensor(name, f"s{name}.displacement"))
+    for name in names:
+        m.add(fb.Actuator(f"f{name}", f"s{name}.displacement", force=f"-10*value + {law}"))
+    return m
+
+
+@pytest.mark.parametrize(
+    ("law", "names"),
+    [
+        ("30*max(0, min(x, y))", "xy"),
+        ("30*where(x > 0, where(y > 0, min(x, y), 0), 0)", "xy"),
+        ("15*(abs(x + y) - abs(x - y))/2", "xy"),
+        ("30*max(0, min(x, min(y, z)))", "xyz"),
+        ("6*max(0, x + y)", "xy"),
+    ],
+)
+def test_kinks_that_meet_are_followed_between_the_coordinates(law, names):
+    """Along x = y = a > 0 the force on each block leads away: 20 a, 5 a, 2 a; along x or y alone, back."""
+    m = pushed_together(law, names)
+    assert m.equilibrium().stability == "unstable"
+    for layer in LAYERS:
+        with pytest.raises(fb.SingularityError, match="has a kink at"):
+            m.modes(coordinates=layer)
+
+
+def test_kinks_that_meet_may_be_stable_or_open():
+    assert pushed_together("4*max(0, x + y)", "xy").equilibrium().stability == "stable"  # 10 > 2*4
+    with pytest.raises(fb.SingularityError, match="whether it is stable there is open"):
+        pushed_together("8*max(0, min(x, y))", "xy").equilibrium()  # no potential, and no motion that grows
+
+
+def test_what_is_smooth_all_around_has_no_kinks():
+    m = pushed_together("x*y + tanh(100*(x - y)) - 3*x*abs(x)", "xy")
+    assert m.equilibrium().kinks == ()

@@ -23,6 +23,7 @@ from ...model.model import Model
 from .curves import slopes, snapshot
 from .derivatives import STEP, Equations
 from .loads import derivative
+from .pieces import faces
 
 BESIDE = 1e-6  # the little way: of the mechanism's length, a radian, or these in a second
 TENTH = 0.1
@@ -139,6 +140,11 @@ def across(law: Law, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray
         normal = normal / np.linalg.norm(normal)
         if not any(what == w and abs(abs(normal @ n) - 1.0) < FLAT**0.5 for n, w in out):
             out.append((normal, what))
+    if not any(what != KINK for _, what in out):
+        between = faces(
+            lambda step: _value(law, at + sizes * step, sizes), len(at), BESIDE, TENTH * BESIDE, AS_MUCH, FLAT
+        )
+        out += [(n, KINK) for n in between if not any(abs(abs(n @ m) - 1.0) < FLAT**0.5 for m, _ in out)]
     return out
 
 

@@ -1,7 +1,8 @@
 """Stability where forces have kinks: every side by its own stiffness.
 
 Forces are continuous across kinks, so an equilibrium is stable if the potential rises on all sides, and unstable if it
-falls along a direction on the side where that direction leads. Sides that say neither leave it open.
+falls along a direction on the side where that direction leads. Where forces have no potential, it is unstable if a
+motion grows along a direction on its side. Sides that say neither leave it open.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from .stiffness import Stiffness, stiffness
 NEUTRAL = 1e-5  # stiffness below this part of what acts is none, the way across considered
 MANY = 6  # kinks of which all sides are looked at
 ACROSS = 2e-6  # way to a side of a kink, in radians or parts of the mechanism's length
+GROWS = 1e-4  # growth below this part of the fastest is none
 INSIDE = 1e-6  # a direction lies on a side, but for this part
 
 
@@ -43,8 +45,9 @@ def from_all_sides(x: Rest, f: Free, found: Sequence[Kink]) -> tuple[str, Stiffn
         if step is None:
             continue
         way = f.Zv @ (f.scale[f.chosen_v] * step) / x.scale
-        s = stiffness(x.moved(ACROSS * way / np.abs(own @ way).min(), 0.0 * x.lam), f)
-        kinds.append(_on_side(s, own))
+        there = x.moved(ACROSS * way / np.abs(own @ way).min(), 0.0 * x.lam)
+        s = stiffness(there, f)
+        kinds.append(_on_side(s, own, there, f))
         if least is None or s.parts.min(initial=np.inf) < least.parts.min(initial=np.inf):
             least = s
     assert least is not None
@@ -54,18 +57,44 @@ def from_all_sides(x: Rest, f: Free, found: Sequence[Kink]) -> tuple[str, Stiffn
     return kind, least
 
 
-def _on_side(s: Stiffness, normals: np.ndarray) -> str:
-    """What one side of kinks says of stability; nothing if it leaves it open."""
-    inward = normals @ s.along / np.linalg.norm(normals, axis=1)[:, None]
-    inside = (inward >= -INSIDE).all(axis=0) | (inward <= INSIDE).all(axis=0)
+def _on_side(s: Stiffness, normals: np.ndarray, x: Rest, f: Free) -> str:
+    """What one side of kinks says of stability; nothing if it leaves it open.
+
+    On a cone a quadratic form is least along a direction in which it is stationary within one of the cone's faces
+    (Kaplan 2000), so every face is asked for its own. Without a potential only a motion that stays on the side tells.
+    """
     if not s.potential:
-        return ""
-    if (inside & (s.parts < -NEUTRAL)).any():
-        return UNSTABLE
-    if (s.parts < -NEUTRAL).any():
-        return ""
-    flat = s.parts <= NEUTRAL
-    return MARGINAL if (inside & flat).any() else "" if flat.sum() > 1 else STABLE
+        return UNSTABLE if _runs_away(x, f, normals) else ""
+    said = STABLE
+    for k in range(len(normals) + 1):
+        for on in itertools.combinations(range(len(normals)), k):
+            along, parts = s.across(normals[list(on)])
+            inside = _inside(along, np.delete(normals, on, axis=0))
+            if (inside & (parts < -NEUTRAL)).any():
+                return UNSTABLE
+            if (inside & (parts <= NEUTRAL)).any():
+                said = MARGINAL
+    return said
+
+
+def _inside(along: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Which directions (nv, n), or their opposites, lead to the inside of normals, or along their border."""
+    inward = normals @ along / np.linalg.norm(normals, axis=1)[:, None]
+    return (inward >= -INSIDE).all(axis=0) | (inward <= INSIDE).all(axis=0)
+
+
+def _runs_away(x: Rest, f: Free, normals: np.ndarray) -> bool:
+    """Whether a straight motion grows that stays on a side: d e^(s t), of real s > 0 and d on the side."""
+    from scipy.linalg import eig
+
+    e = x.equations
+    r = e.at["r"]
+    M, D, K = (f.Zv.T @ X[r] @ f.Zv for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    one, none = np.eye(len(M)), np.zeros_like(M)
+    w, V = eig(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
+    grows = np.isfinite(w) & (w.real > GROWS * np.abs(w[np.isfinite(w)]).max(initial=0.0)) & (w.imag == 0.0)
+    d = f.Zv @ V[: len(M), grows].real / x.scale[:, None]
+    return bool(_inside(d / np.linalg.norm(d, axis=0), normals).any())
 
 
 def _apart(normals: Sequence[np.ndarray]) -> np.ndarray:

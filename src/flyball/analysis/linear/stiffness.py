@@ -7,10 +7,12 @@ none.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from ...numerics.rank import null_space
 from .balance import acting, stiffness_rounding
 from .free import Free
 from .rest import Rest
@@ -23,13 +25,18 @@ class Stiffness:
     """The constrained stiffness at a place, direction by direction.
 
     ``matrix`` (f, f), ``along`` (nv, f) in scaled velocities, ``parts`` (f,) of what acts, and whether it is that of a
-    ``potential``.
+    ``potential``; ``within`` is `across`.
     """
 
     matrix: np.ndarray
     along: np.ndarray
     parts: np.ndarray
     potential: bool
+    within: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]] = field(repr=False)
+
+    def across(self, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """``along`` and ``parts`` of the motions that some normals (m, nv), in scaled velocities, say nothing of."""
+        return self.within(normals)
 
 
 def stiffness(x: Rest, f: Free) -> Stiffness:
@@ -41,11 +48,18 @@ def stiffness(x: Rest, f: Free) -> Stiffness:
     unit = np.abs(K).sum(axis=1) + blur.sum(axis=1)
     unit = 1.0 / np.sqrt(np.where(unit > 0.0, unit, 1.0))
     own, blur = (unit[:, None] * X * unit for X in (K, blur))
-    w, V = np.linalg.eigh(0.5 * (own + own.T))
-    along = Z @ (unit[:, None] * V)
-    size = np.abs(along)
-    acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + (x.scale * acting(e)) @ size**2
-    real = np.abs(w) > np.einsum("ik,ij,jk->k", np.abs(V), blur, np.abs(V))
-    parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
+    acts_by = x.scale * acting(e)
+
+    def within(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        B = null_space(normals @ Z * unit) if len(normals) else np.eye(len(own))
+        w, V = np.linalg.eigh(0.5 * B.T @ (own + own.T) @ B)
+        V = B @ V
+        along = Z @ (unit[:, None] * V)
+        size = np.abs(along)
+        acts = np.einsum("ik,ik->k", size, abs(x.K) @ size) + acts_by @ size**2
+        real = np.abs(w) > np.einsum("ik,ij,jk->k", np.abs(V), blur, np.abs(V))
+        parts = np.where(real, w / np.where(acts > 0.0, acts, 1.0), 0.0)
+        return along / np.linalg.norm(along, axis=0), parts
+
     potential = bool((np.abs(own - own.T) <= NEUTRAL + 2.0 * blur).all())
-    return Stiffness(K, along / np.linalg.norm(along, axis=0), parts, potential)
+    return Stiffness(K, *within(np.zeros((0, len(Z)))), potential, within)
