@@ -209,3 +209,16 @@ def test_kinks_that_meet_may_be_stable_or_open():
 def test_what_is_smooth_all_around_has_no_kinks():
     m = pushed_together("x*y + tanh(100*(x - y)) - 3*x*abs(x)", "xy")
     assert m.equilibrium().kinks == ()
+
+
+def test_a_force_without_a_slope_is_named_where_it_is_to_rest():
+    with pytest.raises(fb.SingularityError, match=r"'-\(value\*\*2\)\*\*0.5' has a kink at push.value = 0 m"):
+        slider("-(value**2)**0.5").equilibrium()
+
+
+@pytest.mark.parametrize("points", [{"x": (0, 1, 2), "y": (0, -3, -9)}, {"x": (-2, -1, 0), "y": (9, 3, 0)}])
+def test_beyond_the_end_of_a_table_nothing_is_known(points):
+    m = slider("ended(value)", fb.Table("ended", **points, interpolation="linear"))
+    for ask in (m.equilibrium, m.modes):
+        with pytest.raises(fb.SingularityError, match=r"'ended\(value\)' has no value or no slope at push.value = 0 m"):
+            ask()

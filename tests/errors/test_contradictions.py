@@ -106,6 +106,13 @@ def test_drivers_that_disagree_later():
     assert "one asks for 2 rad/s^2 where the rest gives 4; two asks for 4 rad/s^2 where the rest gives 2" in text
 
 
+def test_drivers_that_part_slowly():
+    """They agree in all that the start looks at; it was told as a mechanism that may lock."""
+    text = refused(driven(crank(), one=("A.angle", "t"), two=("A.angle", "t + 0.1*t**3")))
+    assert "Driver 'one' and Driver 'two' both move A.angle and disagree from t = 0.00" in text
+    assert "the second derivative of their laws there is 0 and 0.001" in text
+
+
 def test_a_law_without_a_rate_at_the_start():
     text = refused(driven(crank(), one=("A.angle", "sqrt(t)")))
     assert "the law of Driver 'one' has the rate inf there" in text

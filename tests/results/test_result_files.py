@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
+import gc
 import pickle
 import random
 import re
@@ -162,6 +164,21 @@ def test_a_damaged_file_is_refused_or_tells_the_same(how: str, result: Result, t
         else:
             assert data == whole or data[-81:] != whole[-81:]  # only its checksum was hit
             assert back["slider"].x.tobytes() == expected
+
+
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")
+def test_attributes_that_cannot_be_read_leave_no_file_half_open(result: Result, tmp_path: Path) -> None:
+    """Damaged before its end was: "Exception ignored in File.close" beside the refusal."""
+    result.save(tmp_path / "r.nc")
+    data = bytearray((tmp_path / "r.nc").read_bytes())
+    del data[data.rindex(b"\nflyball SHA-256") :]
+    for at in range(96, 480, 8):
+        bad = bytearray(data)
+        bad[at] ^= 255
+        (tmp_path / "bad.nc").write_bytes(bad)
+        with contextlib.suppress(fb.ModelError):
+            fb.load_result(tmp_path / "bad.nc")
+    gc.collect()
 
 
 def rewritten(path: Path, change) -> None:

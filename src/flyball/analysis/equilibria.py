@@ -22,7 +22,7 @@ from .equilibrium import equilibrium as single
 from .equilibrium import resting
 from .linear.found import finished
 from .linear.rest import Rest
-from .linear.search import BALANCED, CLOSED, LONGEST, NEWTON, descent, failure, newton, pushed
+from .linear.search import LONGEST, NEWTON, arrived, descent, failure, newton, pushed
 from .linear.stability import stability
 from .options import Options
 from .progress import shown
@@ -30,7 +30,6 @@ from .progress import shown
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
 NEAR = 0.02  # in the same: a branch that goes on within this has not ended but is steep there
-PUSH = 1e-2  # in radians or parts of the length
 TINY = 1e-7  # steps, in radians or parts of the length, that rounding may keep from becoming shorter
 
 
@@ -141,7 +140,7 @@ class _Way:
         if halvings:
             middle = here + 0.5 * (there - here)
             return self.follow(self.follow(x, here, middle, halvings - 1), middle, there, halvings - 1)
-        return self.jump(x, there, lambda: _over(x, self.at(x, there)))
+        return self.jump(x, there, lambda: pushed(x, self.at(x, there)))
 
     def settled(self, x: Rest, value: float) -> Rest:
         """The place itself, or where it leads where it must be stable and is not."""
@@ -168,17 +167,6 @@ def _apart(x: Rest, y: Rest) -> float:
     return max(max(np.abs(a[k].p - b[k].p).max() / length, np.abs(a[k].R - b[k].R).max()) for k in a)
 
 
-def _over(x: Rest, y: Rest) -> Rest:
-    """A little way along the direction of least stiffness, to the side that the forces push to.
-
-    Just beyond a limit point forces are too small to lead out of its neighbourhood.
-    """
-    direction = stability(x).direction
-    y = y.closed()
-    side = -1.0 if float(direction @ y.r) > 0.0 else 1.0
-    return y.moved(PUSH * side * direction / np.abs(direction).max(), 0.0 * y.lam).closed()
-
-
 def _contracted(x: Rest) -> Rest | None:
     """Newton's method where it contracts from its first step on: what it finds is near; else None."""
     last = LONGEST
@@ -189,6 +177,6 @@ def _contracted(x: Rest) -> Rest | None:
         if not size <= allowed:
             return None
         x, last = x.moved(step, lam), size
-        if size <= TINY**0.5 and x.open() <= CLOSED and x.settled(BALANCED):
-            return x
+        if size <= TINY**0.5 and (best := arrived(x)):
+            return best
     return None

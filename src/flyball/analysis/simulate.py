@@ -25,7 +25,7 @@ from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
-from .motion.options import STABILIZATION, Integration, output_times
+from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
 from .progress import Tell, shown
@@ -93,6 +93,7 @@ def moved(
 def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
+    refuse_unheld(len(times), _width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
@@ -130,10 +131,16 @@ def _energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 
+def _width(a: Assembly) -> int:
+    """How many numbers are kept of each output time."""
+    s = a.compiled.structure
+    return 1 + len(a.y) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
+
+
 def run_clock(a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
     s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
-    width = 1 + len(a.y) + s.nv + len(S.row_i) + len(s.prescribed)
+    width = _width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]

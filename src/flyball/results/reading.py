@@ -63,11 +63,14 @@ def _damaged(where: str, what: str) -> ModelError:
 def _stored(path: Path) -> tuple[dict[str, Any], int]:
     """Texts and arrays of the file's own group, and their format."""
     import h5netcdf
+    import h5py
 
     try:
         if sealed(path) is False:
             raise _damaged(os.fspath(path), "what it holds does not fit the checksum at its end")
-        with h5netcdf.File(path, "r") as file:
+        with h5py.File(path, "r") as whole:
+            dict(whole.attrs)  # h5netcdf leaves a file half open that fails here
+            file = h5netcdf.File(whole, "r")
             if GROUP not in file.groups:
                 raise ModelError(f"{path} is no result of flyball (it holds no group {GROUP!r}); {REMEDY}")
             group = file.groups[GROUP]

@@ -43,7 +43,7 @@ def rounding(e: Equations) -> np.ndarray:
     spread = np.zeros(len(size))
     for other in shaken(e.state):
         np.maximum(spread, np.abs(Equations(other).block("r") - e.block("r")), out=spread)
-    part = connected(e)
+    part = _joined(e)
     most = np.zeros(len(size))
     np.maximum.at(most, part, size * np.maximum(spread, ROUNDED * acting(e)))
     return WIDER * most[part] / size
@@ -51,9 +51,23 @@ def rounding(e: Equations) -> np.ndarray:
 
 def connected(e: Equations) -> np.ndarray:
     """Numbers of the parts of the mechanism that nothing connects, for every velocity, (nv,)."""
+    return _parts(e, abs(e.by_velocity[e.at["n"]]))
+
+
+def _joined(e: Equations) -> np.ndarray:
+    """The same, where all that a constraint can act on is connected, whether it does in this position or not.
+
+    An equation may hold nothing but a multiplier that is rounding itself: what acts beside it tells of what.
+    """
+    G = e.state.c.sparse_jacobian()
+    G.data[:] = 1.0
+    return _parts(e, G)
+
+
+def _parts(e: Equations, G) -> np.ndarray:
     from scipy.sparse.csgraph import connected_components
 
-    r, G = e.at["r"], abs(e.by_velocity[e.at["n"]])
+    r = e.at["r"]
     return connected_components(abs(e.by_position[r]) + abs(e.by_acceleration[r]) + G.T @ G, directed=False)[1]
 
 

@@ -171,8 +171,8 @@ class Beside:
             max(abs(f - g), abs(middle[0])),
             float(max(np.abs(df - dg).max(), np.abs(middle[1]).max())),
             df - dg,
-            max(abs(f), abs(g), abs(h)),
-            float(max(np.abs(x).max() for x in (df, dg, dh))),
+            float(np.max(np.abs([f, g, h]))),  # nan if any is
+            float(np.max(np.abs([df, dg, dh]))),
         )
 
 

@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from ...equations.tree import retract
+from ...errors import AnalysisError
 from ..compiled import Compiled
 from .balance import acting, settled, unbalanced
 from .derivatives import Equations, State
 from .free import free
+from .kinks import kinks, refused
 from .least import least
 
 
@@ -122,8 +124,19 @@ class Rest:
         return self.lam + self.per_row * least(self.G.T, self.r)
 
     def step(self, damping: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Newton's step, scaled, and the change of multipliers; damped by so many times the identity."""
-        return self._solve(self.r, self.g, damping)
+        """Newton's step, scaled, and the change of multipliers; damped by so many times the identity.
+
+        Raises
+        ------
+        SingularityError
+            If a law has no value or no slope there.
+        """
+        try:
+            return self._solve(self.r, self.g, damping)
+        except AnalysisError:
+            if found := kinks(self.equations):
+                raise refused(found, self.t, "where it rests is open") from None
+            raise
 
     def solved(self, r: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Changes of positions along the velocities and of multipliers that make up for changes r and g."""

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import NotConverged
 from ...tables.names import velocity_names
+from .free import free
 from .kinks import kinks
 from .rest import Rest
 from .shaky import refuse_shaky
@@ -20,6 +21,7 @@ NEWTON, DESCENT = 40, 400  # steps
 ENDLESS = 15.0  # way in radians, or in the mechanism's lengths, after which nothing will hold it any more
 ARRIVED = 1e-7  # Newton's last step: the next one would be its square
 LONGEST = 0.3  # a step in radians, or parts of the mechanism's length
+PUSH = 1e-2  # in the same
 BALANCED = 1e-9  # forces left, of those that act
 CLOSED = 1e-10  # of the mechanism's length
 SOFT, HARD, STUCK = 1e-8, 1e2, 1e8  # dampings: where Newton takes over, where descent begins, where it gives up
@@ -39,18 +41,48 @@ def newton(x: Rest) -> Rest | None:
         if not np.isfinite(longest):
             return None
         x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
-        if longest < ARRIVED and x.open() <= CLOSED:
-            best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
-            if best.settled(BALANCED):
-                refuse_shaky(best)
-                return best
+        if longest < ARRIVED and (best := arrived(x)):
+            return best
     return None
 
 
-def pushed(x: Rest) -> Rest:
-    """A little way along the direction of least stiffness."""
+def arrived(x: Rest) -> Rest | None:
+    """The place itself if it is closed and all is balanced there; None if not.
+
+    Raises
+    ------
+    SingularityError
+        If no finite reactions carry the load there.
+    """
+    if not x.open() <= CLOSED:
+        return None
+    best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
+    if not best.settled(BALANCED):
+        return None
+    refuse_shaky(best)
+    return best
+
+
+def pushed(x: Rest, later: Rest | None = None) -> Rest:
+    """A little way along the direction of least stiffness.
+
+    Under later values, if given, to the side that the forces push to: just beyond a limit point they are too small to
+    lead out of its neighbourhood.
+
+    Raises
+    ------
+    NotConverged
+        If nothing is free: nothing can give way then, and no branch end.
+    """
     direction = stability(x).direction
-    return x.moved(1e-2 * direction / np.abs(direction).max(), 0.0 * x.lam).closed()
+    largest = np.abs(direction).max(initial=0.0)
+    if not largest:
+        raise failure(later or x)
+    side = 1.0
+    if later is not None:
+        x = later.closed()
+        side = -1.0 if float(direction @ x.r) > 0.0 else 1.0
+    return x.moved(PUSH * side * direction / largest, 0.0 * x.lam).closed()
 
 
 def descent(x: Rest) -> Rest | None:
@@ -83,6 +115,13 @@ def failure(x: Rest) -> NotConverged:
     names = velocity_names(x.c.structure)
     left = best.equations.block("r")
     residuals = {n.name: float(-value) for n, value in zip(names, left, strict=True)}
+    if not free(best.equations).Zv.shape[1]:
+        what = "their forces do not balance it" if x.open() <= CLOSED else "they do not close any more"
+        return NotConverged(
+            f"no equilibrium of {x.c.structure.model.name!r} was found: joints and drivers leave nothing free, and "
+            f"where the search ended {what}. Check lengths and drivers: it may be past a dead centre, or locked",
+            residuals,
+        )
     jumps = "; ".join(k.text for k in kinks(best.equations) if k.jump)
     if jumps:
         return NotConverged(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -25,7 +26,9 @@ STABILIZATION = {
     "partitioning": projection.PARTITIONING,
 }
 MOST = 10_000_000  # steps
-MOST_OUTPUTS = 100_000_000  # times; beyond, a mechanism of one body alone takes tens of gigabytes
+HELD = 2  # copies of a motion in memory while its parts are put together
+LEAST = 4  # numbers kept of each time: of one hinge
+MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
 RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
 
@@ -97,6 +100,30 @@ def projected(coordinates: str, rtol: float, atol: float, max_steps: int = MOST)
     )
 
 
+def refuse_unheld(outputs: int, width: int) -> None:
+    """Refuse more output times, of ``width`` numbers each, than the memory of this machine holds.
+
+    Raises
+    ------
+    ModelError
+        With how many bytes they take, and how many times would fit.
+    """
+    each, there = HELD * width * np.dtype(float).itemsize, _memory()
+    if outputs * each > there:
+        raise ModelError(
+            f"outputs: {outputs:,} times take {outputs * each // 2**20:,} MiB of memory or more, and this machine has "
+            f"{there // 2**20:,} MiB. Ask for fewer ({there // each:,} would fill it), or simulate in parts (start=)"
+        )
+
+
+def _memory() -> int:
+    """What this machine has [bytes]."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (AttributeError, ValueError, OSError):  # Windows does not tell
+        return MEMORY
+
+
 def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -> np.ndarray:
     """Ascending output times within the interval.
 
@@ -112,10 +139,7 @@ def output_times(t_start: float, t_end: float, outputs: int | Sequence[float]) -
     if isinstance(outputs, (int, np.integer)):
         if outputs < 2:
             raise ModelError(f"outputs must be at least 2 (start and end), got {outputs}")
-        if outputs > MOST_OUTPUTS:
-            raise ModelError(
-                f"outputs must not be more than {MOST_OUTPUTS:,}, got {outputs:,}: no memory holds so many states"
-            )
+        refuse_unheld(int(outputs), LEAST)
         return np.linspace(t_start, t_end, int(outputs))
     try:
         times = np.asarray(outputs, float)

@@ -44,6 +44,7 @@ from .residual import missed
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
 AHEAD = (1e-10, 1e-8, 1e-6)  # parts of the time span after which a law's values are looked at
 LOCKED = 1e-3  # part of the accelerations asked for that no solution of the rows leaves open
+PARTED = 1e-6  # part of a rate or second derivative by which laws of one coordinate differ that disagree
 PARTS = ("value", "rate", "second derivative")
 NOTABLE = 10.0  # times the tolerance: an error of a step from rounding that is told
 LATELY = 1e-3  # part of the time span within which rounding found to decide is why a run stopped
@@ -76,6 +77,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
         or _not_finite(a, clock)
         or _jammed(a, clock)
         or _locked(a, base, clock)
+        or _rivals(a, clock)
         or _stuck(a, clock)
     )
     return f"{name!r}: {text}. {kept}", None
@@ -131,18 +133,10 @@ def _rounded(clock: ex.Clock) -> str:
 
 def of_drivers(a: Assembly, clock: ex.Clock) -> str:
     """A driver whose law is not finite, or jumps, about now; else nothing."""
-    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
+    S, W = a.compiled.values.system, a.compiled.work
     t, span = float(clock.real[ex.T]), float(clock.real[ex.LARGEST])
     stack = np.zeros_like(W.stack)
-    laws = [
-        (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
-        for k, row in enumerate(s.rows)
-        if isinstance(row.element, Driver)
-    ]
-    laws += [
-        (s.model[name], int(S.body_i[b, BODY_LAW]), S.body_i[b, TREE] == REVOLUTE) for name, b in s.prescribed.items()
-    ]
-    for driver, law, wrapped in laws:
+    for driver, law, wrapped in _driving(a):
         with np.errstate(all="ignore"):
             before, *after = (
                 evaluate_jet(S.code, S.const, law, stack, t + d * span, W.sensed, BY_TIME) for d in (-NEAR, *AHEAD)
@@ -150,6 +144,38 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
         problem = _no_number(after) or _jump(before, after[0], NEAR * span, wrapped)
         if problem:
             return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
+    return ""
+
+
+def _driving(a: Assembly) -> list[tuple[Any, int, bool]]:
+    """Drivers, where the law of each begins, and whether whole turns count for nothing."""
+    s, S = a.compiled.structure, a.compiled.values.system
+    laws: list[tuple[Any, int, bool]] = [
+        (row.element, int(S.row_i[k, ROW_LAW]), bool(S.row_i[k, ROW_WRAP]))
+        for k, row in enumerate(s.rows)
+        if isinstance(row.element, Driver)
+    ]
+    return laws + [
+        (s.model[name], int(S.body_i[b, BODY_LAW]), bool(S.body_i[b, TREE] == REVOLUTE))
+        for name, b in s.prescribed.items()
+    ]
+
+
+def _rivals(a: Assembly, clock: ex.Clock) -> str:
+    """Two drivers of one coordinate whose laws part where the motion stopped; else nothing."""
+    S, W, t = a.compiled.values.system, a.compiled.work, float(clock.real[ex.T])
+    stack = np.zeros_like(W.stack)
+    first: dict[str, tuple[Any, tuple]] = {}
+    for driver, law, _ in _driving(a):
+        jet = evaluate_jet(S.code, S.const, law, stack, t, W.sensed, BY_TIME)
+        other, before = first.setdefault(driver.coordinate, (driver, jet))
+        for what, x, y in zip(PARTS[:0:-1], before[:0:-1], jet[:0:-1], strict=True):
+            if abs(x - y) > PARTED * max(abs(x), abs(y)):
+                return (
+                    f"{other.title} and {driver.title} both move {driver.coordinate} and disagree from "
+                    f"t = {t:.6g} s on: the {what} of their laws there is {x:.6g} and {y:.6g}. Leave out one, or make "
+                    f"their laws agree"
+                )
     return ""
 
 
