@@ -48,7 +48,7 @@ class EquilibriaOptions(Options):
 
 def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
     """Equilibria over values of a parameter, each following from the one before: see `Mechanism.equilibria`."""
-    points = checked(model, o.parameter, o.values)
+    points = checked(model, o.parameter, o.values, o.t or None, o.parameters)
     way = _Way(model, o.parameter, o.t, dict(o.parameters or {}), o.stable)
     done = EquilibriumSeries(model.name, o.parameter, points[:0], [], way.jumps)
     x: Rest | None = None
@@ -71,8 +71,18 @@ def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
     return done
 
 
-def checked(model: Model, parameter: str, values: Sequence[float] | np.ndarray) -> np.ndarray:
-    """The values as an array; refuses unknown parameters and what is no number."""
+def checked(
+    model: Model,
+    parameter: str,
+    values: Sequence[float] | np.ndarray,
+    t: float | None,
+    parameters: Mapping[str, float] | None,
+) -> np.ndarray:
+    """The values as an array; refuses unknown parameters, what is no number, and one value besides."""
+    given = t if parameter == "t" else (parameters or {}).get(parameter)
+    if given is not None:
+        where = "t" if parameter == "t" else "parameters"
+        raise ModelError(f"{parameter!r} goes through its values, so {where} cannot hold it at {given}; leave that out")
     known = [*model.parameters, "t"]
     if parameter not in known:
         raise ModelError(f"{model.name!r} has no parameter {parameter!r}{suggest(parameter, known)}; {listing(known)}")

@@ -112,7 +112,7 @@ def numbers(value: Any, name: str) -> np.ndarray:
         If it is none.
     """
     try:
-        found = np.array(value, float)
+        found = np.array(np.nan) if np.iscomplexobj(value) else np.array(value, float)
     except (TypeError, ValueError):
         found = np.array(np.nan)
     if found.ndim != 1 or not np.isfinite(found).all():

@@ -71,7 +71,7 @@ class RootLocusOptions(InstantOptions):
 
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
-    points = checked(model, o.parameter, o.values)
+    points = checked(model, o.parameter, o.values, o.t, o.parameters)
     along = equilibria(model, o.rest(points)) if o.equilibrium else None
 
     def at(place: float) -> Sample:

@@ -20,6 +20,7 @@ from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import mobility
 from .derivatives import STEP, State
+from .loads import derivative
 
 
 def snapshot(x: State, values: Values | None = None) -> Result:
@@ -56,7 +57,7 @@ def slopes(x: State, names: Sequence[str], d: Sequence[np.ndarray], values: Valu
         The mechanism's numbers, already a complex step along a parameter (for one direction).
     """
     result = _result(x, values or x.c.values, *(1j * STEP * np.asarray(part) for part in d))
-    return np.array([result.curve(name)[1].imag / STEP for name in names]).T.reshape(len(d[0]), len(names))
+    return np.array([derivative(result.curve(name)[1]) for name in names]).T.reshape(len(d[0]), len(names))
 
 
 def _sizes(x: State) -> tuple[int, int, int, int]:

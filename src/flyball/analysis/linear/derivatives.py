@@ -39,7 +39,7 @@ from ...tables.system import (
 from ...tables.values import Values, values
 from ..compiled import Compiled
 from ..motion.reasons import broken_force
-from .loads import STEP, as_complex, by_reactions, complex_tables
+from .loads import STEP, as_complex, by_reactions, complex_tables, derivative
 
 NOTICE = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
 CHUNK = 128  # directions a call
@@ -134,7 +134,7 @@ class Equations:
     def by_values(self, stepped: Values) -> np.ndarray:
         """Derivatives along a complex step of the mechanism's numbers, (width,)."""
         steps = np.zeros((1, 3 * self.state.c.structure.nv + 1), complex)
-        return self._run(steps, as_complex(stepped.system))[0].imag / STEP
+        return derivative(self._run(steps, as_complex(stepped.system))[0])
 
     def stepped(self, name: str) -> Values:
         """Numbers of the mechanism, a complex step along a parameter."""
@@ -201,7 +201,7 @@ class Equations:
             steps = np.zeros((count, 3 * nv + 1), complex)
             mine = np.flatnonzero((group >= first) & (group < first + count))
             steps[group[mine] - first, what * nv + mine] = 1j * STEP
-            found = self._run(steps).imag / STEP
+            found = derivative(self._run(steps))
             for d in mine.tolist():
                 at = seen.indices[seen.indptr[d] : seen.indptr[d + 1]]
                 x = found[group[d] - first, at]
@@ -234,7 +234,7 @@ def by_prescription(x: State, stepped: Values) -> tuple[np.ndarray, np.ndarray]:
     for b in x.c.structure.prescribed.values():
         law = int(S.body_i[b, BODY_LAW])
         f, f1, _ = evaluate_jet(S.code, S.const, law, stack, complex(x.t), np.zeros((3, 0), complex), BY_TIME)
-        out.append((-(f - S.body_x[b, OFFSET]).imag / STEP, -np.imag(f1) / STEP))
+        out.append((-derivative(f - S.body_x[b, OFFSET]), -derivative(f1)))
     found = np.array(out).reshape(-1, 2)
     return found[:, 0], found[:, 1]
 

@@ -20,7 +20,7 @@ from ...results.numbers import tuple_of
 from ...results.records import Records
 from ...tables.system import NV, V0
 from .derivatives import State
-from .loads import STEP
+from .loads import STEP, derivative
 from .reduced import Frame
 
 UNDECIDED = 1e-9  # singular values below this part of the largest leave the frame's turning open
@@ -117,7 +117,7 @@ def _of_joints(x: State, turning: np.ndarray) -> np.ndarray:
         H = _of_body(R[:, 0].real.reshape(3, 3), w.real @ x.v, turning)
         size = np.r_[np.full(3, c.values.length), np.ones(3)][:, None]
         J.append(own.real / size)
-        rate.append(own.imag / STEP / size)
+        rate.append(derivative(own) / size)
         turned.append(H @ own.real / size)
     H = np.linalg.lstsq(np.vstack(J), np.vstack(turned) - np.vstack(rate), rcond=None)[0]
     return np.where(np.abs(H) > ROUNDED * np.abs(H).max(initial=0.0), H, 0.0)

@@ -22,6 +22,7 @@ from ...model.force import CoordinateForce
 from ...model.model import Model
 from .curves import slopes, snapshot
 from .derivatives import STEP, Equations
+from .loads import derivative
 from .pieces import faces
 
 BESIDE = 1e-6  # the little way: of the mechanism's length, a radian, or these in a second
@@ -180,7 +181,7 @@ def _value(law: Law, at: np.ndarray, sizes: np.ndarray) -> tuple[float, np.ndarr
     steps = 1j * STEP * np.diag(sizes)
     with np.errstate(all="ignore"):
         found = np.array([law(at + step) for step in steps])
-    return float(found[0].real), found.imag / STEP
+    return float(found[0].real), derivative(found)
 
 
 def _laws(e: Equations, to: Sequence[str]) -> Iterator[tuple[str, str, list[str], Law]]:

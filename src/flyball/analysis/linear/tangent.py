@@ -21,7 +21,7 @@ from ...numerics.rank import TOLERANCE
 from ...tables.names import velocity_names
 from ...tables.values import Values
 from .derivatives import Equations, State
-from .loads import STEP, as_complex, by_reactions, complex_tables, refuse_undetermined
+from .loads import STEP, as_complex, by_reactions, complex_tables, derivative, refuse_undetermined
 
 
 @dataclass
@@ -52,7 +52,7 @@ class Direction:
     @staticmethod
     def derivative(x: np.ndarray) -> np.ndarray:
         """By the parameter, of numbers that carry its step."""
-        return np.imag(x) / STEP
+        return derivative(x)
 
     def along(self, x: State, dq: np.ndarray, dv: np.ndarray) -> np.ndarray:
         """Derivatives of all residuals at x along changes of positions and velocities and the parameter, (width,)."""
@@ -62,7 +62,7 @@ class Direction:
         out = np.zeros((1, self.e.width), complex)
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
         residual_kernel(self.system, self.work, complex(x.t), y, vdot, lam, steps, out)
-        return out[0].imag / STEP
+        return derivative(out[0])
 
 
 class Linear:
