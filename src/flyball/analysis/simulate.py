@@ -79,6 +79,7 @@ def moved(
         If it cannot go on; its ``result`` holds the motion up to then.
     """
     refuse_missing(begun.base, float(t_end))
+    o = o.sized(begun.base.compiled.values.length)
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
