@@ -130,5 +130,5 @@ def _drive(result: Result, driver: Driver) -> Drive:
         rate = view.angular_velocity
     else:
         rate = view.velocity[:, "xyz".index(what)]
-    unit, effort = result[driver.name].channels()["effort"]
+    unit, effort = result[driver.name].quantity("effort")
     return Drive(driver.name, driver.coordinate, unit, np.asarray(effort), np.asarray(rate))
