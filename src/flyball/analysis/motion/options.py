@@ -84,8 +84,12 @@ class Integration(Options):
                                  f"nothing")  # fmt: skip
 
     def sized(self, length: float) -> Self:
-        """With the ``atol`` of a mechanism of that length [m], if none was given."""
-        return self if self.atol is not None else dataclasses.replace(self, atol=usual_atol(self.rtol, length))
+        """With its `tolerance` as ``atol``."""
+        return dataclasses.replace(self, atol=self.tolerance(length))
+
+    def tolerance(self, length: float) -> float:
+        """The ``atol`` given, or that of a mechanism of that length [m]."""
+        return usual_atol(self.rtol, length) if self.atol is None else self.atol
 
     def choices(self) -> dict[str, Any]:
         """The choices of the integration by name, without what else was asked."""
