@@ -168,6 +168,18 @@ def accelerate(S, W, t, p, dy, factored):
 
 
 @formula
+def respond(S, W, f, gamma, x, lam):
+    """Accelerations x and multipliers that other forces and right-hand sides of the rows make at the state in W.
+
+    Prescribed velocities do not change; what that takes is left in W.vel[EFFORT].
+    """
+    for d in range(x.shape[0]):
+        W.vel[GIVEN, d] = 0.0
+    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.option[PASS] and factor(S, W) == 0:
+        solve(S, W, f, gamma, x, lam, True, REFINEMENTS)
+
+
+@formula
 def finite(dy):
     """0, or NOT_FINITE."""
     s = 0.0

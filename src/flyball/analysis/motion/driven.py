@@ -67,6 +67,12 @@ def owed_works(start: Start, clock: ex.Clock, rows: np.ndarray) -> tuple[np.ndar
 
 def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
     """Works at the times of the rows, from none at the first."""
+    known = nodes(a, clock, rows)
+    return integrals(known[:, 0], known[:, 1 + clock.accounts])[np.searchsorted(known[:, 0], rows[:, 0])]
+
+
+def nodes(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
+    """The rows, and as many between them as the integrals of powers take."""
     at = 1 + clock.accounts
     known = rows
     shortest = SHORT * (rows[-1, 0] - rows[0, 0])
@@ -79,9 +85,13 @@ def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
             break
         known = np.vstack([known, more])
         known = known[np.unique(known[:, 0], return_index=True)[1]]
-    pieces, _ = _pieces(known[:, 0], known[:, at])
-    works = np.vstack([np.zeros(len(at)), np.cumsum(pieces, axis=0)])
-    return works[np.searchsorted(known[:, 0], rows[:, 0])]
+    return known
+
+
+def integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """Integrals (n, k) of powers (n, k) over time, from none at the first."""
+    pieces, _ = _pieces(t, P)
+    return np.vstack([np.zeros(P.shape[1]), np.cumsum(pieces, axis=0)])
 
 
 def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
