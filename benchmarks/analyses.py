@@ -63,6 +63,14 @@ def main() -> None:
             lambda r: f"violation {r.health.violation:.1e}",
         ),
     ]
+    driven.inverse_dynamics(3, t_end=0.01)
+    rows.append(
+        measured(
+            "inverse dynamics, Andrews, 1000 times",
+            lambda: driven.inverse_dynamics(1000, t_end=0.03),
+            lambda r: f"drive at most {np.abs(r.efforts['drive']).max():.4g} N m",
+        )
+    )
     print(timing.table(rows, COLUMNS))
     timing.write_json(arguments.json, rows)
     assert np.isfinite([row["seconds"] for row in rows]).all()

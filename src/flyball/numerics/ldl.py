@@ -6,11 +6,16 @@ pattern of L are found once (``analyse``); the compiled part only does arithmeti
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
 
 from ..compiler.jit import formula, kernel
+from .dissection import minimum_degree, nested_dissection
+
+LARGE = 300  # unknowns from which on other orders than minimum degree are tried
+FILLED = 100.0  # and products for each unknown
 
 
 class Pattern(NamedTuple):
@@ -69,7 +74,7 @@ def ldl_solve(P, L, D, x):
 
 
 def analyse(n: int, i: np.ndarray, j: np.ndarray) -> tuple[Pattern, np.ndarray]:
-    """Minimum-degree ordering and pattern of L for a symmetric matrix with entries (i, j).
+    """Order of elimination and pattern of L for a symmetric matrix with entries (i, j).
 
     Parameters
     ----------
@@ -86,55 +91,57 @@ def analyse(n: int, i: np.ndarray, j: np.ndarray) -> tuple[Pattern, np.ndarray]:
     """
     i = np.r_[np.asarray(i, np.int64), np.arange(n)]
     j = np.r_[np.asarray(j, np.int64), np.arange(n)]
-    perm = _minimum_degree(n, i, j)
-    row, column = np.minimum(perm[i], perm[j]), np.maximum(perm[i], perm[j])
+    L = _best(n, i, j)
+    row, column = np.minimum(L.perm[i], L.perm[j]), np.maximum(L.perm[i], L.perm[j])
     keys, place = np.unique(column * n + row, return_inverse=True)
-    Ai = keys % n
     Ap = np.r_[0, np.cumsum(np.bincount(keys // n, minlength=n))].astype(np.int64)
-    return _symbolic(n, perm, Ap, Ai.astype(np.int64)), place.astype(np.int64)
+    by_row = np.argsort(L.Li, kind="stable")
+    Ri = np.repeat(np.arange(n), np.diff(L.Lp))[by_row]
+    Rp = np.r_[0, np.cumsum(np.bincount(L.Li, minlength=n))].astype(np.int64)
+    P = Pattern(L.perm, Ap, (keys % n).astype(np.int64), L.Lp, L.Li, Rp, Ri, by_row.astype(np.int64))
+    return P, place.astype(np.int64)
 
 
-def _minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    import scipy.sparse as sp
-    from scipy.sparse.linalg import splu
+class Lower(NamedTuple):
+    """An order of elimination and the pattern of L that it makes, by columns."""
 
-    if n < 3:
-        return np.arange(n, dtype=np.int64)
-    ones = sp.coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsc()
-    ones.data[:] = -1.0
-    ones.setdiag(2.0 * n)  # diagonally dominant: the trial factorisation only yields the ordering
-    lu = splu(ones.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return np.asarray(lu.perm_c, np.int64)
+    perm: np.ndarray
+    Lp: np.ndarray
+    Li: np.ndarray
+
+    @property
+    def work(self) -> float:
+        """Products of a factorisation."""
+        column = np.diff(self.Lp).astype(float)
+        return float((column * (column + 3.0)).sum() / 2.0)
 
 
-def _symbolic(n: int, perm: np.ndarray, Ap: np.ndarray, Ai: np.ndarray) -> Pattern:
-    """Rows of L through the elimination tree (Liu 1986)."""
-    parent = [-1] * n
-    mark = [-1] * n
-    rows: list[list[int]] = []
+def _best(n: int, i: np.ndarray, j: np.ndarray) -> Lower:
+    """The order that makes less work: minimum degree, or nested dissection where it might pay."""
+    L = _lower(n, i, j, minimum_degree(n, i, j))
+    if n < LARGE or L.work < FILLED * n:
+        return L
+    other = _lower(n, i, j, nested_dissection(n, i, j))
+    return other if other.work < L.work else L
+
+
+def _lower(n: int, i: np.ndarray, j: np.ndarray, perm: np.ndarray) -> Lower:
+    """Pattern of L: each column has the entries of A and of the columns whose first entry it is (Liu 1986)."""
+    row, column = np.minimum(perm[i], perm[j]), np.maximum(perm[i], perm[j])
+    order = np.argsort(row, kind="stable")
+    start = np.searchsorted(row[order], np.arange(n + 1)).tolist()
+    below = column[order].tolist()
+    children: list[list[set[int]]] = [[] for _ in range(n)]
+    columns: list[list[int]] = []
     for k in range(n):
-        mark[k] = k
-        found = []
-        for i in Ai[Ap[k] : Ap[k + 1] - 1].tolist():
-            while mark[i] != k:
-                if parent[i] == -1:
-                    parent[i] = k
-                found.append(i)
-                mark[i] = k
-                i = parent[i]
-        rows.append(sorted(found))
-    Rp = np.r_[0, np.cumsum([len(r) for r in rows])].astype(np.int64)
-    Ri = np.array([i for r in rows for i in r], np.int64)
-    Lp = np.r_[0, np.cumsum(np.bincount(Ri, minlength=n))].astype(np.int64)
-    fill = Lp[:-1].copy()
-    Li = np.zeros(len(Ri), np.int64)
-    Rx = np.zeros(len(Ri), np.int64)
-    for k, r in enumerate(rows):
-        for at, i in enumerate(r, start=Rp[k]):
-            Rx[at] = fill[i]
-            Li[fill[i]] = k
-            fill[i] += 1
-    return Pattern(perm, Ap, Ai, Lp, Li, Rp, Ri, Rx)
+        found = set(below[start[k] : start[k + 1]]).union(*children[k])
+        children[k] = []
+        found.discard(k)
+        columns.append(sorted(found))
+        if found:
+            children[columns[-1][0]].append(found)
+    Lp = np.r_[0, np.cumsum([len(c) for c in columns])].astype(np.int64)
+    return Lower(perm, Lp, np.fromiter(itertools.chain.from_iterable(columns), np.int64, Lp[-1]))
 
 
 @kernel

@@ -77,6 +77,11 @@ class Result:
         return self._states
 
     @property
+    def hints(self) -> np.ndarray:
+        """The same, but works that are not there yet are not found: for those who want turns and places only."""
+        return self._states
+
+    @property
     def final(self) -> tuple[float, np.ndarray]:
         """Time and state vector to go on from."""
         self._settle()

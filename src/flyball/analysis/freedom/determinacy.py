@@ -1,19 +1,30 @@
-"""Which reactions a motion determines, position by position: what no self-stress can change."""
+"""Which reactions a motion determines, position by position: what no self-stress can change.
+
+A mechanism that its drivers move has as many constraints too many as it has more of them than velocities, but where it
+is singular. So many dependencies are found by inverse iteration with one sparse factor a position, in a compiled loop
+(``equations/dependencies.py``); where they turn out to be more or fewer, or to be told apart only just, by singular
+values.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
+from ...equations.dependencies import dependencies
 from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...numerics.rank import parts
+from ...results.records import Records
 from ...results.result import Result
-from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
-from .jacobian import DENSE, lengths, scaled_jacobian, sparse_null_space
+from .jacobian import DENSE, SHOWN, lengths, scaled_jacobian, sparse_null_space
+from .poses import absolute_states
 from .stresses import CHANGED, self_stresses
 
 LEAST = 1e-6  # part of the largest entry of a dependency that makes a row part of it
+NONE, SURE = 1e-11, 1e-4  # singular values, of the largest, that are surely none, and surely some
 
 
 class Determinacy:
@@ -41,55 +52,98 @@ class Determinacy:
 
 def determinacy(result: Result) -> Determinacy:
     """The self-stresses at every output time of a motion."""
-    n = len(result.t)
-    out = Determinacy(n)
+    out = Determinacy(len(result.t))
     own = compiled(result.model, parameters=result.values.told, tree=result.values.structure.tree)
     base = own if not own.structure.tree else compiled(result.model, parameters=own.values.told)
-    if not len(base.structure.rows):
+    if not len(base.structure.rows) or not len(result.t):
         return out
-    found: list[tuple[int, dict[str, np.ndarray]]] = []
-    for k in range(n):
-        q, v = result.q[k].copy(), result.v[k].copy()
-        own.z = result.states[k].copy()
-        if base is not own:
-            q, v = base.take(own, result.t[k], q, v)
-        base.at(result.t[k], q, v)
-        lam, out.least[k] = _dependencies(base)
-        out.count[k] = lam.shape[1]
-        if lam.shape[1]:
-            found.append((k, _stresses(Assembly(base, result.t[k], q, v), lam, out, k)))
-    width = int(out.count.max(initial=0))
-    for k, wrenches in found:
-        for name, w in wrenches.items():
-            out.wrenches.setdefault(name, np.zeros((n, 6, width)))[k, :, : w.shape[1]] = w
+    states = absolute_states(result, own, base)
+    lam = _Along(base, states, out).found()
+    if lam.any():
+        _told(base, states, lam, out)
     return out
 
 
-def _dependencies(c: Compiled) -> tuple[np.ndarray, float]:
-    """Multipliers (nr, k) that act on nothing, at the position last evaluated; the least singular value that counts."""
-    S = c.values.system
-    nr, nv = len(S.row_i), c.structure.nv
-    if max(nr, nv) > DENSE:
+@dataclass
+class _Along:
+    """Dependencies along a motion; how many, and the least singular value that counts, are noted in ``out``."""
+
+    base: Compiled
+    states: np.ndarray
+    out: Determinacy
+
+    def found(self) -> np.ndarray:
+        """Multipliers (n, nr, most) that act on nothing; nothing where there are fewer."""
+        nr, nv = len(self.base.structure.rows), self.base.structure.nv
+        lam = np.zeros((len(self.states), nr, 0))
+        count, left, tried = max(nr - nv, 0), np.arange(len(self.states)), set[int]()
+        while len(left):
+            if count not in tried and count < min(nr, SHOWN):
+                tried.add(count)
+                sure, own = self._iterated(left, count)
+                lam = _put(lam, left[sure], own[sure])
+                left = left[~sure]
+            if len(left):
+                own = self._decomposed(left[0])
+                lam, left, count = _put(lam, left[:1], own[None]), left[1:], own.shape[1]
+        return lam
+
+    def _iterated(self, which: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Whether there are surely ``count``, and those; by the compiled loop."""
+        c = self.base
+        lam, sizes = dependencies(c.values.system, c.work, self.states[which], lengths(c), count)
+        largest, least, none = sizes.T
+        with np.errstate(invalid="ignore"):
+            sure = (least > SURE * largest) & (none < NONE * largest)
+        self.out.count[which], self.out.least[which] = count, least / largest
+        return sure, lam
+
+    def _decomposed(self, k: int) -> np.ndarray:
+        """Multipliers (nr, count) at one time, by singular values."""
+        c, nq, nv = self.base, self.base.structure.nq, self.base.structure.nv
+        t, q, v, z = np.split(self.states[k], np.cumsum([1, nq, nv]))
+        c.z = np.where(np.isnan(z), c.z, z)
+        c.at(float(t[0]), q, v)
         G, size, _ = scaled_jacobian(c)
-        return sparse_null_space(G @ G.T)[1] / np.maximum(size, 1e-300)[:, None], 1.0
-    row_p = S.row_p[: nr + 1]
-    G = np.zeros((nr, nv))
-    np.add.at(G, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[: row_p[-1]]), c.work.G[: row_p[-1]])
-    G *= lengths(c)
-    size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    p = parts(G / size[:, None])
-    return p.dependencies / size[:, None], float(p.values[-1] / p.values[0]) if p.rank else 1.0
+        size = np.maximum(size, 1e-300)
+        if max(G.shape) > DENSE:
+            own, self.out.least[k] = sparse_null_space(G @ G.T)[1], 1.0
+        else:
+            p = parts(G.toarray())
+            own, self.out.least[k] = p.dependencies, float(p.values[-1] / p.values[0]) if p.rank else 1.0
+        self.out.count[k] = own.shape[1]
+        return own / size[:, None]
 
 
-def _stresses(a: Assembly, lam: np.ndarray, out: Determinacy, k: int) -> dict[str, np.ndarray]:
-    """What self-stresses do to joints; efforts of drivers and couplings that they change are noted."""
-    s = a.compiled.structure
-    part = np.abs(lam).max(axis=1) > LEAST * np.abs(lam).max()
-    names = [name for name, rows in s.slices.items() if part[rows].any()]
-    joints = [name for name in names if not isinstance(s.model[name], (Driver, Coupling))]
-    for name in names:
-        if name not in joints:
-            out.efforts.setdefault(name, np.zeros(len(out.count), bool))[k] = True
-    wrenches = self_stresses(a, lam, joints)
-    largest = max((np.abs(w).max() for w in wrenches.values()), default=0.0)
-    return {name: w / largest for name, w in wrenches.items() if np.abs(w).max() > CHANGED * largest}
+def _put(lam: np.ndarray, which: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """``lam`` with the dependencies at some of the times, widened if need be."""
+    more = own.shape[2] - lam.shape[2]
+    lam = np.pad(lam, ((0, 0), (0, 0), (0, max(more, 0))))
+    lam[which, :, : own.shape[2]] = own
+    return lam
+
+
+def _told(base: Compiled, states: np.ndarray, lam: np.ndarray, out: Determinacy) -> None:
+    """What self-stresses do to joints; efforts of drivers and couplings that they change."""
+    s, n = base.structure, len(states)
+    largest = np.abs(lam).max(axis=2)
+    part = largest > LEAST * largest.max(axis=1, keepdims=True)
+    touched = {name: part[:, rows].any(axis=1) for name, rows in s.slices.items()}
+    joints = []
+    for name in [name for name, at in touched.items() if at.any()]:
+        if isinstance(s.model[name], (Driver, Coupling)):
+            out.efforts[name] = touched[name]
+        else:
+            joints.append(name)
+    _, q, v, z = np.split(states, np.cumsum([1, s.nq, s.nv]), axis=1)
+    records = Records(base.values, q, v, np.zeros_like(v))
+    wrenches = self_stresses(base.values, records.frame, z.T, lam, joints)
+    most = np.zeros(n)
+    for name, w in wrenches.items():
+        w[~touched[name]] = 0.0
+        np.maximum(most, np.abs(w).max(axis=(1, 2)), out=most)
+    for name, w in wrenches.items():
+        w /= np.maximum(most, 1e-300)[:, None, None]
+        w[np.abs(w).max(axis=(1, 2)) <= CHANGED] = 0.0
+        if w.any():
+            out.wrenches[name] = w

@@ -1,0 +1,113 @@
+"""Constraints that depend on one another at many states: positions through the engine's door, one sparse factor each.
+
+Rows are divided by their size and velocities counted in lengths, as everywhere where the rank of G is asked for. In
+absolute coordinates only: the factor's pattern is that of G M^-1 G^T.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiler.door import enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..numerics.integrators.clock import COUNTS, REALS, Clock, T
+from ..numerics.integrators.tableaux import tableau
+from ..numerics.ldl import ldl_factor
+from ..numerics.weakest import strongest, weakest
+from ..tables.system import DIAGONAL, V1, System, Work
+from .engine import POSITION, Sheet, engine
+
+ADDED = 1e-13  # to the diagonal, where rows of unit length have 1
+
+
+@formula
+def unit_rows(S, W, scale):
+    """Rows of unit size in W.H, of velocities counted in lengths; what they were divided by in W.row[DIAGONAL]."""
+    for k in range(S.row_i.shape[0]):
+        s = 0.0
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            W.H[e] = W.G[e] * scale[S.col_i[e]]
+            s += W.H[e] * W.H[e]
+        s = s**0.5 if s > 0.0 else 1.0
+        for e in range(S.row_p[k], S.row_p[k + 1]):
+            W.H[e] /= s
+        W.row[DIAGONAL, k] = s
+
+
+@formula
+def factor_square(S, W):
+    """Factor H H^T and a little on its diagonal; as `ldl_factor`."""
+    for e in range(W.A.shape[0]):
+        W.A[e] = 0.0
+    for e in range(S.pair_i.shape[0]):
+        i, j = S.pair_i[e, 0], S.pair_i[e, 1]
+        for k in range(S.pair_i[e, 2]):
+            W.A[S.pair_i[e, 3]] += W.H[i + k] * W.H[j + k]
+    for k in range(S.row_i.shape[0]):
+        W.A[S.ldl.Ap[S.ldl.perm[k] + 1] - 1] += ADDED
+    return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
+
+
+@formula
+def each(address, S, W, R, clock, sheet, states, scale, block, kept, out):
+    """See `dependencies_kernel`."""
+    last = block.shape[0] - 2
+    for n in range(states.shape[0]):
+        clock.real[T] = states[n, 0]
+        for i in range(clock.y.shape[1]):
+            if states[n, 1 + i] == states[n, 1 + i]:  # what is not told goes on from the state before
+                clock.y[0, i] = states[n, 1 + i]
+        enter(address, S, W, R, clock, sheet, POSITION)
+        unit_rows(S, W, scale)
+        if factor_square(S, W) != 0:
+            for i in range(3):
+                out[n, i] = np.nan
+            continue
+        out[n, 0] = strongest(S.row_p, S.col_i, W.H, block[last + 1], W.vel[V1])
+        X = block[: last + 1]
+        out[n, 1], out[n, 2] = weakest(S.ldl, W.L, W.D[0], S.row_p, S.col_i, W.H, X, W.vel[V1], W.D[2])
+        for i in range(last):
+            for k in range(S.row_i.shape[0]):
+                kept[n, k, i] = X[i, k] / W.row[DIAGONAL, k]
+
+
+@kernel
+def dependencies_kernel(address, S, W, R, clock, sheet, states, scale, block, kept, out):
+    """The weakest combinations of rows at every state; ``block`` ends with a vector for the largest singular value."""
+    each(address, held(S), held(W), held(R), held(clock), held(sheet), states, scale, block, kept, out)
+
+
+def dependencies(
+    S: System, W: Work, states: np.ndarray, scale: np.ndarray, count: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """The weakest combinations of the rows at many states, of which as many as ``count`` are to be dependencies.
+
+    Parameters
+    ----------
+    S, W : System, Work
+        In absolute coordinates, with rows.
+    states : ndarray (n, 1 + ny)
+        Times and states; nan: turns and places that are those nearest to the ones before.
+    scale : ndarray (nv,)
+        What velocities are counted in.
+    count : int
+
+    Returns
+    -------
+    multipliers : ndarray (n, nr, count)
+        What should act on nothing.
+    sizes : ndarray (n, 3)
+        The largest singular value of the rows of unit size; the least of those that are not to be dependencies; the
+        largest of those that are. nan where the rows are.
+    """
+    n, nr = len(states), len(S.row_i)
+    ny = states.shape[1] - 1
+    real, y = np.zeros(REALS), np.zeros((1, ny))
+    clock = Clock(real, np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), np.zeros(0, np.int64))
+    block = np.random.default_rng(0).standard_normal((count + 2, nr))
+    kept, out = np.zeros((n, nr, count)), np.zeros((n, 3))
+    sheet, R = Sheet(np.zeros((0, 0))), tableau("rk45")
+    address = engine.address(S, W, R, clock, sheet)
+    dependencies_kernel(address, S, W, R, clock, sheet, states, scale, block, kept, out)
+    return kept, out
