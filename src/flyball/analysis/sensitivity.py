@@ -125,6 +125,8 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
             )
     for name in o.of if o.analysis != "modes" else ():
         one(model, name)
+    if not env:
+        raise ModelError(f"{model.name!r} has no parameters to take derivatives by; give it some: parameters={{...}}")
     times = np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs"))
     rtol, atol = o.of_motion("rtol"), o.of_motion("atol")
     a = Question(

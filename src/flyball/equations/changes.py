@@ -15,6 +15,7 @@ import numpy as np
 
 from ..compiler.door import enter
 from ..compiler.jit import formula
+from ..math.scalar import absolute
 from ..tables.system import (
     BODY_LAW,
     BODY_WORK,
@@ -28,9 +29,7 @@ from ..tables.system import (
     V0,
     X_SOLVED,
 )
-from .engine import SOLVE
-from .residual import ALONG, GAPS, STEPS
-from .solve import magnitude
+from .tasks import ALONG, GAPS, SOLVE, STEPS
 from .tree import quaternion_at
 
 STEP = 1e-40  # of the parameter
@@ -236,7 +235,7 @@ def eliminate(A):
     for j in range(m):
         best = j
         for i in range(j + 1, m):
-            if magnitude(A[i, j]) > magnitude(A[best, j]):
+            if absolute(A[i, j]) > absolute(A[best, j]):
                 best = i
         for i in range(j, m + 1):
             A[j, i], A[best, i] = A[best, i], A[j, i]

@@ -22,9 +22,8 @@ from .follow import follow
 from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
 from .residual import residual
+from .tasks import ARRIVE, FOLLOW, INSPECT, INTEGRATE, MOTION, POSITION, REPORT, RESIDUAL, SOLVE, TANGENT
 from .within import ROWS, inspect
-
-POSITION, MOTION, INTEGRATE, FOLLOW, ARRIVE, REPORT, RESIDUAL, SOLVE, TANGENT, INSPECT = range(10)
 
 
 @formula
@@ -66,7 +65,9 @@ def perform(S, W, R, clock, out, task):
         at = inspect(t, clock.real[H], clock.real[SPAN], clock.count[NEXT], clock.seen, S, W)
         clock.count[NEXT], clock.real[H], clock.real[GROW] = at
         return 0
-    return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
+    if task == INTEGRATE:
+        return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
+    return 0
 
 
 class Sheet(NamedTuple):

@@ -42,11 +42,10 @@ from .dispatch import row_biases, row_values
 from .friction import reaction_loads
 from .kinematics import frame_motions, poses
 from .loads import efforts, forces, gather, inertial
-from .motion import prepare
+from .prescribed import prepare
 from .rows import measured, row_times
+from .tasks import GAPS, STEPS
 from .tree import column, motion, retract
-
-STEPS, ALONG, GAPS = range(3)
 
 
 class Bench(NamedTuple):

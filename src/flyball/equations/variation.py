@@ -19,7 +19,7 @@ from ..numerics.integrators.clock import GROW, NEXT, SPAN, H, T
 from ..numerics.integrators.explicit import advance
 from ..tables.system import BODY_LAW
 from .changes import COUNT, ENGINE, NQ, NZ, OWN, POWERS, R_, S_, SHEET, W_, change, closed, press, settle_at
-from .engine import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
+from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
 
 
 @formula

@@ -25,7 +25,7 @@ from ...numerics.integrators.tableaux import Tableau, tableau
 from ...results.health import Health
 from ...results.result import Result
 from ...tables.specs import Structure
-from ...tables.system import INVERSE, PER_COMPACT, PER_MASS, TREE_P, V0, System, Work
+from ...tables.system import BODY_TURNS, INVERSE, PER_COMPACT, PER_MASS, TREE_P, TREE_TURNS, V0, System, Work
 from ...tables.values import Values
 from ..motion.driven import integrals, nodes
 from ..motion.reasons import reason
@@ -52,10 +52,6 @@ class Changes:
         """Without the states."""
         return self.q, self.v, self.vdot, self.lam
 
-    def kept(self, which: np.ndarray) -> Changes:
-        """At some of the times."""
-        return Changes(*(x[which] for x in (*self.parts, self.z)))
-
 
 @dataclass
 class Varied:
@@ -78,10 +74,14 @@ class Varied:
         """The motion, to be read by name."""
         c, m = start.assembly.compiled, self.motion
         health = Health(True, "a motion and its changes", 0.0, 0.0, 0, 0, 0, 0, 0.0)
-        parts = (np.ascontiguousarray(x) for x in (m.q, m.v, m.z, m.vdot, m.lam))
-        out = Result(c.structure.model, c.values, self.t, *parts, health)
+        q, v, z, vdot, lam = (np.ascontiguousarray(x) for x in (m.q, m.v, m.z, m.vdot, m.lam))
+        out = Result(c.structure.model, c.values, self.t, q, v, z, vdot, lam, health)
         out.wound = start.wound
         return out
+
+
+def _silent(fraction: float, note: str = "") -> None:
+    """Tell nobody."""
 
 
 def followed(loop: Variation) -> Varied:
@@ -89,17 +89,27 @@ def followed(loop: Variation) -> Varied:
     start, clock = loop.start, loop.clock
     at = 1 + clock.accounts
     own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
-    rows, _ = run_clock(start.assembly, own, loop.R, lambda _: None, FOLLOW)
+    rows, _ = run_clock(start.assembly, own, loop.R, _silent, FOLLOW)
     if own.count[ex.STATUS] != ex.DONE:
         raise loop.stopped(own)
-    known = nodes(start.assembly, own, rows) if len(at) else rows[np.isin(rows[:, 0], clock.times)]
-    out = loop.at(known[:, 0], known[:, 1 : 1 + len(start.y)], powers=True)
+    z, n = clock.accounts - loop.nq - loop.nv, len(clock.accounts)
+
+    def powers(some: np.ndarray) -> np.ndarray:
+        found = loop.at(some[:, 0], some[:, 1 : 1 + len(start.y)])
+        return np.hstack([some[:, at], *(size * by.z[:, z] for size, by in zip(loop.sizes, found.by, strict=True))])
+
+    if n:
+        known, P = nodes(start.assembly, own, rows, powers)
+    else:
+        known = rows[np.isin(rows[:, 0], clock.times)]
+        P = known[:, at]
     kept = np.isin(known[:, 0], clock.times)
-    z = clock.accounts - loop.nq - loop.nv
-    out.motion.z[:, z] = start.y[clock.accounts] + integrals(known[:, 0], known[:, at])
-    for by in out.by:
-        by.z[:, z] = integrals(known[:, 0], by.z[:, z])
-    return Varied(out.t[kept], out.motion.kept(kept), [by.kept(kept) for by in out.by])
+    out = loop.at(known[kept, 0], known[kept, 1 : 1 + len(start.y)])
+    works = integrals(known[:, 0], P)[kept] if n else P
+    out.motion.z[:, z] = start.y[clock.accounts] + works[:, :n]
+    for k, by in enumerate(out.by):
+        by.z[:, z] = works[:, (k + 1) * n : (k + 2) * n] / loop.sizes[k]
+    return out
 
 
 class Variation:
@@ -135,11 +145,11 @@ class Variation:
             K=np.zeros((1, len(start.y))),
         )  # fmt: skip
         self.sheet = Sheet(np.zeros((4, max(self.own_width, 1))))
-        self.system, self.scratch, tables = _together(s, as_complex(S))
+        self.system, self.scratch, tables = _together(s, as_complex(S), values)
         found = np.zeros((1, self.nv + 3 * self.nr + 3 * len(s.measured)), complex)
         steps = np.zeros((1, 3 * self.nv + 1), complex)
-        some = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
-        self.bench = residual.Bench(*some, steps, found)
+        t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
+        self.bench = residual.Bench(t, y, vdot, lam, steps, found)
         self.plan = self._planned(values, tables)
         forget(c.work.stack)
 
@@ -154,11 +164,11 @@ class Variation:
             step.append(found[at] * size)
             first.append(first[-1] + len(at))
         nv, nz, rows = self.nv, self.nz, pressing(s).astype(np.int64)
-        m, found = len(rows), nv + self.nr + nv
+        m, wide = len(rows), nv + self.nr + nv
         return Plan(
             np.array([self.nq, nz, self.n, 0], np.int64), np.array(first, np.int64),
-            np.concatenate(entry).astype(np.int64), np.concatenate(step), tables.view(float), np.zeros((self.n, found)),
-            np.zeros(nv), np.zeros(self._long), np.zeros(nv), rows, np.zeros((m, found)), np.zeros((m, nz)),
+            np.concatenate(entry).astype(np.int64), np.concatenate(step), tables.view(float), np.zeros((self.n, wide)),
+            np.zeros(nv), np.zeros(self._long), np.zeros(nv), rows, np.zeros((m, wide)), np.zeros((m, nz)),
             np.zeros((m, m + 1)),
         )  # fmt: skip
 
@@ -185,14 +195,14 @@ class Variation:
             raise self.stopped(clock)
         return self._varied(np.concatenate(rows))
 
-    def at(self, t: np.ndarray, y: np.ndarray, powers: bool = False) -> Varied:
-        """Changes at states (n, width) of a motion that drivers prescribe; with powers in place of works, if wanted."""
+    def at(self, t: np.ndarray, y: np.ndarray) -> Varied:
+        """Changes at states (n, width) of a motion that drivers prescribe, with powers in place of works."""
         n = len(t)
         states = np.zeros((n, self._long))
         states[:, : self.nq + self.nv] = y[:, : self.nq + self.nv]
         z = self.nq + self.nv + 2 * self.nv * self.n
         states[:, z : z + self.nz] = y[:, self.nq + self.nv :]
-        self.plan.size[POWERS] = int(powers)
+        self.plan.size[POWERS] = 1
         clock = self._clock(np.zeros((self.n, 2 * self.nv)))._replace(times=np.ascontiguousarray(t))
         out = np.zeros((n, self.width))
         done = self._call(clock, states, out)
@@ -256,11 +266,14 @@ def _seen(s: Structure, system: System) -> list[np.ndarray]:
     return [body_x, *(getattr(system, name) for name in TABLES[1:]), work(s, system, complex).FK]
 
 
-def _together(s: Structure, system: System) -> tuple[System, Work, np.ndarray]:
+def _together(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
     """Tables and scratch in complex numbers, with all that parameters can change in one array."""
+    for x in values:  # a rotation that is none as it stands, and that a parameter changes, must be looked at
+        at = slice(TREE_TURNS, BODY_TURNS + 1)
+        system.body_x[:, at] = np.maximum(system.body_x[:, at].real, x.system.body_x[:, at].real)
     parts = _seen(s, system)
     tables = np.concatenate([x.ravel() for x in parts])
     ends = np.cumsum([0, *(x.size for x in parts)])
     views = [tables[i:j].reshape(x.shape) for i, j, x in zip(ends[:-1], ends[1:], parts, strict=True)]
-    system = system._replace(**dict(zip(TABLES, views[:-1], strict=True)))
+    system = system._replace(**dict(zip(TABLES, views[:-1], strict=True)))  # type: ignore[arg-type]
     return system, work(s, system, complex)._replace(FK=views[-1]), tables

@@ -7,6 +7,8 @@ times are added, first where they differ most.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ...equations.engine import FOLLOW, motion_kernel
@@ -70,25 +72,27 @@ def owed_works(start: Start, clock: ex.Clock, rows: np.ndarray) -> tuple[np.ndar
 
 def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
     """Works at the times of the rows, from none at the first."""
-    known = nodes(a, clock, rows)
-    return integrals(known[:, 0], known[:, 1 + clock.accounts])[np.searchsorted(known[:, 0], rows[:, 0])]
+    known, P = nodes(a, clock, rows, lambda some: some[:, 1 + clock.accounts])
+    return integrals(known[:, 0], P)[np.searchsorted(known[:, 0], rows[:, 0])]
 
 
-def nodes(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
-    """The rows, and as many between them as the integrals of powers take."""
-    at = 1 + clock.accounts
-    known = rows
+def nodes(
+    a: Assembly, clock: ex.Clock, rows: np.ndarray, powers: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rows, and as many between them as the integrals of what ``powers`` makes of rows take; with these, (n, k)."""
+    known, P = rows, powers(rows)
     shortest = SHORT * (rows[-1, 0] - rows[0, 0])
     for _ in range(ROUNDS):
-        pieces, error = _pieces(known[:, 0], known[:, at])
+        pieces, error = _pieces(known[:, 0], P)
         allowed = ex.LOOSER * clock.real[ex.RTOL] * (clock.real[ex.LEDGER] + np.abs(pieces).sum())
         uneven = _largest(np.where(np.diff(known[:, 0]) > shortest, error, 0.0), allowed)
         more = _halfway(a, clock, known, uneven) if len(uneven) else known[:0]
         if not len(more):
             break
-        known = np.vstack([known, more])
-        known = known[np.unique(known[:, 0], return_index=True)[1]]
-    return known
+        known, P = np.vstack([known, more]), np.vstack([P, powers(more)])
+        first = np.unique(known[:, 0], return_index=True)[1]
+        known, P = known[first], P[first]
+    return known, P
 
 
 def integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
