@@ -1,7 +1,7 @@
 """Mechanisms whose drivers leave no freedom: their motion is kinematics, and works are integrals of what it takes.
 
 The compiled loop (``equations/follow.py``) gives positions, velocities, accelerations and powers at every time that it
-stops at. The powers are integrated by the polynomial through eight neighbouring times; where six say something else,
+stops at. The powers are integrated by the polynomial through eight neighbouring times; where seven say something else,
 times are added, first where they differ most.
 """
 
@@ -19,7 +19,7 @@ from ..mobility import mobility
 from .start import Start
 
 MOST = 4  # starts of the same numbers of which it is kept whether drivers hold them
-NODES, FEWER = 8, 6
+NODES, FEWER = 8, 7  # (an odd number beside an even one: at a jump the two windows do not lie alike)
 ROUNDS = 40
 CALLS = 1_000_000
 CROWDED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
