@@ -1,8 +1,8 @@
 """Mechanisms whose drivers leave no freedom: their motion is kinematics, and works are integrals of what it takes.
 
 The compiled loop (``equations/follow.py``) gives positions, velocities, accelerations and powers at every time that it
-stops at. The powers are integrated by the polynomial through eight neighbouring times; where seven say something else,
-times are added, first where they differ most.
+stops at. The powers are integrated by the polynomial through eight neighbouring times; where six or seven say something
+else, times are added, first where they differ most.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..mobility import mobility
 from .start import Start
 
 MOST = 4  # starts of the same numbers of which it is kept whether drivers hold them
-NODES, FEWER = 8, 7  # (an odd number beside an even one: at a jump the two windows do not lie alike)
+NODES, FEWER = 8, (7, 6)  # an odd number too: at a jump its windows do not lie like those of eight
 ROUNDS = 40
 CALLS = 1_000_000
 CROWDED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
@@ -112,10 +112,10 @@ def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
 
 def _pieces(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrals over every interval, (n - 1, accounts), and how much they differ from those with fewer nodes."""
-    best, other = (_quadrature(t, P, min(m, len(t))) for m in (NODES, FEWER))
-    if len(t) <= FEWER:
-        other = np.diff(t)[:, None] * 0.5 * (P[1:] + P[:-1])
-    return best, np.abs(best - other).sum(axis=1)
+    best = _quadrature(t, P, min(NODES, len(t)))
+    others = [np.diff(t)[:, None] * 0.5 * (P[1:] + P[:-1])] if len(t) <= FEWER[0] else []
+    others += [_quadrature(t, P, m) for m in FEWER if m < len(t)]
+    return best, np.max([np.abs(best - other).sum(axis=1) for other in others], axis=0)
 
 
 def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
