@@ -76,7 +76,7 @@ def begin_at(
     known(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes()
-    found = x.kept.get("begun", key, MOST, lambda: _begun(base.again(), coordinates, parameters))
+    found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters))
     a = base if found.assembly.compiled.values is x else found.assembly.again()
     if before is None:
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
