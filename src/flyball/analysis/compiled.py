@@ -113,10 +113,15 @@ class Compiled:
         """(q, v) of this mechanism in the state (t, q, v) of it in other coordinates; turns and places too."""
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        bodies = other.moving(t, q, v)
-        own = positions(self.values, bodies, hints)
+        same = other.drawn(q) and self.values.given is other.values.given
+        bodies = other.moving(t, q, v) if v.any() or not same else {}
+        own = self.values.q.copy() if same else positions(self.values, bodies, hints)
         self.at(t, own, np.zeros(self.structure.nv))
-        return own, velocities(self.values, bodies, self.work)
+        return own, velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
+
+    def drawn(self, q: np.ndarray) -> bool:
+        """Whether that is the position that is drawn, with the turns that it is drawn with."""
+        return np.array_equal(q, self.values.q) and np.array_equal(self.z, _places(self.values))
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""

@@ -19,6 +19,7 @@ from ..model.inertia import mass_properties
 from ..model.kept import Kept, bits
 from ..model.model import Model
 
+PLAIN = (float, int, str, np.float64)  # kinds of values that their text tells apart to the bit
 MOST = 4  # sets of values of the parameters that are kept
 
 
@@ -48,9 +49,17 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
         If a number makes no sense, or there is no such parameter.
     """
     model = model.snapshot()
-    env = model.environment(parameters)
+    env = _environment(model, parameters or {})
     key = bits(env), tuple(_state_of(path) for path in _files(model))
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
+
+
+def _environment(model: Model, parameters: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Values of all parameters, not to be changed."""
+    if not all(type(x) in PLAIN for x in parameters.values()):
+        return model.environment(parameters)
+    written = tuple((name, type(x), repr(x)) for name, x in parameters.items())
+    return model.kept.get("environment", written, MOST, lambda: model.environment(parameters))
 
 
 def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
