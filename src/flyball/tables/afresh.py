@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..model.body import Frame
 from ..model.coupling import Coupling
+from ..model.force import Force
+from ..model.joint import Joint
 from ..model.model import Model
 from .numbers import Numbers
 
@@ -64,5 +67,9 @@ def _ground_of(model: Model, e: Any) -> set[str]:
     if isinstance(e, Coupling):
         owners = [model.coordinate(text, e)[0] for text in e.coupled()]
         return {owner.name for owner in owners}.union(*(_ground_of(model, owner) for owner in owners))
-    ends = e.ends().values() if hasattr(e, "ends") else (e.body,) if hasattr(e, "body") else ()
+    ends: Collection[str] = ()
+    if isinstance(e, (Joint, Force)):
+        ends = e.ends().values()
+    elif isinstance(e, Frame):
+        ends = (e.body,)
     return {*ends, *(model.carrier(name, e) for name in ends)}

@@ -150,8 +150,10 @@ def _plain(A: Any) -> np.ndarray:
 def _used(A: Any) -> np.ndarray:
     """Which columns are not empty."""
     if isinstance(A, np.ndarray):
-        return A.any(axis=0)
-    return np.asarray(np.bincount(A.indices, minlength=A.shape[1]) > 0)
+        return np.asarray(A.any(axis=0))
+    used = np.zeros(A.shape[1], bool)
+    used[A.indices] = True
+    return used
 
 
 def _above(A: Any, B: Any) -> Any:
