@@ -15,7 +15,7 @@ from ...equations.engine import FOLLOW, motion_kernel
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
 from ..assembly.start import Assembly
-from ..mobility import mobility
+from ..freedom.jacobian import rank_of
 from .start import Start
 
 MOST = 4  # starts of the same numbers of which it is kept whether drivers hold them
@@ -34,7 +34,12 @@ def leaves_no_freedom(start: Start) -> bool:
         return False
     a = start.base
     x, key = a.compiled.values, (float(a.t).hex(), a.y.tobytes())
-    return x.kept.get("held", key, MOST, lambda: mobility(s.model, a.again()).freedoms == 0)
+    return x.kept.get("held", key, MOST, lambda: _rank(a) == s.nv)
+
+
+def _rank(a: Assembly) -> int:
+    a.compiled.at(a.t, a.q, a.v)
+    return rank_of(a.compiled)
 
 
 def at_outputs(clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
