@@ -92,7 +92,7 @@ AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidat
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
-    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)  # until one is made
     made = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
     original = made.__init__
 
