@@ -64,8 +64,11 @@ def scaled_jacobian(c: Compiled) -> tuple[Any, np.ndarray, np.ndarray]:
 
 def rank_of(c: Compiled) -> int:
     """Rank of the Jacobian last evaluated."""
-    G = scaled_jacobian(c)[0]
-    return G.shape[0] - sparse_null_space(G @ G.T)[0] if max(G.shape) > DENSE else rank(G.toarray())
+    if max(len(c.structure.rows), c.structure.nv) > DENSE:
+        G = scaled_jacobian(c)[0]
+        return G.shape[0] - sparse_null_space(G @ G.T)[0]
+    G = c.jacobian() * lengths(c)
+    return rank(G / np.maximum(np.sqrt((G * G).sum(axis=1, keepdims=True)), 1e-300))
 
 
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
