@@ -12,8 +12,6 @@ from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
-from .table import table_class
-
 
 @contextmanager
 def quickly() -> Iterator[None]:
@@ -110,14 +108,14 @@ def _remembered(original: Any) -> Any:
     from numba.core.targetconfig import ConfigStack
 
     found: dict[Any, Any] = {}
-    valued = types.Number, types.Boolean, table_class()
+    numbers = types.Number, types.Boolean
 
     def resolve(self: Any, func: Any, args: Any, kws: Any) -> Any:
         known = func.typing_key if type(func) is types.Function else func
         operator = getattr(known, "__module__", None) == "_operator"
         if kws or not (operator or known is not func):
             return original(self, func, args, kws)
-        if operator and isinstance(args[0], valued):
+        if operator and (isinstance(args[0], numbers) or getattr(args[0], "is_table", False)):
             args = tuple(types.unliteral(x) for x in args)  # what a number's value is tells nothing of the type
         key = self, func, tuple(args), ConfigStack.top_or_none()
         signature = found.get(key)

@@ -19,11 +19,6 @@ def table_type(array: Any) -> Any:
     return _TYPES[0](array)
 
 
-def table_class() -> Any:
-    """The class of these types."""
-    return _TYPES[0]
-
-
 def parts(builder: Any, address: Any, skipped: int = 0) -> Any:
     """Read what stands at an address number by number: the optimiser splits no larger reads.
 
@@ -188,6 +183,8 @@ def _register() -> None:
 
     class Table(types.Type):
         """An array by its address."""
+
+        is_table = True
 
         def __init__(self, array: Any) -> None:
             self.array, self.dtype, self.ndim = array, array.dtype, array.ndim

@@ -103,6 +103,9 @@ def element(cls: T) -> T:
             raise ModelError(_explain(cls.__name__, made, args, kwargs, error)) from None
         except TypeError as error:
             raise ModelError(f"{cls.__name__}: {error}") from None
+        finally:
+            if made.__init__ is not __init__:  # the first one made: pydantic has put its own there
+                made.__init__ = __init__  # type: ignore[misc, method-assign]
 
     __init__.__doc__ = original.__doc__
     __init__.__signature__ = _signature(made)  # type: ignore[attr-defined]
