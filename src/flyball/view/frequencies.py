@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from ..results.linear import LinearModel
 
 POINTS = 500
+SLOWEST = 10  # poles of a large model that are shown
 DECADES = 8.0  # at most
 NONE = 1e-7  # of the largest pole or zero: below, it is at the origin
 SAME = 1e-6  # a pole and a zero nearer than this, of their distance from the origin, cancel
@@ -19,7 +20,10 @@ SHARPEST = 1e-4  # damping ratio of resonances: sharper ones are drawn as if the
 
 def frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndarray:
     """Angular frequencies [rad/s], a decade beyond poles and zeros of (input, output) pairs, closer at resonances."""
-    roots = np.concatenate([np.concatenate(roots_of(model, *pair)) for pair in pairs])
+    if model.large:
+        roots = model.descriptor.nearest(SLOWEST)
+    else:
+        roots = np.concatenate([np.concatenate(roots_of(model, *pair)) for pair in pairs])
     size = np.abs(roots)
     roots = roots[size > NONE * size.max(initial=0.0)]
     size = np.abs(roots) if len(roots) else np.ones(1)
@@ -51,8 +55,14 @@ def phase(model: LinearModel, input: str, output: str, omega: np.ndarray, respon
     """Phase [rad] of a response, without jumps; it begins between -pi and pi.
 
     Every pole and zero contributes an angle that changes evenly with frequency, so that turns are known however sharp
-    a resonance is. Roots on the imaginary axis count as damped.
+    a resonance is. Roots on the imaginary axis count as damped. Of a large model they are not known, and the phase
+    changes by less than half a turn from one frequency to the next.
     """
+    if model.large:
+        known = np.isfinite(response) & (np.abs(response) > 0.0)
+        out = np.where(known, np.angle(response), np.nan)
+        out[known] = np.unwrap(out[known])
+        return out
     zeros, poles = roots_of(model, input, output)
     largest = max(np.abs(zeros).max(initial=0.0), np.abs(poles).max(initial=0.0))
     turned = np.zeros(len(omega))

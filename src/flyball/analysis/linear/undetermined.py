@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...errors import ModelError
-from ...numerics.rank import parts
-from ..freedom.jacobian import lengths
+from ...numerics.sparse_rank import null_spaces
+from ..freedom.jacobian import scaled_jacobian
 from ..freedom.stresses import CHANGED
 from .curves import slopes, snapshot
 from .derivatives import State
@@ -29,13 +29,16 @@ def refuse_undetermined(x: State, names: Sequence[str]) -> None:
     ModelError
         Naming the first of them, and the elements that share what is not determined.
     """
+    import scipy.sparse as sp
+
     s = x.c.structure
     if not names or not len(s.rows):
         return
     x.c.at(x.t, x.q, x.v)
-    G = np.vstack([x.c.jacobian(), prescribed(x.c)]) * lengths(x.c)
-    size = np.maximum(np.sqrt((G * G).sum(axis=1)), 1e-300)
-    free = (parts(G / size[:, None]).dependencies / size[:, None]).T
+    own, size, scale = scaled_jacobian(x.c)
+    size = np.maximum(np.r_[size, scale[prescribed(x.c).argmax(axis=1)]], 1e-300)
+    G = sp.vstack([own, prescribed(x.c)]).tocsr()
+    free = (null_spaces(G)[1] / size[:, None]).T
     if not len(free):
         return
     still = np.zeros((len(free), s.nv))
