@@ -86,7 +86,6 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     if not is_large(x):
         return _small(x, o, named)
     whole = Large.at(x, o.frozen, _parameters(named))
-    refuse_undetermined(x, o.outputs)
     later = partial(_state_space_of, model.snapshot(), o)
     return _told(whole.e, named, o.outputs, later, descriptor_of_large(whole, named, o.outputs), None)
 

@@ -82,16 +82,21 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
     whole = Large.at(x, frozen)
     p = whole.pencil
     w, X, residual = p.nearest(count + FEW)  # more: of pairs and rigid motions one is listed
-    still = np.abs(w) <= STILL * p.fastest
-    rigid = span(np.hstack([X[:, still].real, X[:, still].imag]), TINY)
-    w, X = w[~still], X[:, ~still]
-    one = np.flatnonzero(w.imag >= -ROUNDED * np.abs(w))
-    values = np.r_[np.zeros(rigid.shape[1], complex), w[one].real + 1j * np.maximum(w[one].imag, 0.0)]
-    shapes = np.hstack([rigid, X[:, one]])[:, :count]
-    found = _made(x, values[:count], whole.scale[:, None] * shapes, p.fastest)
+    w = np.where(np.abs(w) <= STILL * p.fastest, 0.0, w)
+    w = np.where(np.abs(w.imag) <= ROUNDED * np.abs(w), w.real, w)
+    left, values, often = np.flatnonzero(w.imag >= 0.0), list[complex](), list[tuple[int, int]]()
+    shapes = [np.zeros((len(X), 0), complex)]
+    while len(left) and len(values) < count:
+        one = np.abs(w[left] - w[left[0]]) <= EQUAL * abs(w[left[0]])
+        own, left = left[one], left[~one]
+        real = w[own[0]].imag == 0.0
+        own_shapes = span(np.hstack([X[:, own].real, X[:, own].imag]) if real else X[:, own], TINY)
+        if len(own) == 1:
+            own_shapes = own_shapes[:, :1] if real else X[:, own]
+        values += [w[own].mean()] * own_shapes.shape[1]
+        often += [(len(own), own_shapes.shape[1])] * own_shapes.shape[1]
+        shapes.append(own_shapes)
+    found = _made(x, np.array(values[:count], complex), whole.scale[:, None] * np.hstack(shapes)[:, :count], p.fastest)
     found.residual = residual
-    near = np.abs(values[:, None] - values) <= EQUAL * np.abs(values)
-    zero = values == 0.0
-    found.geometric_multiplicity = np.where(zero, zero.sum(), near.sum(axis=1))[:count]
-    found.multiplicity = np.where(zero, still.sum(), near.sum(axis=1))[:count]
+    found.multiplicity, found.geometric_multiplicity = np.array(often[:count], int).reshape(-1, 2).T
     return found

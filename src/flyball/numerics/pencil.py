@@ -21,8 +21,9 @@ SHIFT = 1e-3  # of the size of the fastest motion: where eigenvalues next to 0 a
 UNDAMPED, SYMMETRIC = 1e-12, 1e-8  # parts of a matrix that are none
 FEW = 40  # freedoms up to which all eigenvalues are found
 REFINED = 2  # times that a solution is improved
+ROUNDED = 1e-14  # of the terms of a discriminant
 PASSES = 3  # solves that leave nothing of what constraints forbid
-FOUND = 1e-6  # what may be left of an eigenvector, of itself
+FOUND = 1e-6  # part of an eigenvalue's distance that rounding may have moved it by
 
 
 def saddle(P: Any, G: Any, H: Any = None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -131,9 +132,9 @@ class Pencil:
             w, X = self._symmetric(count)
         else:
             w, X = self._shifted(count, near)
+        w, X, residual = self._improved(w, X, near)
         order = np.argsort(np.round(np.abs(w - near) / self.fastest, 13), kind="stable")
-        w, X = w[order], X[:, order]
-        return w, X, self._residual(w, X, near)
+        return w[order], X[:, order], residual
 
     def allowed(self) -> np.ndarray:
         """An orthonormal basis (n, f) of what the rows allow, where that is little."""
@@ -204,18 +205,35 @@ class Pencil:
 
         return apply, z
 
-    def _residual(self, w: np.ndarray, X: np.ndarray, near: complex) -> float:
-        """What solving leaves of eigenvectors."""
-        worst = 0.0
-        if len(w):
-            apply, z = self._inverse(near)
-            for value, x in zip(w, X.T, strict=True):
-                b = np.concatenate([x, value * x]).astype(complex)
-                worst = max(worst, float(np.linalg.norm((value - z) * apply(b) - b) / np.linalg.norm(b)))
-        return worst
+    def _improved(self, w: np.ndarray, X: np.ndarray, near: complex) -> tuple[np.ndarray, np.ndarray, float]:
+        """By two solves each, which rounding at the fastest motions does not reach; and what solving leaves of them."""
+        w, X, worst = w.astype(complex), X.astype(complex), 0.0
+        apply, z = self._inverse(near)
+        for k in range(len(w)):
+            before = np.concatenate([X[:, k], w[k] * X[:, k]])
+            first = apply(before)
+            first /= np.linalg.norm(first)
+            then = apply(first)
+            inverse = np.vdot(first, then)
+            worst = max(worst, float(np.linalg.norm(then - inverse * first) / abs(inverse)))
+            x = then[: len(X)] / np.linalg.norm(then[: len(X)])
+            value = _root([np.vdot(x, A @ x) for A in (self.M, self.D, self.K)], w[k])
+            if abs(value - w[k]) <= FOUND * abs(w[k] - z):
+                w[k], X[:, k] = value, x
+        if self.conservative:
+            w = np.where(np.abs(w.imag) > np.abs(w.real), 1j * w.imag, w.real)
+        return w, X, worst
 
 
 def _pairs(squares: np.ndarray, V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Eigenvalues +-w and shapes from -w^2."""
     w = np.sqrt(-squares.astype(complex))
     return np.concatenate([w, -w]), np.hstack([V, V]).astype(complex)
+
+
+def _root(a: list[complex], near: complex) -> complex:
+    """The root of a[0] s^2 + a[1] s + a[2] next to a number; of two that rounding parts the mean."""
+    if abs(a[1] ** 2 - 4.0 * a[0] * a[2]) <= ROUNDED * abs(a[1]) ** 2:
+        return -0.5 * a[1] / a[0]
+    roots = np.roots(a)
+    return complex(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near

@@ -10,7 +10,7 @@ import numpy as np
 if TYPE_CHECKING:
     from ..results.linear import LinearModel
 
-POINTS = 500
+POINTS, FEWER = 500, 150  # of a large model
 SLOWEST = 10  # poles of a large model that are shown
 DECADES = 8.0  # at most
 NONE = 1e-7  # of the largest pole or zero: below, it is at the origin
@@ -28,9 +28,11 @@ def frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndar
     roots = roots[size > NONE * size.max(initial=0.0)]
     size = np.abs(roots) if len(roots) else np.ones(1)
     low, high = np.log10(size.min()) - 1.0, np.log10(size.max()) + 1.0
-    even = np.logspace(max(low, high - DECADES), high, POINTS)
+    even = np.logspace(max(low, high - DECADES), high, FEWER if model.large else POINTS)
     resonant = roots[(roots.imag > 0.0) & (np.abs(roots.real) < 0.5 * np.abs(roots))]
-    u = np.sinh(np.linspace(-6.0, 6.0, 42))  # even in number: the peak itself of an undamped one is infinite
+    u = np.sinh(
+        np.linspace(-6.0, 6.0, 14 if model.large else 42)
+    )  # even in number: the peak itself of an undamped one is infinite
     near = [abs(r) * (1.0 + max(abs(r.real) / abs(r), SHARPEST) * u) for r in resonant]
     tops = [np.array([r.imag]) for r in resonant if abs(r.real) > SHARPEST * abs(r)]
     every = np.concatenate([even, *near, *tops])
@@ -59,10 +61,7 @@ def phase(model: LinearModel, input: str, output: str, omega: np.ndarray, respon
     changes by less than half a turn from one frequency to the next.
     """
     if model.large:
-        known = np.isfinite(response) & (np.abs(response) > 0.0)
-        out = np.where(known, np.angle(response), np.nan)
-        out[known] = np.unwrap(out[known])
-        return out
+        return _unwrapped(response)
     zeros, poles = roots_of(model, input, output)
     largest = max(np.abs(zeros).max(initial=0.0), np.abs(poles).max(initial=0.0))
     turned = np.zeros(len(omega))
@@ -76,5 +75,25 @@ def phase(model: LinearModel, input: str, output: str, omega: np.ndarray, respon
         return own
     offset = np.nanmedian(np.angle(np.exp(1j * (own - turned))))  # the gain's sign
     out = own + 2.0 * np.pi * np.round((turned + offset - own) / (2.0 * np.pi))
-    first = out[np.isfinite(out)][0]
-    return out - 2.0 * np.pi * np.ceil((first - np.pi * (1.0 - 1e-6)) / (2.0 * np.pi))
+    return _begun(out)
+
+
+def _begun(phase: np.ndarray) -> np.ndarray:
+    """The same phase, but for whole turns, which begins between -pi and pi."""
+    first = phase[np.isfinite(phase)][:1]
+    return phase - 2.0 * np.pi * np.ceil((first - np.pi * (1.0 - 1e-6)) / (2.0 * np.pi)) if len(first) else phase
+
+
+def _unwrapped(response: np.ndarray) -> np.ndarray:
+    """Phase from one frequency to the next; by half a turn it falls at a pole, where the response is large, and rises
+    at a zero.
+    """
+    known = np.flatnonzero(np.isfinite(response) & (np.abs(response) > 0.0))
+    size, turn = np.log(np.abs(response[known])), np.angle(response[known])
+    steps = np.angle(np.exp(1j * np.diff(turn)))
+    beside = size[1:] + size[:-1] - np.r_[size[:1], size[:-2]] - np.r_[size[2:], size[-1:]]
+    half = np.abs(np.abs(steps) - np.pi) < NONE
+    steps[half] = np.where(beside[half] > 0.0, -np.pi, np.pi)
+    out = np.full(len(response), np.nan)
+    out[known] = np.cumsum(np.r_[turn[:1], steps])
+    return _begun(out)

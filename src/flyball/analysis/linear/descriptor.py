@@ -17,15 +17,18 @@ from .free import Free, prescribed, void
 from .inputs import Input
 from .large import Large, unit_rows
 from .reduced import Frame
+from .undetermined import refuse_open
 
 
 def descriptor_of_large(whole: Large, inputs: Sequence[Input], outputs: Sequence[str]) -> Descriptor:
-    """Of a large mechanism at rest."""
+    """Of a large mechanism at rest; errors as `refuse_undetermined`."""
     import scipy.sparse as sp
 
     nv = len(whole.scale)
     none = sp.csr_matrix((nv, nv))
-    return _descriptor(whole.e, whole.rows, (none, none), inputs, outputs)
+    C = gradients(whole.e.state, outputs)
+    refuse_open(whole.e.state, outputs, C)
+    return _descriptor(whole.e, whole.rows, (none, none), inputs, outputs, C)
 
 
 def descriptor(e: Equations, f: Free, frame: Frame, inputs: Sequence[Input], outputs: Sequence[str]) -> Descriptor:
@@ -39,6 +42,7 @@ def descriptor(e: Equations, f: Free, frame: Frame, inputs: Sequence[Input], out
         (sp.csr_matrix(frame.N - frame.H), sp.csr_matrix(frame.H)),
         inputs,
         outputs,
+        gradients(e.state, outputs),
     )
 
 
@@ -52,7 +56,12 @@ def _all_rows(e: Equations) -> Any:
 
 
 def _descriptor(
-    e: Equations, rows: np.ndarray, turning: tuple[Any, Any], inputs: Sequence[Input], outputs: Sequence[str]
+    e: Equations,
+    rows: np.ndarray,
+    turning: tuple[Any, Any],
+    inputs: Sequence[Input],
+    outputs: Sequence[str],
+    C: Any,
 ) -> Descriptor:
     """With those of all rows that are independent."""
     import scipy.sparse as sp
@@ -67,7 +76,7 @@ def _descriptor(
     gaps = np.where(holonomic[: len(g), None], g, n)
     gaps = np.vstack([gaps, np.zeros((G.shape[0] - len(g), len(inputs)))])
     V = sp.vstack([e.by_position[at["n"]], sp.csr_matrix((others, s.nv))]).tocsr()
-    C = gradients(e.state, outputs).tocsc()
+    C = C.tocsc()
     nv, held = s.nv, len(s.rows) + len(s.prescribed)
     kept = rows[rows < held]  # what holds a turn that means nothing has no multiplier that anything depends on
     by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])

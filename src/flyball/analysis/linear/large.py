@@ -89,13 +89,12 @@ class Large:
         import scipy.sparse as sp
 
         e = Equations(x)
-        if not frozen:
-            balanced(x, e)
         if x.c.structure.loads and feels(x, *e.complex_tables):
             raise AnalysisError(
                 f"{x.c.structure.model.name!r} has {len(x.v)} velocities, and friction that follows its joints' "
                 f"reactions; linear equations of so large a mechanism are made without such friction only"
             )
+        x.c.at(x.t, x.q, x.v)
         G, _, scale = scaled_jacobian(x.c)
         weak, vectors = weak_pivots(G @ G.T)
         if len(weak):
@@ -106,6 +105,8 @@ class Large:
         whole = sp.vstack([e.by_velocity[e.at["n"]][rows], one]).tocsr()
         found = cls(e, scale, np.r_[rows, G.shape[0] + np.arange(len(still))], whole)
         found._refuse_kinks(to)
+        if not frozen:
+            balanced(x, e)
         found._refuse_massless()
         if not frozen and timed(x.c.values.system):
             found._refuse_changing()
