@@ -10,7 +10,8 @@ import pytest
 from flyball.compiler import stamp
 from flyball.compiler.stamp import PACKAGE, stamped
 from flyball.equations.engine import engine
-from flyball.equations.residual import residual_kernel
+from flyball.equations.residual import stepped
+from flyball.equations.variation import variation_kernel
 from flyball.numerics.ldl import factor_kernel
 from tests.program.copied import Copy
 
@@ -48,13 +49,16 @@ def names_of(kernel):
 
 def test_an_edit_of_one_loop_does_not_compile_the_others():
     """A kernel's stamp covers what it imports, registries with all they find, and nothing else."""
-    of_engine, of_residual, of_factor = map(names_of, (engine, residual_kernel, factor_kernel))
+    of_engine, of_residual, of_factor = map(names_of, (engine, stepped, factor_kernel))
     explicit = "numerics/integrators/explicit.py"
     assert explicit in of_engine
     assert explicit not in of_residual | of_factor
     for shared in ("equations/rows.py", "constraints/skew.py", "forces/bushing.py", "tables/system.py", "math/vec.py"):
         assert shared in of_engine & of_residual
     assert "numerics/ldl.py" in of_engine & of_factor
+    of_variation = names_of(variation_kernel)
+    assert explicit in of_variation
+    assert not of_variation & {"equations/rows.py", "equations/loads.py", "forces/bushing.py", "equations/engine.py"}
     assert not of_factor & {"equations/rows.py", "forces/bushing.py"}
     assert not {x for x in of_engine if x.startswith(("model/", "analysis/", "joints/"))}
 

@@ -20,7 +20,7 @@ from ..tables.coordinates import BodyState, positions
 from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
-from ..tables.structure import structure
+from ..tables.structure import Choices, structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..tables.values import Values, values
 
@@ -30,9 +30,16 @@ class Compiled:
     """A compiled mechanism with scratch of its own."""
 
     values: Values
-    work: Work
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
+
+    @cached_property
+    def work(self) -> Work:
+        """Scratch of its own."""
+        w = work(self.structure, self.values.system)
+        w.option[STABILIZE] = NONE
+        w.option[PASS] = 1e-13
+        return w
 
     @property
     def structure(self) -> Structure:
@@ -43,6 +50,10 @@ class Compiled:
     def y(self) -> np.ndarray:
         """The drawn state."""
         return np.r_[self.values.q, self.values.v, self.z]
+
+    def again(self) -> Compiled:
+        """The same with scratch of its own; turns and places as here."""
+        return Compiled(self.values, self.z.copy(), self.parameters)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray, task: int = POSITION) -> tuple[int, np.ndarray]:
         """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy).
@@ -102,10 +113,15 @@ class Compiled:
         """(q, v) of this mechanism in the state (t, q, v) of it in other coordinates; turns and places too."""
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        bodies = other.moving(t, q, v)
-        own = positions(self.values, bodies, hints)
+        same = other.drawn(q) and self.values.given is other.values.given
+        bodies = other.moving(t, q, v) if v.any() or not same else {}
+        own = self.values.q.copy() if same else positions(self.values, bodies, hints)
         self.at(t, own, np.zeros(self.structure.nv))
-        return own, velocities(self.values, bodies, self.work)
+        return own, velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
+
+    def drawn(self, q: np.ndarray) -> bool:
+        """Whether that is the position that is drawn, with the turns that it is drawn with."""
+        return np.array_equal(q, self.values.q) and np.array_equal(self.z, _places(self.values))
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""
@@ -118,7 +134,12 @@ class Compiled:
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
-        return self.sparse_jacobian().toarray()
+        S = self.values.system
+        nr, row_p = len(S.row_i), S.row_p[: len(S.row_i) + 1]
+        n = row_p[-1]
+        out = np.zeros((nr, self.structure.nv))
+        np.add.at(out, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[:n]), self.work.G[:n])
+        return out
 
     def sparse_jacobian(self):
         """Sparse copy of the constraint Jacobian last evaluated."""
@@ -133,25 +154,21 @@ class Compiled:
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
         return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
 
-    def inverse_mass_root(self, movable: np.ndarray):
-        """Sparse R with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
+    def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
+        """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
 
         Missing inertias have stand-ins.
         """
-        import scipy.sparse as sp
+        return self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], movable, dense)
 
-        return (sp.diags(movable) @ self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], True)).tocsr()
-
-    def _blocks(self, column: int, translation: np.ndarray, root: bool = False):
+    def _blocks(self, column: int, translation: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
         """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table.
 
-        With ``root`` the square root of that.
+        With ``root`` the square root of that, its rows times these numbers.
         """
-        import scipy.sparse as sp
-
         S = self.values.system
         J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
-        if root:
+        if root is not None:
             if np.iscomplexobj(J):
                 raise TypeError("the root of complex inertias is not known; give real parameters")
             w, V = np.linalg.eigh(J)
@@ -166,8 +183,15 @@ class Compiled:
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
             x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel()]
-        nv = self.structure.nv
-        return sp.csr_matrix((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=(nv, nv))
+        nv, rows, columns, entries = self.structure.nv, np.concatenate(i), np.concatenate(j), np.concatenate(x)
+        entries = entries if root is None else entries * root[rows]
+        if dense:
+            out = np.zeros((nv, nv), entries.dtype)
+            out[rows, columns] = entries
+            return out
+        import scipy.sparse as sp
+
+        return sp.csr_matrix((entries, (rows, columns)), shape=(nv, nv))
 
 
 def compiled(
@@ -183,12 +207,11 @@ def compiled(
     solved: bool = True,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled, solved=solved)
-    x = values(s, parameters, held)
-    w = work(s, x.system)
-    w.option[STABILIZE] = NONE
-    w.option[PASS] = 1e-13
-    return Compiled(x, w, _places(x), dict(parameters or {}))
+    choices = Choices(
+        far=far, positions=positions, holds=tuple(holds), tree=tuple(tree), coupled=coupled, solved=solved
+    )
+    x = values(structure(model, choices), parameters, held)
+    return Compiled(x, _places(x), dict(parameters or {}))
 
 
 def _places(x: Values) -> np.ndarray:

@@ -11,7 +11,7 @@ from ..math.scalar import atan2
 from ..math.vec import cross
 from ..tables.coordinates import REST, BodyState, free_velocities, whole_turns
 from ..tables.forest import TreeJoint
-from ..tables.system import NV, PARENT, PLANAR, Q0, TREE, V0
+from ..tables.system import INERTIA, MASS, NV, PARENT, PLANAR, Q0, TREE, V0
 from ..tables.values import Values
 from .tree import column
 
@@ -53,6 +53,19 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
     return out
 
 
+def kinetic_energy(x: Values, v: np.ndarray) -> float:
+    """Kinetic energy [J] of bodies with the velocities v (nv,) of absolute coordinates."""
+    S = x.system
+    total = 0.0
+    for n, shifts, turns in ((3, 2, slice(2, 3)), (6, 3, slice(0, 3))):
+        b = np.flatnonzero(S.body_i[:, NV] == n)
+        own = v[S.body_i[b, V0, None] + np.arange(n)]
+        J = S.body_x[b, INERTIA : INERTIA + 9].reshape(-1, 3, 3)[:, turns, turns]
+        u, w = own[:, :shifts], own[:, shifts:]
+        total += S.body_x[b, MASS] @ (u * u).sum(axis=1) + np.einsum("bi,bij,bj", w, J, w)
+    return float(0.5 * total)
+
+
 def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: np.ndarray) -> None:
     """Velocities of one tree joint from the motions of the bodies on both sides."""
     S = x.system
@@ -70,6 +83,8 @@ def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: 
 
 def least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """X that makes A x - b least; of complex numbers what carries the derivative, which conjugation would not."""
+    if A.shape[1] == 1:
+        return (A.T @ b) / (A.T @ A)[0]
     x = np.linalg.lstsq(A.real, b.real, rcond=None)[0]
     if not (np.iscomplexobj(A) or np.iscomplexobj(b)):
         return x

@@ -8,7 +8,6 @@ import numpy as np
 
 from .ldl import analyse, factor_kernel
 from .rank import parts
-from .rank import rank as dense_rank
 
 DENSE = 1500  # rows or columns up to which the rank comes from a singular value decomposition
 WEAK = 1e-10  # pivots of a large matrix with unit rows below this count as zero
@@ -16,9 +15,9 @@ ADDED = 1e-13  # to the diagonal of such a matrix
 SHOWN = 64  # vectors of a large matrix' null spaces that are made
 
 
-def rank(G: Any) -> int:
-    """How many rows are independent."""
-    return G.shape[0] - len(weak_pivots(G @ G.T)[0]) if max(G.shape) > DENSE else dense_rank(G.toarray())
+def rank_by_pivots(G: Any) -> int:
+    """How many rows are independent, of a large matrix."""
+    return G.shape[0] - len(weak_pivots(G @ G.T)[0])
 
 
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:

@@ -15,6 +15,7 @@ from ..math.scalar import atan2
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
+from .afresh import Afresh
 from .forest import TreeJoint
 from .specs import FrameSpec
 from .system import Q0, V0
@@ -40,21 +41,29 @@ class BodyState:
     angle: Any = 0.0
 
 
+ALL = Afresh()
 REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
-def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None) -> np.ndarray:
+def positions(
+    x: Values,
+    bodies: Mapping[str, BodyState],
+    hints: Mapping[str, float] | None = None,
+    new: Afresh = ALL,
+) -> np.ndarray:
     """Coordinates (nq,) of the forest for bodies that are there; where these do not fit the tree joints, the nearest.
 
     ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
+    ``new``: which are found; the others are those of its tables.
     """
     s = x.structure
-    q = np.zeros(s.nq, x.system.body_x.dtype)
+    q = new.state("q", s.nq, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
     for name, b in s.place.items():
         if b in hung:
-            _read(x, hung[b], bodies, hints or {}, q)
-        elif b >= 0:
+            if new.asks(hung[b].joint):
+                _read(x, hung[b], bodies, hints or {}, q)
+        elif b >= 0 and new.asks(s.model[name]):
             d, q0 = bodies[name], s.tables["body_i"][b, Q0]
             if s.model.planar:
                 q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
@@ -63,13 +72,13 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
     return q
 
 
-def free_velocities(x: Values, bodies: Mapping[str, BodyState]) -> np.ndarray:
+def free_velocities(x: Values, bodies: Mapping[str, BodyState], new: Afresh = ALL) -> np.ndarray:
     """Velocities (nv,) of the bodies that hang on ground by FREE or PLANAR; zero along all tree joints."""
     s, body_i = x.structure, x.structure.tables["body_i"]
-    v = np.zeros(s.nv, x.system.body_x.dtype)
+    v = new.state("v", s.nv, x.system.body_x.dtype)
     hung = {t.child for t in s.tree_joints.values()}
     for name, b in s.place.items():
-        if b >= 0 and b not in hung:
+        if b >= 0 and b not in hung and new.asks(s.model[name]):
             d, v0 = bodies[name], body_i[b, V0]
             if s.model.planar:
                 v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]

@@ -7,9 +7,8 @@ multiple by the exact derivatives (a complex step). What is chosen is chosen by 
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -17,15 +16,16 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..math.scalar import absolute, maximum
-from ..model.body import GROUND, Body
+from ..model.body import GROUND
 from ..model.coupling import Coupling
-from ..model.element import resolve
-from ..model.force import BodyForce, TwoPointForce
-from ..model.geometry import vector
-from ..model.inertia import mass_properties
+from ..model.force import TwoPointForce
 from ..model.joint import Joint
+from ..model.kept import Kept, bits
+from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
 from .inertia import inverse_inertia
+from .numbers import Numbers, numbers
+from .poses import Poses
 from .specs import FrameSpec, Structure, TermSpec
 from .system import (
     BODY_P,
@@ -47,6 +47,7 @@ from .system import (
     System,
 )
 
+MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
 TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
 BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
@@ -60,10 +61,25 @@ class Values:
     system: System
     q: np.ndarray
     v: np.ndarray
-    numbers: dict[str, SimpleNamespace]
-    bodies: dict[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
+    given: Numbers
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
+    kept: Kept = field(default_factory=Kept)  # where motions of it start
+
+    @property
+    def numbers(self) -> Mapping[str, SimpleNamespace]:
+        """Element -> its fields in SI units."""
+        return self.given.of
+
+    @property
+    def bodies(self) -> Mapping[str, SimpleNamespace]:
+        """Body -> p, R, com: drawn reference frame, centre of mass in it; c: where that is drawn."""
+        return self.given.bodies
+
+    @property
+    def env(self) -> Mapping[str, Any]:
+        """Values of the parameters."""
+        return self.given.env
 
     @property
     def told(self) -> dict[str, float]:
@@ -75,7 +91,7 @@ class Values:
 def values(
     s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None
 ) -> Values:
-    """Numbers of a mechanism.
+    """Numbers of a mechanism: filled in once for each set of values, shared by all who ask, not to be changed.
 
     Parameters
     ----------
@@ -85,130 +101,57 @@ def values(
     holds : mapping, optional
         Values of the coordinates that are held (see ``structure``).
     """
-    model = s.model
-    env = model.environment(parameters)
-    numbers = {e.name: resolve(e, env) for e in model.elements()}
-    given = (*env.values(), *(holds or {}).values())
-    dtype: Any = complex if any(isinstance(x, complex) for x in given) else float
-    bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
-    for b in model.bodies:
-        bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
-    pose = Poses(s, numbers, bodies)
-    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
+    n = numbers(s.model, parameters)
+    if n.complex or any(isinstance(x, complex) for x in (holds or {}).values()):
+        return _filled(s, n, holds or {})
+    return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
+
+
+def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
+    """All tables; where some were filled in before, only the rows that depend on what is different now."""
+    if holds:
+        return _refilled(s, given, holds, Afresh())
+    first = s.kept.known("filled first")
+    x = _refilled(s, given, holds, Afresh.since(first, given, s.model))
+    if first is None and not given.complex:
+        s.kept.get("filled first", None, 1, lambda: x)
+    return x
+
+
+def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
+    model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
+    dtype: Any = complex if given.complex or any(isinstance(x, complex) for x in holds.values()) else float
+    pose = Poses(s, given)
+    frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
     length = _length(s, frame_x, bodies)
-    body_x, semidefinite = _body_x(s, bodies, frame_x, length)
-    _tree_frames(s, pose, numbers, body_x)
+    body_x = _body_x(s, bodies, frame_x, length, new)
+    _tree_frames(s, pose, numbers, body_x, new)
     const, curve_at = _constants(s, numbers, env, dtype)
-    term_x = _term_x(s, pose, numbers, holds or {}, curve_at, dtype)
+    term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
+    force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
+    semidefinite = 1.0 if body_x[:, EXCESS : EXCESS + 9].any() else 0.0
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
-        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers, dtype), t["angle_i"],
-        t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
+        t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, t["angle_i"], t["load_i"],
+         t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip
-    x = Values(s, system, np.zeros(s.nq, dtype), np.zeros(s.nv, dtype), numbers, bodies, float(length.real), pose)
+    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
-    x.q[:], x.v[:] = positions(x, drawn), free_velocities(x, drawn)
+    x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x
 
 
-def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
-    m = mass_properties(b, n, env, planar)
-    R = b.rotation(n)
-    p = vector(n.position, planar, b.name)
-    w = np.zeros(3)
-    if n.angular_velocity is not None:
-        w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
-    arm = R @ m.com
-    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
-    return SimpleNamespace(
-        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
-    )
+def _frame_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
+    for k, f in enumerate(s.frames):
+        if new.asks(f.element):
+            p, R = pose.local(f)
+            x[k, :3], x[k, 3:] = p, R.ravel()
+    return x
 
 
-class Poses:
-    """Where the frames of elements are when the mechanism is drawn."""
-
-    def __init__(self, s: Structure, numbers: dict[str, SimpleNamespace], bodies: dict[str, SimpleNamespace]) -> None:
-        self.s, self.numbers, self.bodies = s, numbers, bodies
-        self.model = s.model
-        self._found: dict[str, dict] = {}
-
-    def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
-        """Position from the body's centre of mass and rotation, in body axes."""
-        if f.element is None:
-            return np.zeros(3), np.eye(3)
-        p, R, name = self.world(f)
-        b = self.bodies[name]
-        return b.R.T @ (p - b.c), b.R.T @ R
-
-    def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
-        """Position, rotation and carrier of a frame in the drawn configuration."""
-        if f.element is None:
-            return np.zeros(3), np.eye(3), GROUND
-        e = f.element
-        n = self.numbers[e.name]
-        end = e.ends()[f.role]
-        name = self.model.carrier(end, e)
-        if isinstance(e, BodyForce):
-            p, R = self.named(end)
-            if isinstance(self.model[end], Body):
-                at = getattr(n, "at", None)
-                p = self.bodies[name].c if at is None else vector(at, self.model.planar, e.title)
-            return p, R, name
-        p, R = self._placed(e, n)[f.role] if hasattr(e, "placed") and n.at is not None else self.named(end)
-        if f.coordinate:
-            R = R @ np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}"))
-        return p, R, name
-
-    def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        if e.name not in self._found:
-            self._found[e.name] = e.placed(n, self.model.planar)
-        return self._found[e.name]
-
-    def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
-        """Drawn pose of a body's reference frame or of a named frame."""
-        if name in self.bodies:
-            return self.bodies[name].p, self.bodies[name].R
-        e = self.model[name]
-        n = self.numbers[name]
-        b = self.bodies[e.body]
-        return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
-
-    def separation(self, e: Any) -> float:
-        """Drawn distance from the first of an element's frames to the last, by way of all between."""
-        points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
-        return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
-
-    def ends(self, e: Any) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Drawn frames F and M of a joint."""
-        F, M = (self.world(FrameSpec(0, e, role))[:2] for role in "FM")
-        return F, M
-
-    def axis(self, joint: str) -> np.ndarray:
-        """Axis of a joint's angle in the world as drawn."""
-        e = self.model[joint]
-        R = self.ends(e)[0][1]
-        turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
-        return (R @ np.array(turn) if len(turn) else R)[:, 2]
-
-    def drawn(self, t: TermSpec) -> float:
-        """What a term's formula gives in the drawn configuration."""
-        poses = (self.world(self.s.frames[k]) for k in (t.F, t.M))
-        F, M = ((tuple(p), tuple(R.ravel()), *((0.0,) * 3,) * 4) for p, R, _ in poses)
-        par = (1.0, *t.formula.par[1:6], 0.0, 0.0) if KINDS[t.formula.kind].turns else (*t.formula.par[:6], 0.0, 0.0)
-        return KINDS[t.formula.kind].row(par, F, M, self.turned(t.owner), None)[0]
-
-    def turned(self, owner: Any) -> float:
-        """Angle of a body or frame in the plane as drawn, whole turns counted; 0 for joints, which begin there."""
-        if isinstance(owner, Joint) or not self.model.planar:
-            return 0.0
-        own = self.numbers[owner.name].angle
-        return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
-
-
-def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> Any:
+def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
     """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
     centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
     ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
@@ -223,36 +166,36 @@ def _reach(ways: np.ndarray) -> Any:
     return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
 
 
-def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
+def _body_x(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any, new: Afresh) -> np.ndarray:
     """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
-    nb = len(s.tables["body_i"])
-    body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
-    semidefinite = 0.0
-    of_body = [_reach(frame_x[s.tables["frame_i"] == b, :3]) for b in range(nb)]
+    body_x = new.table("body_x", (len(s.tables["body_i"]), BODY_WIDTH), frame_x.dtype)
+    moved = {f.body for f in s.frames if new.asks(f.element)}
+    rescaled = new.base is None or new.base.system.glob[-1] != length
     for name, b in s.place.items():
-        if b < 0:
+        if b < 0 or not (rescaled or b in moved or new.asks(s.model[name])):
             continue
+        reach = _reach(frame_x[s.tables["frame_i"] == b, :3])
         d = bodies[name]
         J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2)
+        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * reach**2)
         size = size if size.real > 0.0 else d.mass * length**2
         inverse, more = inverse_inertia(J, size, s.model.planar)
-        if more.any():
-            semidefinite = 1.0
         body_x[b, MASS] = d.mass
         body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
         for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
             body_x[b, at : at + 9] = A.ravel()
-    return body_x, semidefinite
+    return body_x
 
 
-def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -> None:
+def _tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray, new: Afresh) -> None:
     """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
 
     A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
     """
     for t in s.tree_joints.values():
         joint = t.joint
+        if not new.asks(joint):
+            continue
         rest = np.array(joint.rest or np.eye(3))
         (pF, RF), (pM, RM) = (pose.local(FrameSpec(0, joint, role)) for role in "FM")
         start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
@@ -289,7 +232,7 @@ def _leave_out(x: np.ndarray, kind: int) -> None:
         x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
-def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
+def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
     """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
@@ -303,13 +246,20 @@ def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) 
 
 
 def _term_x(
-    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
+    s: Structure,
+    pose: Poses,
+    holds: Mapping[str, Any],
+    curve_at: Mapping[str, int],
+    x: np.ndarray,
+    new: Afresh,
 ) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
-    x = np.zeros((len(s.terms), 8), dtype)
+    numbers = pose.numbers
     factors = {c.name: np.array(c.factors(numbers[c.name], s.model, pose.axis)) for c in s.model.couplings}
     factors = {name: f / f[0] for name, f in factors.items()}
     for k, t in enumerate(s.terms):
+        if not new.asks(t.element, t.owner):
+            continue
         x[k] = t.formula.par
         x[k, 7] = t.sign * t.formula.par[7]
         e = t.element
@@ -331,7 +281,7 @@ def _term_x(
     return x
 
 
-def _offset(t: TermSpec, numbers: dict) -> float:
+def _offset(t: TermSpec, numbers: Mapping) -> float:
     """Value of a term's coordinate as drawn."""
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
@@ -345,10 +295,11 @@ def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: Any) -> np.ndarray:
-    x = np.zeros((len(s.forces), 16), dtype)
+def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
     for k, e in enumerate(s.forces):
+        if not new.asks(e):
+            continue
         separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
-        par = e.parameters(numbers[e.name], separation)
-        x[k, : len(par)] = par
+        par = e.parameters(pose.numbers[e.name], separation)
+        x[k], x[k, : len(par)] = 0.0, par
     return x

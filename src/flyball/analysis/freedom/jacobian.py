@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...numerics.sparse_rank import rank, sparse_null_space
+from ...numerics.rank import rank
+from ...numerics.sparse_rank import DENSE, rank_by_pivots, sparse_null_space
 from ..assembly.start import Assembly
 from ..compiled import Compiled
 
@@ -58,4 +59,7 @@ def scaled_jacobian(c: Compiled) -> tuple[Any, np.ndarray, np.ndarray]:
 
 def rank_of(c: Compiled) -> int:
     """Rank of the Jacobian last evaluated."""
-    return rank(scaled_jacobian(c)[0])
+    if max(len(c.structure.rows), c.structure.nv) > DENSE:
+        return rank_by_pivots(scaled_jacobian(c)[0])
+    G = c.jacobian() * lengths(c)
+    return rank(G / np.maximum(np.sqrt((G * G).sum(axis=1, keepdims=True)), 1e-300))

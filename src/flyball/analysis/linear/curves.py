@@ -102,6 +102,32 @@ def _along(x: State, names: Sequence[str], groups: Sequence[np.ndarray], weights
     return np.concatenate(out)
 
 
+def over_time(
+    motion: Result, names: Sequence[str], values: Values, d: tuple[np.ndarray, ...], z: np.ndarray
+) -> np.ndarray:
+    """Derivatives of curves of a motion by a parameter, (n, names).
+
+    Parameters
+    ----------
+    motion : Result
+    names : sequence of str
+        Sensors, or curves of the result.
+    values : Values
+        The mechanism's numbers, a complex step along the parameter.
+    d : four arrays (n, nv), (n, nv), (n, nv), (n, multipliers)
+        Changes of positions along the velocities, of velocities, accelerations and multipliers.
+    z : ndarray (n, states)
+        Changes of works.
+    """
+    dq, dv, da, dlam = (1j * STEP * part for part in d)
+    q = motion.q.T.astype(complex)
+    retract(values.system, q, dq.T)
+    now = (np.ascontiguousarray(q.T), motion.v + dv, motion.states + 1j * STEP * z)
+    r = Result(motion.model, values, motion.t, *now, motion.vdot + da, motion.multipliers + dlam, motion.health)
+    r.wound = motion.wound
+    return derivative(np.array([r.curve(name)[1] for name in names])).T
+
+
 def _sizes(x: State) -> tuple[int, int, int, int]:
     n = len(x.v)
     return n, n, n, len(x.lam) + len(x.c.structure.prescribed)

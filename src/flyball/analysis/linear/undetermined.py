@@ -18,6 +18,13 @@ from .free import prescribed
 from .least import least
 
 
+def told_by_reactions(x: State, names: Sequence[str]) -> bool:
+    """Whether any of some curves depends on what joints and drivers carry."""
+    n = len(x.lam) + len(x.c.structure.prescribed)
+    still = np.zeros((n, x.c.structure.nv))
+    return bool(np.any(slopes(x, names, (still, still, still, np.eye(n))))) if names and n else False
+
+
 def refuse_undetermined(x: State, names: Sequence[str]) -> None:
     """Refuse curves that multipliers which act on nothing change.
 
