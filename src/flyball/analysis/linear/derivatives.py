@@ -156,8 +156,7 @@ class Equations:
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        if stepped.cold:
-            warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
+        announce()
         S, W = self._system if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
@@ -219,6 +218,12 @@ class Equations:
             return sp.csc_matrix(np.ones((self.width, s.nv), bool)), np.arange(s.nv)
         touched = sp.csc_matrix(pattern(s, self.state.c.values.system))
         return touched, grouped(touched)
+
+
+def announce(*kernels: Any) -> None:
+    """Say that the derivatives of the equations, or loops over them, are compiled first, if they are."""
+    if stepped.cold or any(k.cold for k in kernels):
+        warnings.warn(NOTICE, PerformanceNotice, stacklevel=3)
 
 
 def stepped_values(c: Compiled, name: str) -> Values:
