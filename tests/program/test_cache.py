@@ -102,3 +102,31 @@ print(json.dumps(cache_counts() | {"inverse": D[0]}))
     again = small.run(script)
     assert (again["misses"], again["inverse"]) == (1, 0.25)
     assert small.run(script)["hits"] == 1
+
+
+def test_a_file_that_cannot_be_read_now_is_left_as_it_is(tmp_path):
+    """A read error says nothing of what is in a file: the code is compiled, and the files stay for others."""
+    small = Copy(tmp_path)
+    script = """
+import numpy as np
+from numba.core import caching
+from flyball.numerics.ldl import analyse, factor_kernel
+def refuse(self, name):
+    raise PermissionError(13, "Permission denied")
+if READ:
+    caching.IndexDataCacheFile._load_index = lambda self: refuse(self, "index")
+P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
+L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
+import warnings
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
+print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for w in told]}))
+"""
+    assert small.run("READ = False" + script)["misses"] == 1
+    before = {f: f.read_bytes() for f in small.cache.rglob("*.nb?")}
+    again = small.run("READ = True" + script)
+    assert (again["misses"], again["inverse"]) == (1, 0.25)
+    assert any("cannot be kept" in text for text in again["told"])
+    assert {f: f.read_bytes() for f in small.cache.rglob("*.nb?")} == before
+    assert small.run("READ = False" + script)["hits"] == 1

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...errors import ModelError
 from ...model.model import Model
+from ...numerics.sparse_rank import sparse_null_space
 from ...tables.system import NV, V0
 from ..assembly.start import Assembly
-from .jacobian import sparse_null_space
 
 
 def massless(a: Assembly, G: Any, scale: np.ndarray) -> np.ndarray:

@@ -125,7 +125,7 @@ class Equations:
     @cached_property
     def by_reactions(self) -> np.ndarray:
         """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
-        return by_reactions(self.state, *self._system)
+        return by_reactions(self.state, *self.complex_tables)
 
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model, (width,), the state's numbers held."""
@@ -152,12 +152,13 @@ class Equations:
         return replace(c.values, system=system)
 
     @cached_property
-    def _system(self) -> tuple[System, Work]:
+    def complex_tables(self) -> tuple[System, Work]:
+        """Tables and scratch in complex numbers."""
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
         announce()
-        S, W = self._system if system is None else (system, work(self.state.c.structure, system, complex))
+        S, W = self.complex_tables if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
         out = np.zeros((len(steps), self.width), complex)
