@@ -23,7 +23,7 @@ class Poses:
     def __init__(self, s: Structure, given: Numbers) -> None:
         self.s, self.numbers, self.bodies = s, given.of, given.bodies
         self.model = s.model
-        self._found: dict[str, dict] = {}
+        self._found = given.placed
 
     def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
         """Position from the body's centre of mass and rotation, in body axes."""
