@@ -157,8 +157,7 @@ class Equations:
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        if stepped.cold:
-            warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
+        announce()
         S, W = self.complex_tables if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
@@ -218,6 +217,12 @@ def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
         return sp.csc_matrix(np.ones((width, s.nv), bool)), np.arange(s.nv)
     touched = sp.csc_matrix(pattern(s, S))
     return touched, grouped(touched)
+
+
+def announce(*kernels: Any) -> None:
+    """Say that the derivatives of the equations, or loops over them, are compiled first, if they are."""
+    if stepped.cold or any(k.cold for k in kernels):
+        warnings.warn(NOTICE, PerformanceNotice, stacklevel=3)
 
 
 def stepped_values(c: Compiled, name: str) -> Values:
