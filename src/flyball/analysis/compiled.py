@@ -158,14 +158,16 @@ class Compiled:
             J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
             translation = np.sqrt(translation)
         i, j, x = [], [], []
-        for n, used in ((3, slice(2, 3)), (6, slice(0, 3))):
+        plane = self.structure.model.planar
+        used = slice(2, 3) if plane else slice(0, 3)
+        for n in np.unique(S.body_i[:, NV]):
             b = np.flatnonzero(S.body_i[:, NV] == n)
             v0 = S.body_i[b, V0]
-            shifts, turns = np.arange(n // 3 + 1), np.arange(n // 3 + 1, n)
+            shifts, turns = np.split(np.arange(n), [2 if plane else 3])
             at = v0[:, None] + shifts
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
-            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel()]
+            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
         nv = self.structure.nv
         return sp.csr_matrix((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=(nv, nv))
 

@@ -7,6 +7,7 @@ from ..math.vec import dot, norm, scale, sub
 
 KIND = 3
 OFTEN = True
+POINTS = "FM"
 
 
 @formula

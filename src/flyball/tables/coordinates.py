@@ -17,7 +17,7 @@ from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
 from .forest import TreeJoint
 from .specs import FrameSpec
-from .system import Q0, V0
+from .system import NQ, NV, POINT, Q0, TREE, V0
 
 if TYPE_CHECKING:
     from .values import Values
@@ -56,7 +56,10 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
             _read(x, hung[b], bodies, hints or {}, q)
         elif b >= 0:
             d, q0 = bodies[name], s.tables["body_i"][b, Q0]
-            if s.model.planar:
+            if s.tables["body_i"][b, TREE] == POINT:
+                n = s.tables["body_i"][b, NQ]
+                q[q0 : q0 + n] = d.p[:n]
+            elif s.model.planar:
                 q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
             else:
                 q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
@@ -64,14 +67,17 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
 
 
 def free_velocities(x: Values, bodies: Mapping[str, BodyState]) -> np.ndarray:
-    """Velocities (nv,) of the bodies that hang on ground by FREE or PLANAR; zero along all tree joints."""
+    """Velocities (nv,) of the bodies that hang on ground by FREE, PLANAR or POINT; zero along all tree joints."""
     s, body_i = x.structure, x.structure.tables["body_i"]
     v = np.zeros(s.nv, x.system.body_x.dtype)
     hung = {t.child for t in s.tree_joints.values()}
     for name, b in s.place.items():
         if b >= 0 and b not in hung:
             d, v0 = bodies[name], body_i[b, V0]
-            if s.model.planar:
+            if body_i[b, TREE] == POINT:
+                n = body_i[b, NV]
+                v[v0 : v0 + n] = d.v[:n]
+            elif s.model.planar:
                 v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
             else:
                 v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from .specs import Structure
-from .system import ARTICULATED, PLANAR, SCHUR, SOLVER, TREE
+from .system import ARTICULATED, POINT, SCHUR, SOLVER, TREE
 
 BODY, LINK, TERM, ENTRY, ARTICULATE = 315.0, 112.0, 40.0, 28.0, 12.0
 FACTOR = 1.0  # a product of the factorisation: seen only where a forest's matrix is dense and large
@@ -20,7 +20,7 @@ def counts(s: Structure) -> dict[str, float]:
     t = s.tables
     body_i, solver = t["body_i"], t["kinds"][SOLVER]
     column = np.diff(s.ldl.Lp).astype(float)
-    free = body_i[:, TREE] <= PLANAR
+    free = body_i[:, TREE] <= POINT
     return {
         "constant": 1.0,
         "bodies": float(free.sum()),

@@ -25,7 +25,8 @@ from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.joint import Joint
 from .coordinates import BodyState, free_velocities, positions
-from .inertia import inverse_inertia
+from .inertia import STAND_IN, inverse_inertia, usual_mass
+from .points import check_centred
 from .specs import FrameSpec, Structure, TermSpec
 from .system import (
     BODY_P,
@@ -33,12 +34,15 @@ from .system import (
     BODY_TURNS,
     BODY_WIDTH,
     EXCESS,
+    EXCESS_MASS,
     INERTIA,
     INVERSE,
     MASS,
     OFFSET,
+    PER_BULK,
     PER_COMPACT,
     PER_MASS,
+    POINT,
     REVOLUTE,
     TREE,
     TREE_P,
@@ -96,6 +100,11 @@ def values(
     pose = Poses(s, numbers, bodies)
     frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
     length = _length(s, frame_x, bodies)
+    if s.points:
+        single = {s.place[name]: name for name in s.points}
+        for f, way in zip(s.frames, frame_x[:, :3], strict=True):
+            if f.body in single:
+                check_centred(model, single[f.body], f.element, way, length)
     body_x, semidefinite = _body_x(s, bodies, frame_x, length)
     _tree_frames(s, pose, numbers, body_x)
     const, curve_at = _constants(s, numbers, env, dtype)
@@ -228,19 +237,29 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tup
     nb = len(s.tables["body_i"])
     body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
     semidefinite = 0.0
+    usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
     of_body = [_reach(frame_x[s.tables["frame_i"] == b, :3]) for b in range(nb)]
     for name, b in s.place.items():
         if b < 0:
             continue
         d = bodies[name]
+        bulk = d.mass if d.mass.real > 0.0 else usual
+        more_mass = 0.0 * bulk if d.mass.real > 0.0 else STAND_IN * usual
+        body_x[b, MASS], body_x[b, EXCESS_MASS] = d.mass, more_mass
+        body_x[b, PER_MASS], body_x[b, PER_BULK] = 1.0 / (d.mass + more_mass), 1.0 / bulk
+        semidefinite = max(semidefinite, 1.0 if more_mass.real > 0.0 else 0.0)
+        if s.tables["body_i"][b, TREE] == POINT:
+            body_x[b, PER_COMPACT], body_x[b, INVERSE + 8] = body_x[b, PER_BULK], body_x[b, PER_MASS]
+            body_x[b, EXCESS + 8] = more_mass
+            body_x[b, BODY_R : BODY_R + 9] = d.R.ravel()
+            continue
         J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * of_body[b] ** 2)
-        size = size if size.real > 0.0 else d.mass * length**2
+        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, bulk * of_body[b] ** 2)
+        size = size if size.real > 0.0 else bulk * length**2
         inverse, more = inverse_inertia(J, size, s.model.planar)
         if more.any():
             semidefinite = 1.0
-        body_x[b, MASS] = d.mass
-        body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
+        body_x[b, PER_COMPACT] = 1.0 / size
         for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
             body_x[b, at : at + 9] = A.ravel()
     return body_x, semidefinite

@@ -9,7 +9,7 @@ import numpy as np
 from ...model.body import Body, Initial
 from ...model.joint import Joint
 from ...results.freedoms import FreeMotion
-from ...tables.system import NV, V0
+from ...tables.system import NV, POINT, TREE, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .jacobian import lengths
@@ -54,7 +54,12 @@ def _coordinates(a: Assembly) -> tuple[list[str], Any]:
     joints = sorted(model.joints, key=lambda j: _depth(depth, model, j))
     names = [f"{j.name}.{what}" for j in joints for what in j.measured(model.planar)]
     axes = ("angle", "x", "y") if model.planar else ("x", "y", "z")
-    names += [f"{b.name}.{what}" for b in model.bodies for what in axes]
+    names += [
+        f"{b.name}.{what}"
+        for b in model.bodies
+        for what in axes
+        if what != "angle" or b.name not in own.structure.points  # which has none
+    ]
     measuring = model.snapshot()
     measuring.initial = [Initial(name=name, value=0.0) for name in names]
     held = dict.fromkeys(names, 0.0)
@@ -120,6 +125,8 @@ def _spin(c: Compiled, b: int) -> np.ndarray:
     """Rows that give the angular velocity of a spatial body in world axes."""
     out = np.zeros((3, c.structure.nv))
     v0 = int(c.values.system.body_i[b, V0])
+    if c.values.system.body_i[b, TREE] == POINT:
+        return out
     out[:, v0 + 3 : v0 + 6] = c.work.BK[b, 3:12].reshape(3, 3)
     return out
 
@@ -138,7 +145,7 @@ def _motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMotion:
     moving = tuple(name for name, x in fast.items() if x > STILL * largest)
     if coordinate:
         return FreeMotion(coordinate, coordinate, moving, velocity)
-    name = max(moving, key=fast.__getitem__)
+    name = max((n for n in moving if n not in s.points), key=fast.__getitem__)
     own = velocity[body_i[s.place[name], V0] :][: body_i[s.place[name], NV]]
     others = f"; {', '.join(n for n in moving if n != name)} with it" if len(moving) > 1 else ""
     return FreeMotion(f"{name} {_turning(a, name, own)}{others}", "", moving, velocity)
