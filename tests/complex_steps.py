@@ -12,9 +12,9 @@ import numpy as np
 
 import flyball as fb
 from flyball.errors import ModelError
+from flyball.model.copies import CATEGORIES
 from flyball.model.element import Unit, fields_with
 from flyball.model.expressions import number
-from flyball.model.model import CATEGORIES
 from flyball.tables.specs import Structure
 from flyball.tables.system import (
     BODY_P,

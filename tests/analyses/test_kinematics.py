@@ -100,7 +100,7 @@ def test_masses_have_no_say():
             fb.Body(b.name, mass=b.mass * scale, inertia=0.0 if k else b.inertia, position=b.position, angle=b.angle)
             for b in m.bodies
         ]
-        m._names |= {b.name: b for b in m.bodies}
+        m.by_name |= {b.name: b for b in m.bodies}
         if k:
             m.add(fb.PointForce("load", "rocker", at=(0.4, 0.2), force=(1e5, 0)))
         runs.append(m.kinematics(51, t_end=1.0))

@@ -71,7 +71,7 @@ def test_reactions_in_place_of_the_joint_move_the_same(where, name):
     plane = where == "plane"
     m = two_bodies(where)
     m.bodies.clear()
-    m._names.clear()
+    m.by_name.clear()
     for b in two_bodies(where).bodies:
         _, v, w, _ = centre(one, b.name)  # assembly made the velocities consistent: start with those
         arm = one[b.name].rotation[0] @ np.pad(b.com, (0, 3 - len(b.com)))

@@ -75,7 +75,7 @@ LATER = {("JointFriction", "radius")}  # decides what the friction is about, and
 
 
 def tried(m: fb.Mechanism, kind: type, fields: dict[str, Any]) -> None:
-    trial = m.snapshot()
+    trial = m.copy()
     trial.initial = []
     (trial.add if kind is fb.Initial else trial.replace)(kind(**fields))
 

@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import flyball as fb
+from flyball.model.copies import CATEGORIES
 from flyball.model.io import loads
-from flyball.model.model import CATEGORIES
 
 BODY = '[[bodies]]\nname = "crank"\nmass = 1\ninertia = [1, 1, 1]\n'
 

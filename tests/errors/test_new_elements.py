@@ -236,7 +236,7 @@ def test_it_is_refused_and_said_why(model, case, given, message):
     with pytest.raises(fb.ModelError, match=message) as error:
         m.add(getattr(fb, kind)(**fields))
     assert f"{kind} {fields['name']!r}" in str(error.value)
-    assert "x" not in m._names
+    assert "x" not in m.by_name
 
 
 @pytest.mark.parametrize(("model", "case", "given", "message"), CASES, ids=[f"{c[0].__name__}-{c[1]}" for c in CASES])

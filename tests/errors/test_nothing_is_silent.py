@@ -31,7 +31,7 @@ def test_whole_turns_that_were_asked_for_count(planar):
     m.add(fb.Body("b", mass=1, inertia=1 if planar else (1, 1, 1)))
     m.add(fb.Revolute("J", "ground", "b", at=(0, 0) if planar else (0, 0, 0), axis=None if planar else (0, 0, 1)))
     m.add(fb.TorsionalSpringDamper("T", "J", stiffness=2.0))
-    wound = m.snapshot()
+    wound = m.copy()
     m.add(fb.Driver("d", "J.angle", "10 + t"))
     r = m.simulate(1.0)
     assert r["J"].angle == pytest.approx(10 + r.t, abs=1e-9)

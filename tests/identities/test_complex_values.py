@@ -19,7 +19,7 @@ from flyball.model.grammar import FUNCTIONS
 from flyball.model.shapes import SHAPES
 from flyball.tables.inertia import inverse_inertia
 from flyball.tables.spanning import spanning
-from flyball.tables.structure import structure
+from flyball.tables.structure import Choices, structure
 from flyball.tables.values import values
 from tests import mechanisms
 from tests.complex_steps import STEP, errors_of, tables, with_parameters
@@ -34,7 +34,7 @@ RIGHT_ANGLES = {"Universal": {"axes"}, "WheelOnLine": {"at", "axis", "centre"}} 
 def structures(m):
     """In absolute coordinates, and in joint coordinates if it has any."""
     tree = spanning(m)
-    return [structure(m), *([structure(m, tree=tree)] if tree else [])]
+    return [structure(m), *([structure(m, Choices(tree=tree))] if tree else [])]
 
 
 def check_all(m, skipped=(), refused=()):
@@ -231,7 +231,7 @@ def test_axes_along_those_of_the_world_tilt(axis, direction):
     m = fb.Mechanism("tilted", parameters={"tilt": 0.0})
     m.add(fb.Body("b", mass=1.0, inertia=(0.1, 0.2, 0.15), position=(0.3, 0.2, 0.1)))
     m.add(fb.Revolute("J", "ground", "b", at=(0, 0, 0), axis=tuple(f"{a} + {d}*tilt" for a, d in zip(axis, direction))))
-    s = structure(m, tree=("J",))
+    s = structure(m, Choices(tree=("J",)))
 
     def pose(e):
         x = tables(values(s, {"tilt": e}))["tree joint 0"]
@@ -312,7 +312,7 @@ def test_held_coordinates_may_be_complex():
     m = mechanisms.four_bar()
     hold = fb.Initial("A.angle", value=0.1)
     m.add(hold)
-    s = structure(m, holds=(hold,))
+    s = structure(m, Choices(holds=(hold,)))
     terms = values(s, None, {"A.angle": 0.1 + 1j * STEP}).system.term_x
     k = next(k for k, t in enumerate(s.terms) if t.element is hold)
     assert terms[k, 6] == pytest.approx(0.1 + 1j * STEP, rel=1e-12)

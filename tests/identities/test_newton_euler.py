@@ -12,7 +12,7 @@ import flyball as fb
 from flyball.equations.tree import column
 from flyball.math.vec import dot
 from flyball.tables.spanning import spanning
-from flyball.tables.structure import structure
+from flyball.tables.structure import Choices, structure
 from flyball.tables.system import FRAMES, GROUND_FRAMES, NV
 from tests.contract.zoo import CASES
 from tests.examples.test_examples import FILES, mechanism
@@ -134,5 +134,5 @@ def test_frames_that_are_kept_up_to_date_exist(case):
     """Those of bodies that the loops run over are no more than there are; forces without frames ask for none."""
     m = MORE[case]().snapshot()
     for tree in ((), spanning(m)):
-        t = structure(m, tree=tree).tables
+        t = structure(m, Choices(tree=tree)).tables
         assert t["kinds"][GROUND_FRAMES] <= t["kinds"][FRAMES] <= len(t["frame_i"])

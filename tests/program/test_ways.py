@@ -8,6 +8,7 @@ import pytest
 import flyball as fb
 from flyball.compiler import ways
 from flyball.compiler.link import linked_as_a_whole
+from flyball.compiler.quick import quickly
 from flyball.compiler.stamp import PACKAGE
 
 
@@ -49,9 +50,50 @@ def test_where_internals_differ_compilation_takes_the_usual_way(asked_anew, monk
 
 
 def test_nothing_stays_patched():
-    from numba.core import codegen
+    from numba.core import codegen, ir
+    from numba.core.postproc import PostProcessor
+    from numba.core.targetconfig import TargetConfig
+    from numba.core.typing.context import BaseContext
 
-    before = codegen.CPUCodeLibrary.finalize, codegen.JITCPUCodegen.set_env
-    with linked_as_a_whole("nothing"):
-        assert codegen.CPUCodeLibrary.finalize is not before[0]
-    assert (codegen.CPUCodeLibrary.finalize, codegen.JITCPUCodegen.set_env) == before
+    def patched():
+        library, target = codegen.CPUCodeLibrary, codegen.JITCPUCodegen
+        quick = TargetConfig.values, TargetConfig.__eq__, TargetConfig.__hash__, ir.Inst._rec_list_vars
+        found = BaseContext.resolve_function_type, PostProcessor.run
+        return [library.finalize, library._optimize_functions, target.set_env, *quick, *found]
+
+    before = patched()
+    with linked_as_a_whole("nothing"), quickly():
+        assert all(now is not then for now, then in zip(patched(), before, strict=True))
+    assert patched() == before
+
+
+def test_flags_and_variables_are_what_numba_itself_finds():
+    """The quick ways give the answers of the usual ones, in their order."""
+    from numba.core import compiler
+    from numba.core.compiler import Flags
+
+    def sample(a, b):
+        total = 0.0
+        for i in range(a.shape[0]):
+            x, y = (a[i], b), {"k": b}
+            total += max(x[0], x[1] * i) if i % 2 else len(y)
+        return total
+
+    body = [s for block in compiler.run_frontend(sample).blocks.values() for s in block.body]
+    flags = [Flags(), Flags(), Flags()]
+    flags[1].release_gil = False  # what it is without being set
+    flags[2].release_gil = True
+
+    def answers():
+        listed = [
+            [v.name for v in x.list_vars()]
+            for s in body
+            for x in (s, getattr(s, "value", s))
+            if hasattr(x, "list_vars")
+        ]
+        return listed, [[a == b for a in flags] for b in flags], [hash(x) for x in flags], [x.values() for x in flags]
+
+    usual = answers()
+    with quickly():
+        assert answers() == usual
+    assert answers() == usual

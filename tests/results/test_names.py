@@ -132,7 +132,7 @@ def test_unknown_attributes_get_candidates():
 
 
 def test_vectors_are_no_outputs():
-    m = flat().model
+    m = flat().model.copy()
     with pytest.raises(fb.ModelError, match=r"'A.force' has 2 components; name one: A.fx, A.fy"):
         m.sensitivity(["A.force"], [])
     with pytest.raises(

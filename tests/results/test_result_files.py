@@ -210,6 +210,7 @@ def test_what_was_exchanged_inside_is_found(pair: tuple[str, str], result: Resul
 def test_files_from_before_checksums_are_read_with_a_note(tmp_path: Path) -> None:
     """Tables went on straight then, unless ``outside`` said something else."""
     result = slider_crank()
+    result.model = result.model.copy()
     result.model.add(fb.Table("a", x=(0, 1), y=(0, 1), beyond="line"))
     result.model.add(fb.Table("b", x=(0, 1, 2), y=(0, 1, 0), beyond="repeat"))
     result.save(tmp_path / "r.nc")

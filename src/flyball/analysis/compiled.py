@@ -20,7 +20,7 @@ from ..tables.coordinates import BodyState, positions
 from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
-from ..tables.structure import structure
+from ..tables.structure import Choices, structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..tables.values import Values, values
 
@@ -30,9 +30,16 @@ class Compiled:
     """A compiled mechanism with scratch of its own."""
 
     values: Values
-    work: Work
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
+
+    @cached_property
+    def work(self) -> Work:
+        """Scratch of its own."""
+        w = work(self.structure, self.values.system)
+        w.option[STABILIZE] = NONE
+        w.option[PASS] = 1e-13
+        return w
 
     @property
     def structure(self) -> Structure:
@@ -43,6 +50,10 @@ class Compiled:
     def y(self) -> np.ndarray:
         """The drawn state."""
         return np.r_[self.values.q, self.values.v, self.z]
+
+    def again(self) -> Compiled:
+        """The same with scratch of its own; turns and places as here."""
+        return Compiled(self.values, self.z.copy(), self.parameters)
 
     def at(self, t: float, q: np.ndarray, v: np.ndarray, task: int = POSITION) -> tuple[int, np.ndarray]:
         """Evaluate at a state; rows and kinematics are left in ``work``. Returns (status, dy).
@@ -185,12 +196,11 @@ def compiled(
     solved: bool = True,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
-    s = structure(model, far=far, positions=positions, holds=holds, tree=tree, coupled=coupled, solved=solved)
-    x = values(s, parameters, held)
-    w = work(s, x.system)
-    w.option[STABILIZE] = NONE
-    w.option[PASS] = 1e-13
-    return Compiled(x, w, _places(x), dict(parameters or {}))
+    choices = Choices(
+        far=far, positions=positions, holds=tuple(holds), tree=tuple(tree), coupled=coupled, solved=solved
+    )
+    x = values(structure(model, choices), parameters, held)
+    return Compiled(x, _places(x), dict(parameters or {}))
 
 
 def _places(x: Values) -> np.ndarray:

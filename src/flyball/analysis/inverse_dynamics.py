@@ -35,7 +35,7 @@ class InverseDynamicsOptions(KinematicsOptions):
 
 def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
     """Forces and torques of drives, and reactions, for a given motion: see `Mechanism.inverse_dynamics`."""
-    model = model.snapshot()
+    model = model.copy() if o.motion else model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
     if o.motion:
         outputs, begin = wanted_times(o.times, o.t_start, o.t_end)

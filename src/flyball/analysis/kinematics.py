@@ -177,7 +177,7 @@ def _singular_start(found: Mobility) -> SingularityError | None:
     c = a.compiled
     if not c.structure.model.drivers or not found.redundancy or not found.freedoms:
         return None
-    free = c.structure.model.snapshot()
+    free = c.structure.model.copy()
     free.drivers = []
     loose = compiled(free, parameters=c.values.told)
     loose.follow(c.hints)

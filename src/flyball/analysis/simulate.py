@@ -12,6 +12,7 @@ import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
+from ..equations.velocities import kinetic_energy
 from ..equations.within import kept
 from ..errors import StartWarning
 from ..laws.functions import forget, interrupts_kept
@@ -127,7 +128,7 @@ def _energy_size(a: Assembly, span: float) -> float:
     S, length = a.compiled.values.system, a.compiled.values.length
     mass = S.body_x[:, MASS].sum()
     g = np.sqrt((S.glob[:3] ** 2).sum())
-    moving = 0.5 * float(a.v @ (a.compiled.mass() @ a.v))
+    moving = kinetic_energy(a.compiled.values, a.v)
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from ..errors import PerformanceNotice
 from .link import linked_as_a_whole
+from .quick import quickly
 
 TRIED = ("0.62", "0.63", "0.64", "0.65", "0.66", "0.67", "0.68")
 """Versions of Numba that the tests have passed with, or that lie between two such."""
@@ -21,7 +22,7 @@ def optimise_once(top: str) -> Iterator[None]:
     if not ours():
         yield
         return
-    with linked_as_a_whole(top):
+    with linked_as_a_whole(top), quickly():
         yield
 
 
@@ -58,5 +59,5 @@ def _probe() -> float:
     def probe_kernel(a: Any, b: Any) -> Any:
         return more(a * b)
 
-    with linked_as_a_whole(probe_kernel.__qualname__):
+    with linked_as_a_whole(probe_kernel.__qualname__), quickly():
         return njit(probe_kernel)(2.0, 3.0)

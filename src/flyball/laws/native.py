@@ -16,7 +16,7 @@ from inspect import CO_VARARGS
 from pathlib import Path
 from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
 from typing import Any
-from weakref import WeakKeyDictionary, WeakValueDictionary
+from weakref import WeakKeyDictionary, WeakValueDictionary, ref
 
 import numpy as np
 
@@ -39,6 +39,7 @@ class Native:
 
     def __init__(self, python: Callable[..., Any], count: int) -> None:
         self.python, self.count = python, count
+        self.original: Callable[[], Any] = lambda: None  # the function that ``python`` is a twin of, if it lives
         self.outside: tuple[Any, ...] = ()
         self.reason = ""
         self.raised: list[Exception] = []  # the last exception of a call from compiled code, where it can be known
@@ -55,6 +56,12 @@ class Native:
         code = self._code
         self.address = code.address if hasattr(code, "address") else ctypes.cast(code, ctypes.c_void_p).value or 0
         NATIVE[self.address] = self
+
+    @property
+    def stale(self) -> bool:
+        """Whether what the function takes from outside, or the function, is no longer what was compiled."""
+        plain = self.original()
+        return isinstance(plain, FunctionType) and not _same(self.outside, _outside(plain, set()))
 
     def __reduce__(self) -> Any:
         raise TypeError(
@@ -74,6 +81,7 @@ def native(expression: Expression, count: int) -> Native:
             if count not in codes or not _same(codes[count].outside, _outside(plain, set())):
                 # the key must not be kept by what it leads to
                 codes[count] = Native(_twin(plain, plain.__globals__, plain.__closure__), count)
+                codes[count].original = ref(plain)
             made = codes[count]
     if made.reason:
         _tell(expression, plain, made.reason)

@@ -15,12 +15,13 @@ from typing import Any, NoReturn, TypeVar
 
 from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
+from .copies import CATEGORIES
 from .coupling import Coupling
 from .element import Element, written
 from .force import Force
 from .function import function_name
 from .joint import Joint
-from .model import CATEGORIES, Model, suggest
+from .model import Model, suggest
 from .sensor import IMU, Sensor
 from .shapes.mesh import Mesh, paths_from
 from .table import Table

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
+from .copies import CATEGORIES, changed, copied, refuse_changes, snapshot, thawed
 from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
@@ -20,6 +20,7 @@ from .force import Force, TwoFrameForce
 from .function import function_name
 from .geometry import vector
 from .joint import Joint
+from .kept import Kept
 from .references import check_references
 from .sensor import IMU, Sensor
 from .summary import summary
@@ -29,7 +30,6 @@ from .validity import check_body, check_by_frames, check_frame, check_joint, che
 from .words import listing as listing
 from .words import suggest as suggest
 
-CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
 RESERVED = (GROUND, "energy", "t", "time")
 
 
@@ -46,6 +46,9 @@ class Model:
     parameters : dict
         Named numbers, usable in every expression of the mechanism.
     """
+
+    frozen: ClassVar[bool] = False  # whether it is a snapshot
+    kept: Kept  # of a snapshot: what was worked out of it
 
     def __init__(
         self,
@@ -85,7 +88,7 @@ class Model:
         self.forces: list[Force] = []
         self.drivers: list[Driver] = []
         self.initial: list[Initial] = []
-        self._names: dict[str, Element] = {}
+        self.by_name: dict[str, Element] = {}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
         """Values of the parameters in SI units, with some of them changed.
@@ -106,26 +109,32 @@ class Model:
         if changed:
             return resolve_parameters({**self.parameters, **changed})
         if self._resolved is None or self._resolved[0] != self.parameters:
-            self._resolved = dict(self.parameters), resolve_parameters(self.parameters)
-        return dict(self._resolved[1])
+            vars(self)["_resolved"] = dict(self.parameters), resolve_parameters(self.parameters)
+        return dict(self._resolved[1])  # type: ignore[index]
+
+    def copy(self) -> Any:
+        """A mechanism of the same parts, to be changed without changing this one."""
+        return copied(self)
+
+    __copy__ = copy
 
     def snapshot(self) -> Any:
-        """A copy that later additions to this one do not touch."""
-        out = copy.copy(self)
-        for name in (*CATEGORIES, "parameters", "_names"):
-            setattr(out, name, copy.copy(getattr(self, name)))
-        return out
+        """This mechanism as it is now, for good; the same object again as long as nothing was changed.
+
+        What analyses work out of it hangs on it (`kept`), so that it is worked out once.
+        """
+        return snapshot(self)
 
     def changed(self, parts: Mapping[str, Element | None]) -> Any:
         """A copy with other parts under these names, or (None) without them; nothing is checked."""
-        out = self.snapshot()
-        for category in CATEGORIES:
-            if category != Initial.category:  # these bear the names of what they are about
-                kept = [parts.get(e.name, e) for e in getattr(self, category)]
-                setattr(out, category, [e for e in kept if e is not None])
-        left = {name: parts.get(name, e) for name, e in self._names.items()}
-        out._names = {name: e for name, e in left.items() if e is not None}
-        return out
+        return changed(self, parts)
+
+    def __getstate__(self) -> dict[str, Any]:
+        return thawed(vars(self))
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        refuse_changes(self, f"{name!r} cannot be set")
+        super().__setattr__(name, value)
 
     def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:
         """Acceleration of gravity [m/s^2], three components."""
@@ -143,7 +152,8 @@ class Model:
         if not isinstance(other, Model):
             return NotImplemented
         same = ("name", "planar", "gravity", "parameters", *CATEGORIES)
-        return all(getattr(self, k) == getattr(other, k) for k in same)
+        mine, its = thawed(vars(self)), thawed(vars(other))
+        return all(mine[k] == its[k] for k in same)
 
     __hash__ = None  # type: ignore[assignment]
 
@@ -152,18 +162,18 @@ class Model:
 
     def find(self, name: str) -> Element | None:
         """The part with that name, if there is one."""
-        return self._names.get(name)
+        return self.by_name.get(name)
 
     def names(self) -> list[str]:
         """Names of all parts, in the order they were added."""
-        return list(self._names)
+        return list(self.by_name)
 
     def __getitem__(self, name: str) -> Any:
         """The part with that name."""
-        if name not in self._names:
+        if name not in self.by_name:
             known = self.names()
             raise ModelError(f"{self.name!r} has no part named {name!r}{suggest(str(name), known)}; {listing(known)}")
-        return self._names[name]
+        return self.by_name[name]
 
     def add(self, *elements: Element) -> Any:
         """Add parts and check them against what is there. Returns the (last) part added.
@@ -173,6 +183,7 @@ class Model:
         ModelError
             If a name is taken, a body or joint it refers to is unknown, or a number makes no sense.
         """
+        refuse_changes(self, "nothing can be added")
         last = None
         for e in elements:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
@@ -185,7 +196,7 @@ class Model:
             self.validate(e, self.environment())
             getattr(self, e.category).append(e)
             if not isinstance(e, Initial):
-                self._names[e.name] = e
+                self.by_name[e.name] = e
             last = e
         return last
 
@@ -197,6 +208,7 @@ class Model:
         ModelError
             If there is no such part, or a number makes no sense.
         """
+        refuse_changes(self, f"{e.title} cannot be put in")
         old = self[e.name]
         if old.category != e.category:
             raise ModelError(f"{e.title} cannot take the place of {old.title}")
@@ -204,7 +216,7 @@ class Model:
         self.validate(e, self.environment())
         parts = getattr(self, e.category)
         parts[parts.index(old)] = e
-        self._names[e.name] = e
+        self.by_name[e.name] = e
         return e
 
     def _check_name(self, e: Element) -> None:
@@ -218,12 +230,12 @@ class Model:
             raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
         if isinstance(e, (Sensor, Table)) and e.name in self.parameters:
             raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
-        if e.name in self._names:
-            raise ModelError(f"{e.title}: the name is taken by {self._names[e.name].title}; names must be unique")
+        if e.name in self.by_name:
+            raise ModelError(f"{e.title}: the name is taken by {self.by_name[e.name].title}; names must be unique")
 
     def body(self, name: str, e: Element) -> Body:
         """The body of that name, as asked for by e."""
-        found = self._names.get(name)
+        found = self.by_name.get(name)
         if not isinstance(found, Body):
             names = [b.name for b in self.bodies]
             raise ModelError(
@@ -234,7 +246,7 @@ class Model:
 
     def carrier(self, name: str, e: Element) -> str:
         """Name of the body (or ground) that carries what e attaches to."""
-        found = self._names.get(name)
+        found = self.by_name.get(name)
         if isinstance(found, Frame):
             return found.body
         if name != GROUND and not isinstance(found, Body):
@@ -248,7 +260,7 @@ class Model:
 
     def joint(self, name: str, e: Element, coordinate: str) -> Joint:
         """The joint of that name, which must have the coordinate, as asked for by e."""
-        found = self._names.get(name)
+        found = self.by_name.get(name)
         if not isinstance(found, Joint):
             names = [j.name for j in self.joints]
             raise ModelError(
@@ -266,7 +278,7 @@ class Model:
     def coordinate(self, text: str, e: Element) -> tuple[Any, str]:
         """(joint, coordinate name) or (body or frame, axis) for ``"A.angle"`` or ``"slider.x"``."""
         owner, _, what = text.partition(".")
-        found = self._names.get(owner)
+        found = self.by_name.get(owner)
         if isinstance(found, (Body, Frame)):
             axes = ("x", "y", "angle") if self.planar else ("x", "y", "z")
             if what not in axes:
@@ -353,7 +365,7 @@ class Model:
             expression = dataclasses.replace(expression, where=where)
             if expression.tree.kind == "number":
                 limited(expression.tree.value, of.dimension, where)
-            sensors = {k: x for k in expression.names if isinstance(x := self._names.get(k), Sensor)}
+            sensors = {k: x for k in expression.names if isinstance(x := self.by_name.get(k), Sensor)}
             expression.require(self.names_in_laws(of))
             folded(expression.tree, expression.text)
             refuse_twins(expression.names, of.inputs, sensors, self.parameters)

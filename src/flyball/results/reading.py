@@ -119,14 +119,14 @@ def _read(variable: Any) -> Any:
 def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     from ..model.io import loads
     from ..model.shapes.mesh import paths_from
-    from ..tables.structure import structure
+    from ..tables.structure import Choices, structure
     from ..tables.values import values
 
     try:
         with paths_from(Path(where).parent):
             model = loads(stored["model"], cls, where)
         x = values(
-            structure(model, tree=json.loads(stored["tree"])),
+            structure(model, Choices(tree=tuple(json.loads(stored["tree"])))),
             dict(zip(json.loads(stored["parameters"]), stored["parameter_values"].tolist(), strict=True)),
         )
         arrays = {k: stored[k] for k in ARRAYS}

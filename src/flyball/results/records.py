@@ -128,7 +128,7 @@ class Records:
         return 0.0 if b < 0 else self.x.bodies[self._names[b]].angle
 
 
-def wound(x: Values, q: np.ndarray, angles: Mapping[str, float]) -> dict[str, float]:
+def wound(counted: Mapping[str, float], angles: Mapping[str, float]) -> dict[str, float]:
     """Whole turns that coordinates count and the angles of bodies do not.
 
     A joint that is told to begin two turns on has them in its coordinate where that is one of the mechanism's; the
@@ -136,21 +136,17 @@ def wound(x: Values, q: np.ndarray, angles: Mapping[str, float]) -> dict[str, fl
 
     Parameters
     ----------
-    x : Values
-        Of a planar mechanism.
-    q : ndarray (nq,)
-        Its coordinates at the start.
+    counted : mapping
+        Body -> its turned angle [rad] at the start of a planar motion, as its coordinates have it.
     angles : mapping
-        Body -> its turned angle there [rad].
+        Body -> its turned angle there.
 
     Returns
     -------
     dict
         Body -> how far its coordinates are ahead [rad]; those that are not are left out.
     """
-    still = np.zeros((1, x.structure.nv))
-    records = Records(x, q[None], still, still)
-    ahead = {k: TURN * np.round((records.angle(x.structure.place[k])[0] - a) / TURN) for k, a in angles.items()}
+    ahead = {k: TURN * round((counted[k] - a) / TURN) for k, a in angles.items()}
     return {name: float(more) for name, more in ahead.items() if more != 0.0}
 
 

@@ -16,20 +16,30 @@ import numpy as np
 from ..constraints.blocks import Row
 from ..constraints.registry import KINDS
 from ..errors import FlyballError, ModelError
-from ..model.body import GROUND, Body, Frame
-from ..model.element import Element, resolve, si_numbers
+from ..model.body import Body, Frame
+from ..model.element import Element, si_numbers
 from ..model.force import BodyForce, CoordinateForce, Force
 from ..model.geometry import vector
 from ..model.joint import Joint
 from ..model.model import Model
+from .numbers import numbers
 
 CENTRED = 1e-9  # part of the way to the world's origin by which an end may miss the centre
 
 
-def points(model: Model) -> dict[str, str]:
+def points(model: Model) -> Mapping[str, str]:
     """Bodies without inertia -> why each is no point mass; "" for one that is."""
-    found = {b.name: "" for b in model.bodies if weightless(b)}
-    if not found:
+    model = model.snapshot()
+    return model.kept.get("points", None, 1, lambda: _found(model))
+
+
+def _found(model: Model) -> dict[str, str]:
+    found = {
+        b.name: "its angular velocity is given" if b.angular_velocity is not None else ""
+        for b in model.bodies
+        if weightless(b)
+    }
+    if not any(why == "" for why in found.values()):
         return found
     place = _Places(model)
     for name, role, e, blind in _ends(model, found):
@@ -38,9 +48,6 @@ def points(model: Model) -> dict[str, str]:
                 found[name] = f"{e.title} needs its orientation"
             elif not place.centred(name, role, e):
                 found[name] = f"{e.title} is attached off its centre of mass"
-    for body in model.bodies:
-        if found.get(body.name) == "" and body.angular_velocity is not None:
-            found[body.name] = "its angular velocity is given"
     return found
 
 
@@ -92,7 +99,6 @@ def _coordinates(model: Model) -> Iterator[tuple[str, Element]]:
     for coupling in model.couplings:
         yield from ((text, coupling) for text in coupling.coupled())
     yield from ((d.coordinate, d) for d in model.drivers)
-    yield from ((i.name, i) for i in model.initial)
     for f in model.forces:
         if isinstance(f, CoordinateForce) and f.coordinate_text():
             yield f.coordinate_text(), f
@@ -102,8 +108,7 @@ class _Places:
     """Where ends and centres of mass are drawn, by the model's own numbers."""
 
     def __init__(self, model: Model) -> None:
-        self.model, self.env = model, model.environment()
-        self._resolved: dict[str, Any] = {}
+        self.model, self.numbers = model, numbers(model)
 
     def centred(self, name: str, role: str, e: Element) -> bool:
         """Whether the end of an element on a body is its centre of mass."""
@@ -111,36 +116,21 @@ class _Places:
         at = _written(e, role)
         if body.com is None and at is not None and at == body.position:
             return True
-        if isinstance(e, BodyForce) and at is None and isinstance(self.model[e.body], Body):
-            return True
-        b = self._numbers(body)
-        centre = vector(b.position, self.model.planar, body.title) + body.rotation(b) @ self._vector(b.com, body)
-        way = self._end(role, e) - centre
-        return bool(np.abs(way).max() <= CENTRED * np.abs(centre).max())
+        centre = self.numbers.bodies[name].c
+        return bool(np.abs(self._end(role, e, centre) - centre).max() <= CENTRED * np.abs(centre).max())
 
-    def _end(self, role: str, e: Any) -> np.ndarray:
-        n = self._numbers(e)
-        placed = e.placed(n, self.model.planar) if hasattr(e, "placed") else None
-        if placed is not None:
-            return placed[role][0]
-        if getattr(n, "at", None) is not None:
-            return self._vector(n.at, e)
+    def _end(self, role: str, e: Any, centre: np.ndarray) -> np.ndarray:
+        n, planar = self.numbers.of[e.name], self.model.planar
+        if not isinstance(e, (BodyForce, Body, Frame)) and n.at is not None:
+            return e.placed(n, planar)[role][0]
+        if isinstance(e, BodyForce) and isinstance(self.model[e.body], Body):
+            at = getattr(n, "at", None)
+            return centre if at is None else vector(at, planar, e.title)
         end: Any = self.model[e.ends()[role]]
-        own = self._numbers(end)
-        p = vector(own.position, self.model.planar, end.title)
-        if not isinstance(end, Frame) or end.body == GROUND:
-            return p
-        body: Any = self.model[end.body]
-        b = self._numbers(body)
-        return vector(b.position, self.model.planar, body.title) + body.rotation(b) @ p
-
-    def _vector(self, x: Any, e: Element) -> np.ndarray:
-        return np.zeros(3) if x is None else vector(x, self.model.planar, e.title)
-
-    def _numbers(self, e: Any) -> Any:
-        if e.name not in self._resolved:
-            self._resolved[e.name] = resolve(e, self.env)
-        return self._resolved[e.name]
+        if not isinstance(end, Frame):
+            return self.numbers.bodies[end.name].p
+        b = self.numbers.bodies[end.body]
+        return b.p + b.R @ vector(self.numbers.of[end.name].position, planar, end.title)
 
 
 def _written(e: Any, role: str) -> Any:

@@ -15,6 +15,8 @@ from ..model.model import Model
 from .forest import ends
 from .points import points
 
+MOST = 8  # choices that are kept of a mechanism
+
 
 def saved(joint: Joint, planar: bool) -> int:
     """How many rows a joint needs less where it is a tree joint."""
@@ -45,6 +47,11 @@ def spanning(model: Model, avoided: Collection[str] = ()) -> tuple[str, ...]:
     avoided : collection of str
         Joints that must stay rows.
     """
+    model = model.snapshot()
+    return model.kept.get("spanning", tuple(avoided), MOST, lambda: _forest(model, avoided))
+
+
+def _forest(model: Model, avoided: Collection[str]) -> tuple[str, ...]:
     worth = candidates(model, avoided)
     near: dict[str, list[tuple[str, str]]] = {GROUND: []}
     near |= {b.name: [] for b in model.bodies}

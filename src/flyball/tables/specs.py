@@ -13,6 +13,7 @@ from ..laws.program import compile_law
 from ..model.element import Element
 from ..model.expressions import Expression
 from ..model.force import Force
+from ..model.kept import Kept
 from ..model.model import Model
 from ..numerics.ldl import Pattern
 from .forest import TreeJoint
@@ -91,6 +92,7 @@ class Structure:
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1
     ldl: Pattern = None  # type: ignore[assignment]
+    kept: Kept = field(default_factory=Kept)  # values of it, what they cost
 
     @property
     def nq(self) -> int:

@@ -6,54 +6,74 @@ in ``terms``, forces in ``forces``, patterns of matrices in ``patterns``.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.body import Initial
+from ..model.kept import Kept
 from ..model.model import Model
 from . import forces, patterns, terms
 from .forest import body_table
 from .specs import FrameSpec, Structure
 
+MOST = 8  # structures of one mechanism that are kept
 
-def structure(
-    model: Model,
-    *,
-    far: bool = False,
-    positions: bool = False,
-    holds: Sequence[Initial] = (),
-    tree: Sequence[str] = (),
-    coupled: bool = False,
-    solved: bool = True,
-) -> Structure:
-    """Decide the tables of a mechanism.
 
-    Parameters
+@dataclass(frozen=True, kw_only=True)
+class Choices:
+    """What tables are wanted of a mechanism.
+
+    Attributes
     ----------
-    model : Model
     far : bool
         Use the rows that lead from a far start (assembly) in place of those of motion.
     positions : bool
         Leave out rows that restrain velocities only, which have no say in assembly.
-    holds : sequence of Initial
+    holds : tuple of Initial
         Coordinates to be held at a value, as further rows.
-    tree : sequence of str
+    tree : tuple of str
         Names of joints that become tree joints instead of rows.
     coupled : bool
         Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
     solved : bool
         Whether accelerations are asked for; if not, no matrix is made ready to be factored.
+    """
+
+    far: bool = False
+    positions: bool = False
+    holds: tuple[Initial, ...] = ()
+    tree: tuple[str, ...] = ()
+    coupled: bool = False
+    solved: bool = True
+
+
+PLAIN = Choices()
+
+
+def structure(model: Model, choices: Choices = PLAIN) -> Structure:
+    """The tables of a mechanism, decided once for each of its snapshots and shared by all who ask: not to be changed.
 
     Raises
     ------
     ModelError
         If there are no bodies.
     """
+    model = model.snapshot()
+    found = model.kept.get("structure", choices, MOST, lambda: _decided(model, choices))
+    if found.model is not model or any(f.native.stale for f in found.functions):
+        model.kept.drop("structure", choices)
+        fresh = replace(found, model=model, kept=Kept()) if found.model is not model else _decided(model, choices)
+        found = model.kept.get("structure", choices, MOST, lambda: fresh)
+    return found
+
+
+def _decided(model: Model, choices: Choices) -> Structure:
     if not model.bodies:
         raise ModelError(f"{model.name!r} has no bodies; add at least one")
-    s = Structure(model, far, tuple(tree), positions or far, coupled)
+    c = choices
+    s = Structure(model, c.far, c.tree, c.positions or c.far, c.coupled)
     s.const = [0.0] * len(model.parameters)
     for table in model.tables:
         s.table_at[table.name] = len(s.const)
@@ -61,12 +81,12 @@ def structure(
     body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
     forces.measured_quantities(s)
-    terms.rows(s, holds)
+    terms.rows(s, c.holds)
     forces.forces(s)
     for e in s.loads:
         if (joint := getattr(e, "joint", "")) in s.tree_joints:
             raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
     terms.sort(s)
-    patterns.patterns(s, solved)
+    patterns.patterns(s, c.solved)
     s.tables["code"] = np.array(s.code or [0], np.int64)
     return s

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -19,13 +19,13 @@ from ..constraints.registry import KINDS
 from ..math.scalar import absolute, maximum
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
-from ..model.element import resolve
 from ..model.force import BodyForce, TwoPointForce
 from ..model.geometry import vector
-from ..model.inertia import mass_properties
 from ..model.joint import Joint
+from ..model.kept import Kept, bits
 from .coordinates import BodyState, free_velocities, positions
 from .inertia import STAND_IN, inverse_inertia, usual_mass
+from .numbers import Numbers, numbers
 from .points import check_centred
 from .specs import FrameSpec, Structure, TermSpec
 from .system import (
@@ -51,6 +51,7 @@ from .system import (
     System,
 )
 
+MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
 TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
 BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
@@ -64,10 +65,12 @@ class Values:
     system: System
     q: np.ndarray
     v: np.ndarray
-    numbers: dict[str, SimpleNamespace]
-    bodies: dict[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
+    numbers: Mapping[str, SimpleNamespace]
+    bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
     length: float  # a typical length of the mechanism [m]
+    env: Mapping[str, Any]  # values of the parameters
     poses: Poses  # where frames are when it is drawn
+    kept: Kept = field(default_factory=Kept)  # where motions of it start
 
     @property
     def told(self) -> dict[str, float]:
@@ -79,7 +82,7 @@ class Values:
 def values(
     s: Structure, parameters: Mapping[str, complex] | None = None, holds: Mapping[str, complex] | None = None
 ) -> Values:
-    """Numbers of a mechanism.
+    """Numbers of a mechanism: filled in once for each set of values, shared by all who ask, not to be changed.
 
     Parameters
     ----------
@@ -89,15 +92,16 @@ def values(
     holds : mapping, optional
         Values of the coordinates that are held (see ``structure``).
     """
-    model = s.model
-    env = model.environment(parameters)
-    numbers = {e.name: resolve(e, env) for e in model.elements()}
-    given = (*env.values(), *(holds or {}).values())
-    dtype: Any = complex if any(isinstance(x, complex) for x in given) else float
-    bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
-    for b in model.bodies:
-        bodies[b.name] = _body(b, numbers[b.name], env, model.planar)
-    pose = Poses(s, numbers, bodies)
+    n = numbers(s.model, parameters)
+    if n.complex or any(isinstance(x, complex) for x in (holds or {}).values()):
+        return _filled(s, n, holds or {})
+    return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
+
+
+def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
+    model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
+    dtype: Any = complex if given.complex or any(isinstance(x, complex) for x in holds.values()) else float
+    pose = Poses(s, given)
     frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
     length = _length(s, frame_x, bodies)
     if s.points:
@@ -108,7 +112,7 @@ def values(
     body_x, semidefinite = _body_x(s, bodies, frame_x, length)
     _tree_frames(s, pose, numbers, body_x)
     const, curve_at = _constants(s, numbers, env, dtype)
-    term_x = _term_x(s, pose, numbers, holds or {}, curve_at, dtype)
+    term_x = _term_x(s, pose, numbers, holds, curve_at, dtype)
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
     system = System(
@@ -116,31 +120,17 @@ def values(
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], _force_x(s, pose, numbers, dtype), t["angle_i"],
         t["load_i"], t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
     )  # fmt: skip
-    x = Values(s, system, np.zeros(s.nq, dtype), np.zeros(s.nv, dtype), numbers, bodies, float(length.real), pose)
+    x = Values(s, system, np.zeros(s.nq, dtype), np.zeros(s.nv, dtype), numbers, bodies, float(length.real), env, pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn), free_velocities(x, drawn)
     return x
 
 
-def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
-    m = mass_properties(b, n, env, planar)
-    R = b.rotation(n)
-    p = vector(n.position, planar, b.name)
-    w = np.zeros(3)
-    if n.angular_velocity is not None:
-        w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
-    arm = R @ m.com
-    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
-    return SimpleNamespace(
-        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
-    )
-
-
 class Poses:
     """Where the frames of elements are when the mechanism is drawn."""
 
-    def __init__(self, s: Structure, numbers: dict[str, SimpleNamespace], bodies: dict[str, SimpleNamespace]) -> None:
-        self.s, self.numbers, self.bodies = s, numbers, bodies
+    def __init__(self, s: Structure, given: Numbers) -> None:
+        self.s, self.numbers, self.bodies = s, given.of, given.bodies
         self.model = s.model
         self._found: dict[str, dict] = {}
 
@@ -217,7 +207,7 @@ class Poses:
         return own if isinstance(owner, Body) or owner.body == GROUND else own + self.numbers[owner.body].angle
 
 
-def _length(s: Structure, frame_x: np.ndarray, bodies: dict[str, SimpleNamespace]) -> Any:
+def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
     """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
     centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
     ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
@@ -232,7 +222,7 @@ def _reach(ways: np.ndarray) -> Any:
     return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
 
 
-def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
+def _body_x(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
     """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
     nb = len(s.tables["body_i"])
     body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
@@ -265,7 +255,7 @@ def _body_x(s: Structure, bodies: dict, frame_x: np.ndarray, length: Any) -> tup
     return body_x, semidefinite
 
 
-def _tree_frames(s: Structure, pose: Poses, numbers: dict, body_x: np.ndarray) -> None:
+def _tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray) -> None:
     """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
 
     A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
@@ -308,7 +298,7 @@ def _leave_out(x: np.ndarray, kind: int) -> None:
         x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
-def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
+def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
     """Parameters, literals and tables of the laws, splines of joints; where those of each joint begin."""
     const: list[Any] = list(s.const or [0.0])
     const[: len(s.model.parameters)] = [env[k] for k in s.model.parameters]
@@ -322,7 +312,7 @@ def _constants(s: Structure, numbers: dict, env: Mapping[str, Any], dtype: Any) 
 
 
 def _term_x(
-    s: Structure, pose: Poses, numbers: dict, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
+    s: Structure, pose: Poses, numbers: Mapping, holds: Mapping[str, Any], curve_at: Mapping[str, int], dtype: Any
 ) -> np.ndarray:
     """Parameters of the terms: axes from the declaration, constants from the numbers."""
     x = np.zeros((len(s.terms), 8), dtype)
@@ -350,7 +340,7 @@ def _term_x(
     return x
 
 
-def _offset(t: TermSpec, numbers: dict) -> float:
+def _offset(t: TermSpec, numbers: Mapping) -> float:
     """Value of a term's coordinate as drawn."""
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
@@ -364,7 +354,7 @@ def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float
     return t.sign * (share - _offset(t, pose.numbers))
 
 
-def _force_x(s: Structure, pose: Poses, numbers: dict, dtype: Any) -> np.ndarray:
+def _force_x(s: Structure, pose: Poses, numbers: Mapping, dtype: Any) -> np.ndarray:
     x = np.zeros((len(s.forces), 16), dtype)
     for k, e in enumerate(s.forces):
         separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0

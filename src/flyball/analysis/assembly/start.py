@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -21,6 +21,8 @@ from .positions import CLOSED, OPEN, close, misfit, newton, rounding
 from .told import driven, told, turns, wind
 from .velocities import consistent, contradiction
 
+MOST = 4  # assembled starts of the same numbers that are kept
+
 
 @dataclass(repr=False)
 class Assembly:
@@ -33,6 +35,10 @@ class Assembly:
     moved: dict[str, float] = field(default_factory=dict)  # body -> how far its mass centre went [m]
     iterations: int = 0
     departures: tuple[Departure, ...] = ()  # positions that assembly changed, given velocities that cannot be
+
+    def again(self) -> Assembly:
+        """The same with arrays and scratch of its own."""
+        return replace(self, compiled=self.compiled.again(), q=self.q.copy(), v=self.v.copy(), moved=dict(self.moved))
 
     @property
     def y(self) -> np.ndarray:
@@ -83,9 +89,16 @@ def assembled(
         If no closed position, or no consistent velocity, is found; the message names the joints that disagree and by
         how much.
     """
-    model = model.snapshot()
     plain = compiled(model, parameters=parameters)
-    env = model.environment(parameters)
+    x = plain.values
+    found = x.kept.get("assembled", float(t).hex(), MOST, lambda: _found(x.structure.model, plain, t, parameters, why))
+    return found.again()
+
+
+def _found(
+    model: Model, plain: Compiled, t: float, parameters: Mapping[str, float] | None, why: Why | None
+) -> Assembly:
+    env = plain.values.env
     values, rates = told(model, env)
     known = dict(values) | driven(model, model.drivers, t, env)
     plain.follow(turns(plain, known))

@@ -157,7 +157,7 @@ def _odd_axis(case: Case, holding: list[str]) -> str:
 def _not_moved(case: Case, name: str, holding: list[str]) -> str:
     """Something is free, but does not move what is asked for: in this position, or in none."""
     c = case.c
-    loose = c.structure.model.snapshot()
+    loose = c.structure.model.copy()
     loose.drivers, loose.initial = [], []
     own = compiled(loose, parameters=c.values.told)
     own.follow(c.hints)

@@ -54,13 +54,8 @@ def _coordinates(a: Assembly) -> tuple[list[str], Any]:
     joints = sorted(model.joints, key=lambda j: _depth(depth, model, j))
     names = [f"{j.name}.{what}" for j in joints for what in j.measured(model.planar)]
     axes = ("angle", "x", "y") if model.planar else ("x", "y", "z")
-    names += [
-        f"{b.name}.{what}"
-        for b in model.bodies
-        for what in axes
-        if what != "angle" or b.name not in own.structure.points  # which has none
-    ]
-    measuring = model.snapshot()
+    names += [f"{b.name}.{what}" for b in model.bodies for what in axes]
+    measuring = model.copy()
     measuring.initial = [Initial(name=name, value=0.0) for name in names]
     held = dict.fromkeys(names, 0.0)
     probe = compiled(measuring, parameters=own.values.told, holds=measuring.initial, held=held)

@@ -8,13 +8,14 @@ only.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...equations.scratch import work
 from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
+from ...model.kept import Kept
 from ...results.freedoms import Geometry
 from ...tables.system import NQ, Q0
 from ..assembly.positions import closed_near
@@ -87,7 +88,8 @@ def _way(c: Compiled, q: np.ndarray, start: np.ndarray) -> float:
 def _shaken_rank(a: Assembly) -> int:
     """Rank where the frames of all joints are somewhere else, by a little and at random."""
     c = compiled(a.compiled.structure.model, parameters=a.compiled.values.told)
-    s, S = c.structure, c.values.system
+    s = c.structure
+    S = c.values.system._replace(frame_x=c.values.system.frame_x.copy())
     random = np.random.default_rng(2)
     for k in range(len(S.frame_x)):
         if s.frames[k].role == "world":
@@ -97,7 +99,7 @@ def _shaken_rank(a: Assembly) -> int:
             shift[2] = turn[0] = turn[1] = 0.0
         S.frame_x[k, :3] += shift
         S.frame_x[k, 3:] = (S.frame_x[k, 3:].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
-    shaken = Compiled(c.values, work(s, S), c.z)
+    shaken = Compiled(replace(c.values, system=S, kept=Kept()), c.z)
     shaken.follow(a.compiled.hints)
     shaken.at(a.t, a.q, a.v)
     return rank_of(shaken)

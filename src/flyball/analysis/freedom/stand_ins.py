@@ -75,7 +75,7 @@ def options(there: Found, names: list[str], positions: Sequence[np.ndarray]) -> 
     """What could stand in the place of each element, as it is first, then by cost; all rows from one compilation."""
     own = there.assembly.compiled
     model, env = own.structure.model, own.values.told
-    probe = model.snapshot()
+    probe = model.copy()
     found: dict[str, list[tuple[str, Joint]]] = {name: [] for name in names}
     directions = _directions(model, names, env)
     for name in names:

@@ -44,7 +44,7 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
     ModelError
         If there is no such input; the message lists what there is.
     """
-    out = model.snapshot()
+    out = model.copy()
     inputs = []
     known = possible(model)
     for k, name in enumerate(names):

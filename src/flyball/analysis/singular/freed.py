@@ -102,7 +102,7 @@ def freed(model: Model, driver: str, t: float, parameters: Mapping[str, float] |
             f"way there, and positions cannot be followed over a driver's coordinate"
         )
     env = model.environment(parameters)
-    copy = model.snapshot()
+    copy = model.copy()
     copy.drivers = [_stopped(model, d, t, env) for d in model.drivers if d.name != driver]
     copy.forces, copy.sensors = [], [x for x in model.sensors if _named(x.name, copy.drivers)]
     labels = _coordinates(model)

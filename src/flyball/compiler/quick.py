@@ -1,0 +1,142 @@
+"""Numba's slowest spots, taken out while a kernel of ours compiles: the same answers, a third less time to wait.
+
+Found by profiling cold compilation. Nearly all of it is Numba's own work in Python, and the most of that was to compare
+the same compiler flags option by option, for each call of each function, and to look for variables in numbers, texts
+and places of source. Like `link` this leans on internals of Numba and is used where they are as expected (`ways.ours`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from typing import Any
+
+
+@contextmanager
+def quickly() -> Iterator[None]:
+    """Have Numba compare flags and list variables quickly.
+
+    Raises
+    ------
+    AttributeError
+        If Numba's internals are others.
+    """
+    from numba.core import ir, postproc
+    from numba.core.targetconfig import TargetConfig
+    from numba.core.typing.context import BaseContext
+
+    changed = [
+        (TargetConfig, {"values": _values, "__eq__": _equal, "__hash__": _hashed}),
+        (ir.Inst, {"_rec_list_vars": _variables_in(ir)}),
+        (BaseContext, {"resolve_function_type": _remembered(BaseContext.resolve_function_type)}),
+        (postproc.PostProcessor, {"run": _lifetimes_when_asked(postproc)}),
+    ]
+    before = [(owner, {name: owner.__dict__[name] for name in made}) for owner, made in changed]
+    _put(changed)
+    try:
+        yield
+    finally:
+        _put(before)
+
+
+def _put(changes: list[tuple[Any, dict[str, Any]]]) -> None:
+    for owner, made in changes:
+        for name, value in made.items():
+            setattr(owner, name, value)
+
+
+@cache
+def _defaults(of: Any) -> dict[str, Any]:
+    """The default of every option of a class of flags."""
+    return {name: option.default for name, option in of.options.items()}
+
+
+def _values(self: Any) -> dict[str, Any]:
+    """Every option with its value."""
+    return _defaults(type(self)) | self._values
+
+
+def _equal(self: Any, other: Any) -> Any:
+    """Whether all options are equal; most often nothing but the same ones were set."""
+    if self is other:
+        return True
+    if type(self) is type(other):
+        return self._values == other._values or _values(self) == _values(other)
+    return self.values() == other.values() if hasattr(other, "options") else NotImplemented
+
+
+def _hashed(self: Any) -> int:
+    """As Numba's: it hashes the names of the options."""
+    return _hash_of(type(self))
+
+
+@cache
+def _hash_of(of: Any) -> int:
+    return hash(tuple(sorted(of.options)))
+
+
+def _variables_in(ir: Any) -> Any:
+    """``Inst._rec_list_vars``: the variables in a value, and in what it holds, in their order."""
+    variable, instruction = ir.Var, ir.Inst
+    plain = {int, float, str, bool, type(None), ir.Loc, ir.Const, ir.Global, ir.FreeVar, ir.Arg, ir.Scope}
+
+    def listed(self: Any, value: Any) -> list[Any]:
+        if isinstance(value, variable):
+            return [value]
+        if isinstance(value, instruction):
+            return value.list_vars()
+        if isinstance(value, dict):
+            value = value.values()
+        elif not isinstance(value, list | tuple):
+            return []
+        out = []
+        for x in value:
+            of = type(x)
+            if of is variable:
+                out.append(x)
+            elif of not in plain:
+                out += listed(self, x)
+        return out
+
+    return listed
+
+
+def _remembered(original: Any) -> Any:
+    """``BaseContext.resolve_function_type``: a function has one signature for the same types."""
+    from numba.core.targetconfig import ConfigStack
+    from numba.core.types import Function
+
+    found: dict[Any, Any] = {}
+
+    def resolve(self: Any, func: Any, args: Any, kws: Any) -> Any:
+        if type(func) is not Function or kws:
+            return original(self, func, args, kws)
+        key = self, func, tuple(args), ConfigStack.top_or_none()
+        signature = found.get(key)
+        if signature is None:
+            signature = original(self, func, args, kws)
+            if signature is not None:
+                found[key] = signature
+        return signature
+
+    return resolve
+
+
+def _lifetimes_when_asked(postproc: Any) -> Any:
+    """``PostProcessor.run``: when variables live is found when asked for, and not after each of eight passes.
+
+    What is alive on entry of a block is asked of generators only.
+    """
+    original = postproc.PostProcessor.run
+
+    def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
+        made = self.func_ir
+        if emit_dels or made.is_generator:
+            original(self, emit_dels, extend_lifetimes)
+            return
+        made.blocks = postproc.transforms.canonicalize_cfg(made.blocks)
+        made.variable_lifetime = postproc.VariableLifetime(made.blocks)
+        made.generator_info = None
+
+    return run

@@ -1,0 +1,96 @@
+"""Copies of a model: one to be changed, and the one that stays, on which all that was worked out of it hangs."""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ModelError
+from .body import Initial
+from .kept import Kept
+
+if TYPE_CHECKING:
+    from .element import Element
+    from .model import Model
+
+CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
+STRUCTURAL = ("structure", "spanning")  # kinds of what is kept that no parameter changes
+SETTINGS = ("name", "planar", "gravity", "gravity_told")
+
+
+def copied(model: Model) -> Any:
+    """A model with lists of its own, that can be changed."""
+    out = object.__new__(type(model))
+    vars(out).update(vars(model))
+    vars(out).pop("kept", None)
+    vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
+    vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
+    return out
+
+
+def snapshot(model: Model) -> Any:
+    """The model as it is, unchangeable; the last one as long as it is still true."""
+    last = vars(model).get("_snapshot")
+    if model.frozen or (last is not None and _same(model, last)):
+        return model if model.frozen else last
+    out = copied(model)
+    out.environment()  # worked out now: nothing is stored in it later
+    vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
+    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(out.by_name)})
+    vars(out).update({"kept": Kept(), "frozen": True})
+    if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
+        for kind in STRUCTURAL:
+            out.kept.take(kind, last.kept)
+    vars(model)["_snapshot"] = out
+    return out
+
+
+def thawed(state: Mapping[str, Any]) -> dict[str, Any]:
+    """What is pickled of a model, or copied with all its parts: nothing that was worked out of it."""
+    out = {k: v for k, v in state.items() if k not in ("_snapshot", "kept", "frozen", "_resolved")}
+    out |= {name: list(state[name]) for name in CATEGORIES if name in state}
+    return out | {"_resolved": None, "parameters": dict(state["parameters"]), "by_name": dict(state["by_name"])}
+
+
+def changed(model: Model, parts: Mapping[str, Element | None]) -> Any:
+    """A copy with other parts under these names, or (None) without them."""
+    out = copied(model)
+    for category in CATEGORIES:
+        if category != Initial.category:  # these bear the names of what they are about
+            kept = [parts.get(e.name, e) for e in getattr(model, category)]
+            setattr(out, category, [e for e in kept if e is not None])
+    left = {name: parts.get(name, e) for name, e in model.by_name.items()}
+    out.by_name = {name: e for name, e in left.items() if e is not None}
+    return out
+
+
+def refuse_changes(model: Model, what: str) -> None:
+    """Refuse to change a snapshot: results and what is prepared stand on it."""
+    if model.frozen:
+        raise ModelError(f"{what}: {model.name!r} is here as a result has it, for good; change a copy of it: m.copy()")
+
+
+def _same(model: Model, last: Model) -> bool:
+    """Whether every part is the same object still, and every parameter and setting the same to the bit."""
+    return _same_parts(model, last) and all(_alike(v, last.parameters[k]) for k, v in model.parameters.items())
+
+
+def _same_parts(model: Model, last: Model) -> bool:
+    """The same but for the values of the parameters."""
+    return (
+        all(_identical(getattr(model, k), getattr(last, k)) for k in CATEGORIES)
+        and all(_alike(getattr(model, k), getattr(last, k)) for k in SETTINGS)
+        and type(model) is type(last)
+        and list(model.parameters) == list(last.parameters)
+    )
+
+
+def _identical(a: Iterable[Any], b: Iterable[Any]) -> bool:
+    return len(a) == len(b) and all(map(operator.is_, a, b))  # type: ignore[arg-type]
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """Whether two numbers or texts are the same; 0.0 and -0.0 are not."""
+    return a is b or (type(a) is type(b) and a == b and repr(a) == repr(b))

@@ -1,0 +1,88 @@
+"""The numbers of every element at some values of the parameters, and the bodies made of them: for all coordinates."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from ..model.body import GROUND, Body
+from ..model.element import resolve
+from ..model.geometry import vector
+from ..model.inertia import mass_properties
+from ..model.kept import Kept, bits
+from ..model.model import Model
+
+MOST = 4  # sets of values of the parameters that are kept
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Numbers of a mechanism in SI units."""
+
+    env: Mapping[str, Any]  # parameters
+    of: Mapping[str, SimpleNamespace]  # element -> its fields
+    bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
+    key: Hashable  # two with the same key are the same, to the bit
+    kept: Kept = field(default_factory=Kept)
+
+    @property
+    def complex(self) -> bool:
+        """Whether some parameter is complex."""
+        return any(isinstance(x, complex) for x in self.env.values())
+
+
+def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Numbers:
+    """Numbers of a mechanism at the values of its parameters, with some of them changed.
+
+    Raises
+    ------
+    ModelError
+        If a number makes no sense, or there is no such parameter.
+    """
+    model = model.snapshot()
+    env = model.environment(parameters)
+    key = bits(env), tuple(_state_of(path) for path in _files(model))
+    return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
+
+
+def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
+    of = {e.name: resolve(e, env) for e in model.elements()}
+    bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
+    for b in model.bodies:
+        bodies[b.name] = _body(b, of[b.name], env, model.planar)
+    return Numbers(env, of, bodies, key)
+
+
+def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:
+    m = mass_properties(b, n, env, planar)
+    R = b.rotation(n)
+    p = vector(n.position, planar, b.name)
+    w = np.zeros(3)
+    if n.angular_velocity is not None:
+        w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
+    arm = R @ m.com
+    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
+    return SimpleNamespace(
+        p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
+    )
+
+
+def _files(model: Model) -> tuple[str, ...]:
+    """Files that shapes are read from."""
+    return model.kept.get(
+        "files", None, 1, lambda: tuple(f for b in model.bodies for s in b.shapes() if (f := getattr(s, "file", None)))
+    )
+
+
+def _state_of(path: str) -> tuple[int, int] | None:
+    """Which state of a file is there."""
+    try:
+        stat = os.stat(path)
+    except OSError:
+        return None
+    return stat.st_mtime_ns, stat.st_size
