@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
+MANY = 30  # joints of one coordinate from which on they are read all at once
 NEXT = {"x": "y", "y": "z", "z": "x"}
 
 
@@ -51,9 +52,14 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
     s = x.structure
     q = np.zeros(s.nq, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
+    single = [t for t in hung.values() if len(t.primitives) == 1 and t.primitives[0].kind in "RP"]
+    if len(single) >= MANY:
+        _read_single(x, single, bodies, hints or {}, q)
+        hung |= {t.child: None for t in single}
     for name, b in s.place.items():
         if b in hung:
-            _read(x, hung[b], bodies, hints or {}, q)
+            if (t := hung[b]) is not None:
+                _read(x, t, bodies, hints or {}, q)
         elif b >= 0:
             d, q0 = bodies[name], s.tables["body_i"][b, Q0]
             if s.tables["body_i"][b, TREE] == POINT:
@@ -82,6 +88,32 @@ def free_velocities(x: Values, bodies: Mapping[str, BodyState]) -> np.ndarray:
             else:
                 v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
     return v
+
+
+def _read_single(
+    x: Values, joints: list[TreeJoint], bodies: Mapping[str, BodyState], hints: Mapping[str, Any], q: np.ndarray
+) -> None:
+    """The same as `_read` for hinges and slides, all at once."""
+    at = x.structure.tables["body_i"][[t.child for t in joints], Q0]
+    frames = []
+    for k, role in enumerate("FM"):
+        own = np.array([x.poses.row(FrameSpec(0, t.joint, role)) for t in joints])
+        carriers = [bodies.get(_ends(x, t)[k], REST) for t in joints]
+        p, R = np.array([d.p for d in carriers]), np.array([d.R for d in carriers])
+        frames.append((p + np.einsum("nij,nj->ni", R, own[:, :3]), R @ own[:, 3:].reshape(-1, 3, 3)))
+    (pF, RF), (pM, RM) = frames
+    back = RF.swapaxes(1, 2)
+    rest = np.array([t.joint.rest or np.eye(3) for t in joints])
+    shift, turn = np.einsum("nij,nj->ni", back, pM - pF), back @ RM @ rest.swapaxes(1, 2)
+    for name, i in (("x", 0), ("y", 1), ("z", 2)):
+        of = np.array([t.primitives[0].axis == name for t in joints])
+        slides = of & np.array([t.primitives[0].kind == "P" for t in joints])
+        q[at[slides]] = shift[slides, i]
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for n in np.flatnonzero(of & ~slides):
+            t = joints[n]
+            angle = atan2(turn[n, k, j], turn[n, j, j])
+            q[at[n]] = _with_turns(x, t, t.primitives[0].coordinate, angle, bodies, hints)
 
 
 def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
@@ -146,7 +178,7 @@ def _with_turns(
         drawn = [x.bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
         now_by, drawn_by = (sign * (a[1] - a[0]) for a in (now, drawn))
         F, M = (x.poses.world(FrameSpec(0, t.joint, role))[1] for role in "FM")
-        at = _planar_angle(F.T @ M, t)
+        at = 0.0 if F is M else _planar_angle(F.T @ M, t)
         near = at + now_by - drawn_by
     else:
         return angle

@@ -29,6 +29,9 @@ class Numbers:
     bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
     key: Hashable  # two with the same key are the same, to the bit
     kept: Kept = field(default_factory=Kept)
+    placed: dict[str, Any] = field(default_factory=dict)  # frames of elements in the world as drawn, once asked for
+    world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
+    local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
 
     @property
     def complex(self) -> bool:
@@ -63,10 +66,11 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
     R = b.rotation(n)
     p = vector(n.position, planar, b.name)
     w = np.zeros(3)
+    arm = R @ m.com
+    v = np.zeros(3) if n.velocity is None else vector(n.velocity, planar, b.name)
     if n.angular_velocity is not None:
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
-    arm = R @ m.com
-    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
+        v = v + np.cross(w, arm)
     return SimpleNamespace(
         p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
     )

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
-from ..math.scalar import absolute, maximum
 from ..model.body import GROUND, Body
 from ..model.coupling import Coupling
 from ..model.force import BodyForce, TwoPointForce
@@ -24,37 +23,15 @@ from ..model.geometry import vector
 from ..model.joint import Joint
 from ..model.kept import Kept, bits
 from .coordinates import BodyState, free_velocities, positions
-from .inertia import STAND_IN, inverse_inertia, usual_mass
+from .hinges import tree_frames
+from .masses import mass_table
 from .numbers import Numbers, numbers
 from .points import check_centred
 from .specs import FrameSpec, Structure, TermSpec
-from .system import (
-    BODY_P,
-    BODY_R,
-    BODY_TURNS,
-    BODY_WIDTH,
-    EXCESS,
-    EXCESS_MASS,
-    INERTIA,
-    INVERSE,
-    MASS,
-    OFFSET,
-    PER_BULK,
-    PER_COMPACT,
-    PER_MASS,
-    POINT,
-    REVOLUTE,
-    TREE,
-    TREE_P,
-    TREE_R,
-    TREE_TURNS,
-    System,
-)
+from .system import System
 
 MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
-TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
-BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
 
 
 @dataclass
@@ -102,15 +79,15 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
     dtype: Any = complex if given.complex or any(isinstance(x, complex) for x in holds.values()) else float
     pose = Poses(s, given)
-    frame_x = np.array([np.r_[p, R.ravel()] for p, R in map(pose.local, s.frames)], dtype)
+    frame_x = np.array([pose.row(f) for f in s.frames], dtype)
     length = _length(s, frame_x, bodies)
     if s.points:
         single = {s.place[name]: name for name in s.points}
         for f, way in zip(s.frames, frame_x[:, :3], strict=True):
             if f.body in single:
                 check_centred(model, single[f.body], f.element, way, length)
-    body_x, semidefinite = _body_x(s, bodies, frame_x, length)
-    _tree_frames(s, pose, numbers, body_x)
+    body_x, semidefinite = mass_table(s, bodies, frame_x, length)
+    tree_frames(s, pose, numbers, body_x)
     const, curve_at = _constants(s, numbers, env, dtype)
     term_x = _term_x(s, pose, numbers, holds, curve_at, dtype)
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
@@ -132,20 +109,35 @@ class Poses:
     def __init__(self, s: Structure, given: Numbers) -> None:
         self.s, self.numbers, self.bodies = s, given.of, given.bodies
         self.model = s.model
-        self._found: dict[str, dict] = {}
+        self._given = given
+
+    def row(self, f: FrameSpec) -> np.ndarray:
+        """Position (3) from the body's centre of mass and rotation (9), in body axes."""
+        key = (f.element.name, f.role, f.coordinate) if f.element is not None else ()
+        found = self._given.local.get(key)
+        if found is None:
+            p, R, name = self.world(f)
+            b = self.bodies[name]
+            back = b.R.T
+            found = self._given.local[key] = np.concatenate((back @ (p - b.c), (back @ R).ravel()))
+        return found
 
     def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
         """Position from the body's centre of mass and rotation, in body axes."""
-        if f.element is None:
-            return np.zeros(3), np.eye(3)
-        p, R, name = self.world(f)
-        b = self.bodies[name]
-        return b.R.T @ (p - b.c), b.R.T @ R
+        row = self.row(f)
+        return row[:3], row[3:].reshape(3, 3)
 
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         """Position, rotation and carrier of a frame in the drawn configuration."""
         if f.element is None:
             return np.zeros(3), np.eye(3), GROUND
+        key = f.element.name, f.role, f.coordinate
+        found = self._given.world.get(key)
+        if found is None:
+            found = self._given.world[key] = self._drawn(f)
+        return found
+
+    def _drawn(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         e = f.element
         n = self.numbers[e.name]
         end = e.ends()[f.role]
@@ -162,9 +154,10 @@ class Poses:
         return p, R, name
 
     def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        if e.name not in self._found:
-            self._found[e.name] = e.placed(n, self.model.planar)
-        return self._found[e.name]
+        found = self._given.placed.get(e.name)
+        if found is None:
+            found = self._given.placed[e.name] = e.placed(n, self.model.planar)
+        return found
 
     def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Drawn pose of a body's reference frame or of a named frame."""
@@ -214,88 +207,6 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     longest = ways[np.argmax((ways.real**2).sum(axis=1))]
     length = np.sqrt((longest**2).sum())
     return length if length.real > 0.0 else 1.0
-
-
-def _reach(ways: np.ndarray) -> Any:
-    """The largest component of some ways, taken positive."""
-    flat = ways.ravel()
-    return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
-
-
-def _body_x(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any) -> tuple[np.ndarray, float]:
-    """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
-    nb = len(s.tables["body_i"])
-    body_x = np.zeros((nb, BODY_WIDTH), frame_x.dtype)
-    semidefinite = 0.0
-    usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
-    of_body = [_reach(frame_x[s.tables["frame_i"] == b, :3]) for b in range(nb)]
-    for name, b in s.place.items():
-        if b < 0:
-            continue
-        d = bodies[name]
-        bulk = d.mass if d.mass.real > 0.0 else usual
-        more_mass = 0.0 * bulk if d.mass.real > 0.0 else STAND_IN * usual
-        body_x[b, MASS], body_x[b, EXCESS_MASS] = d.mass, more_mass
-        body_x[b, PER_MASS], body_x[b, PER_BULK] = 1.0 / (d.mass + more_mass), 1.0 / bulk
-        semidefinite = max(semidefinite, 1.0 if more_mass.real > 0.0 else 0.0)
-        if s.tables["body_i"][b, TREE] == POINT:
-            body_x[b, PER_COMPACT], body_x[b, INVERSE + 8] = body_x[b, PER_BULK], body_x[b, PER_MASS]
-            body_x[b, EXCESS + 8] = more_mass
-            body_x[b, BODY_R : BODY_R + 9] = d.R.ravel()
-            continue
-        J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, bulk * of_body[b] ** 2)
-        size = size if size.real > 0.0 else bulk * length**2
-        inverse, more = inverse_inertia(J, size, s.model.planar)
-        if more.any():
-            semidefinite = 1.0
-        body_x[b, PER_COMPACT] = 1.0 / size
-        for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
-            body_x[b, at : at + 9] = A.ravel()
-    return body_x, semidefinite
-
-
-def _tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray) -> None:
-    """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
-
-    A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
-    """
-    for t in s.tree_joints.values():
-        joint = t.joint
-        rest = np.array(joint.rest or np.eye(3))
-        (pF, RF), (pM, RM) = (pose.local(FrameSpec(0, joint, role)) for role in "FM")
-        start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
-        if t.reversed:
-            start, end = (pM, RM @ rest.T), (-RF.T @ pF, RF.T)
-        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [
-            np.eye(3)
-        ]
-        for k, (link, turn) in enumerate(zip(t.links, turns, strict=True)):
-            p, R = start if k == 0 else (np.zeros(3), np.eye(3))
-            body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
-            p, R = end if k == len(turns) - 1 else (np.zeros(3), np.eye(3))
-            body_x[link, BODY_P : BODY_P + 3], body_x[link, BODY_R : BODY_R + 9] = turn.T @ p, (turn.T @ R).ravel()
-        for link in t.links:
-            _leave_out(body_x[link], s.tables["body_i"][link, TREE])
-        for link, step in zip(t.links, t.primitives, strict=False):
-            if step.coordinate in joint.coordinates:
-                body_x[link, OFFSET] = joint.offset(numbers[joint.name], step.coordinate)
-
-
-def _leave_out(x: np.ndarray, kind: int) -> None:
-    """Note in a body's row which of its joint's constant rotations are none: they need not be multiplied.
-
-    One about the axis of a hinge may as well come after the hinge's own, and becomes one with what stands there.
-    """
-    tree, body = slice(TREE_R, TREE_R + 9), slice(BODY_R, BODY_R + 9)
-    T = x[tree].reshape(3, 3).copy()
-    if kind == REVOLUTE and T[2, 2] == 1.0 and not T[2, :2].any() and not T[:2, 2].any():
-        x[BODY_P : BODY_P + 3] = T @ x[BODY_P : BODY_P + 3]
-        x[body], x[tree] = (T @ x[body].reshape(3, 3)).ravel(), np.eye(3).ravel()
-    for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
-        if not x[rotation].imag.any() and np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
-            x[rotation] = np.eye(3).ravel()
-        x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:
