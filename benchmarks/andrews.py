@@ -1,4 +1,4 @@
-"""Andrews' squeezing mechanism for 0.03 s to 1e-5 rad in every angle at the end: flyball and Exudyn in one run.
+"""Andrews' squeezing mechanism for 0.03 s to 1e-5 rad in every angle at the end: flyball, MuJoCo and Exudyn in one run.
 
 Schiehlen, Multibody Systems Handbook (1990); problem II-13 of the Test Set for IVP Solvers. The end is that of an
 80-bit extrapolation of the test set's equations; the test set's own digits differ by 2e-9.
@@ -15,10 +15,11 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
 from contest import Contest, Flyball, Peer
+from trees import planar_motion, planar_tree
 
 from mechanisms import GROUND, Planar, example
 
-T_END, TARGET, SAMPLES = 0.03, 1e-5, 100
+T_END, TARGET, SAMPLES = 0.03, 1e-5, 500
 # beta, theta, gamma, phi, delta, omega, epsilon
 START = (
     *(-0.0617138900142764496358948458001, 0.0, 0.455279819163070380255912382449, 0.222668390165885884674473185609),
@@ -35,12 +36,15 @@ A, B, C = (-0.06934, -0.00227), (-0.03635, 0.03273), (0.014, 0.072)
 STIFFNESS, FREE, TORQUE = 4530.0, 0.07785, 0.033
 ACCURACY = {"end_error": "end error [rad]"}
 
+# module, setting, first number of steps
 PEERS = (
-    ("generalised-alpha 0.95", 8000),
-    ("generalised-alpha 0.95, full Newton", 8000),
-    ("generalised-alpha 0.7", 16000),
-    ("trapezoidal, index 2", 4000),
-    ("trapezoidal, index 2, full Newton", 4000),
+    ("mujoco", "RK4, stiff", 1200),
+    ("mujoco", "RK4, softer (4 steps)", 600),
+    ("exudyn", "generalised-alpha 0.95", 8000),
+    ("exudyn", "generalised-alpha 0.95, full Newton", 8000),
+    ("exudyn", "generalised-alpha 0.7", 16000),
+    ("exudyn", "trapezoidal, index 2", 4000),
+    ("exudyn", "trapezoidal, index 2, full Newton", 4000),
 )
 
 
@@ -87,15 +91,27 @@ def accuracy(end: np.ndarray) -> dict[str, float]:
     return {"end_error": float(np.abs(end - END).max())}
 
 
+def angles(turned: np.ndarray) -> np.ndarray:
+    """The seven angles at the end, from those of the bodies at all times."""
+    k1, k2, k3, k4, k5, k6, k7 = np.unwrap(turned, axis=0)[-1]
+    return np.array([k1, k2 - k1, k3, k4 - k5, k5, k6 - k7, k7])
+
+
 def exudyn_end(p: Planar, setting: str, steps: float, samples: int) -> tuple[Any, float]:
-    """Angles at the end, from those of the bodies."""
+    """Angles at the end."""
     from peer_exudyn import solve
 
     motion, seconds = solve(p, T_END, steps, setting, samples)
-    if motion is None:
-        return None, seconds
-    k1, k2, k3, k4, k5, k6, k7 = motion[0][-1, :, 2]
-    return np.array([k1, k2 - k1, k3, k4 - k5, k5, k6 - k7, k7]), seconds
+    return (None if motion is None else angles(motion[0][:, :, 2])), seconds
+
+
+def mujoco_end(p: Planar, setting: str, steps: float, samples: int) -> tuple[Any, float]:
+    """Angles at the end."""
+    from peer_mujoco import solve
+
+    tree = planar_tree(p)
+    motion, seconds = solve(tree, T_END, steps, setting, samples)
+    return (None if motion is None else angles(planar_motion(p, tree, motion)[0][:, :, 2])), seconds
 
 
 def main() -> None:
@@ -108,7 +124,8 @@ def main() -> None:
         return np.array([run[name].angle[-1] for name in JOINTS])
 
     ours = [Flyball(model, end, method, arguments.coordinates) for method in ("dop853", "rk45")]
-    peers = [Peer("exudyn", setting, partial(exudyn_end, p, setting), first) for setting, first in PEERS]
+    ends = {"mujoco": mujoco_end, "exudyn": exudyn_end}
+    peers = [Peer(name, setting, partial(ends[name], p, setting), first) for name, setting, first in PEERS]
     rows = contest.run(one, ours, peers)
     print(contest.show(rows, ACCURACY))
     timing.write_json(arguments.json, rows)

@@ -7,14 +7,13 @@ right-hand side of flyball for n = 10 to 1000. Usage: ``python chains.py [n ...]
 from __future__ import annotations
 
 from functools import partial
-from importlib import import_module
 from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
 from compiled_loops import RIGHT_HAND_SIDE, clock
-from contest import Contest, Flyball, Peer
+from contest import Contest, Flyball
 from trees import Motion, planar_tree
 from trees import planar_motion as tree_motion
 
@@ -55,14 +54,8 @@ def compare(n: int, coordinates: str) -> list[dict[str, Any]]:
     peers = []
     for name, setting, first, longest in PEERS:
         if n <= longest:
-            solve = partial(solve_peer, name, tree, setting)
-            peers.append(Peer(name.partition("_")[0], setting, solve, first.get(n, 1e-7 if "DOP" in setting else 4000)))
+            peers.append(contest.peer(name, setting, tree, T_END, first.get(n, 1e-7 if "DOP" in setting else 4000)))
     return contest.run(one, ours, peers)
-
-
-def solve_peer(name: str, tree: Any, setting: str, resolution: float, samples: int):
-    """Motion of a peer."""
-    return import_module(f"peer_{name}").solve(tree, T_END, resolution, setting, samples)
 
 
 def right_hand_sides(coordinates: str) -> list[dict[str, Any]]:

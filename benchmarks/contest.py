@@ -3,6 +3,10 @@
 A peer's resolution is a number of fixed steps (at least 1) or a tolerance (below 1). It is made finer (coarser) by
 factors of 2 (10) until the target is met (missed), and the last interval is halved twice. flyball gets the loosest
 tolerance on a grid of half decades, with its own error control and stabilization on.
+
+Two times of each: the kernel, stepping alone from a state that is ready, and the whole call. flyball's whole call is
+``model.simulate(t_end, rtol=...)`` as a user writes it, outputs, assembly and report included. A peer's is its loop
+with the samples kept, from a model that is built.
 """
 
 from __future__ import annotations
@@ -11,22 +15,24 @@ import argparse
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
-from mechanisms import simulate
+from mechanisms import Kernel, simulate
 
 TOLERANCES = tuple(10.0 ** (-e / 2) for e in range(4, 25))
-ATOL = 1e-2  # atol / rtol, as in flyball's defaults
 FINEST = 1e-13
 HALVINGS = 2
+ENOUGH = 100  # times of a motion that can be judged
 TIMED = 10.0  # CPU seconds that the readings in turn may take, if that leaves three of each
 FAILURES = (RuntimeError, ValueError, np.linalg.LinAlgError)
-NOTHING = 1e-7  # part of the motion that flyball integrates to tell its fixed cost
 OPEN = float("inf")
 
+NAMED = {"kernel": "cpu_ms", "call": "call_ms", "compiled": "compiled_ms"}
+RATIOS = {"cpu_ms": "ratio", "call_ms": "call_ratio"}
 COLUMNS = {
     "case": "case",
     "engine": "engine",
@@ -35,7 +41,13 @@ COLUMNS = {
     "steps": "steps",
     "evaluations": "evaluations",
 }
-TIMES = {"cpu_ms": "CPU ms", "ratio": "ratio", "with_output_ms": "with output", "call_ms": "whole call"}
+TIMES = {
+    "cpu_ms": "CPU ms",
+    "ratio": "ratio",
+    "call_ms": "whole call",
+    "call_ratio": "its ratio",
+    "compiled_ms": "without Python",
+}
 
 
 @dataclass(frozen=True)
@@ -53,19 +65,43 @@ class Contest:
     accuracy: Callable[[Any], dict[str, float]]
     key: str
     target: float
-    samples: int = 400
+    samples: int = 500  # intervals of simulate's usual outputs
     patience: float = 10.0
     per: float = 1.0
 
 
 @dataclass(frozen=True)
 class Peer:
-    """Another engine: ``solve(resolution, samples)`` returns (motion, or None without samples; CPU s of stepping)."""
+    """Another engine: ``solve(resolution, samples)`` returns (motion, or None without samples; CPU s of stepping).
+
+    ``compiled(resolution, samples)``: CPU seconds of a run in the engine's own code, where Python runs the rest.
+    """
 
     engine: str
     setting: str
     solve: Callable[[float, int], tuple[Any, float]]
     first: float
+    compiled: Callable[[float, int], float] | None = None
+
+
+def peer(name: str, setting: str, model: Any, t_end: float, first: float, even: int = 1) -> Peer:
+    """A peer by the name of its module, for a model that this takes; its motion is judged as it is.
+
+    Its numbers of steps are made multiples of ``even``, which sets samples at even times.
+    """
+    module = import_module(f"peer_{name}")
+
+    def solve(resolution: float, samples: int) -> tuple[Any, float]:
+        if resolution >= 1:
+            resolution = even * -(-resolution // even)
+            samples = samples and max(k for k in range(1, samples + 1) if resolution % k == 0 and k % even == 0)
+        return module.solve(model, t_end, resolution, setting, samples)
+
+    def compiled(resolution: float, samples: int) -> float:
+        return module.compiled_part(model, t_end, resolution, setting, samples)
+
+    own = compiled if hasattr(module, "compiled_part") else None
+    return Peer(name.partition("_")[0], setting, solve, first, own)
 
 
 @dataclass(frozen=True)
@@ -139,7 +175,9 @@ def find_peer(contest: Contest, peer: Peer) -> dict[str, Any]:
     row = {"engine": peer.engine, "setting": peer.setting} | Search(contest, peer).run()
     best = row.get("resolution", 0)
     row["steps"] = int(best) if best >= 1 else None
-    row["clocks"] = {"cpu": lambda: peer.solve(best, 0)[1]}
+    row["clocks"] = {"kernel": lambda: peer.solve(best, 0)[1], "call": lambda: peer.solve(best, contest.samples)[1]}
+    if peer.compiled is not None:
+        row["clocks"]["compiled"] = lambda: peer.compiled(best, contest.samples)
     return row
 
 
@@ -149,9 +187,10 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
 
     row: dict[str, Any] = {"engine": "flyball", "setting": ours.method, "met": False, contest.key: OPEN, "failed": []}
     for rtol in (r for r in TOLERANCES if r <= ours.loosest):
-        options = {"rtol": rtol, "atol": ATOL * rtol, "method": ours.method, "coordinates": ours.coordinates}
+        options = {"rtol": rtol, "method": ours.method, "coordinates": ours.coordinates}
+        outputs = contest.samples + 1
         try:
-            run = simulate(ours.model, contest.t_end, outputs=contest.samples + 1, **options)
+            run = simulate(ours.model, contest.t_end, outputs=outputs, **options)
         except FlyballError as error:
             row["failed"].append(f"rtol {rtol:.1e}: {str(error)[:200]}")
             continue
@@ -160,7 +199,7 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
             continue
         row |= found | {"resolution": rtol, "steps": run.health.steps + run.health.rejected}
         row |= {"evaluations": run.health.evaluations, "factorisations": run.health.factorisations}
-        row["clocks"] = clocks(ours.model, contest.t_end, contest.samples + 1, options)
+        row["clocks"] = clocks(ours.model, contest.t_end, outputs, options)
         if found[contest.key] <= contest.target:
             row["met"] = True
             break
@@ -168,12 +207,12 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
 
 
 def clocks(model: Any, t_end: float, outputs: int, options: Mapping[str, Any]) -> dict[str, Callable[[], float]]:
-    """What is timed of flyball: the call with output times, without, and the one that integrates nothing."""
-
-    def clock(t: float, count: int) -> Callable[[], float]:
-        return lambda: timing.cpu(lambda: simulate(model, t, outputs=count, **options))
-
-    return {"call": clock(t_end, outputs), "bare": clock(t_end, 2), "nothing": clock(NOTHING * t_end, 2)}
+    """What is timed of flyball: the compiled loop, and the whole call."""
+    kernel = Kernel(model, t_end, 2, **options)
+    return {
+        "kernel": kernel.seconds,
+        "call": lambda: timing.cpu(lambda: simulate(model, t_end, outputs=outputs, **options)),
+    }
 
 
 def run(contest: Contest, ours: Sequence[Flyball], peers: Sequence[Peer]) -> list[dict[str, Any]]:
@@ -200,28 +239,25 @@ def time_in_turn(contest: Contest, rows: Sequence[dict[str, Any]]) -> None:
     repeats = int(np.clip(TIMED / max(sum(first.values()), 1e-6), 3 if sum(first.values()) < TIMED else 1, 25))
     seconds = timing.interleaved(all_clocks, repeats)
     for i, row in enumerate(rows):
-        if row["engine"] == "flyball":
-            call, bare, nothing = (1e3 * seconds[i, key] / contest.per for key in ("call", "bare", "nothing"))
-            row |= {"cpu_ms": bare - nothing, "with_output_ms": call - nothing, "call_ms": call}
-        else:
-            row["cpu_ms"] = 1e3 * seconds[i, "cpu"] / contest.per
-    ours = min((row["cpu_ms"] for row in rows if row["engine"] == "flyball"), default=None)
-    for row in rows:
-        row["ratio"] = row["cpu_ms"] / ours if ours else None
+        row |= {NAMED[key]: 1e3 * seconds[i, key] / contest.per for key in row["clocks"]}
+    for key, ratio in RATIOS.items():
+        ours = min((row[key] for row in rows if row["engine"] == "flyball"), default=None)
+        for row in rows:
+            row[ratio] = row[key] / ours if ours else None
 
 
 def ratios(rows: Sequence[Mapping[str, Any]]) -> str:
-    """Best peer over flyball's best, for stepping alone and for flyball's whole call."""
+    """Best peer over flyball's best, for the kernel and for the whole call."""
     peers = [r for r in rows if r["engine"] != "flyball" and r["met"]]
     ours = [r for r in rows if r["engine"] == "flyball" and r["met"]]
     if not peers or not ours:
         return f"{rows[0]['case']}: no ratio, the target was not met by both sides"
-    peer = min(peers, key=lambda r: r["cpu_ms"])
-    texts = [f"{rows[0]['case']}: best peer {peer['engine']} ({peer['setting']}) {peer['cpu_ms']:.3g} ms"]
-    for key, label in (("cpu_ms", "stepping alone"), ("with_output_ms", "with outputs"), ("call_ms", "whole call")):
-        best = min(r[key] for r in ours)
-        texts.append(f"flyball {label} {best:.3g} ms, ratio {peer['cpu_ms'] / best:.2f}")
-    return "; ".join(texts)
+    texts = []
+    for key, label in (("cpu_ms", "kernel"), ("call_ms", "whole call")):
+        peer, best = min(peers, key=lambda r: r[key]), min(r[key] for r in ours)
+        told = f"{peer['engine']} ({peer['setting']}) {peer[key]:.3g} ms"
+        texts.append(f"{label}: flyball {best:.3g} ms, best peer {told}, ratio {peer[key] / best:.2f}")
+    return f"{rows[0]['case']}: " + "; ".join(texts)
 
 
 def show(rows: Sequence[Mapping[str, Any]], accuracy: Mapping[str, str], unit: str = "CPU ms") -> str:

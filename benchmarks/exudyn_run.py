@@ -12,10 +12,13 @@ sys.exudynFast = True  # the wheel's build without range checks; read once, when
 
 import exudyn as exu  # noqa: E402
 import exudyn.itemInterface as item  # noqa: E402
+import exudyn.utilities as symbolic  # noqa: E402
 
 exu.SetWriteToConsole(False)  # a run that fails is told by its result
 
-__all__ = ["DENSE", "IMPLICIT", "exu", "integrate", "item", "stored"]
+_kept: list = []  # compiled functions must outlive the systems that call them
+
+__all__ = ["DENSE", "IMPLICIT", "driven", "exu", "integrate", "item", "stored"]
 
 # label -> (dynamic solver, spectral radius, modified Newton)
 IMPLICIT = {
@@ -65,6 +68,24 @@ def integrate(system, t_end: float, resolution: float, setting: str, samples: in
     if not done:
         raise RuntimeError("SolveDynamic gave up")
     return seconds
+
+
+def driven(system, item_number, motor, name: str, zero: float = 0.0) -> None:
+    """Have a connector give a motor's torque, as an expression that Exudyn compiles.
+
+    ``name``: of the connector's function; it is given time, number, coordinate, rate and further numbers, and returns
+    what acts against them. ``zero``: the coordinate as drawn.
+    """
+    sin, cos = exu.symbolic.sin, exu.symbolic.cos
+
+    def against(mbs, t, number, x, rate, stiffness, damping, offset):
+        turn = motor.speed * t
+        wanted, faster = motor.swing * (1 - cos(turn)), motor.swing * motor.speed * sin(turn)
+        return motor.stiffness * (x - zero - wanted) + motor.damping * (rate - faster)
+
+    made = symbolic.CreateSymbolicUserFunction(system, against, name, item_number)
+    _kept.append(made)
+    system.SetObjectParameter(item_number, name, made)
 
 
 def stored(system, sensors: Sequence, samples: int) -> list[np.ndarray]:

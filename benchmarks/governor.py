@@ -19,7 +19,7 @@ from trees import Axis, Link, Spring, Tree
 
 from mechanisms import GRAVITY, GROUND, example
 
-T_END, TARGET, SAMPLES = 10.0, 1e-6, 100
+T_END, TARGET, SAMPLES = 10.0, 1e-6, 500
 END = 0.6196229171  # height of the sleeve [m]
 ACCURACY = {"end_error": "end error [m]"}
 X, Y, Z = np.eye(3)

@@ -7,7 +7,7 @@ Usage: ``python loops.py [bricard] [four-bar] [stewart]``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -15,13 +15,13 @@ from typing import Any
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import contest
 import numpy as np
-from contest import Contest, Flyball, Peer
+from contest import Contest, Flyball
 from loop_mechanisms import bricard, spatial_four_bar, stewart
 from trees import Motion, Tree, energy, flyball_motion, flyball_tree, gap
 
 from mechanisms import simulate
 
-T_END, TARGET, SAMPLES = 10.0, 1e-3, 400
+T_END, TARGET, SAMPLES = 10.0, 1e-3, 500
 MAKERS: dict[str, Callable[[], Tree]] = {
     "bricard": bricard,
     "four-bar": spatial_four_bar,
@@ -32,25 +32,22 @@ FINE = {"rtol": 1e-12, "atol": 1e-14}  # of the run whose end the others are com
 SAME, SOFT = 1e-6, 5e-3  # relative differences of starts that are no difference: in general, for soft constraints
 SHORT = 1e-6  # seconds of the runs that tell energies at the start
 
+ENGINES = ("pinocchio", "mujoco", "exudyn_spatial")
+
 # module, setting, first resolution
 PEERS = (
     ("pinocchio", "Python RK4", 1000),
     ("pinocchio", "Python RK4, 5/s", 1000),
     ("pinocchio", "SciPy DOP853", 1e-5),
     ("pinocchio", "SciPy DOP853, 20/s", 1e-5),
-    ("mujoco", "RK4, stiff", 4000),
-    ("mujoco", "RK4, softer (4 steps)", 8000),
+    ("mujoco", "RK4, stiff", 2000),
+    ("mujoco", "RK4, softer (4 steps)", 2000),
     ("exudyn_spatial", "generalised-alpha 0.95", 8000),
     ("exudyn_spatial", "trapezoidal, index 2", 8000),
 )
 
 
-def solve(name: str, tree: Tree, setting: str, resolution: float, samples: int):
-    """Motion of a peer."""
-    return import_module(f"peer_{name}").solve(tree, T_END, resolution, setting, samples)
-
-
-def check_start(tree: Tree, model: Any, coordinates: str) -> None:
+def check_start(tree: Tree, model: Any, coordinates: str, engines: Sequence[str] = ENGINES) -> None:
     """Print how much the engines differ at the start in energy [part of its kinetic and lifted size] and acceleration.
 
     Raises
@@ -63,7 +60,7 @@ def check_start(tree: Tree, model: Any, coordinates: str) -> None:
     ours = np.array([np.r_[v.acceleration[0], v.angular_acceleration[0]] for v in views])
     ours_energy = energy(tree, flyball_motion(tree, run))[0]
     size = sum(link.mass for link in tree.links) * float(np.linalg.norm(tree.gravity))  # a metre's height
-    for name in ("pinocchio", "mujoco", "exudyn_spatial"):
+    for name in engines:
         module = import_module(f"peer_{name}")
         motion, _ = module.solve(tree, SHORT, 1, next(iter(module.SETTINGS)), 1)
         in_energy = abs(energy(tree, motion)[0] - ours_energy) / size
@@ -84,7 +81,7 @@ def compare(name: str, coordinates: str) -> list[dict[str, Any]]:
     end = flyball_motion(tree, fine).position[-1]
 
     def accuracy(motion: Motion) -> dict[str, float]:
-        if not np.isfinite(motion.position).all() or len(motion.position) < SAMPLES:
+        if not np.isfinite(motion.position).all() or len(motion.position) < contest.ENOUGH:
             return {"energy_error": float("inf")}
         e = energy(tree, motion)
         off = float(np.abs(motion.position[-1] - end).max())
@@ -92,7 +89,7 @@ def compare(name: str, coordinates: str) -> list[dict[str, Any]]:
 
     one = Contest(name, T_END, accuracy, "energy_error", TARGET, SAMPLES, patience=6.0, per=T_END)
     ours = [Flyball(model, partial(flyball_motion, tree), method, coordinates) for method in ("dop853", "rk45")]
-    peers = [Peer(n.partition("_")[0], s, partial(solve, n, tree, s), first) for n, s, first in PEERS]
+    peers = [contest.peer(n, s, tree, T_END, first) for n, s, first in PEERS]
     return contest.run(one, ours, peers)
 
 

@@ -11,7 +11,8 @@ Free body: Euler's equations in Jacobi's elliptic functions (Landau and Lifshitz
 from __future__ import annotations
 
 import runpy
-from dataclasses import dataclass
+import time
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,12 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from flyball.analysis.motion.options import MOST, projected
 from flyball.analysis.motion.start import begin
+from flyball.analysis.progress import unwatched
+from flyball.analysis.simulate import clock_for, run_clock
+from flyball.equations.engine import INTEGRATE
+from flyball.numerics.integrators.tableaux import tableau
 
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
@@ -38,6 +44,28 @@ def started(model: fb.Mechanism, coordinates: str = "auto") -> tuple[Any, Any]:
     """(compiled mechanism, state at the start) in the coordinates asked for."""
     start = begin(model.snapshot(), 0.0, None, None, coordinates)
     return start.assembly.compiled, start.y
+
+
+class Kernel:
+    """flyball's compiled loop over a motion, ready to be called again and again: what `simulate` does without the rest.
+
+    Built from the same objects that ``simulate`` makes; only the loop is timed.
+    """
+
+    def __init__(self, model: fb.Mechanism, t_end: float, outputs: int, **options: Any) -> None:
+        o = {"method": "dop853", "coordinates": "auto", "atol": None, "max_steps": MOST} | options
+        self.start = begin(model.snapshot(), 0.0, None, None, o["coordinates"])
+        made = projected(o["coordinates"], o["rtol"], o["atol"], o["max_steps"])
+        self.asked = replace(made, method=o["method"]).sized(self.start.base.compiled.values.length)
+        self.times = np.linspace(0.0, t_end, outputs)
+
+    def seconds(self) -> float:
+        """CPU seconds of one motion."""
+        clock = clock_for(self.start, 0.0, self.times[-1], self.times, self.asked)
+        method = tableau(self.asked.method)
+        begun = time.process_time()
+        run_clock(self.start.assembly, clock, method, unwatched, INTEGRATE)
+        return time.process_time() - begun
 
 
 def example(name: str, **options: Any) -> fb.Mechanism:
@@ -64,6 +92,7 @@ class Planar:
     gravity: float = GRAVITY
     torques: tuple[tuple[int, float], ...] = ()  # body, constant torque on it
     springs: tuple[tuple[int, tuple[float, float], int, tuple[float, float], float, float], ...] = ()
+    motors: tuple[tuple[int, float, float, float, float], ...] = ()  # hinge, and numbers of a `trees.Motor`
 
 
 def fourbars(n: int) -> Planar:
@@ -104,14 +133,22 @@ def fourbars_exact(n: int, t: np.ndarray) -> np.ndarray:
 
 def flyball_planar(p: Planar) -> fb.Mechanism:
     """The same mechanism, described to flyball."""
-    m = fb.Mechanism(p.name, planar=True, gravity=(0.0, -GRAVITY))
+    m = fb.Mechanism(p.name, planar=True, gravity=(0.0, -p.gravity))
     for i, ((x, y, angle), (vx, vy, w)) in enumerate(zip(p.start.tolist(), p.rate.tolist(), strict=True)):
         m.add(fb.Body(f"rod{i}", mass=float(p.mass[i]), inertia=float(p.inertia[i]), position=(x, y), angle=angle,
                       velocity=(vx, vy), angular_velocity=w))  # fmt: skip
     for k, (i, at, j, _) in enumerate(p.hinges):
         where = at if i == GROUND else tuple(float(c[0]) for c in point(p.start[None], i, at).T)
         m.add(fb.Revolute(f"hinge{k}", "ground" if i == GROUND else f"rod{i}", f"rod{j}", at=where))
+    for k, (hinge, *law) in enumerate(p.motors):
+        m.add(fb.Motor(f"motor{k}", f"hinge{hinge}", torque=following(*law)))
     return m
+
+
+def following(stiffness: float, damping: float, swing: float, speed: float) -> str:
+    """The torque of a PD law that follows swing (1 - cos(speed t)), as an expression of t, angle and rate."""
+    turn = f"{speed!r}*t"
+    return f"{stiffness!r}*({swing!r}*(1 - cos({turn})) - angle) + {damping!r}*({swing * speed!r}*sin({turn}) - rate)"
 
 
 def point(q: np.ndarray, body: int, at: tuple[float, float]) -> np.ndarray:

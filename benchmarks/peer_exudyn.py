@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from exudyn_run import DENSE, IMPLICIT, exu, integrate, item, stored
+from exudyn_run import DENSE, IMPLICIT, driven, exu, integrate, item, stored
+from trees import Motor
 
 from mechanisms import GROUND, Planar
 
@@ -39,11 +40,34 @@ def build(p: Planar, watched: bool):
         ends = [marker_at(i, a), marker_at(j, b)]
         spring = {"stiffness": stiffness, "damping": 0, "referenceLength": length}
         system.AddObject(item.ObjectConnectorSpringDamper(markerNumbers=ends, **spring))
+    for h, stiffness, damping, swing, speed in p.motors:
+        drive(system, bodies, p, Motor(h, stiffness, damping, swing, speed))
     for i, torque in p.torques:
         marker = system.AddMarker(item.MarkerBodyRigid(bodyNumber=bodies[i]))
         system.AddLoad(item.LoadTorqueVector(markerNumber=marker, loadVector=[0, 0, torque]))
     system.Assemble()
     return system, sensors
+
+
+def drive(system, bodies, p: Planar, motor: Motor) -> None:
+    """A motor at a hinge on ground, along the body's angle; ``motor.axis`` is the hinge.
+
+    Raises
+    ------
+    ValueError
+        If the hinge is elsewhere.
+    """
+    i, _, j, _ = p.hinges[motor.axis]
+    if i != GROUND:
+        raise ValueError("motors between moving bodies are not built for this engine")
+    node = system.GetObjectParameter(bodies[j], "nodeNumber")
+    point = system.AddNode(item.NodePointGround())
+    ends = [
+        system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=point, coordinate=0)),
+        system.AddMarker(item.MarkerNodeCoordinate(nodeNumber=node, coordinate=2)),
+    ]
+    number = system.AddObject(item.ObjectConnectorCoordinateSpringDamper(markerNumbers=ends))
+    driven(system, number, motor, "springForceUserFunction", float(p.start[j, 2]))
 
 
 def solve(p: Planar, t_end: float, steps: float, setting: str, samples: int = 0):

@@ -6,8 +6,8 @@ All joints are constraints, those of the tree as well as those that cut it.
 from __future__ import annotations
 
 import numpy as np
-from exudyn_run import DENSE, IMPLICIT, exu, integrate, item, stored
-from trees import Link, Motion, Tree, start_twists
+from exudyn_run import DENSE, IMPLICIT, driven, exu, integrate, item, stored
+from trees import Link, Motion, Motor, Tree, start_twists
 
 from mechanisms import GROUND
 
@@ -39,6 +39,9 @@ class Built:
             self.system.AddObject(kind(markerNumbers=ends))
         for s in tree.springs:
             self.spring([self.marker(s.i, s.at_i), self.marker(s.j, s.at_j)], s.stiffness, s.damping, s.length)
+        carried = [k for k, link in enumerate(tree.links) for _ in link.axes]
+        for motor in tree.motors:
+            self.motor(carried[motor.axis], motor)
         self.sensors = [self.sensor(body, what) for body in self.bodies for what in variables]
         self.system.Assemble()
 
@@ -96,6 +99,16 @@ class Built:
         if a.stiffness:
             ends = [self.marker(link.parent, a.point - a.direction), self.marker(k, a.point)]
             self.spring(ends, a.stiffness, 0.0, 1.0 + a.rest)
+
+    def motor(self, k: int, motor: Motor) -> None:
+        """About the hinge on which link k hangs."""
+        link = self.tree.links[k]
+        a = link.axes[0]
+        R = turned(a.direction)
+        ends = [self.marker(link.parent, a.point), self.marker(k, a.point)]
+        connector = item.ObjectConnectorTorsionalSpringDamper
+        number = self.system.AddObject(connector(markerNumbers=ends, rotationMarker0=R, rotationMarker1=R))
+        driven(self.system, number, motor, "springTorqueUserFunction")
 
     def spring(self, ends: list, stiffness: float, damping: float, length: float) -> None:
         """Between two markers."""

@@ -2,7 +2,8 @@
 
 With MuJoCo's default softness it is another mechanism (the N-four-bar loses 0.9 J of 25 for N = 1 at any step), so
 ``solref`` and ``solimp`` are set as its documentation advises for stiff constraints: a time constant of two steps,
-critical damping. Springs between points are tendons.
+critical damping. Springs between points are tendons. Motors are a compiled callback. A link with six freedoms has a
+free joint.
 """
 
 from __future__ import annotations
@@ -10,12 +11,18 @@ from __future__ import annotations
 import time
 
 import mujoco
+import native_motor
 import numpy as np
 from trees import Link, Motion, Tree
 
 from mechanisms import GROUND
 
-SETTINGS = {"RK4, stiff": 2.0, "RK4, softer (4 steps)": 4.0}  # time constant of the constraints in steps
+SETTINGS = {
+    "RK4, stiff": 2.0,
+    "RK4, softer (4 steps)": 4.0,
+}  # time constant of the constraints in steps
+JOINT = mujoco.mjtObj.mjOBJ_JOINT
+FREE = 6  # joints of a link that are one free joint
 IMPEDANCE = (0.9999, 0.9999, 0.001, 0.5, 2.0)
 mujoco.set_mju_user_warning(lambda text: None)  # an unstable run is told by its data, not by a log file
 
@@ -23,15 +30,18 @@ mujoco.set_mju_user_warning(lambda text: None)  # an unstable run is told by its
 def build(tree: Tree, h: float, setting: str):
     """The compiled model."""
     spec = mujoco.MjSpec()
+    spec.compiler.degree = False
     spec.option.gravity = tree.gravity
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
     spec.option.timestep = h
     spec.option.tolerance, spec.option.iterations = 1e-14, 50
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
-    bodies = []
+    bodies: list = []
+    count = 0
     for link in tree.links:
         above = spec.worldbody if link.parent == GROUND else bodies[link.parent]
-        bodies.append(add_body(above, link, origin(tree, link.parent)))
+        bodies.append(add_body(above, link, origin(tree, link.parent), count))
+        count += len(link.axes)
 
     def site(k: int, x: np.ndarray, name: str) -> str:
         on = spec.worldbody if k == GROUND else bodies[k]
@@ -48,6 +58,8 @@ def build(tree: Tree, h: float, setting: str):
         tendon = spec.add_tendon(name=f"spring{n}", **forces)
         tendon.wrap_site(site(s.i, s.at_i, f"from{n}"))
         tendon.wrap_site(site(s.j, s.at_j, f"to{n}"))
+    if tree.motors:
+        native_motor.add_clock(spec, f"joint{tree.motors[0].axis}")
     return spec.compile()
 
 
@@ -56,8 +68,8 @@ def origin(tree: Tree, k: int) -> np.ndarray:
     return np.zeros(3) if k == GROUND else tree.links[k].axes[0].point
 
 
-def add_body(above, link: Link, below: np.ndarray):
-    """A link with its joints; ``below``: where the frame is drawn that it hangs on."""
+def add_body(above, link: Link, below: np.ndarray, first: int):
+    """A link with its joints, the first of that number; ``below``: where the frame is drawn that it hangs on."""
     at = link.axes[0].point
     body = above.add_body(name=link.name, pos=at - below)
     body.mass, body.ipos, body.explicitinertial = link.mass, link.centre - at, True
@@ -66,19 +78,44 @@ def add_body(above, link: Link, below: np.ndarray):
         body.fullinertia = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     else:
         body.inertia = np.diag(J)
-    for a in link.axes:
+    if len(link.axes) == FREE:
+        body.add_freejoint(name=f"joint{first}")
+        return body
+    for k, a in enumerate(link.axes):
         kind = mujoco.mjtJoint.mjJNT_HINGE if a.kind == "hinge" else mujoco.mjtJoint.mjJNT_SLIDE
-        joint = body.add_joint(type=kind, pos=a.point - at, axis=a.direction)
+        joint = body.add_joint(name=f"joint{first + k}", type=kind, pos=a.point - at, axis=a.direction)
         if a.stiffness:
-            joint.stiffness, joint.springref = [a.stiffness, 0, 0], a.rest
+            joint.stiffness, joint.springref, joint.damping = [a.stiffness, 0, 0], a.rest, [a.damping, 0, 0]
     return body
+
+
+def start_rates(tree: Tree) -> np.ndarray:
+    """Rates in MuJoCo's order: of a free joint its velocity, then its angular velocity about x, y, z.
+
+    Raises
+    ------
+    ValueError
+        If six freedoms are not three slides along x, y, z and three hinges about z, y, x.
+    """
+    out, n = np.array(tree.rates), 0
+    for link in tree.links:
+        if len(link.axes) == FREE:
+            if not np.array_equal([a.direction for a in link.axes], np.eye(3)[[0, 1, 2, 2, 1, 0]]):
+                raise ValueError(f"{link.name}: six freedoms that are no free joint")
+            out[n + 3 : n + 6] = out[n + 3 : n + 6][::-1].copy()
+        n += len(link.axes)
+    return out
 
 
 def ready(tree: Tree, h: float, setting: str):
     """(model, data) at the start."""
+    mujoco.set_mjcb_control(None)  # that of another run writes where its data were
     model = build(tree, h, setting)
     data = mujoco.MjData(model)
-    data.qvel[:] = tree.rates
+    data.qvel[:] = start_rates(tree)
+    if tree.motors:
+        names = [f"joint{k}" for k in range(len(tree.axes))]
+        native_motor.install(tree, model, data, [mujoco.mj_name2id(model, JOINT, name) for name in names])
     return model, data
 
 

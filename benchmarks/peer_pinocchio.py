@@ -8,6 +8,8 @@ singular positions DOP853 gets stuck or errs by tens of joules at any tolerance;
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pinocchio as pin
 from steppers import controlled, fixed_steps
@@ -62,16 +64,20 @@ class Built:
         return np.zeros(self.model.nq), v
 
     def acceleration(self, rate: float):
-        """Function of (q, v); ``rate``: Baumgarte's damping rate [1/s]."""
+        """Function of (t, q, v); ``rate``: Baumgarte's damping rate [1/s]."""
+        effort, solve = self.effort(), self.solver(rate)
+        return lambda t, q, v: solve(q, v, effort(t, q, v)).copy()
+
+    def solver(self, rate: float):
+        """Pinocchio's own function of (q, v, efforts): what of the right-hand side is compiled."""
         model, data = self.model, self.data
-        effort = self.effort()
         if not self.tree.cuts:
-            return lambda q, v: pin.aba(model, data, q, v, effort(q)).copy()
+            return lambda q, v, tau: pin.aba(model, data, q, v, tau)
         cuts = self.cuts(rate)
         work = pin.StdVec_RigidConstraintData([c.createData() for c in cuts])
         pin.initConstraintDynamics(model, data, cuts, work)
         rounds = REDUNDANT if self.tree.redundant else ROUNDS
-        return lambda q, v: pin.constraintDynamics(model, data, q, v, effort(q), cuts, work, rounds).copy()
+        return lambda q, v, tau: pin.constraintDynamics(model, data, q, v, tau, cuts, work, rounds)
 
     def cuts(self, rate: float):
         """Rigid constraints: one for each point that a cut holds together."""
@@ -87,7 +93,7 @@ class Built:
         return out
 
     def effort(self):
-        """Function of q: efforts of the springs along joints.
+        """Function of (t, q, v): efforts of springs and motors along joints.
 
         Raises
         ------
@@ -96,14 +102,31 @@ class Built:
         """
         if self.tree.springs:
             raise ValueError("springs between points are not built for this engine")
-        axes = self.tree.axes
-        stiffness, rest = np.zeros(self.model.nv), np.zeros(self.model.nv)
+        axes, motors = self.tree.axes, self.tree.motors
+        stiffness, rest, damping = np.zeros(self.model.nv), np.zeros(self.model.nv), np.zeros(self.model.nv)
         stiffness[self.order] = [a.stiffness for a in axes]
         rest[self.order] = [a.rest for a in axes]
+        damping[self.order] = [a.damping for a in axes]
         zero = np.zeros(self.model.nv)
-        if not stiffness.any():
-            return lambda q: zero
-        return lambda q: stiffness * (rest - q)
+        if motors:
+            place = self.order[[m.axis for m in motors]]
+            kp, kd, swing, speed, given = np.array(
+                [(m.stiffness, m.damping, m.swing, m.speed, m.torque) for m in motors]
+            ).T
+
+            def driven(t, q, v):
+                turn = speed * t
+                tau = stiffness * (rest - q) - damping * v
+                tau[place] += given + kp * (swing * (1 - np.cos(turn)) - q[place])
+                tau[place] += kd * (swing * speed * np.sin(turn) - v[place])
+                return tau
+
+            return driven
+        if damping.any():
+            return lambda t, q, v: stiffness * (rest - q) - damping * v
+        if stiffness.any():
+            return lambda t, q, v: stiffness * (rest - q)
+        return lambda t, q, v: zero
 
     def motion(self, q: np.ndarray, v: np.ndarray) -> Motion:
         """Of the links, at coordinates and rates of shape (times, joints)."""
@@ -125,21 +148,59 @@ class Built:
 
 def solve(tree: Tree, t_end: float, resolution: float, setting: str, samples: int = 0):
     """Integrate. Returns (motion, CPU seconds of the stepping); no motion where samples is 0."""
+    built, rate, (q, v, seconds) = integrated(tree, t_end, resolution, setting, samples)
+    return (built.motion(q, v) if samples else None), seconds
+
+
+def integrated(tree: Tree, t_end: float, resolution: float, setting: str, samples: int):
+    """(model, Baumgarte's rate, (coordinates, rates, CPU seconds)) of a run."""
     built = Built(tree)
     fixed, rate = SETTINGS[setting]
     if fixed:
-        acceleration = built.acceleration(rate * resolution / t_end if rate < 1 else rate)
-        q, v, seconds = fixed_steps(acceleration, *built.start(), t_end, int(resolution), samples)
+        rate = rate * resolution / t_end if rate < 1 else rate
+        run = fixed_steps(built.acceleration(rate), *built.start(), t_end, int(resolution), samples)
     else:
-        q, v, seconds = controlled(built.acceleration(rate), *built.start(), t_end, resolution, samples)
-    return (built.motion(q, v) if samples else None), seconds
+        run = controlled(built.acceleration(rate), *built.start(), t_end, resolution, samples)
+    return built, rate, run
+
+
+def compiled_part(tree: Tree, t_end: float, resolution: float, setting: str, samples: int) -> float:
+    """CPU seconds of Pinocchio's own calls in a run, without efforts and the integrator, which Python runs here.
+
+    Their time at the states of the samples, times their number.
+    """
+    built, rate, (q, v, _) = integrated(tree, t_end, resolution, setting, samples)
+    solve, effort = built.solver(rate), built.effort()
+    tau = [effort(0.0, *state) for state in zip(q, v, strict=True)]
+    states = list(zip(q, v, tau, strict=True))
+    begin = time.process_time()
+    for state in states:
+        solve(*state)
+    each = (time.process_time() - begin) / len(states)
+    return each * calls(built, rate, t_end, resolution, setting)
+
+
+def calls(built: Built, rate: float, t_end: float, resolution: float, setting: str) -> int:
+    """How many right-hand sides a run takes."""
+    if SETTINGS[setting][0]:
+        return 4 * int(resolution)
+    count = 0
+    inner = built.acceleration(rate)
+
+    def counted(t, q, v):
+        nonlocal count
+        count += 1
+        return inner(t, q, v)
+
+    controlled(counted, *built.start(), t_end, resolution, 0)
+    return count
 
 
 def start_accelerations(tree: Tree) -> np.ndarray:
     """Acceleration of each centre and angular acceleration, (links, 6), at the start."""
     built = Built(tree)
     q, v = built.start()
-    a = built.acceleration(0.0)(q, v)
+    a = built.acceleration(0.0)(0.0, q, v)
     pin.forwardKinematics(built.model, built.data, q, v, a)
     out = []
     for k, j in enumerate(built.last):

@@ -9,19 +9,19 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 Array = np.ndarray
-Acceleration = Callable[[Array, Array], Array]
+Acceleration = Callable[[float, Array, Array], Array]  # of (t, q, v)
 Run = tuple[Array, Array, float]
 
 
-def runge_kutta(acceleration: Acceleration, q: Array, v: Array, h: float) -> tuple[Array, Array]:
+def runge_kutta(acceleration: Acceleration, t: float, q: Array, v: Array, h: float) -> tuple[Array, Array]:
     """One step of the classical method of order 4."""
-    a1 = acceleration(q, v)
+    a1 = acceleration(t, q, v)
     v2 = v + h / 2 * a1
-    a2 = acceleration(q + h / 2 * v, v2)
+    a2 = acceleration(t + h / 2, q + h / 2 * v, v2)
     v3 = v + h / 2 * a2
-    a3 = acceleration(q + h / 2 * v2, v3)
+    a3 = acceleration(t + h / 2, q + h / 2 * v2, v3)
     v4 = v + h * a3
-    a4 = acceleration(q + h * v3, v4)
+    a4 = acceleration(t + h, q + h * v3, v4)
     return q + h / 6 * (v + 2 * v2 + 2 * v3 + v4), v + h / 6 * (a1 + 2 * a2 + 2 * a3 + a4)
 
 
@@ -45,7 +45,7 @@ def fixed_steps(acceleration: Acceleration, q: Array, v: Array, t_end: float, st
                 kept_q.append(q)
                 kept_v.append(v)
             if k < steps:
-                q, v = runge_kutta(acceleration, q, v, h)
+                q, v = runge_kutta(acceleration, k * h, q, v, h)
     seconds = time.process_time() - begin
     return np.array(kept_q), np.array(kept_v), seconds
 
@@ -54,8 +54,8 @@ def controlled(acceleration: Acceleration, q: Array, v: Array, t_end: float, rto
     """SciPy's DOP853 with error control, atol a hundredth of rtol. Returns as ``fixed_steps`` does."""
     n = len(q)
 
-    def rate(_: float, y: Array) -> Array:
-        return np.concatenate([y[n:], acceleration(y[:n], y[n:])])
+    def rate(t: float, y: Array) -> Array:
+        return np.concatenate([y[n:], acceleration(t, y[:n], y[n:])])
 
     times = np.linspace(0, t_end, samples + 1) if samples else [t_end]
     begin = time.process_time()

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 import flyball as fb
-from mechanisms import GROUND, Planar, point
+from mechanisms import GROUND, Planar, following, point
 
 Array = np.ndarray
 
@@ -26,6 +26,7 @@ class Axis:
     direction: Array
     stiffness: float = 0.0
     rest: float = 0.0
+    damping: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -71,6 +72,24 @@ class Spring:
 
 
 @dataclass(frozen=True)
+class Motor:
+    """A torque along one of the tree's hinges: a constant, or one that follows swing (1 - cos(speed t)) by a PD law."""
+
+    axis: int  # number of the hinge, in the order of links and axes
+    stiffness: float = 0.0
+    damping: float = 0.0
+    swing: float = 0.0
+    speed: float = 0.0
+    torque: float = 0.0
+
+    def law(self) -> str:
+        """The torque as an expression of t, angle and rate."""
+        if not self.stiffness:
+            return repr(self.torque)
+        return following(self.stiffness, self.damping, self.swing, self.speed)
+
+
+@dataclass(frozen=True)
 class Tree:
     """A mechanism. ``rates``: of all joints of the tree at the start, in the order of links and axes.
 
@@ -84,6 +103,7 @@ class Tree:
     rates: Array
     springs: tuple[Spring, ...] = ()
     redundant: bool = False  # whether some row of its joints repeats others
+    motors: tuple[Motor, ...] = ()
 
     def __post_init__(self) -> None:
         branch: list[int] = []
@@ -158,7 +178,7 @@ def moved(m: Motion, tree: Tree, k: int, x: Array) -> Array:
 
 
 def energy(tree: Tree, m: Motion) -> Array:
-    """Kinetic and potential energy over time [J], springs included."""
+    """Kinetic and potential energy over time [J], springs between points and along slides included."""
     mass = np.array([link.mass for link in tree.links])
     spin = np.einsum("tkji,tkj->tki", m.rotation, m.spin)  # along the link's axes
     inertia = np.array([link.inertia for link in tree.links])
@@ -167,7 +187,7 @@ def energy(tree: Tree, m: Motion) -> Array:
     out -= m.position @ tree.gravity @ mass
     for k, link in enumerate(tree.links):
         for a in link.axes:
-            if a.stiffness:
+            if a.stiffness and a.kind == "slide":
                 d = moved(m, tree, k, a.point) - moved(m, tree, link.parent, a.point)
                 R = np.eye(3) if link.parent == GROUND else m.rotation[:, link.parent]
                 out += 0.5 * a.stiffness * ((d * (R @ a.direction)).sum(axis=1) - a.rest) ** 2
@@ -185,7 +205,7 @@ def gap(tree: Tree, m: Motion) -> float:
 
 def planar_tree(p: Planar) -> Tree:
     """A planar mechanism of hinges as a tree: a hinge that reaches a new body hangs it, any other closes a loop."""
-    at = [np.r_[point(p.start[None], i, a)[0], 0.0] for i, a, _, _ in p.hinges]
+    at = [drawn(p, i, a) for i, a, _, _ in p.hinges]
     hangs: dict[int, list[int]] = {}  # hinges that hang bodies on each body
     cut, reached = [], {GROUND}
     for h, (i, _, j, _) in enumerate(p.hinges):
@@ -208,7 +228,21 @@ def planar_tree(p: Planar) -> Tree:
         rates.append(p.rate[j, 2] - (0.0 if i == GROUND else p.rate[i, 2]))
         waiting += hangs.get(j, [])[::-1]
     cuts = tuple(Cut(place[p.hinges[h][0]], place[p.hinges[h][2]], at[h]) for h in cut)
-    return Tree(p.name, np.array([0.0, -p.gravity, 0.0]), tuple(links), cuts, np.array(rates))
+    springs = tuple(
+        Spring(place.get(i, GROUND), drawn(p, i, a), place.get(j, GROUND), drawn(p, j, b), k, 0.0, length)
+        for i, a, j, b, k, length in p.springs
+    )
+    motors = tuple(Motor(place[p.hinges[h][2]], *law) for h, *law in p.motors)
+    if any(links[place[body]].parent != GROUND for body, _ in p.torques):
+        raise ValueError(f"{p.name}: a torque on a body that does not hang on ground is no hinge's")
+    motors += tuple(Motor(place[body], torque=torque) for body, torque in p.torques)
+    gravity = np.array([0.0, -p.gravity, 0.0])
+    return Tree(p.name, gravity, tuple(links), cuts, np.array(rates), springs, motors=motors)
+
+
+def drawn(p: Planar, body: int, at: tuple[float, float]) -> Array:
+    """Where a point of a planar body is at the start."""
+    return np.r_[point(p.start[None], body, at)[0], 0.0]
 
 
 def planar_motion(p: Planar, tree: Tree, m: Motion) -> tuple[Array, Array]:
@@ -232,6 +266,9 @@ def flyball_tree(tree: Tree) -> fb.Mechanism:
         ends = names[c.i], names[c.j]
         joint = fb.Revolute(f"cut {k}", *ends, at=c.point, axis=c.axis) if c.axis is not None else None
         m.add(joint or fb.Spherical(f"cut {k}", *ends, at=c.point))
+    carried = [k for k, link in enumerate(tree.links) for _ in link.axes]
+    for k, motor in enumerate(tree.motors):
+        m.add(fb.Motor(f"motor {k}", f"joint {carried[motor.axis]}", torque=motor.law()))
     for k, s in enumerate(tree.springs):
         m.add(fb.SpringDamper(f"spring {k}", names[s.i], names[s.j], at=(s.at_i, s.at_j), stiffness=s.stiffness,
                               damping=s.damping, length=s.length))  # fmt: skip
@@ -244,6 +281,9 @@ def add_joint(m: fb.Mechanism, name: str, parent: str, link: Link) -> None:
     first = link.axes[0]
     if kinds == ["hinge"]:
         m.add(fb.Revolute(name, parent, link.name, at=first.point, axis=first.direction))
+        if first.stiffness:
+            held = {"stiffness": first.stiffness, "damping": first.damping, "angle": first.rest}
+            m.add(fb.TorsionalSpringDamper(f"spring of {name}", name, **held))
     elif kinds == ["hinge", "hinge"]:
         axes = (first.direction, link.axes[1].direction)
         m.add(fb.Universal(name, parent, link.name, at=first.point, axes=axes))

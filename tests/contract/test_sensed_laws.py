@@ -69,7 +69,7 @@ def test_driver_that_follows_two_sensors():
     )
     m.add(fb.Initial("sx.displacement", value=0.7, rate=1.3), fb.Initial("sy.displacement", value=-1.1, rate=0.4))
     m.add(fb.PointForce("f", "x", force=(2.0, 0)))
-    r = m.simulate(1.5, outputs=31)
+    r = m.simulate(1.5, outputs=31, rtol=1e-8)
     (x, dx, ddx), (y, dy, ddy), (z, _, ddz) = (
         (r[f"s{k}"].displacement, r[f"s{k}"].rate, r[f"s{k}"].acceleration) for k in mass
     )
@@ -210,7 +210,7 @@ def test_a_sensed_angle_counts_turns():
     m.add(fb.Table("curve", x=[-20.0, 0.0, 20.0], y=[2.0, 0.0, -2.0], interpolation="linear"))
     m.add(fb.Motor("f", joint="A", torque="curve(a)"))
     J = np.array([1, 2, 2]) / 3.0 @ (np.array([0.02, 0.03, 0.04]) * np.array([1, 2, 2]) / 3.0)
-    r = m.simulate(5.0, outputs=26)
+    r = m.simulate(5.0, outputs=26, rtol=1e-8)
     assert r["A"].angle == pytest.approx(6.0 * np.pi * np.cos(np.sqrt(0.1 / J) * r.t), abs=1e-5)
 
 

@@ -56,7 +56,7 @@ def test_example_is_sound(name):
     report = m.check()
     assert report.redundancy == REDUNDANT.get(name, 0)
     assert report.moved == {}
-    r = m.simulate(SECONDS.get(name, 1.0), outputs=101)
+    r = m.simulate(SECONDS.get(name, 1.0), outputs=101, rtol=1e-8)
     assert r.health.success
     assert r.health.violation < 1e-9
     assert r.health.velocity_violation < 1e-8

@@ -71,7 +71,7 @@ class CompareOptions(Options):
     start: Result | None
     method: str
     rtol: float
-    atol: float
+    atol: float | None
     max_step: float
     max_steps: int | None
     alpha: float
@@ -240,7 +240,7 @@ def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) 
 
 
 def _choice(job: _Task, name: str) -> Integration:
-    return job.asked.integration(WAYS[name], job.max_steps)
+    return job.asked.integration(WAYS[name], job.max_steps).sized(job.base.base.compiled.values.length)
 
 
 def _state(c: Compiled, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -80,6 +80,7 @@ def moved(
         If it cannot go on; its ``result`` holds the motion up to then.
     """
     refuse_missing(begun.base, float(t_end))
+    o = o.sized(begun.base.compiled.values.length)
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
@@ -97,7 +98,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     refuse_unheld(len(times), _width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
-    real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.atol
+    real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
     real[ex.SPAN] = (t_end - t) or 1.0
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
@@ -111,7 +112,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
     W.option[ALPHA], W.option[BETA] = o.alpha or 0.0, o.beta or 0.0
     length = a.compiled.values.length
-    loose = o.atol + o.rtol * length
+    loose = o.tolerance(length) + o.rtol * length
     near = loose * min(1.0, loose / (NEARER * length))
     W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))

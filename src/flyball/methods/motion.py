@@ -28,8 +28,8 @@ class Motions(Model):
         start: Result | None = None,
         coordinates: str = "auto",
         method: str = "dop853",
-        rtol: float = 1e-8,
-        atol: float = 1e-10,
+        rtol: float = 1e-7,
+        atol: float | None = None,
         max_step: float | str = math.inf,
         max_steps: int = 10_000_000,
         stabilization: str = "projection",
@@ -38,6 +38,13 @@ class Motions(Model):
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
         """Integrate the equations of motion.
+
+        Tolerances are of the error of a single step, and errors of steps add up. With the default ``rtol`` of 1e-7 the
+        error at the end is about 1e-6 of the motion or less (displacements and turns by their largest, speeds by the
+        fastest) for motions of some ten swings or turns: more than lengths and masses are ever known to. It grows with
+        the square of the time where a period is slightly off, and faster where the motion itself is sensitive to its
+        start (near singular positions, in chains that fly about, at ropes that go slack), which no tolerance changes.
+        Ten times the tolerance is ten times the error, and costs a quarter less.
 
         Parameters
         ----------
@@ -57,8 +64,9 @@ class Motions(Model):
             Explicit Runge-Kutta pair, of order 8 or 5.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least.
-        atol : float [m, rad, m/s, rad/s]
-            Tolerance of the error of a step where the state is small.
+        atol : float [m, rad, m/s, rad/s], optional
+            Tolerance of the error of a step where the state is small. If not given a hundredth of ``rtol``, and less
+            for mechanisms smaller than a metre: that times their length [m]; never less than rounding.
         max_step : float or str [s]
             Longest step. What a law does for less than a 20 000th of the time span can go unseen: give it there.
         max_steps : int
@@ -103,8 +111,8 @@ class Motions(Model):
         parameters: Mapping[str, float | str] | None = None,
         start: Result | None = None,
         method: str = "dop853",
-        rtol: float = 1e-8,
-        atol: float = 1e-10,
+        rtol: float = 1e-7,
+        atol: float | None = None,
         max_step: float | str = math.inf,
         max_steps: int | None = None,
         alpha: float = 10.0,
@@ -138,8 +146,8 @@ class Motions(Model):
             Explicit Runge-Kutta pair, of order 8 or 5.
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
-        atol : float [m, rad, m/s, rad/s]
-            Tolerance of the error of a step where the state is small.
+        atol : float [m, rad, m/s, rad/s], optional
+            Tolerance of the error of a step where the state is small; as for `simulate`.
         max_step : float or str [s]
             Longest step.
         max_steps : int, optional

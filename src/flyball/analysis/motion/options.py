@@ -6,7 +6,7 @@ import dataclasses
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -31,6 +31,8 @@ LEAST = 4  # numbers kept of each time: of one hinge
 MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
 RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
+SMALL = 1e-2  # part of a coordinate's size below which its error is held to atol, where that is not given
+LEAST_ATOL = 1e-14  # part of the mechanism's length [m], or of a radian, that rounding leaves
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +42,7 @@ class Integration(Options):
     coordinates: str
     method: str
     rtol: float
-    atol: float
+    atol: float | None
     max_step: float
     max_steps: int
     stabilization: str
@@ -52,7 +54,8 @@ class Integration(Options):
         if isinstance(self.max_step, str):
             object.__setattr__(self, "max_step", seconds(self.max_step, "max_step"))
         for name in ("rtol", "atol", "max_step"):
-            positive(getattr(self, name), name)
+            if getattr(self, name) is not None or name != "atol":
+                positive(getattr(self, name), name)
         count(self.max_steps, "max_steps")
         if self.rtol < FINEST:
             raise ModelError(
@@ -80,9 +83,22 @@ class Integration(Options):
                 raise ModelError(f"{name} is a rate of stabilization='baumgarte'; with {self.stabilization!r} it does "
                                  f"nothing")  # fmt: skip
 
+    def sized(self, length: float) -> Self:
+        """With its `tolerance` as ``atol``."""
+        return dataclasses.replace(self, atol=self.tolerance(length))
+
+    def tolerance(self, length: float) -> float:
+        """The ``atol`` given, or that of a mechanism of that length [m]."""
+        return usual_atol(self.rtol, length) if self.atol is None else self.atol
+
     def choices(self) -> dict[str, Any]:
         """The choices of the integration by name, without what else was asked."""
         return {f.name: getattr(self, f.name) for f in dataclasses.fields(Integration)}
+
+
+def usual_atol(rtol: float, length: float) -> float:
+    """The tolerance where the state is small, of a mechanism of that length [m]."""
+    return max(SMALL * rtol, LEAST_ATOL) * min(1.0, length)
 
 
 def projected(coordinates: str, rtol: float, atol: float, max_steps: int = MOST) -> Integration:
