@@ -56,7 +56,7 @@ def estimate(n: dict[str, float]) -> float:
 
 
 def least(model: Model, tree: Sequence[str]) -> float:
-    """What a right-hand side costs at least [ns] in a forest of these tree joints: links, and M where there are rows.
+    """What a right-hand side costs at least [ns] in a forest of these tree joints: links, and M and its factor.
 
     For each velocity M has those of all that its body hangs on: deep trees with many loops are seen from here, without
     their tables.
@@ -71,4 +71,4 @@ def least(model: Model, tree: Sequence[str]) -> float:
     for b, (parent, n) in enumerate(body_i[:, [PARENT, NV]].tolist()):
         above[b] = above[parent] + n
         entries += n * above[parent] + n * (n + 1) // 2
-    return LINK * float((body_i[:, TREE] > POINT).sum()) + ENTRY * entries
+    return LINK * float((body_i[:, TREE] > POINT).sum()) + ENTRY * float(2 * entries - body_i[:, NV].sum())
