@@ -1,4 +1,4 @@
-"""Analyses that are held to a time: modes and linear equations of 1000 bodies, kinematics of Andrews' mechanism.
+"""Analyses that are held to a time: linear equations and modes of 3000 bodies, equilibria, driven motions.
 
 CPU time, warm; the first row is the one compilation that linear analyses need. Usage: ``python analyses.py``.
 """
@@ -15,6 +15,18 @@ import flyball as fb
 from mechanisms import GRAVITY, example
 
 COLUMNS = {"what": "what", "seconds": "CPU [s]", "found": "found"}
+
+
+def aslant(n: int) -> fb.Mechanism:
+    """A chain of n uniform rods, 1 m and 1 kg in all, drawn 0.2 rad beside where it hangs."""
+    m = fb.Mechanism("chain", planar=True, gravity=(0, -GRAVITY))
+    before, way = "ground", np.array([np.sin(0.2), -np.cos(0.2)]) / n
+    for k in range(n):
+        at = tuple((k + 0.5) * way)
+        m.add(fb.Body(f"rod {k}", mass=1 / n, inertia=n**-3 / 12, position=at, angle=0.2))
+        m.add(fb.Revolute(f"J{k}", before, f"rod {k}", at=tuple(k * way)))
+        before = f"rod {k}"
+    return m
 
 
 def chain(n: int, planar: bool = True) -> fb.Mechanism:
@@ -39,6 +51,35 @@ def andrews() -> fb.Mechanism:
     return m
 
 
+def damped(n: int) -> fb.Mechanism:
+    """The chain with a damper in every hinge."""
+    m = chain(n)
+    for k in range(n):
+        m.add(fb.CoordinateSpring(f"damper {k}", f"J{k}.angle", stiffness=0, damping=1e-4))
+    return m
+
+
+def ladder(n: int) -> fb.Mechanism:
+    """Two hanging chains of n rods with a rung at every hinge: n loops, 3 n bodies."""
+    m, h = fb.Mechanism("ladder", planar=True, gravity=(0, -GRAVITY)), 1 / n
+    for k in range(n):
+        for side, x in (("left", 0.0), ("right", 0.3)):
+            before = f"{side} {k - 1}" if k else "ground"
+            m.add(fb.Body(f"{side} {k}", mass=h, inertia=h**3 / 12, position=(x, -(k + 0.5) * h)))
+            m.add(fb.Revolute(f"{side} hinge {k}", before, f"{side} {k}", at=(x, -k * h)))
+        m.add(fb.Body(f"rung {k}", mass=h, inertia=h * 0.09 / 12, position=(0.15, -(k + 1) * h)))
+        for side, x in (("left", 0.0), ("right", 0.3)):
+            m.add(fb.Revolute(f"{side} end {k}", f"{side} {k}", f"rung {k}", at=(x, -(k + 1) * h)))
+    return m
+
+
+def pushed(m: fb.Mechanism) -> fb.Mechanism:
+    """With a force at its last body that is an input."""
+    at = m.bodies[-1].position
+    m.add(fb.PointForce("push", m.bodies[-1].name, at=at, force=(0,) * len(at)))
+    return m
+
+
 def measured(what: str, run: Callable[[], object], tell: Callable[[object], str]) -> dict[str, object]:
     """One row."""
     found: list[object] = []
@@ -50,13 +91,40 @@ def main() -> None:
     """Command line."""
     arguments = contest.parser(__doc__).parse_args()
     rows = [measured("first linear model (compiles)", chain(3).linearize, lambda L: f"{len(L.A)} states")]
-    big, spatial, driven = chain(1000), chain(1000, planar=False), andrews()
+    driven = andrews()
     chain(3).modes()
     driven.kinematics(3, t_end=0.01)
+    for what, m in (
+        ("3000 planar links", pushed(chain(3000))),
+        ("3000 links on ball joints", pushed(chain(3000, planar=False))),
+        ("3000 planar links with dampers", pushed(damped(3000))),
+        ("1000 loops of 3 bodies", pushed(ladder(1000))),
+    ):
+        middle = f"{m.bodies[len(m.bodies) // 2].name}.x"
+        linear: list[fb.LinearModel] = []
+        rows += [
+            measured(
+                f"linearize, {what}",
+                lambda m=m, middle=middle, to=linear: to.append(m.linearize(["push.x"], [middle])),
+                lambda _, of=linear: repr(of[0].descriptor),
+            ),
+            measured(
+                "    ten eigenvalues, one response of it",
+                lambda of=linear: (of[0].descriptor.nearest(10), of[0].response([1.0])),
+                lambda r: f"slowest {abs(r[0][0]):.5g} rad/s",
+            ),
+            measured(
+                f"ten modes, {what}", lambda m=m: m.modes(count=10), lambda r: f"{r.omega[0]:.5f} rad/s, {r.kinds[0]}"
+            ),
+        ]
+    hung = chain(300)
     rows += [
-        measured("linearize, 1000 planar links", big.linearize, lambda L: f"{len(L.A)} states"),
-        measured("10 modes, 1000 planar links", lambda: big.modes(count=10), lambda m: f"{m.omega[0]:.5f} rad/s"),
-        measured("10 modes, 1000 links on ball joints", lambda: spatial.modes(count=10), lambda m: m.kinds[0]),
+        measured(
+            "equilibrium, 300 planar links drawn aslant",
+            lambda: aslant(300).equilibrium(),
+            lambda e: f"{e.stability}, {e.method}",
+        ),
+        measured("equilibrium, 300 planar links as they hang", hung.equilibrium, lambda e: e.stability),
         measured(
             "kinematics, Andrews, 1000 times",
             lambda: driven.kinematics(1000, t_end=0.03),

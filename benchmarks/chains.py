@@ -31,6 +31,7 @@ PEERS = (
     ("mujoco", "RK4, stiff", {10: 4000, 30: 8000, 100: 40000}, 100),
     ("pinocchio", "Python RK4", {10: 4000, 30: 8000, 100: 40000}, 100),
     ("pinocchio", "SciPy DOP853", {10: 1e-6, 30: 1e-7, 100: 1e-7}, 100),
+    ("drake", "RK3, error control", {10: 1e-6}, 10),
     ("exudyn_tree", "RK44", {10: 4000, 30: 8000}, 30),
     ("exudyn_tree", "RK67", {10: 2000, 30: 4000}, 30),
     ("exudyn_tree", "DOPRI5", {10: 1e-7, 30: 1e-7}, 30),

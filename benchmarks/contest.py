@@ -217,6 +217,7 @@ def clocks(model: Any, t_end: float, outputs: int, options: Mapping[str, Any]) -
 
 def run(contest: Contest, ours: Sequence[Flyball], peers: Sequence[Peer]) -> list[dict[str, Any]]:
     """All engines: searched one after the other, then timed in turn."""
+    print(timing.heading(), flush=True)
     rows = []
     for searched, entries in ((find_flyball, ours), (find_peer, peers)):
         for entry in entries:

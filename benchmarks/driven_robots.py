@@ -36,10 +36,10 @@ PEERS = (
     ("mujoco", "RK4, softer (4 steps)", 2000),
 )
 LOOPS_ONLY = ("RK4, softer (4 steps)",)
-EXUDYN = {
+OTHERS = {
     "delta": (("exudyn_spatial", "generalised-alpha 0.95", 4000), ("exudyn_spatial", "trapezoidal, index 2", 4000)),
     "3-RRR": (("exudyn", "generalised-alpha 0.95", 4000), ("exudyn", "trapezoidal, index 2", 4000)),
-    "humanoid": (("exudyn_tree", "RK44", 2000), ("exudyn_tree", "RK67", 1000)),
+    "humanoid": (("exudyn_tree", "RK44", 2000), ("exudyn_tree", "RK67", 1000), ("drake", "RK3, error control", 1e-5)),
 }
 
 
@@ -64,7 +64,7 @@ def compare(name: str, target: float, coordinates: str) -> list[dict[str, Any]]:
     model = flyball_planar(given) if planar else flyball_tree(given)
     motion = partial(flyball_planar_motion, given) if planar else partial(flyball_motion, tree)
     if not planar:
-        check_start(tree, model, coordinates, ("pinocchio", "mujoco", EXUDYN[name][0][0]))
+        check_start(tree, model, coordinates, dict.fromkeys(module for module, *_ in (*PEERS, *OTHERS[name])))
     fine = looked_at(name, motion(simulate(model, t_end, rtol=1e-12, coordinates=coordinates)), tree, given)
     way = float(np.linalg.norm(fine - fine[0], axis=2).max())
 
@@ -78,7 +78,7 @@ def compare(name: str, target: float, coordinates: str) -> list[dict[str, Any]]:
     one = Contest(case, t_end, accuracy, "error", target, patience=6.0, per=t_end)
     ours = [Flyball(model, motion, method, coordinates) for method in ("dop853", "rk45")]
     peers = []
-    for module, setting, first in (*PEERS, *EXUDYN[name]):
+    for module, setting, first in (*PEERS, *OTHERS[name]):
         if tree.cuts or setting not in LOOPS_ONLY:
             taken = given if module == "exudyn" else tree
             peers.append(contest.peer(module, setting, taken, t_end, first, LOOKS))

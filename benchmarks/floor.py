@@ -211,6 +211,9 @@ def rate() -> float:
 
 def mechanisms() -> dict[str, Any]:
     """Names and models."""
+    from robots import delta, humanoid
+    from trees import flyball_tree
+
     import flyball as fb
     from mechanisms import chain, flyball_planar, fourbars
 
@@ -219,6 +222,8 @@ def mechanisms() -> dict[str, Any]:
         "four-bar": flyball_planar(fourbars(1)),
         "Bricard": fb.load(examples / "bricard.toml"),
         "chain of 100": flyball_planar(chain(100)),
+        "delta robot": flyball_tree(delta()),
+        "humanoid": flyball_tree(humanoid()),
     }
 
 

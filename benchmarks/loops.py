@@ -7,7 +7,7 @@ Usage: ``python loops.py [bricard] [four-bar] [stewart]``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from functools import partial
 from importlib import import_module
 from typing import Any
@@ -47,7 +47,7 @@ PEERS = (
 )
 
 
-def check_start(tree: Tree, model: Any, coordinates: str, engines: Sequence[str] = ENGINES) -> None:
+def check_start(tree: Tree, model: Any, coordinates: str, engines: Iterable[str] = ENGINES) -> None:
     """Print how much the engines differ at the start in energy [part of its kinetic and lifted size] and acceleration.
 
     Raises

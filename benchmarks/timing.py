@@ -13,6 +13,7 @@ import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
 from datetime import date
+from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
@@ -20,7 +21,7 @@ from typing import Any
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ[_variable] = "1"
 
-PACKAGES = ("numpy", "scipy", "numba", "exudyn", "mujoco", "mujoco-core", "pin")
+PACKAGES = ("numpy", "scipy", "numba", "exudyn", "mujoco", "pin", "drake")
 
 
 def cpu(work: Callable[[], Any]) -> float:
@@ -71,6 +72,14 @@ def machine() -> dict[str, Any]:
         "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
         "versions": found,
     }
+
+
+@lru_cache(maxsize=1)
+def heading() -> str:
+    """The machine and the versions in a line."""
+    m = machine()
+    versions = ", ".join(f"{name} {number}" for name, number in m["versions"].items())
+    return f"{m['date']}, {m['processor']}, {m['cores']} cores, load {m['load']}, Python {m['python']}, {versions}"
 
 
 def text(value: Any) -> str:

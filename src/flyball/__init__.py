@@ -29,6 +29,7 @@ Ask how it moves
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
     m.compare(t_end)              -> Comparison of formulations of the equations of motion
+    m.prepare(coordinates)        -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
 
 Ask where it rests, and what small motions do
     m.equilibrium()               -> Equilibrium, stable or not; m.equilibria(parameter, values) -> EquilibriumSeries
@@ -63,6 +64,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assembly.start import Assembly as Assembly
+    from .analysis.prepared import Prepared as Prepared
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -134,6 +136,7 @@ _HOME = {
     "SingularityError": "errors",
     "NotConverged": "errors",
     "Assembly": "analysis.assemble",
+    "Prepared": "analysis.prepared",
     "MassReport": "results.mass",
     "Mobility": "results.mobility",
     "Report": "results.check",

@@ -10,7 +10,8 @@ import pytest
 from flyball.compiler import stamp
 from flyball.compiler.stamp import PACKAGE, stamped
 from flyball.equations.engine import engine
-from flyball.equations.residual import residual_kernel
+from flyball.equations.residual import stepped
+from flyball.equations.variation import variation_kernel
 from flyball.numerics.ldl import factor_kernel
 from tests.program.copied import Copy
 
@@ -48,13 +49,16 @@ def names_of(kernel):
 
 def test_an_edit_of_one_loop_does_not_compile_the_others():
     """A kernel's stamp covers what it imports, registries with all they find, and nothing else."""
-    of_engine, of_residual, of_factor = map(names_of, (engine, residual_kernel, factor_kernel))
+    of_engine, of_residual, of_factor = map(names_of, (engine, stepped, factor_kernel))
     explicit = "numerics/integrators/explicit.py"
     assert explicit in of_engine
     assert explicit not in of_residual | of_factor
     for shared in ("equations/rows.py", "constraints/skew.py", "forces/bushing.py", "tables/system.py", "math/vec.py"):
         assert shared in of_engine & of_residual
     assert "numerics/ldl.py" in of_engine & of_factor
+    of_variation = names_of(variation_kernel)
+    assert explicit in of_variation
+    assert not of_variation & {"equations/rows.py", "equations/loads.py", "forces/bushing.py", "equations/engine.py"}
     assert not of_factor & {"equations/rows.py", "forces/bushing.py"}
     assert not {x for x in of_engine if x.startswith(("model/", "analysis/", "joints/"))}
 
@@ -98,3 +102,31 @@ print(json.dumps(cache_counts() | {"inverse": D[0]}))
     again = small.run(script)
     assert (again["misses"], again["inverse"]) == (1, 0.25)
     assert small.run(script)["hits"] == 1
+
+
+def test_a_file_that_cannot_be_read_now_is_left_as_it_is(tmp_path):
+    """A read error says nothing of what is in a file: the code is compiled, and the files stay for others."""
+    small = Copy(tmp_path)
+    script = """
+import numpy as np
+from numba.core import caching
+from flyball.numerics.ldl import analyse, factor_kernel
+def refuse(self, name):
+    raise PermissionError(13, "Permission denied")
+if READ:
+    caching.IndexDataCacheFile._load_index = lambda self: refuse(self, "index")
+P, _ = analyse(1, np.zeros(0, int), np.zeros(0, int))
+L, D, Y = np.zeros(len(P.Li)), np.zeros(1), np.zeros(1)
+import warnings
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    factor_kernel(P, np.full(len(P.Ai) + 1, 4.0), L, D, Y)
+print(json.dumps(cache_counts() | {"inverse": D[0], "told": [str(w.message) for w in told]}))
+"""
+    assert small.run("READ = False" + script)["misses"] == 1
+    before = {f: f.read_bytes() for f in small.cache.rglob("*.nb?")}
+    again = small.run("READ = True" + script)
+    assert (again["misses"], again["inverse"]) == (1, 0.25)
+    assert any("cannot be kept" in text for text in again["told"])
+    assert {f: f.read_bytes() for f in small.cache.rglob("*.nb?")} == before
+    assert small.run("READ = False" + script)["hits"] == 1

@@ -37,7 +37,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "laws": {*LIBRARY, "model"},
     "tables": {*LIBRARY, *ELEMENTS, "numerics", "laws"},
     "equations": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables"},
-    "results": {*LIBRARY, *ELEMENTS, "laws", "tables", "equations"},
+    "results": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables", "equations"},
     "analysis": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables", "equations", "results"},
     "symbolic": {*LIBRARY, *ELEMENTS, "numerics", "laws", "tables", "equations", "results"},
     "view": {*LIBRARY, *ELEMENTS, "tables", "equations", "results"},

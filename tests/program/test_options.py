@@ -26,7 +26,7 @@ from flyball.methods.statics import Statics
 FAMILIES = (Motions, Statics, Design, Freedom)
 METHODS = {name: f for c in FAMILIES for name, f in vars(c).items() if inspect.isfunction(f)}
 COMMANDS = typer.main.get_command(app).commands
-NOT_COMMANDS = {"assemble", "mass_properties"}  # `check` tells both
+NOT_COMMANDS = {"assemble", "mass_properties", "prepare"}  # `check` tells two; what is prepared is for Python
 SHARED = {"model", "change", "as_json", "help"}
 ELSEWHERE = {  # arguments that do not stand on the command line, or otherwise
     "parameters": "--set",

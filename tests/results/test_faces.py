@@ -15,7 +15,7 @@ import flyball as fb
 from flyball.results.numbers import clean, number, span, tuple_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-OWED = {"Assembly", "MassReport", "Mobility", "Report"}  # tables of names and numbers: have no picture
+OWED = {"Assembly", "MassReport", "Mobility", "Prepared", "Report"}  # tables of names and numbers: have no picture
 
 
 def crank() -> fb.Mechanism:
@@ -45,6 +45,7 @@ MADE = {
     "MassReport": lambda: crank().mass_properties(),
     "Report": lambda: crank().check(),
     "Assembly": lambda: crank().assemble(),
+    "Prepared": lambda: crank().prepare(),
 }
 
 

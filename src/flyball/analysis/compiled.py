@@ -114,10 +114,15 @@ class Compiled:
         """(q, v) of this mechanism in the state (t, q, v) of it in other coordinates; turns and places too."""
         hints = other.hints | other.turned(q)
         self.follow(hints)
-        bodies = other.moving(t, q, v)
-        own = positions(self.values, bodies, hints)
+        same = other.drawn(q) and self.values.given is other.values.given
+        bodies = other.moving(t, q, v) if v.any() or not same else {}
+        own = self.values.q.copy() if same else positions(self.values, bodies, hints)
         self.at(t, own, np.zeros(self.structure.nv))
-        return own, velocities(self.values, bodies, self.work)
+        return own, velocities(self.values, bodies, self.work) if bodies else np.zeros(self.structure.nv)
+
+    def drawn(self, q: np.ndarray) -> bool:
+        """Whether that is the position that is drawn, with the turns that it is drawn with."""
+        return np.array_equal(q, self.values.q) and np.array_equal(self.z, _places(self.values))
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""
@@ -130,7 +135,12 @@ class Compiled:
 
     def jacobian(self) -> np.ndarray:
         """Dense copy of the constraint Jacobian last evaluated, (nr, nv)."""
-        return self.sparse_jacobian().toarray()
+        S = self.values.system
+        nr, row_p = len(S.row_i), S.row_p[: len(S.row_i) + 1]
+        n = row_p[-1]
+        out = np.zeros((nr, self.structure.nv))
+        np.add.at(out, (np.repeat(np.arange(nr), np.diff(row_p)), S.col_i[:n]), self.work.G[:n])
+        return out
 
     def sparse_jacobian(self):
         """Sparse copy of the constraint Jacobian last evaluated."""
@@ -145,25 +155,21 @@ class Compiled:
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
         return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
 
-    def inverse_mass_root(self, movable: np.ndarray):
-        """Sparse R with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
+    def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
+        """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
 
         Missing inertias have stand-ins.
         """
-        import scipy.sparse as sp
+        return self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], movable, dense)
 
-        return (sp.diags(movable) @ self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], True)).tocsr()
-
-    def _blocks(self, column: int, translation: np.ndarray, root: bool = False):
+    def _blocks(self, column: int, translation: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
         """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table.
 
-        With ``root`` the square root of that.
+        With ``root`` the square root of that, its rows times these numbers.
         """
-        import scipy.sparse as sp
-
         S = self.values.system
         J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
-        if root:
+        if root is not None:
             if np.iscomplexobj(J):
                 raise TypeError("the root of complex inertias is not known; give real parameters")
             w, V = np.linalg.eigh(J)
@@ -180,8 +186,15 @@ class Compiled:
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
             x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
-        nv = self.structure.nv
-        return sp.csr_matrix((np.concatenate(x), (np.concatenate(i), np.concatenate(j))), shape=(nv, nv))
+        nv, rows, columns, entries = self.structure.nv, np.concatenate(i), np.concatenate(j), np.concatenate(x)
+        entries = entries if root is None else entries * root[rows]
+        if dense:
+            out = np.zeros((nv, nv), entries.dtype)
+            out[rows, columns] = entries
+            return out
+        import scipy.sparse as sp
+
+        return sp.csr_matrix((entries, (rows, columns)), shape=(nv, nv))
 
 
 def compiled(

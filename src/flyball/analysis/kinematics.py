@@ -17,13 +17,14 @@ from ..equations.engine import FOLLOW, INTEGRATE
 from ..errors import AssemblyError, MobilityError, ModelError, SimulationError, SingularityError
 from ..model.body import Driver
 from ..model.model import Model
+from ..numerics.sparse_rank import DENSE
 from ..results.mobility import Mobility
 from ..results.result import Result
 from .assemble import assemble
 from .assembly.start import Assembly
 from .compiled import compiled
 from .freedom.geometry import positions_nearby
-from .freedom.jacobian import DENSE, rank_of, scaled_jacobian
+from .freedom.jacobian import rank_of, scaled_jacobian
 from .mobility import mobility
 from .motion.options import output_times, projected
 from .motion.start import Start, begin_at

@@ -7,25 +7,30 @@ accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import one
+from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
-from ..results.linear import LinearModel
+from ..results.linear import LinearModel, StateSpace
 from ..results.result import Result
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
-from .linear.derivatives import Equations, State, by_prescription
+from .linear.derivatives import Equations, State
+from .linear.descriptor import descriptor, descriptor_of_large
+from .linear.effects import effects, stepped
 from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.kinks import refuse_kinks
+from .linear.large import DENSE, Large, is_large
 from .linear.reduced import Frame, Inputs, Reduced, reduced
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
@@ -51,10 +56,10 @@ class InstantOptions(Options):
         if self.about is not None and self.t is not None:
             raise ModelError("about has its own time: leave out t")
 
-    def state(self, model: Model, coordinates: str | None = None) -> State:
-        """The state there, in coordinates of these or of others."""
+    def state(self, model: Model, most: int | None = None) -> State:
+        """The state there; with more velocities than ``most`` in absolute coordinates."""
         return instant(
-            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=coordinates or self.coordinates
+            model, self.about, t=self.t or 0.0, parameters=self.parameters, coordinates=self.coordinates, most=most
         )[0]
 
 
@@ -70,15 +75,47 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     for name in o.outputs:
         one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
-    x = o.state(model)
-    model, named = with_inputs(x.c.structure.model, o.inputs)
-    if named:
-        x = _in_copy(model, x)
-    e, f, frame = _about(x, o.frozen, to=[i.name for i in named if i.name == i.parameter])
+    here = model
+    if o.about is None:  # the copy with inputs is assembled at once
+        here, named = with_inputs(model, o.inputs)
+    x = o.state(here, DENSE)
+    if len(x.v) > DENSE and not is_large(x):
+        x = o.state(here)
+    if o.about is not None:
+        x, named = _with(x, o.inputs)
+    if not is_large(x):
+        return _small(x, o, named)
+    whole = Large.at(x, o.frozen, _parameters(named))
+    later = partial(_state_space_of, model.snapshot(), o)
+    return _told(whole.e, named, o.outputs, later, descriptor_of_large(whole, named, o.outputs), None)
+
+
+def _small(x: State, o: LinearizeOptions, named: list[Input]) -> LinearModel:
+    """Of mechanisms with few velocities: the constraints are taken out."""
+    e, f, frame = _about(x, o.frozen, to=_parameters(named))
     r = reduced(e, f, frame, _effects(e, f, named))
     if frame.turning.any() and (named or o.outputs):
         _refuse_turning(e, f, r, frame, named, o.outputs)
-    return _model(e, f, r, frame, named, o.outputs)
+    refuse_undetermined(x, o.outputs)
+    space = _state_space(e, f, r, named, o.outputs)
+    return _told(e, named, o.outputs, space, partial(descriptor, e, f, frame, named, o.outputs), frame)
+
+
+def _state_space_of(model: Model, o: LinearizeOptions) -> StateSpace:
+    """What is dense of a large mechanism."""
+    x, named = _with(o.state(model), o.inputs)
+    return _small(x, o, named).dense
+
+
+def _with(x: State, inputs: Sequence[str]) -> tuple[State, list[Input]]:
+    """The same state of a copy of the model, whose laws have the inputs."""
+    model, named = with_inputs(x.c.structure.model, inputs)
+    return _in_copy(model, x) if named else x, named
+
+
+def _parameters(inputs: list[Input]) -> list[str]:
+    """Those inputs that are parameters of the model."""
+    return [i.name for i in inputs if i.name == i.parameter]
 
 
 def _refuse_turning(
@@ -130,18 +167,8 @@ def _in_copy(model: Model, x: State) -> State:
 
 def _effects(e: Equations, f: Free, inputs: list[Input]) -> Inputs:
     """What the inputs do to the equations."""
-    by, g, n = [], [], []
-    for i in inputs:
-        stepped = e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
-        by.append(e.by_values(stepped))
-        told = by_prescription(e.state, stepped)
-        g.append(told[0])
-        n.append(told[1])
-    W = np.array(by).reshape(len(inputs), e.width).T
-    prescribed = len(e.state.c.structure.prescribed)
-    given, rates = (np.array(part).reshape(len(inputs), prescribed).T for part in (g, n))
-    g_w = np.vstack([W[e.at["g"]], given])[f.on_positions]
-    return Inputs(W[e.at["r"]], g_w, np.vstack([W[e.at["n"]], rates]))
+    r, g, n = effects(e, inputs)
+    return Inputs(r, g[f.on_positions], n)
 
 
 def _outputs(e: Equations, r: Reduced, inputs: list[Input], names: Sequence[str]) -> np.ndarray:
@@ -150,12 +177,11 @@ def _outputs(e: Equations, r: Reduced, inputs: list[Input], names: Sequence[str]
     parts = [part.T for part in (r.position, r.velocity, r.acceleration, r.multipliers)]
     out = slopes(e.state, names, parts)
     for k, i in enumerate(inputs):
-        values = e.stepped_law(i.parameter) if i.parameter != i.name else e.stepped(i.name)
-        out[n + k] = slopes(e.state, names, [part[n + k : n + k + 1] for part in parts], values)[0]
+        out[n + k] = slopes(e.state, names, [part[n + k : n + k + 1] for part in parts], stepped(e, i))[0]
     return out.T
 
 
-def _state_space(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
+def _matrices(r: Reduced, y: np.ndarray, inputs: list[Input], outputs: Sequence[str]) -> list[np.ndarray]:
     """A, B, C, D in the state in which rates of inputs do not appear."""
     A, n = r.A, len(r.rate)
     B, B1, B2 = r.inputs(r.rate)
@@ -178,37 +204,46 @@ def _sorted(w: np.ndarray) -> np.ndarray:
     return w[np.lexsort((w.imag, w.real, np.abs(w.imag)))]
 
 
-def _model(e: Equations, f: Free, r: Reduced, frame: Frame, inputs: list[Input], outputs: Sequence[str]) -> LinearModel:
-    x, s = e.state, e.state.c.structure
-    shot = snapshot(x)
-    curves = [shot.curve(name) for name in outputs]
-    refuse_undetermined(x, outputs)
-    A, B, C, D = _state_space(r, _outputs(e, r, inputs, outputs), inputs, outputs)
+def _state_space(e: Equations, f: Free, r: Reduced, inputs: list[Input], outputs: Sequence[str]) -> StateSpace:
+    A, B, C, D = _matrices(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
     sign = np.array([n.sign for n in (*named, *rates)])
     own, A = sign[: len(named)], sign[:, None] * A * sign
     second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
-    return LinearModel(
-        name=s.model.name,
+    return StateSpace(
         A=A,
         B=sign[:, None] * B,
         C=C * sign,
         D=D,
         states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates)),
         state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates)),
-        inputs=tuple(i.name for i in inputs),
-        input_units=tuple(i.unit for i in inputs),
-        outputs=tuple(outputs),
-        output_units=tuple(unit for unit, _ in curves),
-        output_values=np.array([float(values[0]) for _, values in curves]),
         mass=second[0],
         damping=second[1],
         stiffness=second[2],
-        turning=frame.turning,
         eigenvalues=_sorted(spectrum(A, None if r.doubt is None else r.doubt.signed(sign)).values),
-        t=x.t,
         motion=r.position[:, : len(sign)] * sign,
-        point=shot,
-        seen_from=frame.told,
+    )
+
+
+def _told(
+    e: Equations,
+    inputs: list[Input],
+    outputs: Sequence[str],
+    dense: StateSpace | Callable[[], StateSpace],
+    sparse: Descriptor | Callable[[], Descriptor],
+    frame: Frame | None,
+) -> LinearModel:
+    shot = snapshot(e.state)
+    curves = [shot.curve(name) for name in outputs]
+    return LinearModel(
+        e.state.c.structure.model.name,
+        [(i.name, i.unit) for i in inputs],
+        [(name, unit) for name, (unit, _) in zip(outputs, curves, strict=True)],
+        np.array([float(values[0]) for _, values in curves]),
+        shot,
+        dense,
+        sparse,
+        np.zeros(3) if frame is None else frame.turning,
+        "" if frame is None else frame.told,
     )

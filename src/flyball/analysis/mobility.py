@@ -13,6 +13,7 @@ import numpy as np
 
 from ..errors import AssemblyError
 from ..model.model import Model
+from ..numerics.sparse_rank import null_spaces
 from ..results.freedoms import FreeMotion, Geometry, RedundantSet
 from ..results.mobility import Mobility
 from ..tables.system import SEMIDEFINITE
@@ -20,7 +21,7 @@ from .assembly.start import Assembly, assembled
 from .freedom.freedoms import free_motions
 from .freedom.geometry import geometry
 from .freedom.inertia import check_inertia, massless
-from .freedom.jacobian import Found, null_spaces, scaled_jacobian
+from .freedom.jacobian import Found, scaled_jacobian
 from .freedom.redundancy import redundant_sets
 from .freedom.stresses import undetermined
 

@@ -60,6 +60,7 @@ class OptimizeOptions(DerivativeOptions):
             about=self.about,
             rtol=self.rtol,
             atol=self.atol,
+            coordinates=self.coordinates,
             verify=False,
         )
 

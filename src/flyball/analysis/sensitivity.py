@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,23 +15,28 @@ from ..results.linear import follow
 from ..results.result import Result
 from ..results.sensitivity import Sensitivity
 from .assemble import assemble
+from .compiled import Compiled
 from .equilibrium import equilibrium, resting
 from .linear.begun import held, start_tangents
-from .linear.curves import slopes, snapshot
-from .linear.derivatives import Equations, State
-from .linear.differences import Found, aside, check, derivative
+from .linear.carried import carried
+from .linear.curves import over_time, slopes, snapshot
+from .linear.derivatives import Equations, State, stepped_values
+from .linear.differences import Found, aside, check, derivative, whole
 from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
 from .linear.kinks import refuse_kinks
 from .linear.rest import Rest
-from .linear.tangent import Direction, Linear, Tangent, closed
-from .linear.undetermined import refuse_undetermined
-from .linear.variation import Variation
+from .linear.tangent import Direction, Linear, Tangent, friction
+from .linear.undetermined import refuse_undetermined, told_by_reactions
+from .linear.variation import Variation, Varied, followed
 from .linearize import without_inputs
+from .motion.ahead import refuse_missing
+from .motion.layer import known
 from .motion.options import output_times, projected
+from .motion.start import begin
 from .options import Options, positive
-from .simulate import SimulateOptions, simulate
+from .simulate import SimulateOptions, clock_for, simulate
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
@@ -51,17 +56,21 @@ class DerivativeOptions(Options):
     about: str | None
     rtol: float | None
     atol: float | None
+    coordinates: str
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.analysis not in ANALYSES:
-            known = list(ANALYSES)
-            raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, known)}; {listing(known)}")
+            all_ = list(ANALYSES)
+            raise ModelError(f"unknown analysis {self.analysis!r}{suggest(self.analysis, all_)}; {listing(all_)}")
         for name in ("t_end", "outputs", "rtol", "atol"):
             if getattr(self, name) is not None and self.analysis != "motion":
                 raise ModelError(f"{name} is of a motion; with analysis={self.analysis!r} it does nothing")
         if self.analysis == "motion" and self.t_end is None:
             raise ModelError("sensitivity of a motion: give t_end")
+        known(self.coordinates)
+        if self.coordinates != "auto" and self.analysis != "motion":
+            raise ModelError(f"coordinates are those of a motion; with analysis={self.analysis!r} they do nothing")
         for name in ("rtol", "atol"):
             if getattr(self, name) is not None:
                 positive(getattr(self, name), name)
@@ -103,6 +112,7 @@ class Question:
     about: str | None
     rtol: float
     atol: float
+    coordinates: str
 
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
@@ -110,13 +120,27 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     env = model.environment(o.parameters)
     for name in o.to:
         if name not in env:
-            known = list(env)
-            raise ModelError(f"{model.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
+            raise ModelError(
+                f"{model.name!r} has no parameter {name!r}{suggest(name, list(env))}; {listing(list(env))}"
+            )
     for name in o.of if o.analysis != "modes" else ():
         one(model, name)
+    if not env:
+        raise ModelError(f"{model.name!r} has no parameters to take derivatives by; give it some: parameters={{...}}")
     times = np.zeros(0) if o.t_end is None else output_times(o.t, o.t_end, o.of_motion("outputs"))
     rtol, atol = o.of_motion("rtol"), o.of_motion("atol")
-    a = Question(model.snapshot(), o.of, o.to or tuple(env), o.t, dict(o.parameters or {}), times, o.about, rtol, atol)
+    a = Question(
+        model.snapshot(),
+        o.of,
+        o.to or tuple(env),
+        o.t,
+        dict(o.parameters or {}),
+        times,
+        o.about,
+        rtol,
+        atol,
+        o.coordinates,
+    )
     out = ANALYSES[o.analysis][0](a)
     out.parameters = {name: env[name] for name in a.to}
     return _verified(a, o.analysis, out) if o.verify else out
@@ -179,40 +203,45 @@ def _at_instant(a: Question) -> Found:
 
 
 def _motion(a: Question) -> Sensitivity:
-    base = assemble(a.model, t=a.t, parameters=a.parameters)
+    begun = begin(a.model, a.t, a.parameters, None, a.coordinates)
+    base, layer = begun.base, begun.assembly.compiled
+    refuse_missing(base, float(a.times[-1]))
     x = State.moving(base.compiled, base.t, base.q, base.v)
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
-    times = a.times if a.times[0] == a.t else np.r_[a.t, a.times]
-    if held(base):
-        way = _driven(a, x, directions, times)
+    values = [d.values if layer is base.compiled else stepped_values(layer, d.name) for d in directions]
+    driven = held(base)
+    if driven:
+        if layer.structure.loads:
+            friction(x, Linear(x).G)
+        start = []
     else:
         refuse_jumps(a.model, a.to)
         _refuse_kinks(a, e, ())
-        way = Variation(x, directions, start_tangents(a.model, a.parameters, base, x, directions)).run(
-            times, a.rtol, a.atol
-        )
-    values, found = [], []
-    for state, tangents in way:
-        values.append(_row(state, a.of))
-        found.append(_columns(a, state, directions, tangents))
-    kept = slice(len(times) - len(a.times), None)
+        tangents = start_tangents(a.model, a.parameters, base, x, directions)
+        start = [carried(begun, *of) for of in zip(directions, values, tangents, strict=True)]
+    clock = clock_for(begun, a.t, float(a.times[-1]), a.times, projected(a.coordinates, a.rtol, a.atol))
+    loop = Variation(begun, clock, values, [whole(a.model, a.parameters, name) for name in a.to])
+    varied = followed(loop) if driven else loop.run(*(np.array(part) for part in zip(*start, strict=True)))
+    motion = varied.result(begun)
+    _refuse_undetermined(layer, varied, a.of)
+    found = [motion.curve(name) for name in a.of]
+    by = [over_time(motion, a.of, v, c.parts, c.z) for v, c in zip(values, varied.by, strict=True)]
+    units = tuple(unit for unit, _ in found)
     return Sensitivity(
-        "motion", a.of, a.to, _units(x, a.of), {}, a.times, np.array(values)[kept], np.array(found)[kept]
+        "motion", a.of, a.to, units, {}, a.times, np.array([x for _, x in found]).T, np.stack(by, axis=-1)
     )
 
 
-def _driven(
-    a: Question, x: State, directions: Sequence[Direction], times: np.ndarray
-) -> Iterator[tuple[State, list[Tangent]]]:
-    """States and tangents of a motion that drivers prescribe: the constraints alone decide both."""
-    r = _simulated(a, times, a.parameters, "absolute", 1e-8, 1e-10)
-    still = np.zeros(len(x.v))
-    for k, t in enumerate(times.tolist()):
-        x.c.z[:] = r.states[k]
-        state = State.moving(x.c, t, r.q[k], r.v[k])
-        lin = Linear(state)
-        yield state, [closed(d, state, lin, still, still) for d in directions]
+def _refuse_undetermined(c: Compiled, varied: Varied, of: Sequence[str]) -> None:
+    """Refuse quantities that redundancy leaves open at one of the times."""
+    m = varied.motion
+    for k, t in enumerate(varied.t.tolist()):
+        c.z[:] = m.z[k]
+        state = State.moving(c, t, m.q[k], m.v[k])
+        if k == 0 and not told_by_reactions(state, of):
+            return
+        refuse_undetermined(state, of)
 
 
 def _simulated(

@@ -28,6 +28,6 @@ def announce_compiling(talk: bool, *kernels: str) -> None:
 
 def _will_compile(name: str) -> bool:
     from ..equations.engine import engine
-    from ..equations.residual import residual_kernel
+    from ..equations.residual import stepped
 
-    return {"motion_kernel": engine, "residual_kernel": residual_kernel}[name].cold  # type: ignore[attr-defined]
+    return {"motion_kernel": engine, "residual_kernel": stepped}[name].cold  # type: ignore[attr-defined]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import pickle
 import warnings
 from functools import lru_cache
 from pathlib import Path
@@ -10,6 +11,10 @@ from typing import Any, ClassVar
 
 from ..errors import PerformanceNotice
 from .stamp import source_stamp
+
+_UNPICKLING = (pickle.UnpicklingError, EOFError, ImportError, AttributeError, LookupError, TypeError, ValueError)
+DAMAGE = (*_UNPICKLING, RuntimeError)
+"""What says that a file is damaged: all that unpickling makes of wrong bytes, and LLVM of wrong code."""
 
 
 def cache_of(function: Any) -> Any:
@@ -53,20 +58,35 @@ def _cache_class() -> Any:
         _impl_class = Implementation
 
         def load_overload(self, sig: Any, target_context: Any) -> Any:
-            """What is kept for these types; nothing where the files are damaged, which are then written anew."""
+            """What is kept for these types; nothing where the files are damaged, which are then written anew.
+
+            Numba would first import all that it can compile: what is compiled needs its runtime only.
+            """
+            from numba.core.runtime import rtsys
+
+            rtsys.initialize(target_context)
             try:
-                return super().load_overload(sig, target_context)
-            except Exception:
+                return self._load_overload(sig, target_context)
+            except DAMAGE:
                 with contextlib.suppress(OSError):
                     self.flush()
-                return None
+            except OSError:  # says nothing of what is in the files: others may read them
+                pass
+            return None
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            """Keep what was compiled, where it can be kept."""
+            try:
+                super().save_overload(sig, data)
+            except OSError as error:
+                warnings.warn(f"compiled code cannot be kept: {error}", PerformanceNotice, stacklevel=2)
 
         @property
         def empty(self) -> bool:
             """Whether nothing of this version is kept."""
             try:
                 return not self._cache_file._load_index()
-            except Exception:  # damaged, or another Numba
+            except (OSError, *DAMAGE):
                 return True
 
     return Cache

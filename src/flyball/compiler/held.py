@@ -12,6 +12,7 @@ import hashlib
 from typing import Any
 
 from .jit import on_numba
+from .table import parts, table_type
 
 
 def held(fields):  # type: ignore[no-untyped-def]
@@ -58,26 +59,20 @@ def _register() -> None:
         key = Held
 
         def generic_resolve(self, typ: Any, attr: str) -> Any:  # type: ignore[override]
-            return typ.whole[typ.whole.fields.index(attr)] if attr in typ.whole.fields else None
+            if attr not in typ.whole.fields:
+                return None
+            field = typ.whole[typ.whole.fields.index(attr)]
+            return table_type(field) if is_table(field) else field
 
     @lower_getattr_generic(Held)
     def read(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
         address = builder.bitcast(value, context.get_value_type(typ.whole).as_pointer())
         k = typ.whole.fields.index(name)
-        skipped = 2 if isinstance(typ.whole[k], types.Array) else 0  # owners: nobody counts references here
-        return parts(builder, cgutils.gep_inbounds(builder, address, 0, k), skipped)
+        field = cgutils.gep_inbounds(builder, address, 0, k)
+        return builder.bitcast(field, cgutils.voidptr_t) if is_table(typ.whole[k]) else parts(builder, field)
 
-    def parts(builder: Any, address: Any, skipped: int = 0) -> Any:
-        """Read what stands at an address number by number: the optimiser splits no larger reads."""
-        of = address.type.pointee
-        if not isinstance(of, ir.Aggregate):
-            number = builder.load(address)
-            number.set_metadata("invariant.load", builder.module.add_metadata([]))
-            return number
-        whole = ir.Constant(of, None)
-        for k in range(skipped, len(of)):
-            whole = builder.insert_value(whole, parts(builder, cgutils.gep_inbounds(builder, address, 0, k)), k)
-        return whole
+    def is_table(typ: Any) -> bool:
+        return isinstance(typ, types.Array) and typ.layout == "C"
 
     @type_callable(held)
     def of(context):  # type: ignore[no-untyped-def]

@@ -71,7 +71,7 @@ def _link_all(self: Any) -> None:
     for lib in seen.values():
         if hasattr(lib, "_reload_init"):  # since 0.63
             self._reload_init.update(lib._reload_init)
-        self._final_module.link_in(_shared(lib), preserve=True)
+        self._final_module.link_in(_shared(lib), preserve=False)
     for function in self._final_module.functions:
         # nobody outside calls them: the optimiser may inline them, and drop arguments that they do not use
         if not function.is_declaration and function.linkage == binding.Linkage.linkonce_odr:

@@ -104,14 +104,19 @@ def _variables_in(ir: Any) -> Any:
 
 def _remembered(original: Any) -> Any:
     """``BaseContext.resolve_function_type``: a function has one signature for the same types."""
+    from numba.core import types
     from numba.core.targetconfig import ConfigStack
-    from numba.core.types import Function
 
     found: dict[Any, Any] = {}
+    numbers = types.Number, types.Boolean
 
     def resolve(self: Any, func: Any, args: Any, kws: Any) -> Any:
-        if type(func) is not Function or kws:
+        known = func.typing_key if type(func) is types.Function else func
+        operator = getattr(known, "__module__", None) == "_operator"
+        if kws or not (operator or known is not func):
             return original(self, func, args, kws)
+        if operator and (isinstance(args[0], numbers) or getattr(args[0], "is_table", False)):
+            args = tuple(types.unliteral(x) for x in args)  # what a number's value is tells nothing of the type
         key = self, func, tuple(args), ConfigStack.top_or_none()
         signature = found.get(key)
         if signature is None:

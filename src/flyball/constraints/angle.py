@@ -7,7 +7,7 @@ the whole turns are those that bring it next to ``hint``.
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.scalar import atan2, rounded
+from ..math.scalar import atan2, divide, rounded
 from ..math.vec import add, col, cross, dot, neg, scale, sub
 
 KIND = 4
@@ -36,13 +36,13 @@ def row(par, F, M, hint, data):
     r = c * c + s * s
     u = sub(scale(c, y), scale(s, x))
     mu = cross(m, u)
-    n = scale(1.0 / r, mu)
+    n = scale(divide(1.0, r), mu)
     c1 = dot(w, cross(m, x))
     s1 = dot(w, cross(m, y))
     u1 = add(sub(scale(c1, y), scale(s1, x)), cross(F[2], u))
     mu1 = add(cross(cross(M[2], m), u), cross(m, u1))
     r1 = 2.0 * (c * c1 + s * s1)
-    n1 = scale(1.0 / r, sub(mu1, scale(r1, n)))
+    n1 = scale(divide(1.0, r), sub(mu1, scale(r1, n)))
     o = 0.0 * par[0]
     bias = dot(n, sub(M[4], F[4])) + dot(n1, w)
     theta = atan2(s, c)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import divide
 from ..math.vec import dot, norm, scale, sub
 
 KIND = 3
@@ -19,8 +20,8 @@ def row(par, F, M, hint, data):
     d = sub(M[0], F[0])
     u = sub(M[3], F[3])
     length = norm(d)
-    e = scale(1.0 / length, d)
+    e = scale(divide(1.0, length), d)
     rate = dot(e, u)
     o = 0.0 * par[0]
-    bias = dot(e, sub(M[5], F[5])) + (dot(u, u) - rate * rate) / length
+    bias = dot(e, sub(M[5], F[5])) + divide(dot(u, u) - rate * rate, length)
     return length - par[6], e, (o, o, o), (o, o, o), bias

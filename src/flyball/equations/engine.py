@@ -13,18 +13,17 @@ import numpy as np
 from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..numerics.integrators.clock import COUNTS, REALS, STATES, Clock, T
+from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES, Clock, H, T
 from ..numerics.integrators.explicit import advance
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..tables.system import COORDINATES, System, Work
 from .dispatch import remember
 from .follow import follow
-from .motion import arrive, derivative, report
+from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
 from .residual import residual
+from .tasks import ARRIVE, FOLLOW, INSPECT, INTEGRATE, MOTION, POSITION, REPORT, RESIDUAL, SOLVE, TANGENT
 from .within import ROWS, inspect
-
-POSITION, MOTION, INTEGRATE, FOLLOW, ARRIVE, REPORT, RESIDUAL = range(7)
 
 
 @formula
@@ -54,7 +53,21 @@ def perform(S, W, R, clock, out, task):
             W.y[0, i] = y[i]
         residual(S, W, t, W.y[0], out[1], out[2], out[0])
         return 0
-    return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
+    if task == SOLVE:
+        nv = W.vel.shape[1]
+        nr = S.row_i.shape[0]
+        respond(S, W, out[0, :nv], out[1, :nr], out[2, :nv], out[3, :nr])
+        return 0
+    if task == TANGENT:
+        tangent(y, clock.K[0], S, W)
+        return 0
+    if task == INSPECT:
+        at = inspect(t, clock.real[H], clock.real[SPAN], clock.count[NEXT], clock.seen, S, W)
+        clock.count[NEXT], clock.real[H], clock.real[GROW] = at
+        return 0
+    if task == INTEGRATE:
+        return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
+    return 0
 
 
 class Sheet(NamedTuple):
@@ -92,7 +105,10 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
         POSITION: kinematics and rows; the state's turns and places on curves are brought up to it. MOTION: also its
         derivative, in ``clock.K[0]``. ARRIVE: the state is put on the constraints, and how far that moved it goes to
         ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. RESIDUAL: of the equations at the accelerations
-        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. INTEGRATE: go on with the integration; FOLLOW: go on with
+        ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
+        ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
+        make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
+        see ``within.inspect``; in and out by the clock. INTEGRATE: go on with the integration; FOLLOW: go on with
         what the drivers prescribe.
 
     Returns

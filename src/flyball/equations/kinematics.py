@@ -24,6 +24,12 @@ def motions(S, W, v):
     """Velocities and bias accelerations at these poses."""
     for b in range(S.body_i.shape[0]):
         motion(S, W, b, v)
+    frame_motions(S, W)
+
+
+@formula
+def frame_motions(S, W):
+    """Those of the frames, from their bodies'."""
     for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
         _, _, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
         store_motion(W.FK, k, w, u, alpha, a)

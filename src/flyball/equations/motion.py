@@ -47,6 +47,7 @@ from .dispatch import progress, remember
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .loads import efforts, forces, gather, inertial
 from .partition import exchange
+from .prescribed import prepare
 from .projection import (
     BAUMGARTE,
     HERE,
@@ -66,22 +67,9 @@ from .projection import (
 )
 from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
-from .tree import normalise, rates
+from .tree import rates
 
 NOT_FINITE, JAMMED, SINGULAR = 3, 4, 5
-
-
-@formula
-def prepare(S, W, t, q, v):
-    """Unit quaternions; prescribed coordinates, velocities and accelerations (W.vel[GIVEN]) as their laws say."""
-    normalise(S, q)
-    for b in range(S.body_i.shape[0]):
-        law = S.body_i[b, BODY_LAW]
-        if law >= 0:
-            f, f1, f2 = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, BY_TIME)
-            q[S.body_i[b, Q0]] = f - S.body_x[b, OFFSET]
-            v[S.body_i[b, V0]] = f1
-            W.vel[GIVEN, S.body_i[b, V0]] = f2
 
 
 @formula
@@ -165,6 +153,18 @@ def accelerate(S, W, t, p, dy, factored):
     progress(S, W, p[nq + nv :], work)
     W.info[STATUS] = finite(dy)
     return W.info[STATUS]
+
+
+@formula
+def respond(S, W, f, gamma, x, lam):
+    """Accelerations x and multipliers that other forces and right-hand sides of the rows make at the state in W.
+
+    Prescribed velocities do not change; what that takes is left in W.vel[EFFORT].
+    """
+    for d in range(x.shape[0]):
+        W.vel[GIVEN, d] = 0.0
+    if solve(S, W, f, gamma, x, lam, True, REFINEMENTS) > STALE * W.option[PASS] and factor(S, W) == 0:
+        solve(S, W, f, gamma, x, lam, True, REFINEMENTS)
 
 
 @formula

@@ -9,62 +9,91 @@ Newton-Euler: Luh, Walker and Paul 1980; Featherstone 2008, section 5.3), so no 
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..math.vec import add, cross, load3, put3, scale, sub
+from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
 from ..tables.system import (
     BIAS,
+    BODY_LAW,
     COORDINATES,
     F_APPLIED,
+    FREE,
     G_VALUE,
     GAMMA,
+    GIVEN,
     LAM,
     LOAD,
     NU,
     NV,
-    PARENT,
+    PLANAR,
     RATE,
     RETURNED,
+    TREE,
     V0,
     V2,
     VALUE,
 )
 from .dispatch import row_biases, row_values
 from .friction import reaction_loads
-from .kinematics import motions, poses
+from .kinematics import frame_motions, poses
 from .loads import efforts, forces, gather, inertial
+from .prescribed import prepare
 from .rows import measured, row_times
-from .tree import column, retract
+from .tasks import GAPS, STEPS
+from .tree import column, motion, retract
+
+
+class Bench(NamedTuple):
+    """A state, steps from it, and what the residuals are there; all complex."""
+
+    t: np.ndarray  # (1,) [s]
+    state: np.ndarray  # (nq + nv + nz,)
+    vdot: np.ndarray  # (nv,)
+    lam: np.ndarray  # (nr,)
+    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time
+    out: np.ndarray  # (n, nv + 3 nr + 3 nm)
 
 
 @formula
-def residuals(S, W, t, state, vdot, lam, steps, out):
-    """The residual at several states, each a finite step from the given one.
+def residuals(S, W, bench, task):
+    """The residual at several states, each a finite step from the given one; see `Bench`.
 
-    Parameters
-    ----------
-    S, W
-        Tables and scratch.
-    t : number [s]
-    state : (nq + nv + nz,)
-    vdot, lam : (nv,), (nr,)
-    steps : (n, 3 nv + 1)
-        Steps of positions (along the velocities), of velocities, of accelerations, and of time.
-    out : (n, nv + 3 nr + 3 nm)
-        Filled with r, g, G v - nu, G vdot - gamma; then value, rate and acceleration of every measured quantity.
+    ``bench.out`` is filled with r, g, G v - nu, G vdot - gamma; then value, rate and acceleration of every measured
+    quantity. With STEPS steps are taken as they are. With ALONG what drivers prescribe of tree joints is as their laws
+    say, whatever the steps are; with GAPS also, and only g and G v - nu are found.
     """
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
+    nr = S.row_i.shape[0]
     a = W.vel[V2]
-    for n in range(steps.shape[0]):
-        p = W.y[0]
-        for i in range(state.shape[0]):
-            p[i] = state[i]
-        retract(S, p[:nq], steps[n, :nv])
+    p = W.y[0]
+    for n in range(bench.steps.shape[0]):
+        t = bench.t[0] + bench.steps[n, 3 * nv]
+        for i in range(p.shape[0]):
+            p[i] = bench.state[i]
+        retract(S, p[:nq], bench.steps[n, :nv])
         for d in range(nv):
-            p[nq + d] += steps[n, nv + d]
-            a[d] = vdot[d] + steps[n, 2 * nv + d]
-        residual(S, W, t + steps[n, 3 * nv], p, a, lam, out[n])
+            p[nq + d] += bench.steps[n, nv + d]
+            a[d] = bench.vdot[d] + bench.steps[n, 2 * nv + d]
+        if task != STEPS:
+            prepare(S, W, t, p[:nq], p[nq : nq + nv])
+            for b in range(S.body_i.shape[0]):
+                if S.body_i[b, BODY_LAW] >= 0:
+                    a[S.body_i[b, V0]] = W.vel[GIVEN, S.body_i[b, V0]]
+        if task == GAPS:
+            poses(S, W, p[:nq])
+            row_values(S, W, t, p[nq + nv :])
+            for k in range(nr):
+                bench.out[n, nv + k] = W.row[G_VALUE, k]
+                bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.row[NU, k]
+        else:
+            residual(S, W, t, p, a, bench.lam, bench.out[n])
+    return 0
 
 
 @formula
@@ -77,22 +106,19 @@ def residual(S, W, t, p, vdot, lam, out):
     z = p[nq + nv :]
     poses(S, W, p[:nq])
     row_values(S, W, t, z)
-    motions(S, W, v)
-    row_biases(S, W, t, v, z)
+    accelerated(S, W, v, vdot)
+    frame_motions(S, W)
+    row_biases(S, W, t, v, z)  # the bias at true accelerations is the acceleration itself
     for k in range(nr):
         W.row[LAM, k] = lam[k]
         out[nv + k] = W.row[G_VALUE, k]
         out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
-        out[nv + 2 * nr + k] = row_times(S, W, k, vdot) - W.row[GAMMA, k]
+        out[nv + 2 * nr + k] = -W.row[GAMMA, k]
     nm = measured(S)
     for m in range(nm):
-        a = W.sensed[BIAS, m]
-        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
-            a += W.G[e] * vdot[S.col_i[e]]
         out[nv + 3 * nr + m] = W.sensed[VALUE, m]
         out[nv + 3 * nr + nm + m] = W.sensed[RATE, m]
-        out[nv + 3 * nr + 2 * nm + m] = a
-    accelerated(S, W, vdot)
+        out[nv + 3 * nr + 2 * nm + m] = W.sensed[BIAS, m]
     reaction_loads(S, W)
     for n in range(2 * nm, W.sensed.shape[1]):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
@@ -109,30 +135,53 @@ def residual(S, W, t, p, vdot, lam, out):
 
 
 @formula
-def accelerated(S, W, vdot):
-    """Add what ``vdot`` does to the accelerations of the bodies in W, which held their bias."""
+def accelerated(S, W, v, vdot):
+    """Velocities and true accelerations of all bodies at the poses in W, parents first."""
     for b in range(S.body_i.shape[0]):
-        o = 0.0 * W.BK[b, 0]
-        alpha = (o, o, o)
-        a = alpha
-        P = load3(W.O, b, 0)
-        parent = S.body_i[b, PARENT]
-        if parent >= 0:
-            alpha = load3(W.IC, parent, 0)
-            a = add(load3(W.IC, parent, 3), cross(alpha, sub(P, load3(W.BK, parent, 0))))
-        for k in range(S.body_i[b, NV]):
-            x, u = column(S, W, b, k)
-            d = vdot[S.body_i[b, V0] + k]
-            alpha = add(alpha, scale(d, x))
-            a = add(a, scale(d, u))
-        a = add(a, cross(alpha, sub(load3(W.BK, b, 0), P)))
-        put3(W.IC, b, 0, alpha)
-        put3(W.IC, b, 3, a)
-        put3(W.BK, b, 18, add(load3(W.BK, b, 18), alpha))
-        put3(W.BK, b, 21, add(load3(W.BK, b, 21), a))
+        motion(S, W, b, v)
+        kind = S.body_i[b, TREE]
+        v0 = S.body_i[b, V0]
+        alpha = load3(W.BK, b, 18)
+        a = load3(W.BK, b, 21)
+        if kind == PLANAR:
+            a = add(a, (vdot[v0], vdot[v0 + 1], 0.0 * vdot[v0]))
+            alpha = add(alpha, (0.0 * vdot[v0], 0.0 * vdot[v0], vdot[v0 + 2]))
+        elif kind == FREE:
+            a = add(a, (vdot[v0], vdot[v0 + 1], vdot[v0 + 2]))
+            alpha = add(alpha, mv(load9(W.BK, b, 3), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
+        else:
+            arm = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
+            for k in range(S.body_i[b, NV]):
+                x, u = column(S, W, b, k)
+                turn = scale(vdot[v0 + k], x)
+                alpha = add(alpha, turn)
+                a = add(a, add(scale(vdot[v0 + k], u), cross(turn, arm)))
+        put3(W.BK, b, 18, alpha)
+        put3(W.BK, b, 21, a)
+
+
+@door
+def stepped(S, W, bench, _, __, task):
+    """`residuals` behind an address; compiled for complex numbers, when first needed."""
+    return residuals(S, W, bench, task)
 
 
 @kernel
-def residual_kernel(S, W, t, state, vdot, lam, steps, out):
-    """The equations at states near one state, see ``residuals``; compiled for complex numbers, when first needed."""
-    residuals(held(S), held(W), t, state, vdot, lam, steps, out)
+def through_stepped(address, S, W, bench, task):
+    """From Python through the door."""
+    b = held(bench)
+    return enter(address, held(S), held(W), b, b, b, task)
+
+
+def address(S: Any, W: Any, bench: Bench) -> int:
+    """Of the door to the residuals, for other loops."""
+    return stepped.address(S, W, bench, bench, bench)
+
+
+def residual_kernel(
+    S: Any, W: Any, t: complex, state: np.ndarray, vdot: np.ndarray, lam: np.ndarray, steps: np.ndarray, out: np.ndarray
+) -> None:
+    """The equations at states near one state, see ``residuals``; nan where they cannot be evaluated."""
+    bench = Bench(np.array([t]), state, vdot, lam, steps, out)
+    out[:] = np.nan
+    through_stepped(address(S, W, bench), S, W, bench, STEPS)

@@ -12,7 +12,7 @@ A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``c
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.scalar import cos, sin, sqrt
+from ..math.scalar import cos, divide, sin, sqrt
 from ..math.vec import (
     add,
     col,
@@ -293,7 +293,7 @@ def retract(S, q, d):
         k, w = quaternion_at(S, b)
         if k >= 0:
             x = (0.5 * d[w], 0.5 * d[w + 1], 0.5 * d[w + 2])
-            r = 1.0 / sqrt(1.0 + dot(x, x))  # the Cayley step: a unit quaternion for any d
+            r = divide(1.0, sqrt(1.0 + dot(x, x)))  # the Cayley step: a unit quaternion for any d
             e = quaternion_product((q[k], q[k + 1], q[k + 2], q[k + 3]), (r, r * x[0], r * x[1], r * x[2]))
             for i in range(4):
                 q[k + i] = e[i]
@@ -305,6 +305,7 @@ def normalise(S, q):
     for b in range(S.body_i.shape[0]):
         k, _ = quaternion_at(S, b)
         if k >= 0:
-            s = 1.0 / sqrt(q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3])
+            square = q[k] * q[k] + q[k + 1] * q[k + 1] + q[k + 2] * q[k + 2] + q[k + 3] * q[k + 3]
+            s = divide(1.0, sqrt(square))
             for i in range(4):
                 q[k + i] *= s

@@ -90,6 +90,8 @@ def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: 
 
 def least_squares(A: np.ndarray, b: np.ndarray) -> np.ndarray:
     """X that makes A x - b least; of complex numbers what carries the derivative, which conjugation would not."""
+    if A.shape[1] == 1:
+        return (A.T @ b) / (A.T @ A)[0]
     x = np.linalg.lstsq(A.real, b.real, rcond=None)[0]
     if not (np.iscomplexobj(A) or np.iscomplexobj(b)):
         return x

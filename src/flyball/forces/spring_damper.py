@@ -6,6 +6,7 @@ from types import SimpleNamespace
 from typing import Annotated, ClassVar
 
 from ..compiler.jit import formula
+from ..math.scalar import divide
 from ..math.vec import dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
@@ -18,7 +19,7 @@ def inputs(par, F, M):
     """Length and its rate."""
     d = sub(M[0], F[0])
     length = norm(d)
-    return length, dot(d, sub(M[3], F[3])) / length
+    return length, divide(dot(d, sub(M[3], F[3])), length)
 
 
 @formula
@@ -26,7 +27,7 @@ def wrench(par, F, M, laws, values):
     """Force on M that pulls it towards F: k (length - free length) + c rate + actuator force."""
     length, rate = values
     s = par[0] * (length - par[2]) + par[1] * rate + laws[0]
-    e = scale(1.0 / length, sub(M[0], F[0]))
+    e = scale(divide(1.0, length), sub(M[0], F[0]))
     o = 0.0 * par[0]
     return neg(scale(s, e)), (o, o, o)
 

@@ -83,7 +83,7 @@ def _register() -> None:
             builder.call(builder.inttoptr(args[0], code.as_pointer()), [start])
             return context.get_dummy_value()
 
-        return types.void(types.int64, stack, types.int64), generate
+        return types.void(types.int64, getattr(stack, "array", stack), types.int64), generate  # the whole array
 
     @overload(call, jit_options={"error_model": "numpy"})
     def choose(address, stack, row):

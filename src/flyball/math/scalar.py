@@ -249,7 +249,25 @@ def _register() -> None:
             return (lambda x: complex_(x)) if isinstance(x, types.Complex) else (lambda x: real(x))
 
     for function, name in _ANALYTIC.items():
-        analytic(function, name)
+        if function not in (sin, cos, sqrt):
+            analytic(function, name)
+
+    def stepped(function: Function, real: Function, complex_: Function) -> None:
+        """Overload a function whose complex argument carries a step: of first order, which is what it is for."""
+
+        @overload(function, jit_options=options)
+        def choose(x):
+            return complex_ if isinstance(x, types.Complex) else real
+
+    def complex_sqrt(x):
+        if not x.real > 0.0:
+            return cmath.sqrt(x)
+        root = math.sqrt(x.real)
+        return complex(root, 0.5 * x.imag / root)
+
+    stepped(sin, lambda x: math.sin(x), lambda x: complex(math.sin(x.real), x.imag * math.cos(x.real)))
+    stepped(cos, lambda x: math.cos(x), lambda x: complex(math.cos(x.real), -x.imag * math.sin(x.real)))
+    stepped(sqrt, lambda x: math.sqrt(x), complex_sqrt)
 
     def either(function: Function, real: Function, complex_: Function) -> None:
         """Overload a function of two numbers, of which one or both may be complex."""
@@ -296,7 +314,11 @@ def _register() -> None:
     def quotient(a, b):
         return a / b
 
+    def complex_quotient(a, b):  # Numba's own raises where b is zero, and takes three divisions
+        f = a.real / b.real
+        return complex(f, (a.imag - f * b.imag) / b.real)
+
     either(minimum, smaller, smaller)
     either(maximum, larger, larger)
-    either(divide, quotient, quotient)
+    either(divide, quotient, complex_quotient)
     either(power, lambda a, b: math.pow(a, b), lambda a, b: _complex_power(complex(a), complex(b)))

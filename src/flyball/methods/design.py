@@ -29,6 +29,7 @@ class Design(Model):
         about: str | None = None,
         rtol: float | None = None,
         atol: float | None = None,
+        coordinates: str = "auto",
         verify: bool = False,
     ) -> Sensitivity:
         """Derivatives of kinematics, reactions, equilibria, eigenvalues or a motion by parameters.
@@ -57,7 +58,10 @@ class Design(Model):
         rtol : float [1], optional
             Tolerance of the error of a step of a motion relative to the state, 1e-9 if not given.
         atol : float [m, rad, m/s, rad/s], optional
-            Tolerance of the error of a step of a motion where the state is small, 1e-11 if not given.
+            Tolerance of the error of a step of a motion where the state is small, 1e-11 if not given. Both go for the
+            motion and for what a change of a parameter by the whole of it changes.
+        coordinates : {"auto", "absolute", "joint"}
+            In which a motion is computed, as for `simulate`.
         verify : bool
             Also by central differences of the whole analysis.
 
@@ -93,6 +97,7 @@ class Design(Model):
         about: str | None = None,
         rtol: float | None = None,
         atol: float | None = None,
+        coordinates: str = "auto",
         evaluations: int = 200,
         tolerance: float = 1e-10,
         progress: bool | Callable[[float], None] = True,
@@ -130,6 +135,8 @@ class Design(Model):
         rtol : float [1], optional
             As for `sensitivity`.
         atol : float [m, rad, m/s, rad/s], optional
+            As for `sensitivity`.
+        coordinates : {"auto", "absolute", "joint"}
             As for `sensitivity`.
         evaluations : int
             Most analyses to be made.

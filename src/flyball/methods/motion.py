@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from ..analysis.prepared import Prepared
     from ..model.model import Model
     from ..results.comparison import Comparison
     from ..results.inverse import InverseDynamics
@@ -99,6 +100,33 @@ class Motions(Model):
         from ..analysis.simulate import SimulateOptions, simulate
 
         return simulate(self, SimulateOptions.asked(locals()))
+
+    def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
+        """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.
+
+        For loops of your own: controllers, estimators, planners. Analyses need it not: what is made ready for one call
+        serves the next, as long as the mechanism is the same.
+
+        Parameters
+        ----------
+        coordinates : {"auto", "absolute", "joint"}
+            Those of the arrays; auto: those in which a right-hand side costs less.
+        parameters : mapping, optional
+            Values of parameters in place of the model's, in SI units or with a unit.
+
+        Returns
+        -------
+        Prepared
+            It does not change, and threads may share it.
+
+        Raises
+        ------
+        AssemblyError
+            If the mechanism cannot be assembled.
+        """
+        from ..analysis.prepare import PrepareOptions, prepare
+
+        return prepare(self, PrepareOptions.asked(locals()))
 
     def compare(
         self,

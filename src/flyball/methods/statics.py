@@ -150,7 +150,8 @@ class Statics(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the states are changes of.
+            Those that the states are changes of. With more than 600 velocities at rest what is dense is made when it is
+            asked for, and `LinearModel.descriptor` is in absolute coordinates.
         frozen : bool
             The equations of this very instant, of a motion that need not be steady: their eigenvalues tell little.
 
@@ -192,7 +193,7 @@ class Statics(Model):
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit.
         coordinates : {"auto", "absolute", "joint"}
-            Those that the linear equations are made in.
+            Those that the linear equations are made in; absolute ones with more than 600 velocities at rest.
         count : int, optional
             How many, slowest first; all, or of large mechanisms the ten slowest, if not given.
         frozen : bool

@@ -92,7 +92,7 @@ AngularVelocity = Annotated[float | str | tuple[float | str, ...], BeforeValidat
 @dataclass_transform(kw_only_default=True, frozen_default=True, field_specifiers=(field,))
 def element(cls: T) -> T:
     """Make a class of frozen, validated fields; its own fields are keyword-only."""
-    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True)
+    config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, defer_build=True)  # until one is made
     made = pydantic.dataclasses.dataclass(frozen=True, kw_only=True, config=config)(cls)
     original = made.__init__
 
@@ -103,6 +103,9 @@ def element(cls: T) -> T:
             raise ModelError(_explain(cls.__name__, made, args, kwargs, error)) from None
         except TypeError as error:
             raise ModelError(f"{cls.__name__}: {error}") from None
+        finally:
+            if made.__init__ is not __init__:  # the first one made: pydantic has put its own there
+                made.__init__ = __init__  # type: ignore[misc, method-assign]
 
     __init__.__doc__ = original.__doc__
     __init__.__signature__ = _signature(made)  # type: ignore[attr-defined]

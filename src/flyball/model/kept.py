@@ -37,6 +37,11 @@ class Kept:
                 known.popitem(last=False)
         return made
 
+    def known(self, kind: str, key: Hashable = None) -> Any:
+        """The same if it is there, else None."""
+        with self._lock:
+            return self._found.get(kind, OrderedDict()).get(key)
+
     def drop(self, kind: str, key: Hashable) -> None:
         """Forget one of them."""
         with self._lock:

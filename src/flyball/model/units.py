@@ -1,4 +1,4 @@
-"""Text with units ("30 deg", "5 mm", "2 kN/m") to numbers in SI units, through pint.
+"""Text with units ("30 deg", "2 kN/m") to numbers in SI units, by a table of the common ones, else through pint.
 
 Angles are kept apart from plain numbers here, which pint does not do: "5 deg" is no length, and "50 Hz" (1/s) is no
 angular speed (rad/s), a mistake of 2 pi that nobody sees.
@@ -11,6 +11,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..errors import UnitError
+from .common_units import COMMON, common_unit
 
 _NUMBER = r"[+-]?\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 _QUANTITY = re.compile(  # a number keeps its exponent: "1e6*t" is a formula, not 1 of a unit "e6*t"
@@ -114,6 +115,8 @@ def is_unit(text: str) -> bool:
 
 def powers_as_written(unit: str) -> dict[str, float]:
     """Long name of each symbol of a unit -> its power: "N/mm" is newton 1, millimeter -1; `UnitError` if unknown."""
+    if (common := common_unit(unit)) is not None:
+        return dict(common.written)
     _unit(unit, unit, None)
     return dict(_registry().Quantity(1.0, unit).unit_items())
 
@@ -125,6 +128,8 @@ def powers_in_si(unit: str) -> dict[str, float]:
 
 def unit_name(symbol: str) -> str:
     """Long name of a single unit ("mm": "millimeter"), or nothing if it is unknown."""
+    if symbol in COMMON:
+        return COMMON[symbol][0]
     return str(_registry().get_name(symbol)) if is_unit(symbol) else ""
 
 
@@ -143,6 +148,8 @@ def _registry() -> Any:
 @lru_cache(maxsize=512)
 def _unit(text: str, unit: str, dimension: str | None) -> tuple[float, tuple[tuple[str, float], ...]]:
     """SI factor of a unit and the powers of its base units, sorted."""
+    if (common := common_unit(unit)) is not None:
+        return common.factor, common.powers
     import pint
 
     registry: Any = _registry()

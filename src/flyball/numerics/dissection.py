@@ -14,6 +14,7 @@ import numpy as np
 
 LEAF = 60  # parts up to this size are left to minimum degree
 CORNERS = 4
+SMALL = 60  # orders up to this one need no SciPy
 EVEN = 0.2  # least product of the parts that two halves are of the whole
 
 
@@ -146,14 +147,32 @@ def _cover(left: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 
 def minimum_degree(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Place (n,) of every unknown in an order by minimum degree (Liu 1985), from SuperLU."""
+    """Place (n,) of every unknown in an order by minimum degree: of large matrices Liu's (1985), from SuperLU."""
+    if n < SMALL:
+        return _least_first(n, i, j)
     import scipy.sparse as sp
     from scipy.sparse.linalg import splu
 
-    if n < 3:
-        return np.arange(n, dtype=np.int64)
     ones = sp.coo_matrix((np.ones(2 * len(i)), (np.r_[i, j], np.r_[j, i])), shape=(n, n)).tocsc()
     ones.data[:] = -1.0
     ones.setdiag(2.0 * n)  # diagonally dominant: the trial factorisation only yields the ordering
     lu = splu(ones.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
     return np.asarray(lu.perm_c, np.int64)
+
+
+def _least_first(n: int, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """Always the unknown with the fewest neighbours next, which then are neighbours of each other."""
+    near: list[set[int]] = [set() for _ in range(n)]
+    for a, b in zip(i.tolist(), j.tolist(), strict=True):
+        if a != b:
+            near[a].add(b)
+            near[b].add(a)
+    left, place = set(range(n)), np.empty(n, np.int64)
+    for k in range(n):
+        least = min(left, key=lambda a: (len(near[a]), a))
+        place[least] = k
+        left.remove(least)
+        for a in near[least]:
+            near[a] |= near[least]
+            near[a] -= {a, least}
+    return place

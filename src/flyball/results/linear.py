@@ -3,72 +3,153 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.model import listing, suggest
+from .descriptor import Descriptor
 
 if TYPE_CHECKING:
     from .result import Result
 
+SHOWN = 10  # eigenvalues of a large mechanism in a text
 ROUNDED = 1e-12  # part of a number below which its real or imaginary part is rounding
 
 
-@dataclass(repr=False)
-class LinearModel:
-    """Linear equations of a mechanism about a state.
+@dataclass
+class StateSpace:
+    """The equations with the constraints taken out; see the properties of `LinearModel`."""
 
-    The states are changes of as many coordinates as there are freedoms, then changes of their rates. Where inputs move
-    the mechanism (drivers), the states are shifted by multiples of the inputs.
-
-    Attributes
-    ----------
-    A, B, C, D : ndarray
-        x' = A x + B u, y = C x + D u; inputs and outputs are changes too.
-    states, inputs, outputs : tuple of str
-    state_units, input_units, output_units : tuple of str
-    output_values : ndarray
-        Outputs at the state itself.
-    mass, damping, stiffness : ndarray (f, f) or None
-        M, D and K of M a'' + D a' + K a = 0 in the first f states; None where constraints are on velocities only.
-    turning : ndarray (3,) [rad/s]
-        Angular velocity of the frame that the states are seen from, zero about an equilibrium.
-    eigenvalues : ndarray (n,) complex [1/s]
-        Of A, by imaginary, then real part; those that cannot be told apart are replaced by their mean.
-    t : float [s]
-    motion : ndarray (nv, n)
-        Changes of all positions along the mechanism's velocities, per unit of each state.
-    point : Result
-        The state itself, as a result with one time.
-    seen_from : str
-        The frame from which the motion is steady, in words; empty about an equilibrium.
-    """
-
-    name: str
     A: np.ndarray
     B: np.ndarray
     C: np.ndarray
     D: np.ndarray
     states: tuple[str, ...]
     state_units: tuple[str, ...]
-    inputs: tuple[str, ...]
-    input_units: tuple[str, ...]
-    outputs: tuple[str, ...]
-    output_units: tuple[str, ...]
-    output_values: np.ndarray
     mass: np.ndarray | None
     damping: np.ndarray | None
     stiffness: np.ndarray | None
-    turning: np.ndarray
     eigenvalues: np.ndarray
-    t: float
-    motion: np.ndarray = field(repr=False)
-    point: Result = field(repr=False)
-    seen_from: str = ""
+    motion: np.ndarray
+
+
+class LinearModel:
+    """Linear equations of a mechanism about a state.
+
+    The states are changes of as many coordinates as there are freedoms, then changes of their rates. Where inputs move
+    the mechanism (drivers), the states are shifted by multiples of the inputs.
+
+    Of a mechanism that is ``large`` the sparse `descriptor` is made at once, and what is dense when it is first asked
+    for: that takes long and much memory.
+
+    Attributes
+    ----------
+    inputs, outputs, input_units, output_units : tuple of str
+    output_values : ndarray
+        Outputs at the state itself.
+    turning : ndarray (3,) [rad/s]
+        Angular velocity of the frame that the states are seen from, zero about an equilibrium.
+    t : float [s]
+    point : Result
+        The state itself, as a result with one time.
+    seen_from : str
+        The frame from which the motion is steady, in words; empty about an equilibrium.
+    large : bool
+        Whether there are so many velocities that what is dense is made when asked for.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        inputs: Sequence[tuple[str, str]],
+        outputs: Sequence[tuple[str, str]],
+        output_values: np.ndarray,
+        point: Result,
+        dense: StateSpace | Callable[[], StateSpace],
+        sparse: Descriptor | Callable[[], Descriptor],
+        turning: np.ndarray,
+        seen_from: str = "",
+    ) -> None:
+        self.name, self.point, self.t = name, point, float(point.t[0])
+        self.inputs, self.input_units = (tuple(x[k] for x in inputs) for k in range(2))
+        self.outputs, self.output_units = (tuple(x[k] for x in outputs) for k in range(2))
+        self.output_values = output_values
+        self.turning, self.seen_from = turning, seen_from
+        self.large = not isinstance(dense, StateSpace)
+        self._dense, self._sparse = dense, sparse
+
+    @property
+    def dense(self) -> StateSpace:
+        """All that is dense."""
+        if not isinstance(self._dense, StateSpace):
+            self._dense = self._dense()
+        return self._dense
+
+    @property
+    def descriptor(self) -> Descriptor:
+        """The equations with the constraints left in, sparse."""
+        if callable(self._sparse):
+            self._sparse = self._sparse()
+        return self._sparse
+
+    @property
+    def A(self) -> np.ndarray:
+        """In x' = A x + B u, (n, n)."""
+        return self.dense.A
+
+    @property
+    def B(self) -> np.ndarray:
+        """In x' = A x + B u, (n, inputs)."""
+        return self.dense.B
+
+    @property
+    def C(self) -> np.ndarray:
+        """In y = C x + D u, (outputs, n)."""
+        return self.dense.C
+
+    @property
+    def D(self) -> np.ndarray:
+        """In y = C x + D u, (outputs, inputs)."""
+        return self.dense.D
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states x."""
+        return self.dense.states
+
+    @property
+    def state_units(self) -> tuple[str, ...]:
+        """Their units."""
+        return self.dense.state_units
+
+    @property
+    def mass(self) -> np.ndarray | None:
+        """M of M a'' + D a' + K a = 0 in the first f states, (f, f); None with constraints on velocities only."""
+        return self.dense.mass
+
+    @property
+    def damping(self) -> np.ndarray | None:
+        """D of the same."""
+        return self.dense.damping
+
+    @property
+    def stiffness(self) -> np.ndarray | None:
+        """K of the same."""
+        return self.dense.stiffness
+
+    @property
+    def eigenvalues(self) -> np.ndarray:
+        """Of A, by imaginary, then real part, (n,) complex [1/s]; those that cannot be told apart are their mean."""
+        return self.dense.eigenvalues
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Changes of all positions along the mechanism's velocities, per unit of each state, (nv, n)."""
+        return self.dense.motion
 
     def to_control(self) -> Any:
         """The model as ``control.StateSpace``; its names have ``_`` in place of points and blanks.
@@ -114,6 +195,8 @@ class LinearModel:
         At an undamped pole it is infinite.
         """
         i, k = self.input_index(input), self.output_index(output)
+        if self.large:
+            return self.descriptor.response(omega, i, k)
         one = np.eye(len(self.A))
         b, c, d = self.B[:, i], self.C[k], self.D[k, i]
 
@@ -169,14 +252,17 @@ class LinearModel:
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people: names, eigenvalues; of a single input and output poles, zeros and gain."""
-        out = []
-        for what in ("state", "input", "output"):
+        out = [("states", f"many: {self.descriptor!r}")] if self.large else []
+        for what in ("input", "output") if self.large else ("state", "input", "output"):
             units = getattr(self, f"{what}_units")
             for k, (name, unit) in enumerate(zip(getattr(self, f"{what}s"), units, strict=True)):
                 now = f", {self.output_values[k]:.6g} at the state itself" if what == "output" else ""
                 out.append((what, f"{name} [{unit}]{now}"))
         if self.seen_from:
             out.append(("seen from", self.seen_from))
+        if self.large:
+            slow = self.descriptor.nearest(SHOWN)
+            return out + [("slowest", f"{_written(w)} 1/s") for w in slow if w.imag >= 0.0]
         out += [("eigenvalues", f"{_written(w)} 1/s") for w in self.eigenvalues if w.imag >= 0.0]
         if len(self.inputs) == len(self.outputs) == 1:
             zeros, _, gain = self.transfer()
@@ -186,16 +272,18 @@ class LinearModel:
 
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names."""
-        matrices = {k: getattr(self, k) for k in ("A", "B", "C", "D", "mass", "damping", "stiffness")}
         out: dict[str, Any] = {
             "name": self.name,
             "t": self.t,
             "turning": self.turning.tolist(),
             "seen_from": self.seen_from,
         }
-        for what in ("states", "inputs", "outputs"):
+        for what in ("inputs", "outputs") if self.large else ("states", "inputs", "outputs"):
             units = getattr(self, f"{what[:-1]}_units")
             out[what] = [{"name": n, "unit": u} for n, u in zip(getattr(self, what), units, strict=True)]
+        if self.large:
+            return out | {"descriptor": self.descriptor.as_dict()}
+        matrices = {k: getattr(self, k) for k in ("A", "B", "C", "D", "mass", "damping", "stiffness")}
         out |= {k: None if X is None else X.tolist() for k, X in matrices.items()}
         return out | {"eigenvalues": [[float(w.real), float(w.imag)] for w in self.eigenvalues]}
 

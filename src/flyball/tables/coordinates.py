@@ -15,6 +15,7 @@ from ..math.scalar import atan2
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
+from .afresh import Afresh
 from .forest import TreeJoint
 from .specs import FrameSpec
 from .system import NQ, NV, POINT, Q0, TREE, V0
@@ -41,26 +42,33 @@ class BodyState:
     angle: Any = 0.0
 
 
+ALL = Afresh()
 REST = BodyState(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
-def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, float] | None = None) -> np.ndarray:
+def positions(
+    x: Values,
+    bodies: Mapping[str, BodyState],
+    hints: Mapping[str, float] | None = None,
+    new: Afresh = ALL,
+) -> np.ndarray:
     """Coordinates (nq,) of the forest for bodies that are there; where these do not fit the tree joints, the nearest.
 
     ``hints``: angles of joints, "joint.coordinate", within half a turn; the drawn turns where they are not told.
+    ``new``: which are found; the others are those of its tables.
     """
     s = x.structure
-    q = np.zeros(s.nq, x.system.body_x.dtype)
+    q = new.state("q", s.nq, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
-    single = [t for t in hung.values() if len(t.primitives) == 1 and t.primitives[0].kind in "RP"]
-    if len(single) >= MANY:
-        _read_single(x, single, bodies, hints or {}, q)
-        hung |= {t.child: None for t in single}
+    single = {b: t for b, t in hung.items() if len(t.primitives) == 1 and t.primitives[0].kind in "RP"}
+    if len(single) < MANY:
+        single = {}
+    _read_single(x, [t for t in single.values() if new.asks(t.joint)], bodies, hints or {}, q)
     for name, b in s.place.items():
         if b in hung:
-            if (t := hung[b]) is not None:
-                _read(x, t, bodies, hints or {}, q)
-        elif b >= 0:
+            if b not in single and new.asks(hung[b].joint):
+                _read(x, hung[b], bodies, hints or {}, q)
+        elif b >= 0 and new.asks(s.model[name]):
             d, q0 = bodies[name], s.tables["body_i"][b, Q0]
             if s.tables["body_i"][b, TREE] == POINT:
                 n = s.tables["body_i"][b, NQ]
@@ -72,13 +80,13 @@ def positions(x: Values, bodies: Mapping[str, BodyState], hints: Mapping[str, fl
     return q
 
 
-def free_velocities(x: Values, bodies: Mapping[str, BodyState]) -> np.ndarray:
+def free_velocities(x: Values, bodies: Mapping[str, BodyState], new: Afresh = ALL) -> np.ndarray:
     """Velocities (nv,) of the bodies that hang on ground by FREE, PLANAR or POINT; zero along all tree joints."""
     s, body_i = x.structure, x.structure.tables["body_i"]
-    v = np.zeros(s.nv, x.system.body_x.dtype)
+    v = new.state("v", s.nv, x.system.body_x.dtype)
     hung = {t.child for t in s.tree_joints.values()}
     for name, b in s.place.items():
-        if b >= 0 and b not in hung:
+        if b >= 0 and b not in hung and new.asks(s.model[name]):
             d, v0 = bodies[name], body_i[b, V0]
             if body_i[b, TREE] == POINT:
                 n = body_i[b, NV]
@@ -94,17 +102,19 @@ def _read_single(
     x: Values, joints: list[TreeJoint], bodies: Mapping[str, BodyState], hints: Mapping[str, Any], q: np.ndarray
 ) -> None:
     """The same as `_read` for hinges and slides, all at once."""
+    if not joints:
+        return
     at = x.structure.tables["body_i"][[t.child for t in joints], Q0]
     frames = []
     for k, role in enumerate("FM"):
         own = np.array([x.poses.row(FrameSpec(0, t.joint, role)) for t in joints])
         carriers = [bodies.get(_ends(x, t)[k], REST) for t in joints]
         p, R = np.array([d.p for d in carriers]), np.array([d.R for d in carriers])
-        frames.append((p + np.einsum("nij,nj->ni", R, own[:, :3]), R @ own[:, 3:].reshape(-1, 3, 3)))
+        frames.append((p + (R @ own[:, :3, None])[..., 0], R @ own[:, 3:].reshape(-1, 3, 3)))
     (pF, RF), (pM, RM) = frames
     back = RF.swapaxes(1, 2)
     rest = np.array([t.joint.rest or np.eye(3) for t in joints])
-    shift, turn = np.einsum("nij,nj->ni", back, pM - pF), back @ RM @ rest.swapaxes(1, 2)
+    shift, turn = (back @ (pM - pF)[..., None])[..., 0], back @ RM @ rest.swapaxes(1, 2)
     for name, i in (("x", 0), ("y", 1), ("z", 2)):
         of = np.array([t.primitives[0].axis == name for t in joints])
         slides = of & np.array([t.primitives[0].kind == "P" for t in joints])

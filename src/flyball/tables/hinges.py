@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from .afresh import Afresh
+from .poses import Poses
 from .specs import FrameSpec, Structure
 from .system import BODY_P, BODY_R, BODY_TURNS, OFFSET, REVOLUTE, TREE, TREE_P, TREE_R, TREE_TURNS
 
@@ -15,14 +17,14 @@ TO_AXIS = {"x": np.roll(ONE, 2, axis=1), "y": np.roll(ONE, 1, axis=1), "z": ONE}
 BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
 
 
-def tree_frames(s: Structure, pose: Any, numbers: Mapping, body_x: np.ndarray) -> None:
+def tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray, new: Afresh) -> None:
     """Frames of all tree joints into the body table.
 
     A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
     """
-    if not s.tree_joints:
+    joints = [t for t in s.tree_joints.values() if new.asks(t.joint)]
+    if not joints:
         return
-    joints = list(s.tree_joints.values())
     back = np.array([t.reversed for t in joints])[:, None, None]
     rest = np.array([t.joint.rest or ONE for t in joints])
     (pF, RF), (pM, RM) = (_stacked([pose.local(FrameSpec(0, t.joint, role)) for t in joints]) for role in "FM")
@@ -30,9 +32,9 @@ def tree_frames(s: Structure, pose: Any, numbers: Mapping, body_x: np.ndarray) -
     before_p, before_R = np.where(back, pM, pF), np.where(back, RM @ _turned(rest), RF)
     beyond_p, beyond_R = np.where(back, -F_back @ pF, -M_back @ pM), np.where(back, F_back, M_back)
     for t in joints:
-        for link, p in zip(t.links, t.primitives, strict=False):
-            if p.coordinate in t.joint.coordinates:
-                body_x[link, OFFSET] = t.joint.offset(numbers[t.joint.name], p.coordinate)
+        for link, step in zip(t.links, t.primitives, strict=False):
+            if step.coordinate in t.joint.coordinates:
+                body_x[link, OFFSET] = t.joint.offset(numbers[t.joint.name], step.coordinate)
     links = np.array([link for t in joints for link in t.links])
     turns = np.array([_turn(t, k) for t in joints for k in range(len(t.links))])
     last = np.cumsum([len(t.links) for t in joints]) - 1

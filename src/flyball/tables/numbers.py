@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Hashable, Mapping
-from dataclasses import dataclass, field
+import re
+from collections.abc import Hashable, Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -12,11 +13,13 @@ import numpy as np
 
 from ..model.body import GROUND, Body
 from ..model.element import resolve
+from ..model.expressions import Expression
 from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.kept import Kept, bits
 from ..model.model import Model
 
+PLAIN = (float, int, str, np.float64)  # kinds of values that their text tells apart to the bit
 MOST = 4  # sets of values of the parameters that are kept
 
 
@@ -28,7 +31,8 @@ class Numbers:
     of: Mapping[str, SimpleNamespace]  # element -> its fields
     bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
     key: Hashable  # two with the same key are the same, to the bit
-    kept: Kept = field(default_factory=Kept)
+    since: Kept  # stands for the numbers that were found first
+    changed: frozenset[str] = frozenset()  # elements whose numbers are not those
     placed: dict[str, Any] = field(default_factory=dict)  # frames of elements in the world as drawn, once asked for
     world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
     local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
@@ -48,17 +52,67 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
         If a number makes no sense, or there is no such parameter.
     """
     model = model.snapshot()
-    env = model.environment(parameters)
+    env = _environment(model, parameters or {})
     key = bits(env), tuple(_state_of(path) for path in _files(model))
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
 
 
+def _environment(model: Model, parameters: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Values of all parameters, not to be changed."""
+    if not all(type(x) in PLAIN for x in parameters.values()):
+        return model.environment(parameters)
+    written = tuple((name, type(x), repr(x)) for name, x in parameters.items())
+    return model.kept.get("environment", written, MOST, lambda: model.environment(parameters))
+
+
 def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
+    """From those that were found first, if files are as then; only what names a changed parameter is found anew."""
+    first: Numbers | None = model.kept.known("first numbers")
+    if first is None or first.key[1] != key[1]:  # type: ignore[index]
+        new = _all(model, env, key)
+        return new if new.complex else model.kept.get("first numbers", None, 1, lambda: new)
+    named = model.kept.get("named", None, 1, lambda: _named(model))
+    other = {k for k, x in env.items() if not _same(x, first.env[k])}
+    changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
+    of = {**first.of, **{e.name: resolve(e, env) for e in changed}}
+    bodies = {
+        **first.bodies,
+        **{e.name: _body(e, of[e.name], env, model.planar) for e in changed if isinstance(e, Body)},
+    }
+    return Numbers(env, of, bodies, key, first.since, frozenset(e.name for e in changed))
+
+
+def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     of = {e.name: resolve(e, env) for e in model.elements()}
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, of[b.name], env, model.planar)
-    return Numbers(env, of, bodies, key)
+    return Numbers(env, of, bodies, key, Kept())
+
+
+def _same(a: Any, b: Any) -> bool:
+    """To the bit: 0.0 and -0.0 are not."""
+    return type(a) is type(b) and a == b and (a != 0.0 or str(a) == str(b))
+
+
+def _named(model: Model) -> dict[str, frozenset[str]]:
+    """Element -> parameters that its numbers may depend on: all that some text in it names."""
+    found = {e.name: frozenset(words(e)) & model.parameters.keys() for e in model.elements()}
+    return {name: frozenset(used) for name, used in found.items() if used}
+
+
+def words(value: Any) -> Iterator[str]:
+    """Every name in the texts of an element, of shapes and lists in it."""
+    if isinstance(value, str):
+        yield from re.findall(r"[^\W\d]\w*", value)
+    elif isinstance(value, (tuple, list)):
+        for x in value:
+            yield from words(x)
+    elif isinstance(value, Expression):
+        yield from value.names
+    elif is_dataclass(value):
+        for f in fields(value):
+            yield from words(getattr(value, f.name))
 
 
 def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -> SimpleNamespace:

@@ -163,8 +163,8 @@ def sort(s: Structure) -> None:
     s.tables["row_i"] = np.array([(r.law, r.wrap, r.work) for r in s.rows], np.int64).reshape(-1, 3)
     terms = np.searchsorted([t.formula.kind for t in s.terms], np.arange(TERM_KINDS + 1))
     ground = int((s.tables["frame_i"] < 0).sum())
-    absolute = not s.tree_joints and not (s.coupled and s.rows)
-    solver = SCHUR if absolute else COUPLED if s.rows else ARTICULATED
+    absolute = not s.tree_joints and not s.coupled
+    solver = SCHUR if absolute else COUPLED if s.rows or s.coupled else ARTICULATED
     moving = ground + sum(s.frames[new[k]].body >= 0 for k in used)
     s.tables["kinds"] = np.r_[terms, solver, s.nq, moving, ground].astype(np.int64)
     _force_frames(s, new)

@@ -68,13 +68,12 @@ def standard_plots(result: Result, folder: str | os.PathLike) -> list[Path]:
         makers["paths"] = partial(_paths, result)
     order = ("energy", "coordinates", "positions", "paths", "reactions", "actuation", "sensors")
     written = []
-    for name in (k for k in order if k in makers):
-        with styled():
+    with styled():
+        for name in (k for k in order if k in makers):
             drawing = makers[name]()
             headed(drawing, f"{result.model.name}: {name}")
-            path = folder / f"{name}.png"
-            handed_out(drawing, path)
-            written.append(path)
+            written.append(folder / f"{name}.png")
+            handed_out(drawing, written[-1])
     return written
 
 

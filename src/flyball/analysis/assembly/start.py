@@ -100,7 +100,7 @@ def _found(
 ) -> Assembly:
     env = plain.values.env
     values, rates = told(model, env)
-    known = dict(values) | driven(model, model.drivers, t, env)
+    known = dict(values) | driven(model, t, env)
     plain.follow(turns(plain, known))
     drawn = plain.values.q.copy()
     wind(plain, known, drawn)
@@ -156,7 +156,9 @@ def _by_frames(model: Model) -> bool:
 
 def _moved(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> dict[str, float]:
     """Body -> how far its mass centre went, beyond rounding."""
-    out = {}
+    out: dict[str, float] = {}
+    if np.array_equal(before, after):
+        return out
     k = 2 if c.structure.model.planar else 3
     for name, b in c.structure.place.items():
         if b >= 0:
@@ -169,7 +171,10 @@ def _moved(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> d
 
 def _repositioned(c: Compiled, before: np.ndarray, after: np.ndarray, near: float) -> list[Departure]:
     """Poses of reference frames that are not those drawn, beyond rounding."""
-    out, x = [], c.values
+    out: list[Departure] = []
+    if np.array_equal(before, after):
+        return out
+    x = c.values
     k = 2 if x.structure.model.planar else 3
     small = 1e-12 * x.length + near
     for name, b in x.structure.place.items():

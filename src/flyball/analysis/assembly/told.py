@@ -8,7 +8,7 @@ import numpy as np
 
 from ...model.body import Body, Driver, Frame
 from ...model.element import LawOf
-from ...model.expressions import number
+from ...model.expressions import Expression, number
 from ...model.model import Model
 from ..compiled import Compiled
 
@@ -50,12 +50,18 @@ def told(model: Model, env: Mapping[str, float]) -> tuple[dict[str, float], dict
     return values, rates
 
 
-def driven(model: Model, drivers: list[Driver], t: float, env: Mapping[str, float]) -> dict[str, float]:
+def _law(model: Model, d: Driver) -> Expression:
+    return model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}")
+
+
+def driven(model: Model, t: float, env: Mapping[str, float]) -> dict[str, float]:
     """What drivers' laws ask for at time t, as far as they follow time alone."""
     out = {}
+    model = model.snapshot()
     tables = {x.name: x for x in model.tables}
-    for d in drivers:
-        law = model.law(d.law, LawOf(model.unit(d.coordinate, d)), f"law of {d.title}")
+    laws = model.kept.get("laws of drivers", None, 1, lambda: {d.name: _law(model, d) for d in model.drivers})
+    for d in model.drivers:
+        law = laws[d.name]
         if law.names <= {"t", *env}:
             out[d.coordinate] = law.evaluate({**env, "t": t}, tables=tables)
     return out

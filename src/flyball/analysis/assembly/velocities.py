@@ -23,6 +23,7 @@ from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
 CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
 WRONG = 1e-9  # the same, above which rows contradict one another
 BLOCKED = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
+SMALL = 100  # velocities up to which matrices are dense
 SOFT = 1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
 
 
@@ -37,7 +38,7 @@ class Wanted:
     c: Compiled
     q: np.ndarray
     nu: np.ndarray
-    G: Any
+    G: Any  # both dense up to `SMALL` velocities
     root: Any
     held: list[Given]  # hard, besides the constraints
     soft: list[Given]
@@ -46,26 +47,25 @@ class Wanted:
     @classmethod
     def at(cls, c: Compiled, q: np.ndarray, nu: np.ndarray, still: np.ndarray | None = None) -> Wanted:
         """At the position last evaluated, q, for rows with the right-hand sides nu."""
-        import scipy.sparse as sp
-
         told = given(c.values)
+        small = c.structure.nv <= SMALL
         free = np.ones(c.structure.nv)
         for g in told:
             if g.as_drawn and g.whole:
                 free[g.at : g.at + g.n] = 0.0
-        root = c.inverse_mass_root(free)
+        root = c.inverse_mass_root(free, dense=small)
         held = [g for g in told if g.as_drawn and not g.whole]
         soft = [g for g in told if not g.as_drawn]
-        weights = {g.name: _weight(root[g.at : g.at + g.n, g.at : g.at + g.n].toarray(), g) for g in soft}
-        G = c.sparse_jacobian()
+        weights = {g.name: _weight(_plain(root[g.at : g.at + g.n, g.at : g.at + g.n]), g) for g in soft}
+        G = c.jacobian() if small else c.sparse_jacobian()
         if held:
-            G = sp.vstack([G, _stacked(c, q, held, {})]).tocsr()
+            G = _above(G, _stacked(c, q, held, {}))
         return cls(c, q, nu, G, root, held, soft, weights)
 
     @property
     def determined(self) -> bool:
         """Whether these rows leave no velocity free."""
-        A = np.vstack([x.toarray() for x in self._whitened()])
+        A = np.vstack([_plain(x) for x in self._whitened()])
         free = (abs(self.root).sum(axis=0) > 0.0).sum()
         return bool(np.linalg.matrix_rank(A, tol=BLOCKED * _norm(A)) == free) if A.size else free == 0
 
@@ -98,9 +98,7 @@ def _weight(R: np.ndarray, g: Given) -> np.ndarray:
 
 
 def _stacked(c: Compiled, q: np.ndarray, told: list[Given], weights: Mapping[str, np.ndarray]):
-    """Derivatives of the (weighted) deviations of bodies by all velocities, sparse."""
-    import scipy.sparse as sp
-
+    """Derivatives of the (weighted) deviations of bodies by all velocities; dense up to `SMALL` of these."""
     i, j, x, n = [], [], [], 0
     for g in told:
         T = gradient(c.values, g, q)
@@ -110,10 +108,18 @@ def _stacked(c: Compiled, q: np.ndarray, told: list[Given], weights: Mapping[str
         j.append(g.at + columns.ravel())
         x.append(T.ravel())
         n += len(T)
+    nv = c.structure.nv
+    if nv <= SMALL:
+        dense = np.zeros((n, nv), np.result_type(float, *x))
+        if n:
+            dense[np.concatenate(i), np.concatenate(j)] = np.concatenate(x)
+        return dense
+    import scipy.sparse as sp
+
     if not n:
-        return sp.csr_matrix((0, c.structure.nv))
+        return sp.csr_matrix((0, nv))
     entries = (np.concatenate(x), (np.concatenate(i), np.concatenate(j)))
-    return sp.csr_matrix(entries, shape=(n, c.structure.nv))
+    return sp.csr_matrix(entries, shape=(n, nv))
 
 
 def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
@@ -121,11 +127,9 @@ def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
 
     Golub and Van Loan, *Matrix Computations*, section 6.2 (least squares with equality constraints).
     """
-    import scipy.sparse as sp
-
-    used = np.unique(sp.vstack([A, C]).indices)
+    used = np.flatnonzero(_used(A) | _used(C))
     n = A.shape[1]
-    A, C = A[:, used].toarray(), C[:, used].toarray()
+    A, C = _plain(A[:, used]), _plain(C[:, used])
     V, inverse = _pseudo_inverse(A, NO_PART * _norm(A))
     left = C - (C @ V) @ V.T
     inverse_left = _pseudo_inverse(left, BLOCKED * _norm(C))[1]
@@ -137,6 +141,27 @@ def _dense(A, C) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
         return x
 
     return solve
+
+
+def _plain(A: Any) -> np.ndarray:
+    return A if isinstance(A, np.ndarray) else A.toarray()
+
+
+def _used(A: Any) -> np.ndarray:
+    """Which columns are not empty."""
+    if isinstance(A, np.ndarray):
+        return np.asarray(A.any(axis=0))
+    used = np.zeros(A.shape[1], bool)
+    used[A.indices] = True
+    return used
+
+
+def _above(A: Any, B: Any) -> Any:
+    if isinstance(A, np.ndarray):
+        return np.vstack([A, B])
+    import scipy.sparse as sp
+
+    return sp.vstack([A, B]).tocsr()
 
 
 def _norm(A: np.ndarray) -> float:
@@ -229,7 +254,7 @@ def consistent(
 
 def terms(w: Wanted, v: np.ndarray) -> float:
     """What terms of the hard rows may be: a body that spins fast about its own axis leaves rounding in them all."""
-    largest = float(abs(w.G).max()) if w.G.nnz else 0.0
+    largest = float(abs(w.G).max()) if w.G.shape[0] else 0.0
     return max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
 
 

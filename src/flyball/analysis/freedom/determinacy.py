@@ -16,10 +16,11 @@ from ...equations.dependencies import dependencies
 from ...model.body import Driver
 from ...model.coupling import Coupling
 from ...numerics.rank import parts
+from ...numerics.sparse_rank import DENSE, SHOWN, sparse_null_space
 from ...results.records import Records
 from ...results.result import Result
 from ..compiled import Compiled, compiled
-from .jacobian import DENSE, SHOWN, lengths, scaled_jacobian, sparse_null_space
+from .jacobian import lengths, scaled_jacobian
 from .poses import absolute_states
 from .stresses import CHANGED, self_stresses
 

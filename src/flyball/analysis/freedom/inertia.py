@@ -8,10 +8,10 @@ import numpy as np
 
 from ...errors import ModelError
 from ...model.model import Model
+from ...numerics.sparse_rank import sparse_null_space
 from ...tables.points import points
 from ...tables.system import NV, V0
 from ..assembly.start import Assembly
-from .jacobian import sparse_null_space
 
 FEW = 1e-3  # part of a motion that is no turn
 

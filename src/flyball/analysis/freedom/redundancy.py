@@ -6,11 +6,12 @@ import numpy as np
 
 from ...model.body import Driver
 from ...numerics.rank import rank
+from ...numerics.sparse_rank import SHOWN
 from ...results.freedoms import RedundantSet
 from ...tables.system import G_VALUE, NU
 from ..compiled import Compiled
 from .cures import cures
-from .jacobian import SHOWN, Found, scaled_jacobian
+from .jacobian import Found, scaled_jacobian
 from .stresses import undetermined
 from .supports import irreducible
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +22,10 @@ from ..compiled import compiled
 from ..mobility import mobility
 from .derivatives import STEP, State
 from .loads import derivative
+
+GROUP = 400  # numbers up to which curves are differentiated by each of them at once
+PARTS = 32  # that a group of them is split into
+CHUNK = 64  # directions that are looked at together
 
 
 def snapshot(x: State, values: Values | None = None) -> Result:
@@ -58,6 +63,69 @@ def slopes(x: State, names: Sequence[str], d: Sequence[np.ndarray], values: Valu
     """
     result = _result(x, values or x.c.values, *(1j * STEP * np.asarray(part) for part in d))
     return np.array([derivative(result.curve(name)[1]) for name in names]).T.reshape(len(d[0]), len(names))
+
+
+def gradients(x: State, names: Sequence[str]) -> Any:
+    """Derivatives of curves by everything, sparse (names, 3 nv + multipliers): positions, velocities, and so on.
+
+    A curve depends on few of many numbers. They are looked for in groups, taken along random ways: groups that change
+    nothing are left, others are parted.
+    """
+    import scipy.sparse as sp
+
+    ends = np.cumsum(_sizes(x))
+    random = np.random.default_rng(0).uniform(1.0, 2.0, ends[-1])
+    groups = [np.arange(ends[-1])] if ends[-1] > GROUP else []
+    single = np.arange(0 if groups else ends[-1])
+    while groups:
+        smaller = [part for g in groups for part in np.array_split(g, min(PARTS, len(g)))]
+        felt = (_along(x, names, smaller, random) != 0.0).sum(axis=1).tolist()
+        left = [g for g, some in zip(smaller, felt, strict=True) if some]
+        single = np.r_[single, [g[0] for g in left if len(g) == 1]].astype(int)
+        groups = [g for g in left if len(g) > 1]
+    single = np.sort(single)
+    found = _along(x, names, [single[k : k + 1] for k in range(len(single))], np.ones(ends[-1]))
+    columns, of = np.nonzero(found)
+    return sp.csr_matrix((found[columns, of], (of, single[columns])), shape=(len(names), ends[-1]))
+
+
+def _along(x: State, names: Sequence[str], groups: Sequence[np.ndarray], weights: np.ndarray) -> np.ndarray:
+    """Derivatives of curves along all numbers of each group together, (groups, names)."""
+    ends = np.cumsum(_sizes(x))
+    out = [np.zeros((0, len(names)))]
+    for first in range(0, len(groups), CHUNK):
+        some = groups[first : first + CHUNK]
+        ways = np.zeros((len(some), ends[-1]))
+        for k, g in enumerate(some):
+            ways[k, g] = weights[g]
+        out.append(slopes(x, names, np.split(ways, ends[:-1], axis=1)))
+    return np.concatenate(out)
+
+
+def over_time(
+    motion: Result, names: Sequence[str], values: Values, d: tuple[np.ndarray, ...], z: np.ndarray
+) -> np.ndarray:
+    """Derivatives of curves of a motion by a parameter, (n, names).
+
+    Parameters
+    ----------
+    motion : Result
+    names : sequence of str
+        Sensors, or curves of the result.
+    values : Values
+        The mechanism's numbers, a complex step along the parameter.
+    d : four arrays (n, nv), (n, nv), (n, nv), (n, multipliers)
+        Changes of positions along the velocities, of velocities, accelerations and multipliers.
+    z : ndarray (n, states)
+        Changes of works.
+    """
+    dq, dv, da, dlam = (1j * STEP * part for part in d)
+    q = motion.q.T.astype(complex)
+    retract(values.system, q, dq.T)
+    now = (np.ascontiguousarray(q.T), motion.v + dv, motion.states + 1j * STEP * z)
+    r = Result(motion.model, values, motion.t, *now, motion.vdot + da, motion.multipliers + dlam, motion.health)
+    r.wound = motion.wound
+    return derivative(np.array([r.curve(name)[1] for name in names])).T
 
 
 def _sizes(x: State) -> tuple[int, int, int, int]:

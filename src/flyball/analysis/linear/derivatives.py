@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...equations.residual import residual_kernel
+from ...equations.residual import residual_kernel, stepped
 from ...equations.scratch import work
 from ...errors import AnalysisError, ModelError, PerformanceNotice
 from ...laws.evaluation import evaluate_jet
@@ -125,7 +125,7 @@ class Equations:
     @cached_property
     def by_reactions(self) -> np.ndarray:
         """Derivatives of r by the rows' multipliers besides -G^T: joint friction's, (nv, rows)."""
-        return by_reactions(self.state, *self._system)
+        return by_reactions(self.state, *self.complex_tables)
 
     def by_parameter(self, name: str) -> np.ndarray:
         """Derivatives by a parameter of the model, (width,), the state's numbers held."""
@@ -138,9 +138,7 @@ class Equations:
 
     def stepped(self, name: str) -> Values:
         """Numbers of the mechanism, a complex step along a parameter."""
-        c = self.state.c
-        value = c.structure.model.environment(c.parameters)[name]
-        return values(c.structure, c.parameters | {name: complex(value, STEP)})  # type: ignore[arg-type]
+        return stepped_values(self.state.c, name)
 
     def by_law(self, name: str) -> np.ndarray:
         """Derivatives by a parameter that stands in laws only, (width,)."""
@@ -154,20 +152,18 @@ class Equations:
         return replace(c.values, system=system)
 
     @cached_property
-    def _system(self) -> tuple[System, Work]:
+    def complex_tables(self) -> tuple[System, Work]:
+        """Tables and scratch in complex numbers."""
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        if residual_kernel.cold:  # type: ignore[attr-defined]
+        if stepped.cold:
             warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
-        S, W = self._system if system is None else (system, work(self.state.c.structure, system, complex))
+        S, W = self.complex_tables if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
         out = np.zeros((len(steps), self.width), complex)
-        try:
-            residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
-        except ZeroDivisionError:  # complex numbers know no infinity
-            out[:] = np.nan
+        residual_kernel(S, W, complex(x.t), y, vdot, lam, steps, out)
         if not np.isfinite(out.view(float)).all():
             raise self._not_finite(W.stack)
         return out
@@ -224,6 +220,12 @@ class Equations:
             return sp.csc_matrix(np.ones((self.width, s.nv), bool)), np.arange(s.nv)
         touched = sp.csc_matrix(pattern(s, self.state.c.values.system))
         return touched, grouped(touched)
+
+
+def stepped_values(c: Compiled, name: str) -> Values:
+    """Numbers of a mechanism, a complex step along a parameter."""
+    value = c.structure.model.environment(c.parameters)[name]
+    return values(c.structure, c.parameters | {name: complex(value, STEP)})  # type: ignore[arg-type]
 
 
 def by_prescription(x: State, stepped: Values) -> tuple[np.ndarray, np.ndarray]:

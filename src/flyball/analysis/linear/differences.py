@@ -48,7 +48,7 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
             error = 0.0
         return error, best, error * h <= ROUNDED * largest
 
-    h = STEP * _whole(model, parameters, name)
+    h = STEP * whole(model, parameters, name)
     best: tuple[float, np.ndarray] | None = None
     way = 0.1
     for _ in range(TRIES):
@@ -73,18 +73,18 @@ def derivative(model: Model, parameters: Mapping[str, float], name: str, found: 
 
 def aside(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> tuple[float, np.ndarray, str]:
     """The step with which differences begin, what is found that far aside, and the parameter's name."""
-    h = STEP * _whole(model, parameters, name)
+    h = STEP * whole(model, parameters, name)
     return h, found({**parameters, name: model.environment(parameters)[name] + h}), name
 
 
 def check(model: Model, parameters: Mapping[str, float], name: str, found: Found) -> np.ndarray:
     """The same with one small step, second order."""
     value = model.environment(parameters)[name]
-    h = CHECK * _whole(model, parameters, name)
+    h = CHECK * whole(model, parameters, name)
     return (found({**parameters, name: value + h}) - found({**parameters, name: value - h})) / (2.0 * h)
 
 
-def _whole(model: Model, parameters: Mapping[str, float], name: str) -> float:
+def whole(model: Model, parameters: Mapping[str, float], name: str) -> float:
     """The parameter itself; if it is zero, the change of it that changes something of the mechanism by the whole.
 
     Places count as parts of the mechanism's length, other numbers as parts of the largest of their kind.

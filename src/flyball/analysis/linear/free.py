@@ -172,12 +172,17 @@ def refuse_singular(e: Equations, f: Free) -> None:
         G = _nearby(c, x.t, x.q, a, f.scale)
         if G is not None and rank(G, f.scale) > here:
             names = _lost(f, G, c)
-            raise SingularityError(
-                f"the mechanism is in a singular position at t = {x.t:.6g} s: the constraints of {', '.join(names)} "
-                f"depend on each other here and not nearby, so that there is no linear model; move it away from there",
-                x.t,
-                names,
-            )
+            raise singular(x.t, names)
+
+
+def singular(t: float, names: tuple[str, ...]) -> SingularityError:
+    """The error that names the elements whose constraints lose rank at a position."""
+    return SingularityError(
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} "
+        f"depend on each other here and not nearby, so that there is no linear model; move it away from there",
+        t,
+        names,
+    )
 
 
 def _nearby(c: Compiled, t: float, q: np.ndarray, step: np.ndarray, scale: np.ndarray) -> np.ndarray | None:

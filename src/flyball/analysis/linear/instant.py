@@ -17,6 +17,8 @@ from ..motion.layer import in_coordinates
 from ..motion.start import begin
 from .derivatives import State
 
+SPARSE = "absolute: of so many velocities the equations are sparse there"
+
 
 def instant(
     model: Model,
@@ -25,6 +27,7 @@ def instant(
     t: float | str = 0.0,
     parameters: Mapping[str, float] | None = None,
     coordinates: str = "auto",
+    most: int | None = None,
 ) -> tuple[State, str]:
     """State of a mechanism, and the coordinates that it is in and why.
 
@@ -39,6 +42,8 @@ def instant(
         Values in SI units in place of the model's, and of those that an equilibrium was found with.
     coordinates : str
         ``"auto"``, ``"absolute"`` or ``"joint"``.
+    most : int, optional
+        With more velocities than this absolute coordinates are taken, in which large mechanisms are sparse.
 
     Raises
     ------
@@ -49,16 +54,29 @@ def instant(
     """
     if isinstance(about, Result):
         start = begin(model, about.final[0], parameters, about, coordinates)
-        a, why = start.assembly, start.coordinates
+        base, a, why = start.base, start.assembly, start.coordinates
     elif isinstance(about, Equilibrium):
-        known = {**about.parameters, **(parameters or {})}
-        a, why = in_coordinates(_there(model, about, known), coordinates, known)
+        told = {**about.parameters, **(parameters or {})}
+        base = _there(model, about, told)
+        a, why = _chosen(base, coordinates, told, most)
     elif about is None:
         base = assemble(model, t=number(t, {}, "s", "t"), parameters=parameters)
-        a, why = in_coordinates(base, coordinates, parameters)
+        a, why = _chosen(base, coordinates, parameters, most)
     else:
         raise ModelError(f"about must be a result or an equilibrium, got {type(about).__name__}")
+    if most is not None and a.compiled.structure.nv > most:
+        a, why = base, SPARSE
     return State.moving(a.compiled, a.t, a.q, a.v), why
+
+
+def _chosen(
+    base: Assembly, coordinates: str, parameters: Mapping[str, float] | None, most: int | None
+) -> tuple[Assembly, str]:
+    """The assembly in the coordinates asked for; where none have few velocities, these are not made."""
+    s = base.compiled.structure
+    if most is not None and coordinates == "auto" and s.nv - len(s.rows) > most:
+        return base, SPARSE
+    return in_coordinates(base, coordinates, parameters)
 
 
 def _there(model: Model, about: Equilibrium, parameters: Mapping[str, float]) -> Assembly:

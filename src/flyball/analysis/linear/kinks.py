@@ -20,7 +20,7 @@ from ...model.element import LawOf, fields_with
 from ...model.expressions import Expression
 from ...model.force import CoordinateForce
 from ...model.model import Model
-from .curves import slopes, snapshot
+from .curves import gradients, snapshot
 from .derivatives import STEP, Equations
 from .loads import derivative
 from .pieces import faces
@@ -252,14 +252,14 @@ def _told(
 ) -> Kink:  # fmt: skip
     x, nv = e.state, len(e.state.v)
     curves = [name for name, _, _ in at if name not in to]
-    one, none, rows = np.eye(nv), np.zeros((nv, nv)), np.zeros((nv, len(x.lam) + len(x.c.structure.prescribed)))
     sizes = np.array([x.c.values.length if unit.startswith("m") else 1.0 for _, _, (unit, _) in at])
     weights = np.array([normal[k] / sizes[k] for k, (name, _, _) in enumerate(at) if name not in to])
-    along = tuple(slopes(x, curves, (*way, none, rows)) @ weights for way in ((one, none), (none, one)))
+    by_all = gradients(x, curves).T @ weights
+    along = by_all[:nv], by_all[nv : 2 * nv]
     where = ", ".join(
         f"{name} = {value + 0.0:.6g} {unit}".strip()
         for (name, value, (unit, _)), n in zip(at, normal, strict=True)
         if abs(n) > FLAT
     )
     by = any(name in to and abs(n) > FLAT for (name, _, _), n in zip(at, normal, strict=True))
-    return Kink(element, f"{text} {what} at {where}", what != KINK, along, by)  # type: ignore[arg-type]
+    return Kink(element, f"{text} {what} at {where}", what != KINK, along, by)

@@ -81,6 +81,21 @@ def by_reactions(x: State, system: System, W: Work) -> np.ndarray:
     return out
 
 
+def feels(x: State, system: System, W: Work) -> bool:
+    """Whether the equations of motion depend on the multipliers by more than -G^T; arguments as `by_reactions`."""
+    s = x.c.structure
+    nv, nr = s.nv, len(s.rows)
+    random = np.random.default_rng(0).uniform(1.0, 2.0, nr)
+    steps = np.zeros((1, 3 * nv + 1), complex)
+    found = np.zeros((1, nv + 3 * nr + 3 * len(s.measured)), complex)
+    y, vdot, lam = x.y.astype(complex), x.vdot.astype(complex), x.lam + 1j * STEP * random
+    residual_kernel(system, W, complex(x.t), y, vdot, lam, steps, found)
+    x.c.at(x.t, x.q, x.v)
+    G = x.c.sparse_jacobian()
+    left = derivative(found[0, :nv]) + G.T @ random
+    return bool((np.abs(left) > FELT * (abs(G).T @ random)).any())
+
+
 def refuse_undetermined(s: Structure, G: np.ndarray, F: np.ndarray) -> None:
     """Refuse friction under reactions that redundancy leaves open: what it does then depends on what nobody knows.
 

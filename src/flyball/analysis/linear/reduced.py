@@ -135,7 +135,8 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     try:
         doubt = without_rounding(terms, a_dot, forces, e, f)
     except np.linalg.LinAlgError:
-        raise _without_inertia(terms.mass, f) from None
+        d = f.chosen_v[int(np.argmin(np.abs(np.diag(terms.mass))))]
+        raise without_inertia(f.names[d].name) from None
     b_dot = np.linalg.solve(terms.mass, 0.0 - forces) if f.Zv.shape[1] else a_dot[:0]
     acceleration = f.Zv @ b_dot + known + H @ u
     left = M @ (acceleration - H @ u) + others
@@ -149,9 +150,8 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     return out
 
 
-def _without_inertia(M: np.ndarray, f: Free) -> ModelError:
+def without_inertia(name: str) -> ModelError:
     """The error that names what moves without inertia."""
-    name = f.names[f.chosen_v[int(np.argmin(np.abs(np.diag(M))))]].name
     return ModelError(
         f"nothing with inertia moves along {name}: there is no linear equation of motion; give it a mass or a moment "
         f"of inertia"

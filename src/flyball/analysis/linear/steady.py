@@ -119,10 +119,15 @@ def _refuse_changing(x: State, e: Equations, f: Free, frame: Frame) -> None:
     x.c.at(x.t, x.q, x.v)
     x.c.z = z
     if np.abs(then - now).max(initial=0.0) > SAME * np.abs(now).max(initial=0.0):
-        raise AnalysisError(
-            "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
-            "those of this very instant with frozen=True"
-        )
+        raise changing()
+
+
+def changing() -> AnalysisError:
+    """The error for linear equations that are others a moment later."""
+    return AnalysisError(
+        "the mechanism rests, but laws of its forces change with time, and its linear equations with them; ask for "
+        "those of this very instant with frozen=True"
+    )
 
 
 def moved_on(x: State, f: Free, frame: Frame) -> tuple[Equations, Free, Frame]:

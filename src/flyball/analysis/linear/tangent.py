@@ -90,10 +90,7 @@ class Linear:
         """Pseudo-inverse of the equations of motion with the constraints: rows may be redundant."""
         A = self.A
         if self.x.c.structure.loads:
-            n, s = len(self.M), self.x.c.structure
-            F = by_reactions(self.x, *complex_tables(self.x.c))
-            turns = np.array([1.0 if d.unit == "m" else 1.0 / self.x.c.values.length for d in velocity_names(s)])
-            refuse_undetermined(s, self.G * turns, F)
+            n, F = len(self.M), friction(self.x, self.G)
             A = A.copy()
             A[:n, n:] += self.scale[:, None] * F * self.size
         return np.linalg.pinv(A, rcond=1e-12)
@@ -110,6 +107,15 @@ class Linear:
         n = len(self.M)
         x = self.inverse @ -np.r_[self.scale * r, self.size * a]
         return self.scale * x[:n], self.size * x[n:]
+
+
+def friction(x: State, G: np.ndarray) -> np.ndarray:
+    """What joint friction makes of the reactions, F (nv, rows); refused where redundancy leaves these open."""
+    s = x.c.structure
+    F = by_reactions(x, *complex_tables(x.c))
+    turns = np.array([1.0 if d.unit == "m" else 1.0 / x.c.values.length for d in velocity_names(s)])
+    refuse_undetermined(s, G * turns, F)
+    return F
 
 
 def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) -> Tangent:

@@ -1,129 +1,293 @@
-"""Sensitivity of whole motions: the variational equations beside the equations of motion.
+"""Motions and how they change with parameters: what the compiled loop (``equations/variation.py``) is given, and what
+it hands out.
 
-    dq' = dv + N dq,    (dvdot, dlam) from the linearised equations at every instant (see ``tangent``)
-
-Both are integrated together by an explicit Runge-Kutta method of order 8; after every step the motion is put back on
-the constraints, and its changes on the linearised ones. (Direct differentiation: Haug and Ehle 1982; Chang and
-Nikravesh 1985. That the changes may be put back like this, see Serban and Freeman 1996.)
+The start is assembled, and its changes found, in absolute coordinates (``begun.py``); in joint coordinates they are
+those that the bodies' are (`carried`). Steps of a parameter are parts of it, so that the tolerances of changes are
+those of the motion.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
-from ...equations.engine import MOTION
-from ...equations.tree import normalise, retract
+from ...equations import residual
+from ...equations.changes import POWERS, Plan
+from ...equations.engine import FOLLOW, Sheet, engine
+from ...equations.scratch import work
+from ...equations.variation import variation_kernel
 from ...errors import SimulationError
-from ...tables.system import EFFORT, G_VALUE, LAM, NU, X_SOLVED
-from ..compiled import Compiled
-from .derivatives import State
-from .frames import kinematic
-from .tangent import Direction, Linear, Tangent, closed
+from ...laws.functions import forget
+from ...numerics.integrators import clock as ex
+from ...numerics.integrators.tableaux import Tableau, tableau
+from ...results.health import Health
+from ...results.result import Result
+from ...tables.specs import Structure
+from ...tables.system import (
+    BODY_TURNS,
+    EXCESS_MASS,
+    INVERSE,
+    PER_BULK,
+    PER_COMPACT,
+    PER_MASS,
+    TREE_P,
+    TREE_TURNS,
+    V0,
+    System,
+    Work,
+)
+from ...tables.values import Values
+from ..motion.driven import integrals, nodes
+from ..motion.reasons import reason
+from ..motion.start import Start
+from ..simulate import run_clock
+from .loads import as_complex, pressing
 
-CLOSED = 1e-12  # of the mechanism's length
-PASSES = 8
+TABLES = ("body_x", "frame_x", "term_x", "force_x", "const", "glob")
+FOUND = 10_000_000  # numbers of output that are held at a time
+
+
+@dataclass
+class Changes:
+    """A motion at times, and how it changes with one parameter; each (n, ..), along the times first."""
+
+    q: np.ndarray
+    v: np.ndarray
+    vdot: np.ndarray
+    lam: np.ndarray
+    z: np.ndarray
+
+    @property
+    def parts(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Without the states."""
+        return self.q, self.v, self.vdot, self.lam
+
+
+@dataclass
+class Varied:
+    """A motion and its changes.
+
+    Attributes
+    ----------
+    t : ndarray (n,) [s]
+    motion : Changes
+        Coordinates, velocities, accelerations, multipliers with efforts, states.
+    by : list of Changes
+        Of each parameter; positions along the velocities.
+    """
+
+    t: np.ndarray
+    motion: Changes
+    by: list[Changes]
+
+    def result(self, start: Start) -> Result:
+        """The motion, to be read by name."""
+        c, m = start.assembly.compiled, self.motion
+        health = Health(True, "a motion and its changes", 0.0, 0.0, 0, 0, 0, 0, 0.0)
+        q, v, z, vdot, lam = (np.ascontiguousarray(x) for x in (m.q, m.v, m.z, m.vdot, m.lam))
+        out = Result(c.structure.model, c.values, self.t, q, v, z, vdot, lam, health)
+        out.wound = start.wound
+        return out
+
+
+def _silent(fraction: float, note: str = "") -> None:
+    """Tell nobody."""
+
+
+def followed(loop: Variation) -> Varied:
+    """A motion that drivers prescribe, and its changes: the constraints decide both, works are integrals of powers."""
+    start, clock = loop.start, loop.clock
+    at = 1 + clock.accounts
+    own = clock._replace(real=clock.real.copy(), count=clock.count.copy(), y=clock.y.copy(), K=clock.K.copy())
+    rows, _ = run_clock(start.assembly, own, loop.R, _silent, FOLLOW)
+    if own.count[ex.STATUS] != ex.DONE:
+        raise loop.stopped(own)
+    z, n = clock.accounts - loop.nq - loop.nv, len(clock.accounts)
+
+    def powers(some: np.ndarray) -> np.ndarray:
+        found = loop.at(some[:, 0], some[:, 1 : 1 + len(start.y)])
+        return np.hstack([some[:, at], *(size * by.z[:, z] for size, by in zip(loop.sizes, found.by, strict=True))])
+
+    if n:
+        known, P = nodes(start.assembly, own, rows, powers)
+    else:
+        known = rows[np.isin(rows[:, 0], clock.times)]
+        P = known[:, at]
+    kept = np.isin(known[:, 0], clock.times)
+    out = loop.at(known[kept, 0], known[kept, 1 : 1 + len(start.y)])
+    works = integrals(known[:, 0], P)[kept] if n else P
+    out.motion.z[:, z] = start.y[clock.accounts] + works[:, :n]
+    for k, by in enumerate(out.by):
+        by.z[:, z] = works[:, (k + 1) * n : (k + 2) * n] / loop.sizes[k]
+    return out
 
 
 class Variation:
-    """A motion and its changes with parameters.
+    """The loop of a motion and its changes, ready to run.
 
     Parameters
     ----------
-    x : State
-        Start, in absolute coordinates.
-    directions : sequence of Direction
-        Parameters.
-    start : sequence of Tangent
-        How the start changes with each.
+    start : Start
+        Where the motion begins, in the coordinates that it is computed in.
+    clock : Clock
+        Of the motion alone.
+    values : sequence of Values
+        The mechanism's numbers with a complex step of each parameter.
+    sizes : sequence of float
+        What counts as a whole change of each parameter.
+    method : str
+        The integrator.
     """
 
-    def __init__(self, x: State, directions: Sequence[Direction], start: Sequence[Tangent]) -> None:
-        self.c: Compiled = x.c
-        self.x = x
-        self.M = x.c.mass().toarray()
-        self.directions = list(directions)
-        self.nq, self.nv = len(x.q), len(x.v)
-        self.nz = len(x.z)
-        self.y = np.concatenate([x.y, *(np.r_[d.q, d.v] for d in start)])
+    def __init__(
+        self, start: Start, clock: ex.Clock, values: Sequence[Values], sizes: Sequence[float], method: str = "dop853"
+    ) -> None:
+        self.start, self.clock, self.sizes = start, clock, np.array(sizes, float)
+        c = start.assembly.compiled
+        self.c, s, S = c, c.structure, c.values.system
+        self.nq, self.nv, self.nz, self.nr, self.n = s.nq, s.nv, len(s.states), len(S.row_i), len(values)
+        self.prescribed = [int(S.body_i[b, V0]) for b in s.prescribed.values()]
+        self.R: Tableau = tableau(method)
+        self.own_width = 1 + len(start.y) + self.nv + self.nr + len(self.prescribed)
+        self.width = self.own_width + self.n * (4 * self.nv + self.nr + self.nz)
+        self.own = clock._replace(
+            real=clock.real.copy(), count=clock.count.copy(), y=np.zeros((ex.STATES, len(start.y))),
+            K=np.zeros((1, len(start.y))),
+        )  # fmt: skip
+        self.sheet = Sheet(np.zeros((4, max(self.own_width, 1))))
+        self.system, self.scratch, tables = _together(s, as_complex(S), values)
+        found = np.zeros((1, self.nv + 3 * self.nr + 3 * len(s.measured)), complex)
+        steps = np.zeros((1, 3 * self.nv + 1), complex)
+        t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
+        self.bench = residual.Bench(t, y, vdot, lam, steps, found)
+        self.plan = self._planned(values, tables)
+        forget(c.work.stack)
 
-    def run(self, times: np.ndarray, rtol: float, atol: float) -> Iterator[tuple[State, list[Tangent]]]:
-        """The state and its changes at every time; steps end at the times.
+    def _planned(self, values: Sequence[Values], tables: np.ndarray) -> Plan:
+        """Which numbers of the tables each parameter changes."""
+        s = self.c.structure
+        entry, step, first = [np.zeros(0, np.int64)], [np.zeros(0)], [0]
+        for x, size in zip(values, self.sizes, strict=True):
+            found = np.concatenate([part.imag.ravel() for part in _seen(s, as_complex(x.system))])
+            at = np.flatnonzero(found)
+            entry.append(2 * at + 1)
+            step.append(found[at] * size)
+            first.append(first[-1] + len(at))
+        nv, nz, rows = self.nv, self.nz, pressing(s).astype(np.int64)
+        m, wide = len(rows), nv + self.nr + nv
+        return Plan(
+            np.array([self.nq, nz, self.n, 0], np.int64), np.array(first, np.int64),
+            np.concatenate(entry).astype(np.int64), np.concatenate(step), tables.view(float), np.zeros((self.n, wide)),
+            np.zeros(nv), np.zeros(self._long), np.zeros(nv), rows, np.zeros((m, wide)), np.zeros((m, nz)),
+            np.zeros((m, m + 1)),
+        )  # fmt: skip
+
+    @property
+    def _long(self) -> int:
+        """Width of the state of motion and changes."""
+        return self.nq + self.nv + self.nz + self.n * (2 * self.nv + self.nz)
+
+    def run(self, dq: np.ndarray, dv: np.ndarray) -> Varied:
+        """Integrate from changes (parameters, nv) of the start.
 
         Raises
         ------
         SimulationError
-            If the step becomes too small: a singular position, or something that is not smooth.
+            If it cannot go on: a singular position, or something that is not smooth.
         """
-        from scipy.integrate import DOP853
+        clock = self._clock(np.concatenate([dq, dv], axis=1) * self.sizes[:, None])
+        buffer = np.zeros((max(2, min(len(clock.times), FOUND // self.width + 1)), self.width))
+        none = np.zeros((0, self._long))
+        rows = []
+        while clock.count[ex.STATUS] == ex.RUNNING:
+            rows.append(buffer[: self._call(clock, none, buffer)].copy())
+        if clock.count[ex.STATUS] != ex.DONE:
+            raise self.stopped(clock)
+        return self._varied(np.concatenate(rows))
 
-        t, first = float(times[0]), None
-        yield self._at(t, self.y)
-        for end in times[1:]:
-            solver = DOP853(self._rate, t, self.y, float(end), rtol=rtol, atol=atol, first_step=_within(first, end - t))
-            while solver.status == "running":
-                message = solver.step()
-                if solver.status == "failed":
-                    raise SimulationError(
-                        f"the variational equations stopped at t = {solver.t:.6g} s: {message}", None, t
-                    )
-                first = solver.h_abs
-                solver.y = self._closed(solver.t, solver.y)
-                solver.f = self._rate(solver.t, solver.y)
-            t, self.y = float(solver.t), solver.y
-            yield self._at(t, self.y)
+    def at(self, t: np.ndarray, y: np.ndarray) -> Varied:
+        """Changes at states (n, width) of a motion that drivers prescribe, with powers in place of works."""
+        n = len(t)
+        states = np.zeros((n, self._long))
+        states[:, : self.nq + self.nv] = y[:, : self.nq + self.nv]
+        z = self.nq + self.nv + 2 * self.nv * self.n
+        states[:, z : z + self.nz] = y[:, self.nq + self.nv :]
+        self.plan.size[POWERS] = 1
+        clock = self._clock(np.zeros((self.n, 2 * self.nv)))._replace(times=np.ascontiguousarray(t))
+        out = np.zeros((n, self.width))
+        done = self._call(clock, states, out)
+        if done < n:
+            raise self.stopped(clock, float(t[done]))
+        return self._varied(out)
 
-    def _split(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Positions, velocities, states, and changes (parameters, 2 nv)."""
-        q, v, z, more = np.split(y, np.cumsum([self.nq, self.nv, self.nz]))
-        return q.copy(), v.copy(), z, more.reshape(len(self.directions), 2 * self.nv)
+    def _call(self, clock: ex.Clock, states: np.ndarray, out: np.ndarray) -> int:
+        S, W = self.c.values.system, self.c.work
+        given = (S, W, self.R, self.own, self.sheet)
+        doors = engine.address(*given), residual.address(self.system, self.scratch, self.bench)
+        return variation_kernel(*doors, *given, self.system, self.scratch, self.bench, self.plan, clock, states, out)
 
-    def _state(self, t: float, q: np.ndarray, v: np.ndarray) -> State:
-        return State.moving(self.c, t, q, v)
+    def _clock(self, changes: np.ndarray) -> ex.Clock:
+        """Of motion and changes."""
+        own, n = self.clock, self.n
+        Y = np.zeros((ex.STATES, self._long))
+        at, more = self.nq + self.nv, 2 * self.nv * n
+        y = self.start.y
+        Y[0, :at], Y[0, at : at + more], Y[0, at + more : at + more + self.nz] = y[:at], changes.ravel(), y[at:]
+        accounts = [own.accounts + more + k * self.nz for k in range(n + 1)]
+        count = own.count.copy()
+        count[ex.CONTROLLED] = at + more
+        return own._replace(
+            real=own.real.copy(), count=count, y=Y, K=np.zeros((len(own.K), self._long)),
+            accounts=np.concatenate(accounts).astype(np.int64),
+        )  # fmt: skip
 
-    def _rate(self, t: float, y: np.ndarray) -> np.ndarray:
-        q, v, z, changes = self._split(y)
-        normalise(self.c.values.system, q)
-        _, dy = self.c.at(t, q, v, MOTION)
-        W = self.c.work
-        x = State(self.c, t, q, v, self.c.z.copy(), W.vel[X_SOLVED].copy(), W.row[LAM].copy(), W.vel[EFFORT].copy())
-        out = np.zeros_like(y)
-        out[: self.nq + self.nv + self.nz] = dy
-        lin, N = Linear(x, self.M), kinematic(x)
-        parts = out[self.nq + self.nv + self.nz :].reshape(changes.shape)
-        for k, d in enumerate(self.directions):
-            dq, dv = np.split(changes[k], 2)
-            left = d.along(x, dq, dv)
-            parts[k, : self.nv] = dv + N @ dq
-            parts[k, self.nv :] = lin.acceleration(left[d.e.at["r"]], left[d.e.at["a"]])[0]
-        return out
+    def _varied(self, rows: np.ndarray) -> Varied:
+        cuts = np.cumsum([1, self.nq, self.nv, self.nz, self.nv])
+        t, q, v, z, vdot, lam = np.split(rows[:, : self.own_width], cuts, axis=1)
+        nv, nr, nz = self.nv, self.nr, self.nz
+        by = []
+        for k in range(self.n):
+            first = self.own_width + k * (4 * nv + nr + nz)
+            part = rows[:, first : first + 4 * nv + nr + nz] / self.sizes[k]
+            dq, dv, da, dlam, effort, dz = np.split(part, np.cumsum([nv, nv, nv, nr, nv]), axis=1)
+            by.append(Changes(dq, dv, da, np.hstack([dlam, effort[:, self.prescribed]]), dz))
+        return Varied(t[:, 0], Changes(q, v, vdot, lam, z), by)
 
-    def _closed(self, t: float, y: np.ndarray) -> np.ndarray:
-        """Motion and changes back on their constraints."""
-        q, v, z, changes = self._split(y)
-        S = self.c.values.system
-        normalise(S, q)
-        for _ in range(PASSES):
-            self.c.at(t, q, v)
-            lin, g = Linear(State(self.c, t, q, v, self.c.z, v, self.x.lam, v), self.M), self.c.work.row[G_VALUE].copy()
-            if not np.abs(g[lin.which]).max(initial=0.0) > CLOSED * self.c.values.length:
-                break
-            retract(S, q, lin.motion(-g, lin.which))
-        v += lin.motion(self.c.work.row[NU] - self.c.jacobian() @ v)
-        x = self._state(t, q, v)
-        lin = Linear(x, self.M)
-        for k, d in enumerate(self.directions):
-            now = closed(d, x, lin, *np.split(changes[k], 2))
-            changes[k] = np.r_[now.q, now.v]
-        return np.concatenate([q, v, self.c.z, changes.ravel()])
-
-    def _at(self, t: float, y: np.ndarray) -> tuple[State, list[Tangent]]:
-        q, v, _, changes = self._split(y)
-        x = self._state(t, q, v)
-        lin = Linear(x, self.M)
-        return x, [closed(d, x, lin, *np.split(changes[k], 2)) for k, d in enumerate(self.directions)]
+    def stopped(self, clock: ex.Clock, t: float | None = None) -> SimulationError:
+        """Why it went no further."""
+        t = float(clock.real[ex.T]) if t is None else t
+        real, own = clock.real.copy(), self.clock
+        real[ex.T] = t
+        y, at = own.y.copy(), self.nq + self.nv
+        y[0, :at], y[0, at:] = clock.y[0, :at], clock.y[0, at + 2 * self.nv * self.n :][: self.nz]
+        stopped = own._replace(real=real, count=clock.count, y=y)
+        message, cause = reason(self.start.assembly, self.start.base, stopped, kept=False)
+        error = SimulationError(
+            f"the motion and its changes with the parameters stop at t = {t:.6g} s: {message}", None, t
+        )
+        error.__cause__ = cause
+        return error
 
 
-def _within(first: float | None, span: float) -> float | None:
-    return None if first is None else min(first, span)
+def _seen(s: Structure, system: System) -> list[np.ndarray]:
+    """The tables that the residuals look at, and records of frames, of which those on ground hold numbers."""
+    body_x = system.body_x.copy()
+    body_x[:, INVERSE:TREE_P] = body_x[:, PER_MASS : PER_COMPACT + 1] = body_x[:, EXCESS_MASS : PER_BULK + 1] = (
+        0.0  # for the solve alone
+    )
+    return [body_x, *(getattr(system, name) for name in TABLES[1:]), work(s, system, complex).FK]
+
+
+def _together(s: Structure, system: System, values: Sequence[Values]) -> tuple[System, Work, np.ndarray]:
+    """Tables and scratch in complex numbers, with all that parameters can change in one array."""
+    for x in values:  # a rotation that is none as it stands, and that a parameter changes, must be looked at
+        at = slice(TREE_TURNS, BODY_TURNS + 1)
+        system.body_x[:, at] = np.maximum(system.body_x[:, at].real, x.system.body_x[:, at].real)
+    parts = _seen(s, system)
+    tables = np.concatenate([x.ravel() for x in parts])
+    ends = np.cumsum([0, *(x.size for x in parts)])
+    views = [tables[i:j].reshape(x.shape) for i, j, x in zip(ends[:-1], ends[1:], parts, strict=True)]
+    system = system._replace(**dict(zip(TABLES, views[:-1], strict=True)))  # type: ignore[arg-type]
+    return system, work(s, system, complex)._replace(FK=views[-1]), tables

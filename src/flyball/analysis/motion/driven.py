@@ -1,11 +1,13 @@
 """Mechanisms whose drivers leave no freedom: their motion is kinematics, and works are integrals of what it takes.
 
 The compiled loop (``equations/follow.py``) gives positions, velocities, accelerations and powers at every time that it
-stops at. The powers are integrated by the polynomial through eight neighbouring times; where six say something else,
-times are added, first where they differ most.
+stops at. The powers are integrated by the polynomial through eight neighbouring times; where six or seven say something
+else, times are added, first where they differ most.
 """
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 
@@ -13,11 +15,11 @@ from ...equations.engine import FOLLOW, motion_kernel
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
 from ..assembly.start import Assembly
-from ..mobility import mobility
+from ..freedom.jacobian import rank_of
 from .start import Start
 
 MOST = 4  # starts of the same numbers of which it is kept whether drivers hold them
-NODES, FEWER = 8, 6
+NODES, FEWER = 8, (7, 6)  # an odd number too: at a jump its windows do not lie like those of eight
 ROUNDS = 40
 CALLS = 1_000_000
 CROWDED = 1e-3  # distance of neighbouring nodes, as part of half of all eight's width
@@ -32,7 +34,12 @@ def leaves_no_freedom(start: Start) -> bool:
         return False
     a = start.base
     x, key = a.compiled.values, (float(a.t).hex(), a.y.tobytes())
-    return x.kept.get("held", key, MOST, lambda: mobility(s.model, a.again()).freedoms == 0)
+    return x.kept.get("held", key, MOST, lambda: _rank(a) == s.nv)
+
+
+def _rank(a: Assembly) -> int:
+    a.compiled.at(a.t, a.q, a.v)
+    return rank_of(a.compiled)
 
 
 def at_outputs(clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
@@ -70,21 +77,33 @@ def owed_works(start: Start, clock: ex.Clock, rows: np.ndarray) -> tuple[np.ndar
 
 def _works(a: Assembly, clock: ex.Clock, rows: np.ndarray) -> np.ndarray:
     """Works at the times of the rows, from none at the first."""
-    at = 1 + clock.accounts
-    known = rows
+    known, P = nodes(a, clock, rows, lambda some: some[:, 1 + clock.accounts])
+    return integrals(known[:, 0], P)[np.searchsorted(known[:, 0], rows[:, 0])]
+
+
+def nodes(
+    a: Assembly, clock: ex.Clock, rows: np.ndarray, powers: Callable[[np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The rows, and as many between them as the integrals of what ``powers`` makes of rows take; with these, (n, k)."""
+    known, P = rows, powers(rows)
     shortest = SHORT * (rows[-1, 0] - rows[0, 0])
     for _ in range(ROUNDS):
-        pieces, error = _pieces(known[:, 0], known[:, at])
+        pieces, error = _pieces(known[:, 0], P)
         allowed = ex.LOOSER * clock.real[ex.RTOL] * (clock.real[ex.LEDGER] + np.abs(pieces).sum())
         uneven = _largest(np.where(np.diff(known[:, 0]) > shortest, error, 0.0), allowed)
         more = _halfway(a, clock, known, uneven) if len(uneven) else known[:0]
         if not len(more):
             break
-        known = np.vstack([known, more])
-        known = known[np.unique(known[:, 0], return_index=True)[1]]
-    pieces, _ = _pieces(known[:, 0], known[:, at])
-    works = np.vstack([np.zeros(len(at)), np.cumsum(pieces, axis=0)])
-    return works[np.searchsorted(known[:, 0], rows[:, 0])]
+        known, P = np.vstack([known, more]), np.vstack([P, powers(more)])
+        first = np.unique(known[:, 0], return_index=True)[1]
+        known, P = known[first], P[first]
+    return known, P
+
+
+def integrals(t: np.ndarray, P: np.ndarray) -> np.ndarray:
+    """Integrals (n, k) of powers (n, k) over time, from none at the first."""
+    pieces, _ = _pieces(t, P)
+    return np.vstack([np.zeros(P.shape[1]), np.cumsum(pieces, axis=0)])
 
 
 def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
@@ -98,10 +117,10 @@ def _largest(error: np.ndarray, allowed: float) -> np.ndarray:
 
 def _pieces(t: np.ndarray, P: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Integrals over every interval, (n - 1, accounts), and how much they differ from those with fewer nodes."""
-    best, other = (_quadrature(t, P, min(m, len(t))) for m in (NODES, FEWER))
-    if len(t) <= FEWER:
-        other = np.diff(t)[:, None] * 0.5 * (P[1:] + P[:-1])
-    return best, np.abs(best - other).sum(axis=1)
+    best = _quadrature(t, P, min(NODES, len(t)))
+    others = [np.diff(t)[:, None] * 0.5 * (P[1:] + P[:-1])] if len(t) <= FEWER[0] else []
+    others += [_quadrature(t, P, m) for m in FEWER if m < len(t)]
+    return best, np.max([np.abs(best - other).sum(axis=1) for other in others], axis=0)
 
 
 def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:

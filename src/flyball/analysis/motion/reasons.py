@@ -51,7 +51,7 @@ LATELY = 1e-3  # part of the time span within which rounding found to decide is 
 SHARP = 10.0  # a law that changes this many times more than its own slope says has jumped
 
 
-def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception | None]:
+def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> tuple[str, Exception | None]:
     """What stopped the integration, and the exception that a user's function raised, if one did.
 
     Parameters
@@ -62,16 +62,18 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
         The mechanism in absolute coordinates, where every joint and driver has rows.
     clock : Clock
         State of the integration.
+    kept : bool
+        Whether there is a result up to then.
     """
     name = a.compiled.structure.model.name
     t = float(clock.real[ex.T])
-    kept = f"The motion up to t = {t:.6g} s is kept in the error's result"
+    after = f". The motion up to t = {t:.6g} s is kept in the error's result" if kept else ""
     if clock.count[ex.STATUS] == ex.TOO_MANY:
-        return f"{name!r}: {_too_many(a, clock)}{_rounded(clock)}. {kept}", None
+        return f"{name!r}: {_too_many(a, clock)}{_rounded(clock)}{after}", None
     stack = a.compiled.work.stack
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
-        return f"{name!r}: just after t = {t:.6g} s, {found.message}. {kept}", found.exception
+        return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
     text = (
         of_drivers(a, clock)
         or _not_finite(a, clock)
@@ -80,7 +82,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock) -> tuple[str, Exception
         or _rivals(a, clock)
         or _stuck(a, clock)
     )
-    return f"{name!r}: {text}. {kept}", None
+    return f"{name!r}: {text}{after}", None
 
 
 def remarks(a: Assembly, clock: ex.Clock) -> tuple[str, ...]:

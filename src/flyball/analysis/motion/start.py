@@ -76,7 +76,7 @@ def begin_at(
     known(coordinates)
     x = base.compiled.values
     key = coordinates, float(base.t).hex(), base.y.tobytes()
-    found = x.kept.get("begun", key, MOST, lambda: _begun(base.again(), coordinates, parameters))
+    found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters))
     a = base if found.assembly.compiled.values is x else found.assembly.again()
     if before is None:
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
@@ -91,7 +91,7 @@ def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None) ->
 
 def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:
     s = a.compiled.structure
-    if not s.tree or not s.model.planar:
+    if not s.tree or not s.model.planar or (base.compiled.drawn(base.q) and a.compiled.drawn(y[: s.nq])):
         return {}
     q, c = y[: s.nq], a.compiled
     c.at(a.t, q, np.zeros(s.nv))

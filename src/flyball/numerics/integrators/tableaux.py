@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
+
+from . import dop853
 
 
 class Tableau(NamedTuple):
@@ -24,41 +27,55 @@ class Tableau(NamedTuple):
 
 
 def _rk45() -> Tableau:
-    """Dormand and Prince (1980), order 5(4), 6 stages; numbers from SciPy."""
-    from scipy.integrate import RK45
-
-    A = np.zeros((7, 7))
-    A[:6, :5] = RK45.A
-    A[6, :6] = RK45.B
+    """Dormand and Prince (1980), order 5(4), 6 stages; dense output of order 4 by Shampine (1986)."""
+    stages = [
+        [],
+        [1 / 5],
+        [3 / 40, 9 / 40],
+        [44 / 45, -56 / 15, 32 / 9],
+        [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729],
+        [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+        [35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84],
+    ]
+    A = np.array([row + [0.0] * (7 - len(row)) for row in stages])
+    c = np.array([0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0])
     E = np.zeros((2, 7))
-    E[0] = RK45.E
-    return Tableau(A, np.r_[RK45.C, 1.0], E, np.ascontiguousarray(RK45.P), np.array([5, 6, 7], np.int64))
+    E[0] = [-71 / 57600, 0, 71 / 16695, -71 / 1920, 17253 / 339200, -22 / 525, 1 / 40]
+    P = np.array(
+        [
+            [1, -8048581381 / 2820520608, 8663915743 / 2820520608, -12715105075 / 11282082432],
+            [0, 0, 0, 0],
+            [0, 131558114200 / 32700410799, -68118460800 / 10900136933, 87487479700 / 32700410799],
+            [0, -1754552775 / 470086768, 14199869525 / 1410260304, -10690763975 / 1880347072],
+            [0, 127303824393 / 49829197408, -318862633887 / 49829197408, 701980252875 / 199316789632],
+            [0, -282668133 / 205662961, 2019193451 / 616988883, -1453857185 / 822651844],
+            [0, 40617522 / 29380423, -110615467 / 29380423, 69997945 / 29380423],
+        ]
+    )
+    return Tableau(A, c, E, P, np.array([5, 6, 7], np.int64))
 
 
 def _dop853() -> Tableau:
-    """Hairer, Norsett and Wanner (1993), order 8(5,3), 12 stages, dense output of order 7; numbers from SciPy."""
-    from scipy.integrate import DOP853
-
-    s = 16
-    A = np.zeros((s, s))
-    A[:12, :12] = DOP853.A[:12, :12]
-    A[12, :12] = DOP853.B
-    A[13:, :] = DOP853.A_EXTRA
-    c = np.r_[DOP853.C, 1.0, DOP853.C_EXTRA]
-    E = np.zeros((2, s))
-    E[0, :13] = DOP853.E5
-    E[1, :13] = DOP853.E3
+    """Order 8(5,3), 12 stages, dense output of order 7; its source is named in `dop853`."""
+    s = len(dop853.C)
+    A = np.array([_dense(row, s) for row in dop853.A])
+    E = np.array([_dense(dop853.E5, s), _dense(dop853.E3, s)])
     # y + x (F0 + (1 - x) (F1 + x (F2 + (1 - x) (...)))): expanded into powers of x
-    B = np.zeros(s)
-    B[:12] = DOP853.B
-    first, last = np.eye(s)[0], np.eye(s)[12]
-    F = [B, first - B, 2 * B - first - last, *DOP853.D]
+    B, first, last = A[12], np.eye(s)[0], np.eye(s)[12]
+    F = [B, first - B, 2 * B - first - last, *(_dense(row, s) for row in dop853.D)]
     total = np.zeros((s, 1))
     for i in range(len(F) - 1, -1, -1):
         total[:, 0] += F[i]
         factor = np.array([0.0, 1.0]) if i % 2 == 0 else np.array([1.0, -1.0])
         total = np.stack([np.convolve(row, factor) for row in total])
-    return Tableau(A, c, E, np.ascontiguousarray(total[:, 1:]), np.array([8, 12, s], np.int64))
+    P = np.ascontiguousarray(total[:, 1:])
+    return Tableau(A, np.array(dop853.C), E, P, np.array([8, 12, s], np.int64))
+
+
+def _dense(row: Mapping[int, float], length: int) -> np.ndarray:
+    out = np.zeros(length)
+    out[list(row)] = list(row.values())
+    return out
 
 
 TABLEAUX = {"dop853": _dop853, "rk45": _rk45}

@@ -1,0 +1,238 @@
+"""What `Mechanism.prepare` hands out: the equations of a mechanism on plain arrays, for robots, control and others.
+
+M(q) vdot = f(t, q, v) + G(t, q)^T lam + effort        g(t, q) = 0        qdot = T(q) v
+"""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+
+from ..equations.engine import MOTION
+from ..equations.tree import column, rates, retract
+from ..errors import AnalysisError, ModelError
+from ..laws.functions import fault
+from ..model.body import GROUND, Frame
+from ..results.result import Result
+from ..tables.names import velocity_names
+from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
+from .compiled import Compiled, compiled
+from .motion.start import Start
+
+
+class Prepared:
+    """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
+
+    Threads may share it. Answers depend on nothing but the arguments: turned angles that are no coordinates are those
+    within half a turn of the start's.
+
+    Attributes
+    ----------
+    model : Mechanism
+        As it was when it was prepared; additions to the original are not seen.
+    parameters : dict
+        Values of its parameters [SI].
+    coordinates : str
+        Which they are, and why.
+    q, v : ndarray (nq,), (nv,)
+        The start: as described and assembled at t = 0. A spatial body that hangs freely has x, y, z of its centre of
+        mass and a quaternion (scalar first) in q, the velocity of that point in world axes and its angular velocity
+        in its own axes in v; a planar one x, y, angle. Tree joints have their coordinates, spherical ones a quaternion
+        and the angular velocity in the moved axes.
+    names : tuple of str
+        What each velocity is the rate of, (nv,).
+    rows : tuple of str
+        The element and what it restrains, for each constraint row, (nr,).
+    """
+
+    def __init__(self, start: Start) -> None:
+        c = start.assembly.compiled
+        self._start, self._here = start.assembly.again(), threading.local()
+        self.model: Any = c.structure.model
+        self.parameters, self.coordinates = c.values.told, start.coordinates
+        self.q, self.v = start.assembly.q.copy(), start.assembly.v.copy()
+        for a in (self.q, self.v):
+            a.setflags(write=False)
+        self.names = tuple(n.name for n in velocity_names(c.structure))
+        self.rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
+
+    def simulate(self, t_end: float | str, **options: Any) -> Result:
+        """The same as `Mechanism.simulate` in these coordinates, with these values of the parameters.
+
+        Parameters
+        ----------
+        t_end : float or str [s]
+            End of the motion.
+        **options
+            Those of `Mechanism.simulate`; ``parameters`` change further values.
+        """
+        if "coordinates" in options:
+            raise ModelError("coordinates were chosen when the mechanism was prepared: m.prepare(coordinates=...)")
+        layer = "joint" if self._start.compiled.structure.tree else "absolute"
+        values = self.parameters_given | dict(options.pop("parameters", None) or {})
+        return self.model.simulate(t_end, coordinates=layer, parameters=values, **options)
+
+    @property
+    def parameters_given(self) -> dict[str, Any]:
+        """Values that it was prepared with in place of the model's."""
+        return dict(self._start.compiled.parameters)
+
+    def mass_matrix(self, q: np.ndarray) -> np.ndarray:
+        """M, (nv, nv) [kg, kg m, kg m^2], symmetric."""
+        c = self._scratch("bare")
+        self._at(c, 0.0, q, np.zeros(len(self.v)), MOTION)
+        M = np.zeros((len(self.v), len(self.v)))
+        row, at, _ = c.values.system.mass_i.T
+        M[row, at] = c.work.M
+        return np.tril(M) + np.tril(M, -1).T
+
+    def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Vdot, (nv,) [m/s^2, rad/s^2], with the constraints' reactions.
+
+        Coordinates that drivers prescribe are taken where these want them at t, also in `multipliers`, `efforts` and
+        `forces`.
+
+        Raises
+        ------
+        AnalysisError
+            If a law gives no finite number there, or the equations have no solution.
+        """
+        return self._moving(t, q, v).work.vel[X_SOLVED].copy()
+
+    def multipliers(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Lam, (nr,): reactions are G^T lam."""
+        return self._moving(t, q, v).work.row[LAM].copy()
+
+    def efforts(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """What drivers give along the coordinates that they prescribe, (nv,) [N, N m]; 0 for the others."""
+        return self._moving(t, q, v).work.vel[EFFORT].copy()
+
+    def forces(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """F, (nv,) [N, N m]: all forces but reactions, gyroscopic ones included."""
+        return self._moving(t, q, v).work.vel[F_APPLIED].copy()
+
+    def jacobian(self, t: float, q: np.ndarray) -> np.ndarray:
+        """G, (nr, nv): derivatives of the constraint rows along the velocities."""
+        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).jacobian()
+
+    def constraint(self, t: float, q: np.ndarray) -> np.ndarray:
+        """How far the constraint rows are from closed, g, (nr,) [m, rad, 1]; 0 for those of velocities only."""
+        return self._at(self._scratch(), t, q, np.zeros(len(self.v))).work.row[G_VALUE].copy()
+
+    def constraint_rate(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """G v less what drivers ask for, (nr,) [m/s, rad/s]."""
+        c = self._at(self._scratch(), t, q, v)
+        return c.jacobian() @ np.asarray(v, float) - c.work.row[NU]
+
+    def rates(self, q: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Qdot, (nq,): v, where coordinates are no quaternions."""
+        q, v = self._state(q, v)
+        out = np.zeros(len(q))
+        rates(self._start.compiled.values.system, q, v, out)
+        return out
+
+    def step(self, q: np.ndarray, d: np.ndarray) -> np.ndarray:
+        """Q moved by the finite step d (nv,) along the velocities, (nq,); quaternions keep their length."""
+        q, d = self._state(q, d)
+        retract(self._start.compiled.values.system, q, d)
+        return q
+
+    def pose(self, name: str, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origin (3,) [m] of a body's reference frame or a named frame, and its axes as columns (3, 3); world axes."""
+        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
+        b, offset, turn = self._carried(c, name)
+        if b < 0:
+            return offset, turn
+        p, R = c.work.BK[b, :3].copy(), c.work.BK[b, 3:12].reshape(3, 3).copy()
+        return p + R @ offset, R @ turn
+
+    def frame_jacobian(self, name: str, q: np.ndarray) -> np.ndarray:
+        """Derivatives of velocity (rows 0 to 2) and angular velocity (3 to 5) of a frame, world axes, (6, nv)."""
+        c = self._at(self._scratch(), 0.0, q, np.zeros(len(self.v)))
+        S, W = c.values.system, c.work
+        b, offset, _ = self._carried(c, name)
+        J = np.zeros((6, len(self.v)))
+        point = W.BK[b, :3] + W.BK[b, 3:12].reshape(3, 3) @ offset
+        while b >= 0:
+            for k in range(int(S.body_i[b, NV])):
+                turn, shift = (np.array(x) for x in column(S, W, b, k))
+                at = int(S.body_i[b, V0]) + k
+                J[:3, at], J[3:, at] = shift + np.cross(turn, point - W.O[b]), turn
+            b = int(S.body_i[b, PARENT])
+        return J
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        s = self._start.compiled.structure
+        return [
+            ("prepared", f"{self.model.name}, {s.nv} velocities, {len(s.rows)} constraint rows"),
+            ("coordinates", self.coordinates),
+            ("velocities", ", ".join(self.names[:12]) + (", ..." if len(self.names) > 12 else "")),
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data: the start, names of velocities and rows, values of the parameters."""
+        start = {"q": self.q.tolist(), "v": self.v.tolist()}
+        names = {"velocities": list(self.names), "rows": list(self.rows)}
+        return {"name": self.model.name, "coordinates": self.coordinates, "parameters": self.parameters} | names | start
+
+    def __repr__(self) -> str:
+        """The lines."""
+        return "\n".join(f"{label:<12} {text}" for label, text in self.lines())
+
+    def _scratch(self, which: str = "moving") -> Compiled:
+        """This thread's own scratch, with the turns of the start."""
+        found: Compiled | None = getattr(self._here, which, None)
+        if found is None:
+            found = self._start.compiled.again() if which == "moving" else self._bare()
+            setattr(self._here, which, found)
+        if which == "moving":
+            found.z = self._start.compiled.z.copy()
+        return found
+
+    def _bare(self) -> Compiled:
+        """Bodies and joints alone, with a mass matrix; drivers would put what they prescribe where they want it."""
+        c = self._start.compiled
+        bare = self.model.copy()
+        bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
+        return compiled(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
+
+    def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> Compiled:
+        c = self._at(self._scratch(), t, q, v, MOTION)
+        if not np.isfinite(c.work.vel[X_SOLVED]).all():
+            found = c.structure.missed(c.work.stack) or fault(c.work.stack, c.structure.functions)
+            why = found.message if found else "a force or a law gives no finite number, or the equations no solution"
+            raise AnalysisError(f"{self.model.name!r} at t = {float(t):.6g} s: {why}")
+        return c
+
+    def _at(self, c: Compiled, t: float, q: np.ndarray, v: np.ndarray, task: int | None = None) -> Compiled:
+        q, v = self._state(q, v)
+        c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
+        return c
+
+    def _state(self, q: Any, v: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Copies as floats, refused if there are more or less than there must be."""
+        out = []
+        for name, x, known in (("q", q, self.q), ("v", v, self.v)):
+            found = np.array(x, float)
+            if found.shape != known.shape:
+                raise ModelError(
+                    f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
+                    f"coordinates, as p.{name} has"
+                )
+            out.append(found)
+        return out[0], out[1]
+
+    def _carried(self, c: Compiled, name: str) -> tuple[int, np.ndarray, np.ndarray]:
+        """Row of the body that carries a frame (-1: ground), its origin and axes seen from there."""
+        if name == GROUND:
+            return -1, np.zeros(3), np.eye(3)
+        e = self.model[name]
+        if e.category not in ("bodies", "frames"):
+            raise ModelError(f"{e.title} has no pose; ask for a body or a frame")
+        p, R = c.values.poses.named(name)
+        body = c.values.bodies[e.body if isinstance(e, Frame) else name]
+        b = c.structure.place[e.body if isinstance(e, Frame) else name]
+        return b, body.R.T @ (p - body.c), body.R.T @ R

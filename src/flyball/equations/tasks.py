@@ -1,0 +1,6 @@
+"""What may be asked at the doors, by number: of the engine (see `engine.motion_kernel`) and of the residuals."""
+
+from __future__ import annotations
+
+POSITION, MOTION, INTEGRATE, FOLLOW, ARRIVE, REPORT, RESIDUAL, SOLVE, TANGENT, INSPECT = range(10)
+STEPS, ALONG, GAPS = range(3)

@@ -1,0 +1,239 @@
+"""Few eigenvalues of M x'' + D x' + K x = G^T l, G x = 0 with sparse matrices, nothing being reduced.
+
+With x = X exp(s t) and a shift z one solve with [K + z D + z^2 M, -G^T; G, 0] applies (A - z E)^-1 E of the descriptor
+form to (x, x'), on what the constraints allow: its largest eigenvalues 1 / (s - z) are those of the s next to z
+(Ericsson and Ruhe 1980; the infinite ones of the constraints are its zeros, and solves take them out: Meerbergen and
+Spence 1997). Undamped symmetric problems are solved in s^2 with half as many unknowns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..errors import AnalysisError
+
+SHIFT = 1e-3  # of the size of the fastest motion: where eigenvalues next to 0 are sought from, on the left
+UNDAMPED, SYMMETRIC = 1e-12, 1e-8  # parts of a matrix that are none
+FEW = 40  # freedoms up to which all eigenvalues are found
+REFINED = 2  # times that a solution is improved
+ROUNDED = 1e-14  # of the terms of a discriminant
+PASSES = 3  # solves that leave nothing of what constraints forbid
+FOUND = 1e-6  # part of an eigenvalue's distance that rounding may have moved it by
+
+
+def saddle(P: Any, G: Any, H: Any = None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given.
+
+    Raises
+    ------
+    AnalysisError
+        If there are no such x and l for every f and g.
+    """
+    import scipy.sparse as sp
+    from scipy.sparse.linalg import splu
+
+    n, size = P.shape[0], abs(P).max() or 1.0
+    A = (sp.bmat([[P, -size * G.T], [size * (G if H is None else H), None]]) if G.shape[0] else P).tocsc()
+    try:
+        factor = splu(A)
+    except RuntimeError:
+        raise AnalysisError(
+            "the linear equations have no one solution: something moves without inertia, or this is an eigenvalue"
+        ) from None
+
+    def once(b: np.ndarray) -> np.ndarray:
+        if np.iscomplexobj(b) and not np.iscomplexobj(A.data):
+            return once(np.ascontiguousarray(b.real)) + 1j * once(np.ascontiguousarray(b.imag))
+        return factor.solve(b.astype(A.dtype))
+
+    def solve(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        b = np.concatenate([f, size * g])
+        y = once(b)
+        for _ in range(REFINED):
+            y += once(b - A @ y)
+        return y[:n], size * y[n:]
+
+    return solve
+
+
+@dataclass
+class Pencil:
+    """Sparse matrices of linear equations at rest.
+
+    Attributes
+    ----------
+    M, D, K : sparse (n, n)
+        In units in which the unknowns compare.
+    G : sparse (m, n)
+        Independent rows of unit size.
+    """
+
+    M: Any
+    D: Any
+    K: Any
+    G: Any
+
+    @property
+    def freedoms(self) -> int:
+        """What the rows leave."""
+        return self.M.shape[0] - self.G.shape[0]
+
+    @cached_property
+    def fastest(self) -> float:
+        """Size of the fastest motions [1/s], roughly."""
+        stiff, slow = (float(abs(X).max()) if X.nnz else 0.0 for X in (self.K, self.D))
+        mass = float(abs(self.M).max())
+        return max(np.sqrt(stiff / mass), slow / mass) or 1.0
+
+    @cached_property
+    def conservative(self) -> bool:
+        """Whether nothing damps or turns, and the stiffness is that of a potential."""
+        size = abs(self.K).max() if self.K.nnz else 0.0
+        still = abs(self.D).max() <= UNDAMPED * max(size, 1e-300) if self.D.nnz else True
+        return bool(still and (not self.K.nnz or abs(self.K - self.K.T).max() <= SYMMETRIC * size))
+
+    def solver(self, s: complex) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
+        """What gives x of (K + s D + s^2 M) x - G^T l = f, G x = g; errors as `saddle`."""
+        solve = saddle(self.K + s * self.D + s * s * self.M, self.G)
+        return lambda f, g: solve(f, g)[0]
+
+    def nearest(self, count: int, near: complex = 0.0) -> tuple[np.ndarray, np.ndarray, float]:
+        """Eigenvalues next to a number, their shapes, and what is left of these.
+
+        Parameters
+        ----------
+        count : int
+            How many at least: of a pair next to a real number both are there.
+        near : complex [1/s]
+
+        Returns
+        -------
+        w : ndarray (k,) complex
+            By distance.
+        X : ndarray (n, k) complex
+        residual : float
+            The largest part by which an eigenvector differs from what solving makes of it.
+
+        Raises
+        ------
+        AnalysisError
+            If they are not found.
+        """
+        if not self.freedoms:
+            return np.zeros(0, complex), np.zeros((self.M.shape[0], 0), complex), 0.0
+        if 2 * self.freedoms <= max(2 * FEW, 2 * count + 20):
+            w, X = self._all()
+        elif self.conservative and near == 0.0:
+            w, X = self._symmetric(count)
+        else:
+            w, X = self._shifted(count, near)
+        w, X, residual = self._improved(w, X, near)
+        order = np.argsort(np.round(np.abs(w - near) / self.fastest, 13), kind="stable")
+        return w[order], X[:, order], residual
+
+    def allowed(self) -> np.ndarray:
+        """An orthonormal basis (n, f) of what the rows allow, where that is little."""
+        import scipy.sparse as sp
+
+        n = self.M.shape[0]
+        if not self.G.shape[0]:
+            return np.eye(n)
+        still = Pencil(self.M, 0.0 * self.D, sp.identity(n, format="csr"), self.G).solver(0.0)
+        random = np.random.default_rng(1).standard_normal((n, self.freedoms))
+        none = np.zeros((self.G.shape[0], self.freedoms))
+        for _ in range(2):
+            random, _ = np.linalg.qr(still(random, none))
+        return random
+
+    def _all(self) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.linalg import eig, eigh
+
+        Z = self.allowed()
+        M, D, K = (Z.T @ (X @ Z) for X in (self.M, self.D, self.K))
+        if self.conservative:
+            squares, V = eigh(0.5 * (K + K.T), M)
+            return _pairs(squares, Z @ V)
+        one, none = np.eye(len(M)), np.zeros_like(M)
+        w, V = eig(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
+        known = np.isfinite(w)
+        return w[known], Z @ V[: len(M), known]
+
+    def _symmetric(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.sparse.linalg import LinearOperator, eigsh
+
+        n, none = self.M.shape[0], np.zeros(self.G.shape[0])
+        shift = SHIFT * self.fastest
+        solve = Pencil(self.M, 0.0 * self.D, 0.5 * (self.K + self.K.T), self.G).solver(shift)
+        inverse = LinearOperator((n, n), matvec=lambda b: solve(b.ravel(), none), dtype=float)
+        start = solve(self.M @ np.random.default_rng(0).standard_normal(n), none)
+        return _pairs(*eigsh(self.K, k=count, M=self.M, sigma=-(shift**2), OPinv=inverse, which="LM", v0=start))
+
+    def _shifted(self, count: int, near: complex) -> tuple[np.ndarray, np.ndarray]:
+        from scipy.sparse.linalg import ArpackError, LinearOperator, eigs
+
+        n = self.M.shape[0]
+        apply, shift = self._inverse(near)
+        start = np.random.default_rng(0).standard_normal(2 * n).astype(np.result_type(shift))
+        for _ in range(PASSES):
+            start = apply(start)
+            start /= np.linalg.norm(start)
+        many = min(2 * count + 2, 2 * self.freedoms - 2)
+        inverse = LinearOperator((2 * n, 2 * n), matvec=apply, dtype=start.dtype)
+        try:
+            values, V = eigs(inverse, k=many, which="LM", v0=start)
+        except ArpackError as error:
+            raise AnalysisError(f"the eigenvalues next to {near:.4g} 1/s were not found: {error}") from None
+        return shift + 1.0 / values, V[:n]
+
+    def _inverse(self, near: complex) -> tuple[Callable[[np.ndarray], np.ndarray], complex]:
+        """(A - z E)^-1 E on (x, x'), and z: next to ``near``, on the left where that is real."""
+        n = self.M.shape[0]
+        z = near - SHIFT * self.fastest
+        z = float(np.real(z)) if np.imag(z) == 0.0 else z
+        solve = self.solver(z)
+        G, M, by = self.G, self.M, self.D + z * self.M
+
+        def apply(b: np.ndarray) -> np.ndarray:
+            b = b.ravel()
+            x = solve(-(M @ b[n:]) - by @ b[:n], np.zeros(G.shape[0], b.dtype))
+            return np.concatenate([x, b[:n] + z * x])
+
+        return apply, z
+
+    def _improved(self, w: np.ndarray, X: np.ndarray, near: complex) -> tuple[np.ndarray, np.ndarray, float]:
+        """By two solves each, which rounding at the fastest motions does not reach; and what solving leaves of them."""
+        w, X, worst = w.astype(complex), X.astype(complex), 0.0
+        apply, z = self._inverse(near)
+        for k in range(len(w)):
+            before = np.concatenate([X[:, k], w[k] * X[:, k]])
+            first = apply(before)
+            first /= np.linalg.norm(first)
+            then = apply(first)
+            inverse = np.vdot(first, then)
+            worst = max(worst, float(np.linalg.norm(then - inverse * first) / abs(inverse)))
+            x = then[: len(X)] / np.linalg.norm(then[: len(X)])
+            value = _root([np.vdot(x, A @ x) for A in (self.M, self.D, self.K)], w[k])
+            if abs(value - w[k]) <= FOUND * abs(w[k] - z):
+                w[k], X[:, k] = value, x
+        if self.conservative:
+            w = np.where(np.abs(w.imag) > np.abs(w.real), 1j * w.imag, w.real)
+        return w, X, worst
+
+
+def _pairs(squares: np.ndarray, V: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Eigenvalues +-w and shapes from -w^2."""
+    w = np.sqrt(-squares.astype(complex))
+    return np.concatenate([w, -w]), np.hstack([V, V]).astype(complex)
+
+
+def _root(a: list[complex], near: complex) -> complex:
+    """The root of a[0] s^2 + a[1] s + a[2] next to a number; of two that rounding parts the mean."""
+    if abs(a[1] ** 2 - 4.0 * a[0] * a[2]) <= ROUNDED * abs(a[1]) ** 2:
+        return -0.5 * a[1] / a[0]
+    roots = np.roots(a)
+    return complex(roots[np.argmin(np.abs(roots - near))]) if len(roots) else near

@@ -1,0 +1,125 @@
+"""The equations on plain arrays: against closed forms, against one another, from many threads."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests import mechanisms
+from tests.examples.test_examples import FILES
+
+LAYERS = ["absolute", "joint"]
+G = 9.81
+
+
+def double_pendulum() -> fb.Mechanism:
+    """Rods of 1 m, 2 kg and of 0.5 m, 3 kg, hanging along -y."""
+    m = fb.Mechanism("double", planar=True, gravity=(0, -G), parameters={"m": 3.0})
+    m.add(fb.Body("a", mass=2, inertia=2 / 12, position=(0, -0.5)))
+    m.add(fb.Body("b", mass="m", inertia="m*0.25/12", position=(0, -1.25)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(0, -1)))
+    return m
+
+
+def test_double_pendulum():
+    """Mass matrix and accelerations of the textbook (angles of the joints: the second is relative)."""
+    p = double_pendulum().prepare(coordinates="joint")
+    assert p.names == ("A.angle", "B.angle")
+    assert p.rows == ()
+    q, v = np.array([0.4, -0.7]), np.array([1.3, -0.6])
+    l1, c1, c2, m1, m2, I1, I2 = 1.0, 0.5, 0.25, 2.0, 3.0, 2 / 12, 3 * 0.25 / 12
+    h = m2 * l1 * c2
+    M12 = I2 + m2 * c2**2 + h * np.cos(q[1])
+    M11 = I1 + m1 * c1**2 + m2 * l1**2 + 2 * h * np.cos(q[1]) + I2 + m2 * c2**2
+    M = np.array([[M11, M12], [M12, I2 + m2 * c2**2]])
+    s = h * np.sin(q[1])
+    bias = np.array([s * (2 * v[0] * v[1] + v[1] ** 2), -s * v[0] ** 2])
+    low = m2 * c2 * np.sin(q.sum())
+    f = bias - G * np.array([(m1 * c1 + m2 * l1) * np.sin(q[0]) + low, low])
+    np.testing.assert_allclose(p.mass_matrix(q), M, rtol=1e-13)
+    np.testing.assert_allclose(p.forces(0.0, q, v), f, rtol=1e-12)
+    np.testing.assert_allclose(p.acceleration(0.0, q, v), np.linalg.solve(M, f), rtol=1e-12)
+    np.testing.assert_allclose(p.rates(q, v), v)
+    tip, R = p.pose("b", q)
+    np.testing.assert_allclose(tip[:2], [np.sin(0.4) - 0.25 * np.sin(0.3), -np.cos(0.4) - 0.25 * np.cos(0.3)])
+    np.testing.assert_allclose(R[:2, 0], [np.cos(-0.3), np.sin(-0.3)])
+
+
+def somewhere(p) -> tuple[np.ndarray, np.ndarray]:
+    random = np.random.default_rng(1)
+    return p.step(p.q, 1e-3 * random.normal(size=len(p.v))), random.normal(size=len(p.v))
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("name", FILES)
+def test_the_equations_fit_together(name, layer):
+    """M vdot = f + G^T lam + effort; G is the derivative of g; M is that of the bodies' kinetic energies."""
+    m = mechanisms.example(name)
+    try:
+        p = m.prepare(coordinates=layer)
+    except fb.AnalysisError:
+        pytest.skip("friction with redundant joints has no joint coordinates")
+    q, v = somewhere(p)
+    x, lam = p.acceleration(0.0, p.q, p.v), p.multipliers(0.0, p.q, p.v)
+    terms = [p.mass_matrix(p.q) @ x, p.forces(0.0, p.q, p.v), p.jacobian(0.0, p.q).T @ lam, p.efforts(0.0, p.q, p.v)]
+    size = max(np.abs(a).max(initial=0.0) for a in terms)
+    np.testing.assert_allclose(terms[0], terms[1] + terms[2] + terms[3], atol=1e-8 * size)
+    J = np.zeros((len(p.rows), len(p.v)))
+    holonomic = [r.holonomic for r in p._start.compiled.structure.rows]
+    if not any(d.law for d in m.drivers):
+        for k, e in enumerate(np.eye(len(p.v))):
+            h = 1e-5
+            J[:, k] = (p.constraint(0.0, p.step(q, h * e)) - p.constraint(0.0, p.step(q, -h * e))) / (2 * h)
+        np.testing.assert_allclose(J[holonomic], p.jacobian(0.0, q)[holonomic], atol=3e-6)
+    energy = 0.0
+    for b in m.bodies:
+        x, R = p._start.compiled.values.bodies[b.name], p.pose(b.name, q)[1]
+        rates = p.frame_jacobian(b.name, q) @ v
+        w, u = rates[3:], rates[:3] + np.cross(rates[3:], R @ x.com)
+        inertia = np.diag([0, 0, x.inertia[2, 2]]) if m.planar else x.inertia
+        energy += 0.5 * (x.mass * u @ u + (R.T @ w) @ inertia @ (R.T @ w))
+    assert 0.5 * v @ p.mass_matrix(q) @ v == pytest.approx(energy, rel=1e-10)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_motions_are_those_of_the_mechanism(layer):
+    m = double_pendulum()
+    p = m.prepare(coordinates=layer, parameters={"m": 4.0})
+    assert p.parameters == {"m": 4.0}
+    m.add(fb.Driver("d", "A.angle", "t"))  # is not seen
+    m.drivers.clear()
+    a = p.simulate(0.5, outputs=11)
+    b = m.simulate(0.5, outputs=11, coordinates=layer, parameters={"m": 4.0})
+    assert a.q.tobytes() == b.q.tobytes()
+    assert p.simulate(0.5, parameters={"m": 3.0})["b"].x[-1] == m.simulate(0.5, coordinates=layer)["b"].x[-1]
+    with pytest.raises(fb.ModelError, match="coordinates were chosen"):
+        p.simulate(0.5, coordinates="joint")
+
+
+def test_answers_do_not_depend_on_who_asks_or_asked():
+    p = mechanisms.example("andrews.toml").prepare()
+    random = np.random.default_rng(0)
+    states = [(p.step(p.q, 0.3 * random.normal(size=len(p.v))), random.normal(size=len(p.v))) for _ in range(40)]
+    wanted = [p.acceleration(0.0, *s).tobytes() for s in states]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda k: p.acceleration(0.0, *states[k]).tobytes(), [*range(40), *range(39, -1, -1)]))
+    assert found == wanted + wanted[::-1]
+
+
+def test_wrong_arguments_are_refused():
+    p = double_pendulum().prepare()
+    with pytest.raises(fb.ModelError, match=r"q has the shape \(3,\); 'double' has 2 numbers there"):
+        p.mass_matrix(np.zeros(3))
+    with pytest.raises(fb.ModelError, match="no part named 'c'"):
+        p.pose("c", p.q)
+    with pytest.raises(fb.ModelError, match="Revolute 'A' has no pose"):
+        p.pose("A", p.q)
+    with pytest.raises(ValueError, match="read-only"):
+        p.q[0] = 1.0
+    m = double_pendulum()
+    m.add(fb.Motor("M", "A", torque="sqrt(1 - t)"))
+    with pytest.raises(fb.AnalysisError, match="at t = 2 s"):
+        m.prepare().acceleration(2.0, p.q, p.v)

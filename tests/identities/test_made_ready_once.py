@@ -1,0 +1,164 @@
+"""A mechanism that was made ready earlier answers as a fresh one does, to the last bit, whatever was asked between."""
+
+from __future__ import annotations
+
+import dataclasses
+import random
+from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
+
+import pytest
+
+import flyball as fb
+from flyball.analysis.compiled import compiled
+from flyball.errors import FlyballError
+from flyball.tables.spanning import spanning
+from flyball.tables.structure import Choices, structure
+from flyball.tables.values import Values, values
+from tests import mechanisms
+from tests.complex_steps import with_parameters
+from tests.contract import zoo
+from tests.examples.test_examples import FILES
+
+TABLES = ("body_x", "frame_x", "term_x", "force_x", "const", "glob")
+
+
+def bits(x: Values) -> dict[str, bytes]:
+    found = {name: getattr(x.system, name) for name in TABLES} | {"q": x.q, "v": x.v}
+    return {name: a.tobytes() for name, a in found.items()}
+
+
+def answers(mechanism: fb.Mechanism, /, **parameters: float) -> dict[str, bytes] | str:
+    """All numbers of a short motion, or why there is none."""
+    try:
+        r = mechanism.simulate(0.02, outputs=3, parameters=parameters or None)
+    except FlyballError as error:
+        return str(error)
+    told = {
+        k: v for k, v in dataclasses.asdict(r.health).items() if isinstance(v, (int, float, str)) and k != "seconds"
+    }
+    arrays = {k: getattr(r, k).tobytes() for k in ("t", "q", "v", "vdot", "multipliers", "states")}
+    return arrays | {k: repr(v).encode() for k, v in told.items()}
+
+
+def same_tables(m: fb.Mechanism, chosen: random.Random) -> None:
+    """With other values of some parameters, in both coordinate layers, real and complex."""
+    tree = spanning(m)
+    names = list(m.parameters)
+    for _ in range(12):
+        some = chosen.sample(names, min(len(names), chosen.choice((1, 1, 2))))
+        env = m.environment()
+        given = {k: (env[k] or 0.1) * (1.0 + 1e-3 * chosen.random()) for k in some}
+        if chosen.random() < 0.2:
+            given = {k: complex(v, 1e-30) for k, v in given.items()}
+        for choices in (Choices(), *([Choices(tree=tree)] if tree else [])):
+            fresh = deepcopy(m)
+            try:
+                wanted = bits(values(structure(fresh, choices), given))
+            except FlyballError:
+                continue
+            found = bits(values(structure(m, choices), given))
+            assert [k for k in wanted if found[k] != wanted[k]] == [], (given, choices)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_another_value_fills_in_what_depends_on_it(name):
+    m = mechanisms.example(name)
+    chosen = random.Random(name)
+    if m.parameters:
+        same_tables(m, chosen)
+    m, _ = with_parameters(m)
+    same_tables(m, chosen)
+
+
+@pytest.mark.parametrize(("where", "name"), zoo.CASES)
+def test_every_joint_is_filled_in(where, name):
+    m, _ = with_parameters(zoo.joined(where, name))
+    same_tables(m, random.Random(name))
+
+
+def edited(m: fb.Mechanism, chosen: random.Random) -> None:
+    """One change of any kind that a user could make."""
+    kind = chosen.choice(("parameter", "gravity", "replace", "remove", "initial"))
+    with_mass = [b for b in m.bodies if isinstance(b.mass, (int, float))]
+    if kind == "parameter" and m.parameters:
+        k = chosen.choice(list(m.parameters))
+        m.parameters[k] = m.environment()[k] * (1.0 + 1e-3 * chosen.random())
+    elif kind == "gravity":
+        m.gravity = tuple(9.0 + chosen.random() if g != 0.0 else 0.0 for g in m.gravity_vector()[: len(m.gravity)])
+    elif kind == "replace" and with_mass:
+        b = chosen.choice(with_mass)
+        m.replace(dataclasses.replace(b, mass=b.mass * (1.0 + 1e-3 * chosen.random())))
+    elif kind == "remove" and m.forces:
+        m.forces.remove(chosen.choice(m.forces))
+    elif kind == "initial" and m.initial:
+        m.initial.pop()
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_whatever_was_asked_and_changed_before(name):
+    m = mechanisms.example(name)
+    chosen = random.Random(name)
+    for _ in range(5):
+        given = {}
+        if m.parameters and chosen.random() < 0.6:
+            k = chosen.choice(list(m.parameters))
+            given[k] = m.environment()[k] * (1.0 + 1e-3 * chosen.random())
+        wanted = answers(deepcopy(m), **given)
+        assert answers(m, **given) == wanted
+        assert answers(m, **given) == wanted
+        edited(m, chosen)
+
+
+def test_analyses_leave_the_tables_as_they_are():
+    m = mechanisms.example("governor.toml")
+    wanted = answers(deepcopy(m))
+    x = compiled(m).values
+    before = bits(x)
+    assert not m.mobility().sets
+    steady = m.equilibrium(turning=["bearing.angle"])
+    m.modes(about=steady)
+    m.simulate(0.02, stabilization="partitioning")
+    m.simulate(0.02, stabilization="baumgarte", alpha=5.0)
+    assert compiled(m).values is x
+    assert bits(x) == before
+    assert answers(m) == wanted
+
+
+def test_threads_share_what_is_ready():
+    m = mechanisms.example("andrews.toml")
+    wanted = [answers(deepcopy(m), torque=0.033 + 1e-3 * k) for k in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(lambda k: answers(m, torque=0.033 + 1e-3 * k), range(8))) == wanted
+        assert list(pool.map(lambda k: answers(m, torque=0.033 + 1e-3 * (k % 2)), range(8))) == wanted[:2] * 4
+
+
+def test_a_snapshot_is_the_same_until_something_changes():
+    m = mechanisms.example("slider_crank.toml")
+    s = m.snapshot()
+    assert m.snapshot() is s
+    assert s.snapshot() is s
+    m.parameters["speed"] = m.parameters["speed"]
+    assert m.snapshot() is s
+    m.joints.append(m.joints.pop())
+    assert m.snapshot() is s
+    m.gravity = (0.0, -1.0)
+    assert m.snapshot() is not s
+    with pytest.raises(fb.ModelError, match=r"for good; change a copy of it: m.copy\(\)"):
+        s.gravity = (0.0, -2.0)
+    with pytest.raises(fb.ModelError, match="nothing can be added"):
+        m.simulate(0.01).model.add(fb.Body("x", mass=1, inertia=1))
+    c = s.copy()
+    c.add(fb.Body("x", mass=1, inertia=1))
+    assert "x" not in s.names()
+
+
+def test_functions_whose_globals_change_are_made_again():
+    scope = {"k": 1.0}
+    exec("def pull(t):\n    return k", scope)
+    m = fb.Mechanism("block", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    m.add(fb.PointForce("F", "b", force=(scope["pull"], 0)))
+    assert m.simulate(1.0)["b"].x[-1] == pytest.approx(0.5)
+    scope["k"] = 3.0
+    assert m.simulate(1.0)["b"].x[-1] == pytest.approx(1.5)
