@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass
 from functools import cache
 from types import SimpleNamespace
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
@@ -90,11 +90,11 @@ class Joint(Element):
 
     def rows(self, planar: bool) -> list[Row]:
         """The rows that count: in the plane, those that speak of the normal are fulfilled anyway."""
-        return list(_rows(type(self), planar))
+        return list(_rows(type(self), planar))  # type: ignore[arg-type]
 
     def primitives(self, planar: bool) -> tuple[Primitive, ...]:
         """Its chain as a tree joint: in the plane, what leaves it falls away."""
-        return _primitives(type(self), planar)
+        return _primitives(type(self), planar)  # type: ignore[arg-type]
 
     def loose(self, planar: bool) -> list[Row]:
         """The rows that remain where it is a tree joint."""
@@ -150,7 +150,7 @@ class Joint(Element):
 
 
 @cache
-def _rows(kind: Any, planar: bool) -> tuple[Row, ...]:
+def _rows(kind: type[Joint], planar: bool) -> tuple[Row, ...]:
     """The rows that count; of all joints of a kind the same."""
     if not planar:
         return kind.blocks
@@ -158,7 +158,7 @@ def _rows(kind: Any, planar: bool) -> tuple[Row, ...]:
 
 
 @cache
-def _primitives(kind: Any, planar: bool) -> tuple[Primitive, ...]:
+def _primitives(kind: type[Joint], planar: bool) -> tuple[Primitive, ...]:
     """The chain as a tree joint; of all joints of a kind the same."""
     chain = FLOATING if kind.chain is None else kind.chain
     if not planar:

@@ -70,7 +70,10 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     first: Numbers | None = model.kept.known("first numbers")
     if first is None or first.key[1] != key[1]:  # type: ignore[index]
         new = _all(model, env, key)
-        return new if new.complex else model.kept.get("first numbers", None, 1, lambda: new)
+        if new.complex:
+            return new
+        model.kept.drop("first numbers", None)  # of files as they were
+        return model.kept.get("first numbers", None, 1, lambda: new)
     named = model.kept.get("named", None, 1, lambda: _named(model))
     other = {k for k, x in env.items() if not _same(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
