@@ -31,6 +31,7 @@ from flyball.numerics.integrators.tableaux import tableau
 GRAVITY = 9.81
 ROD = 1.0 / 12.0  # moment of inertia of a uniform rod of 1 m and 1 kg [kg m^2]
 GROUND = -1
+RTOL = 1e-7  # of `simulate` unless given
 CHAIN_ANGLE = np.pi / 6  # of the serial pendulum from hanging, at the start [rad]
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -49,22 +50,25 @@ def started(model: fb.Mechanism, coordinates: str = "auto") -> tuple[Any, Any]:
 class Kernel:
     """flyball's compiled loop over a motion, ready to be called again and again: what `simulate` does without the rest.
 
-    Built from the same objects that ``simulate`` makes; only the loop is timed.
+    Built from the same objects that ``simulate`` makes; only the loop is timed. ``task``: FOLLOW for mechanisms whose
+    drivers leave no freedom.
     """
 
-    def __init__(self, model: fb.Mechanism, t_end: float, outputs: int, **options: Any) -> None:
-        o = {"method": "dop853", "coordinates": "auto", "atol": None, "max_steps": MOST} | options
+    def __init__(
+        self, model: fb.Mechanism, t_end: float, outputs: int, *, task: int = INTEGRATE, **options: Any
+    ) -> None:
+        o = {"method": "dop853", "coordinates": "auto", "rtol": RTOL, "atol": None, "max_steps": MOST} | options
         self.start = begin(model.snapshot(), 0.0, None, None, o["coordinates"])
         made = projected(o["coordinates"], o["rtol"], o["atol"], o["max_steps"])
         self.asked = replace(made, method=o["method"]).sized(self.start.base.compiled.values.length)
-        self.times = np.linspace(0.0, t_end, outputs)
+        self.times, self.task = np.linspace(0.0, t_end, outputs), task
 
     def seconds(self) -> float:
         """CPU seconds of one motion."""
         clock = clock_for(self.start, 0.0, self.times[-1], self.times, self.asked)
         method = tableau(self.asked.method)
         begun = time.process_time()
-        run_clock(self.start.assembly, clock, method, unwatched, INTEGRATE)
+        run_clock(self.start.assembly, clock, method, unwatched, self.task)
         return time.process_time() - begun
 
 

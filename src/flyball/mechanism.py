@@ -27,3 +27,9 @@ class Mechanism(Motions, Statics, Design, Freedom, Model):
         from .view.described import described
 
         return described(self)
+
+
+for _family in (Motions, Statics, Design, Freedom):  # so that Python's own messages name what the user called
+    for _name, _method in vars(_family).items():
+        if not _name.startswith("_") and callable(_method):
+            _method.__qualname__ = f"Mechanism.{_name}"

@@ -135,3 +135,21 @@ def test_a_force_that_grows_with_time_grows():
         m.add(fb.Actuator("A", "P.displacement", force="2 m/s^2*t"))
     m.add(fb.Actuator("A", "P.displacement", force="(2 N)*t"))
     assert m.simulate(3.0, outputs=2)["P"].displacement[-1] == pytest.approx(4.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("text", ["95.5 rpm*t", "5 rpm t", "9.81 m/s^2*t", "2*(60 rpm*t)", "3 t*rpm", "2 N*t"])
+def test_time_behind_a_unit_is_no_tonne_in_a_parameter(text):
+    with pytest.raises(fb.ModelError, match=r"parameter 'speed': .*'t' stands for time.*write '.*t.*' there"):
+        fb.Mechanism("a", planar=True, parameters={"speed": text}).environment()
+
+
+@pytest.mark.parametrize(
+    ("text", "value"), [("5 t", 5000.0), ("1 t/m^3", 1000.0), ("2 t*m^2", 2000.0), ("2*(5 t)", 1e4), ("2 N*s", 2.0)]
+)
+def test_tonnes_and_units_that_look_like_names_stay_what_they_are(text, value):
+    assert fb.Mechanism("a", planar=True, parameters={"x": text}).environment()["x"] == value
+
+
+def test_time_behind_a_unit_is_no_tonne_in_a_field():
+    with pytest.raises(fb.UnitError, match=r"mass of Body 'b': '5 kg\*t': 't' stands for time"):
+        fb.Mechanism("a", planar=True).add(fb.Body("b", mass="5 kg*t", inertia=1.0))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..errors import FlyballError
 from ..model.body import GROUND
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce
@@ -85,7 +86,9 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
     if not model.gravity_told and not model.gravity_vector().any():
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         yield f"no gravity; if that is not meant, give gravity={example}"
-    if model.drivers and freedoms == 0:
+    if model.drivers and freedoms == 0 and _locked(model):
+        yield "no freedom is left even without the drivers: it is locked as it is drawn and will not move"
+    elif model.drivers and freedoms == 0:
         yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"
     elif freedoms == 0:
         yield "no freedom is left: it is a structure and will not move"
@@ -95,6 +98,16 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
     for name in model.parameters:
         if name not in used:
             yield f"parameter {name!r} is used nowhere"
+
+
+def _locked(model: Model) -> bool:
+    """Whether nothing can move where drivers ask for nothing."""
+    trial = model.copy()
+    trial.drivers = []
+    try:
+        return mobility(trial, assemble(trial), inertia=False).freedoms == 0
+    except FlyballError:  # what drivers hold may have no inertia, or need them to be placed
+        return False
 
 
 def _touched(model: Model) -> tuple[set[str], set[str]]:

@@ -74,14 +74,17 @@ class CompareOptions(Options):
     atol: float | None
     max_step: float
     max_steps: int | None
-    alpha: float
-    beta: float
+    alpha: float | None
+    beta: float | None
     progress: bool | Callable[[float], None]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "formulations", _known(self.formulations))
         count(self.repeats, "repeats", 0)
+        for name in ("alpha", "beta"):
+            if "baumgarte" not in (self.formulations or ()) and getattr(self, name) is not None:
+                raise ModelError(f"{name} is a rate of the formulation 'baumgarte', which is not among those compared")
         self.integration(WAYS["baumgarte"])
 
     def integration(self, way: Way, max_steps: int = MOST) -> Integration:

@@ -55,6 +55,10 @@ class InstantOptions(Options):
         super().__post_init__()
         if self.about is not None and self.t is not None:
             raise ModelError("about has its own time: leave out t")
+        if self.frozen and isinstance(self.about, Equilibrium) and not self.about.speeds:
+            raise ModelError(
+                "frozen is about a motion: at an equilibrium nothing moves, and it does nothing; leave it out"
+            )
 
     def state(self, model: Model, most: int | None = None) -> State:
         """The state there; with more velocities than ``most`` in absolute coordinates."""

@@ -65,6 +65,22 @@ class OptimizeOptions(DerivativeOptions):
         )
 
 
+FLAT = "every derivative is zero where it begins, at the best place or at any other: begin elsewhere to be sure"
+ENOUGH = "as many analyses as evaluations= allows"
+FITTED = {  # by the status of SciPy's least_squares
+    0: ENOUGH,
+    1: "no change of the parameters makes it less",
+    2: "the cost falls by less than the tolerance",
+    3: "the parameters change by less than the tolerance",
+    4: "the cost and the parameters change by less than the tolerance",
+}
+SEARCHED = {  # by the status of L-BFGS-B
+    0: "no change of the parameters makes it less by more than the tolerance",
+    1: ENOUGH,
+    2: "nothing along the slope is less: the function has a kink there, or rounding is as large as the tolerance",
+}
+
+
 def optimize(model: Model, o: OptimizeOptions) -> Optimum:
     """Find parameters that serve best: see `Mechanism.optimize`."""
     with shown(o.progress, "optimizing") as tell:
@@ -147,7 +163,11 @@ class Search:
             residual, x0, jacobian, bounds=(self.low, self.high), xtol=self.asked.tolerance,
             ftol=self.asked.tolerance, gtol=1e-15, max_nfev=self.asked.evaluations,
         )  # fmt: skip
-        out = self._optimum(r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, r.message)
+        flat = r.nfev == 1 and r.cost > 0.0 and not np.any(r.grad)
+        out = self._optimum(
+            r.x, float(r.cost), 0.5 * float(begin @ begin), r.status > 0, FLAT if flat else FITTED[r.status]
+        )
+        out.success &= not flat
         out.start_values, out.target = first.values, np.broadcast_to(goal, first.values.shape)
         return out
 
@@ -173,7 +193,10 @@ class Search:
         tolerance = self.asked.tolerance
         options = {"maxfun": self.asked.evaluations, "ftol": tolerance, "gtol": tolerance}
         r = minimize(cost, x0, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-        out = self._optimum(r.x, float(r.fun), first, bool(r.success), str(r.message))
+        flat = r.nfev == 1 and not np.any(r.jac)
+        out = self._optimum(
+            r.x, float(r.fun), first, bool(r.success) and not flat, FLAT if flat else SEARCHED[r.status]
+        )
         out.start_values = begin
         return out
 

@@ -40,6 +40,8 @@ class RootLocusOptions(InstantOptions):
             raise ModelError("root_locus: an equilibrium is one of its own parameters; say equilibrium=True instead")
         if self.about is not None and self.equilibrium:
             raise ModelError("root_locus: say either about or equilibrium=True, which places the mechanism itself")
+        if self.frozen and self.equilibrium:
+            raise ModelError("root_locus: frozen does nothing where nothing moves: leave out frozen or equilibrium")
 
     def here(self, value: float, about: Equilibrium | None) -> InstantOptions:
         """Where the mechanism is at a value; at an equilibrium if that is given."""

@@ -14,7 +14,7 @@ from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.velocities import kinetic_energy
 from ..equations.within import kept
-from ..errors import StartWarning
+from ..errors import ModelError, StartWarning
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..numerics.integrators import clock as ex
@@ -55,6 +55,11 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     times = output_times(t_start, o.t_end, o.outputs)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
+    if o.stabilization != "projection" and not len(begun.assembly.compiled.values.system.row_i):
+        raise ModelError(
+            f"stabilization={o.stabilization!r} does nothing: in joint coordinates no constraint is left to be kept; "
+            "leave it out, or give coordinates='absolute'"
+        )
     for d in changed_velocities(begun.base.departures):
         warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)

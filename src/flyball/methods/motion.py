@@ -143,8 +143,8 @@ class Motions(Model):
         atol: float | None = None,
         max_step: float | str = math.inf,
         max_steps: int | None = None,
-        alpha: float = 10.0,
-        beta: float = 10.0,
+        alpha: float | None = None,
+        beta: float | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Comparison:
         """Integrate the same motion by several formulations: drift, energy and cost of each.
@@ -180,10 +180,10 @@ class Motions(Model):
             Longest step.
         max_steps : int, optional
             Steps after which a formulation is given up; twenty times those of the reference if not given.
-        alpha : float [1/s]
-            First rate of Baumgarte's method.
-        beta : float [1/s]
-            Second rate of Baumgarte's method.
+        alpha : float [1/s], optional
+            First rate of Baumgarte's method, 10 if not given.
+        beta : float [1/s], optional
+            Second rate of Baumgarte's method, 10 if not given.
         progress : bool or callable
             As for `simulate`.
 

@@ -19,7 +19,10 @@ _JOIN = re.compile(r"[\s*/·+-]*\(*$")
 
 
 def refuse_attached(number: str, unit: str, names: Collection[str], dimension: str | None) -> None:
-    """Raise `UnitError` if a symbol of a unit could be meant as one of these names, or is called like a function."""
+    """Raise `UnitError` if a symbol of a unit could be meant as one of these names, or is called like a function.
+
+    Where time is no name, "t" behind a unit is refused too: "60 rpm*t" is meant as a law, and would be read in tonnes.
+    """
     found = _doubtful(unit, names, dimension)
     if not found:
         return
@@ -30,6 +33,11 @@ def refuse_attached(number: str, unit: str, names: Collection[str], dimension: s
     symbol, long = match[0], unit_name(match[0])
     text = f"{number} {unit}"
     as_unit = f"; for the unit '{number} {unit[: match.start()]}{long}{unit[match.end() :]}'"
+    if symbol == "t" and "t" not in names:
+        raise UnitError(
+            f"'{text}': 't' stands for time behind a unit, and time is known only in laws of drivers and forces; write "
+            f"'{product(number, unit, match.start())}' there{as_unit}"
+        )
     raise UnitError(
         f"'{text}': '{symbol}' is a name here, and so no part of a unit; for the product write "
         f"'{product(number, unit, match.start())}'{as_unit if long != symbol and _fits(text, dimension) else ''}"
@@ -49,9 +57,12 @@ def _doubtful(unit: str, names: Collection[str], dimension: str | None) -> list[
     out = []
     for m in _SYMBOL.finditer(unit):
         called = unit[m.end() :].lstrip().startswith("(")
-        if called or (
-            m[0] in names and not _customary(m[0], unit, dimension, alone=not _head(unit, m.start()).strip("1"))
-        ):
+        alone = not _head(unit, m.start()).strip("1")
+        if m[0] == "t" and "t" not in names:
+            doubtful = not (alone and _of_known_kind(unit, dimension))
+        else:
+            doubtful = m[0] in names and not _customary(m[0], unit, dimension, alone)
+        if called or doubtful:
             out.append(m)
         if called:
             break
@@ -78,6 +89,14 @@ def product(number: str, unit: str, start: int) -> str:
 def _head(unit: str, start: int) -> str:
     """What stands before a place in a unit, without the operator between."""
     return _JOIN.sub("", unit[:start])
+
+
+def _of_known_kind(unit: str, dimension: str | None) -> bool:
+    """Whether a unit measures what is wanted, or something that has a name: "t" a mass, "t/m^3" a density."""
+    try:
+        return powers_in_si(unit) in [powers_in_si(k) for k in (*KINDS, dimension or "1") if k not in ("", "1")]
+    except UnitError:
+        return False
 
 
 def _customary(symbol: str, unit: str, dimension: str | None, alone: bool) -> bool:

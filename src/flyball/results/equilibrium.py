@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
@@ -100,6 +101,7 @@ class Equilibrium:
         """Everything as plain numbers and names, all curves included."""
         kept = ("t", "stability", "least", "unbalanced", "method", "weakest", "preload", "speeds", "parameters")
         out = {k: getattr(self, k) for k in kept}
+        out["least"] = self.least if math.isfinite(self.least) else None  # nothing is free: JSON knows no infinity
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
         curves = self.result.channels().items()
         return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}

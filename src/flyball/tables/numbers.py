@@ -31,9 +31,9 @@ class Numbers:
     of: Mapping[str, SimpleNamespace]  # element -> its fields
     bodies: Mapping[str, SimpleNamespace]  # p, R, com: drawn reference frame, centre of mass in it
     key: Hashable  # two with the same key are the same, to the bit
+    placed: dict[str, Any]  # element -> its frames in the world as drawn, found when asked for
     since: Kept  # stands for the numbers that were found first
     changed: frozenset[str] = frozenset()  # elements whose numbers are not those
-    placed: dict[str, Any] = field(default_factory=dict)  # frames of elements in the world as drawn, once asked for
     world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
     local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
 
@@ -82,7 +82,9 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
         **first.bodies,
         **{e.name: _body(e, of[e.name], env, model.planar) for e in changed if isinstance(e, Body)},
     }
-    return Numbers(env, of, bodies, key, first.since, frozenset(e.name for e in changed))
+    other = {e.name for e in changed}
+    placed = {name: frames for name, frames in first.placed.copy().items() if name not in other}
+    return Numbers(env, of, bodies, key, placed, first.since, frozenset(other))
 
 
 def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
@@ -90,7 +92,7 @@ def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, of[b.name], env, model.planar)
-    return Numbers(env, of, bodies, key, Kept())
+    return Numbers(env, of, bodies, key, {}, Kept())
 
 
 def _same(a: Any, b: Any) -> bool:
