@@ -78,3 +78,26 @@ def test_those_that_it_determines_are_told():
     found = m.sensitivity(["B.fx", "A.fz"], ["mass"], verify=True)
     assert found["A.fz", "mass"] == pytest.approx(9.81 / 2, rel=1e-9)
     assert found.difference < 1e-5
+
+
+def three_cranks() -> fb.Mechanism:
+    """Three cranks and a bar, one more than it takes: it moves because they are alike."""
+    m = fb.Mechanism("three cranks", planar=True, gravity=(0, -9.81), parameters={"off": 0.0, "load": 1.0})
+    m.add(fb.Body("bar", mass="load", inertia=0.5, position=(1.6, 0.8)))
+    for k, x in enumerate((0, 2)):
+        m.add(fb.Body(f"c{k}", mass=1, inertia=0.1, position=(x + 0.3, 0.4)))
+        m.add(fb.Revolute(f"A{k}", "ground", f"c{k}", at=(x, 0)))
+        m.add(fb.Revolute(f"B{k}", f"c{k}", "bar", at=(x + 0.6, 0.8)))
+    m.add(fb.Distance("rod", "ground", "bar", at=((1, 0), (1.6, 0.8)), length="1 + off"))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_a_length_that_redundant_joints_do_not_allow_to_change_is_refused(coordinates):
+    m = three_cranks()
+    motion = {"analysis": "motion", "t_end": 0.3, "outputs": 3, "coordinates": coordinates}
+    with pytest.raises(fb.ModelError, match=r"'three cranks' cannot be assembled with another 'off': .*rod"):
+        m.sensitivity(["bar.x"], ["off"], **motion)
+    with pytest.raises(fb.ModelError, match="cannot be assembled with another 'off'"):
+        m.sensitivity(["bar.x"], ["off"])
+    assert m.sensitivity(["bar.x"], ["load"], **motion, verify=True).difference < 1e-5

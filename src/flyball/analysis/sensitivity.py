@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..equations.variation import variation_kernel
 from ..errors import ModelError, SingularityError
 from ..model.model import Model, listing, suggest
 from ..model.quantities import one
@@ -17,10 +18,10 @@ from ..results.sensitivity import Sensitivity
 from .assemble import assemble
 from .compiled import Compiled
 from .equilibrium import equilibrium, resting
-from .linear.begun import held, start_tangents
+from .linear.begun import held, start_changes, start_tangents
 from .linear.carried import carried
 from .linear.curves import over_time, slopes, snapshot
-from .linear.derivatives import Equations, State, stepped_values
+from .linear.derivatives import Equations, State, announce, stepped_values
 from .linear.differences import Found, aside, check, derivative, whole
 from .linear.eigenvalues import changes
 from .linear.instant import instant
@@ -203,6 +204,7 @@ def _at_instant(a: Question) -> Found:
 
 
 def _motion(a: Question) -> Sensitivity:
+    announce(variation_kernel)
     begun = begin(a.model, a.t, a.parameters, None, a.coordinates)
     base, layer = begun.base, begun.assembly.compiled
     refuse_missing(base, float(a.times[-1]))
@@ -210,16 +212,14 @@ def _motion(a: Question) -> Sensitivity:
     e = Equations(x)
     directions = [Direction(e, name) for name in a.to]
     values = [d.values if layer is base.compiled else stepped_values(layer, d.name) for d in directions]
-    driven = held(base)
-    if driven:
-        if layer.structure.loads:
-            friction(x, Linear(x).G)
-        start = []
-    else:
+    driven, lin = held(base), Linear(x)
+    if layer.structure.loads:
+        friction(x, lin.G)
+    if not driven:
         refuse_jumps(a.model, a.to)
         _refuse_kinks(a, e, ())
-        tangents = start_tangents(a.model, a.parameters, base, x, directions)
-        start = [carried(begun, *of) for of in zip(directions, values, tangents, strict=True)]
+    pairs = start_changes(a.model, a.parameters, base, x, directions, lin)
+    start = [carried(begun, *of) for of in zip(directions, values, pairs, strict=True)]
     clock = clock_for(begun, a.t, float(a.times[-1]), a.times, projected(a.coordinates, a.rtol, a.atol))
     loop = Variation(begun, clock, values, [whole(a.model, a.parameters, name) for name in a.to])
     varied = followed(loop) if driven else loop.run(*(np.array(part) for part in zip(*start, strict=True)))

@@ -18,7 +18,7 @@ TURNS = True
 @formula
 def unwrapped(theta, hint):
     """Theta plus the whole turns that bring it next to ``hint``."""
-    return theta + 6.283185307179586 * rounded((hint - theta) / 6.283185307179586)
+    return theta + 6.283185307179586 * rounded(0.15915494309189535 * (hint - theta))
 
 
 @formula

@@ -16,49 +16,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError
+from .saddle import null_basis, saddle
 
 SHIFT = 1e-3  # of the size of the fastest motion: where eigenvalues next to 0 are sought from, on the left
 UNDAMPED, SYMMETRIC = 1e-12, 1e-8  # parts of a matrix that are none
 FEW = 40  # freedoms up to which all eigenvalues are found
-REFINED = 2  # times that a solution is improved
 ROUNDED = 1e-14  # of the terms of a discriminant
 PASSES = 3  # solves that leave nothing of what constraints forbid
 FOUND = 1e-6  # part of an eigenvalue's distance that rounding may have moved it by
-
-
-def saddle(P: Any, G: Any, H: Any = None) -> Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-    """What gives x and l of P x - G^T l = f, H x = g; H is G if not given.
-
-    Raises
-    ------
-    AnalysisError
-        If there are no such x and l for every f and g.
-    """
-    import scipy.sparse as sp
-    from scipy.sparse.linalg import splu
-
-    n, size = P.shape[0], abs(P).max() or 1.0
-    A = (sp.bmat([[P, -size * G.T], [size * (G if H is None else H), None]]) if G.shape[0] else P).tocsc()
-    try:
-        factor = splu(A)
-    except RuntimeError:
-        raise AnalysisError(
-            "the linear equations have no one solution: something moves without inertia, or this is an eigenvalue"
-        ) from None
-
-    def once(b: np.ndarray) -> np.ndarray:
-        if np.iscomplexobj(b) and not np.iscomplexobj(A.data):
-            return once(np.ascontiguousarray(b.real)) + 1j * once(np.ascontiguousarray(b.imag))
-        return factor.solve(b.astype(A.dtype))
-
-    def solve(f: np.ndarray, g: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        b = np.concatenate([f, size * g])
-        y = once(b)
-        for _ in range(REFINED):
-            y += once(b - A @ y)
-        return y[:n], size * y[n:]
-
-    return solve
 
 
 @dataclass
@@ -136,24 +101,10 @@ class Pencil:
         order = np.argsort(np.round(np.abs(w - near) / self.fastest, 13), kind="stable")
         return w[order], X[:, order], residual
 
-    def allowed(self) -> np.ndarray:
-        """An orthonormal basis (n, f) of what the rows allow, where that is little."""
-        import scipy.sparse as sp
-
-        n = self.M.shape[0]
-        if not self.G.shape[0]:
-            return np.eye(n)
-        still = Pencil(self.M, 0.0 * self.D, sp.identity(n, format="csr"), self.G).solver(0.0)
-        random = np.random.default_rng(1).standard_normal((n, self.freedoms))
-        none = np.zeros((self.G.shape[0], self.freedoms))
-        for _ in range(2):
-            random, _ = np.linalg.qr(still(random, none))
-        return random
-
     def _all(self) -> tuple[np.ndarray, np.ndarray]:
         from scipy.linalg import eig, eigh
 
-        Z = self.allowed()
+        Z = null_basis(self.G)
         M, D, K = (Z.T @ (X @ Z) for X in (self.M, self.D, self.K))
         if self.conservative:
             squares, V = eigh(0.5 * (K + K.T), M)

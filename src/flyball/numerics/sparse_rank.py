@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .ldl import analyse, factor_kernel
+from .ldl import Pattern, analyse, factor_kernel
 from .rank import parts
 
 DENSE = 1500  # rows or columns up to which the rank comes from a singular value decomposition
@@ -57,14 +57,7 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
 
     n = A.shape[0]
     size = np.sqrt(np.where(A.diagonal() > 0.0, A.diagonal(), 1.0))
-    A = (sp.diags(1.0 / size) @ A @ sp.diags(1.0 / size)).tocoo()
-    P, place = analyse(n, A.row, A.col)
-    upper = P.perm[A.row] <= P.perm[A.col]  # each pair of entries counts once
-    x = np.zeros(len(P.Ai))
-    np.add.at(x, place[: A.nnz][upper], A.data[upper])
-    x[P.Ap[1:] - 1] += ADDED
-    D, L = np.zeros(n), np.zeros(len(P.Li))
-    factor_kernel(P, x, L, D, np.zeros(n))
+    P, L, D = _factor(sp.diags(1.0 / size) @ A @ sp.diags(1.0 / size), ADDED)
     transposed = (sp.csc_matrix((L, P.Li, P.Lp), shape=(n, n)) + sp.identity(n, format="csc")).T.tocsr()
 
     def vectors(pivots: np.ndarray) -> np.ndarray:
@@ -80,3 +73,22 @@ def weak_pivots(A: Any) -> tuple[np.ndarray, np.ndarray]:
     weak = np.sort(np.r_[np.flatnonzero(sure), which[quotients < 10.0 * ADDED]])
     ends = vectors(weak[:SHOWN])[P.perm] / size[:, None]
     return np.argsort(P.perm)[weak], ends / np.maximum(np.abs(ends).max(axis=0, initial=0.0), 1e-300)
+
+
+def negative_pivots(A: Any) -> int:
+    """How many eigenvalues of a sparse symmetric matrix are negative (Sylvester's law of inertia)."""
+    return int((_factor(A, 0.0)[2] < 0.0).sum())
+
+
+def _factor(A: Any, added: float) -> tuple[Pattern, np.ndarray, np.ndarray]:
+    """L D L^T in a pattern and order of its own, of A and so much more on its diagonal; D is inverse."""
+    A = A.tocoo()
+    n = A.shape[0]
+    P, place = analyse(n, A.row, A.col)
+    upper = P.perm[A.row] <= P.perm[A.col]  # each pair of entries counts once
+    x = np.zeros(len(P.Ai))
+    np.add.at(x, place[: A.nnz][upper], A.data[upper])
+    x[P.Ap[1:] - 1] += added
+    D, L = np.zeros(n), np.zeros(len(P.Li))
+    factor_kernel(P, x, L, D, np.zeros(n))
+    return P, L, D

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import AnalysisError, ModelError
-from ..numerics.pencil import Pencil, saddle
+from ..numerics.pencil import Pencil
+from ..numerics.saddle import saddle
 
 
 @dataclass(repr=False)

@@ -26,7 +26,7 @@ from ..steps import tangent_rate, tangent_step
 from .derivatives import State
 from .differences import derivative
 from .loads import STEP
-from .tangent import Direction, Linear, Tangent, closed
+from .tangent import Direction, Linear, Tangent, closed, nearest
 
 ROUNDED = 1e-12  # difference of the start from what is described, of the mechanism's length or the largest velocity
 
@@ -34,7 +34,21 @@ ROUNDED = 1e-12  # difference of the start from what is described, of the mechan
 def start_tangents(
     model: Model, parameters: Mapping[str, float], base: Assembly, x: State, directions: Sequence[Direction]
 ) -> list[Tangent]:
-    """Changes of the start with each parameter.
+    """Changes of the start with each parameter, with accelerations and multipliers; see `start_changes`."""
+    lin = Linear(x)
+    pairs = start_changes(model, parameters, base, x, directions, lin)
+    return [closed(d, x, lin, *pair) for d, pair in zip(directions, pairs, strict=True)]
+
+
+def start_changes(
+    model: Model,
+    parameters: Mapping[str, float],
+    base: Assembly,
+    x: State,
+    directions: Sequence[Direction],
+    lin: Linear,
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Changes of positions and velocities of the start with each parameter.
 
     Parameters
     ----------
@@ -47,18 +61,20 @@ def start_tangents(
         The same with accelerations and multipliers.
     directions : sequence of Direction
         Parameters.
+    lin : Linear
+        The constraints there.
     """
-    lin, still = Linear(x), np.zeros(len(x.v))
+    still = np.zeros(len(x.v))
     if held(base):
-        return [closed(d, x, lin, still, still) for d in directions]
+        return [nearest(d, x, lin, still, still) for d in directions]
     if as_described(model, base):
-        return [closed(d, x, lin, *_described(d, base, x)) for d in directions]
+        return [nearest(d, x, lin, *_described(d, base, x)) for d in directions]
 
     def found(p: Mapping[str, float]) -> np.ndarray:
         b = assemble(model, t=base.t, parameters=p)
         return np.r_[tangent_step(base.compiled, base.q, b.q), b.v]
 
-    return [closed(d, x, lin, *np.split(derivative(model, parameters, d.name, found), 2)) for d in directions]
+    return [nearest(d, x, lin, *np.split(derivative(model, parameters, d.name, found), 2)) for d in directions]
 
 
 def held(base: Assembly) -> bool:

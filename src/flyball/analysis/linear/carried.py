@@ -15,10 +15,12 @@ from ...tables.values import Values
 from ..motion.start import Start
 from ..steps import tangent_rate
 from .loads import STEP, derivative
-from .tangent import Direction, Tangent
+from .tangent import Direction
 
 
-def carried(start: Start, d: Direction, own: Values, of: Tangent) -> tuple[np.ndarray, np.ndarray]:
+def carried(
+    start: Start, d: Direction, own: Values, of: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
     """Changes (nv,), (nv,) of positions, along the velocities, and of velocities.
 
     Parameters
@@ -28,12 +30,12 @@ def carried(start: Start, d: Direction, own: Values, of: Tangent) -> tuple[np.nd
         The parameter, in absolute coordinates.
     own : Values
         The mechanism's numbers in the coordinates of the motion, a complex step along the parameter.
-    of : Tangent
+    of : two arrays (nv,), (nv,)
         The changes in absolute coordinates.
     """
     base, c = start.base, start.assembly.compiled
     if c is base.compiled:
-        return of.q, of.v
+        return of
     bodies = _bodies(start, d.values, of)
     q = positions(own, bodies, base.compiled.hints | base.compiled.turned(base.q))
     still = np.zeros((1, c.structure.nv))
@@ -42,12 +44,12 @@ def carried(start: Start, d: Direction, own: Values, of: Tangent) -> tuple[np.nd
     return tangent_rate(c, q.real, derivative(q)), derivative(v)
 
 
-def _bodies(start: Start, values: Values, of: Tangent) -> dict[str, BodyState]:
+def _bodies(start: Start, values: Values, of: tuple[np.ndarray, np.ndarray]) -> dict[str, BodyState]:
     """How every body moves at the start, with what the parameter changes as imaginary parts."""
     base = start.base
     q = base.q.astype(complex)
-    retract(values.system, q, 1j * STEP * of.q)
-    v = base.v + 1j * STEP * of.v
+    retract(values.system, q, 1j * STEP * of[0])
+    v = base.v + 1j * STEP * of[1]
     r = Records(values, q[None], v[None], np.zeros((1, len(v))))
     out = {}
     for name, b in values.structure.place.items():

@@ -157,8 +157,7 @@ class Equations:
         return complex_tables(self.state.c)
 
     def _run(self, steps: np.ndarray, system: System | None = None) -> np.ndarray:
-        if stepped.cold:
-            warnings.warn(NOTICE, PerformanceNotice, stacklevel=2)
+        announce()
         S, W = self.complex_tables if system is None else (system, work(self.state.c.structure, system, complex))
         x = self.state
         y, vdot, lam = (a.astype(complex) for a in (x.y, x.vdot, x.lam))
@@ -190,36 +189,40 @@ class Equations:
         nv = self.state.c.structure.nv
         touched, group = self._groups
         groups = int(group.max(initial=-1)) + 1
-        rows, columns, entries = [], [], []
-        seen = sp.csc_matrix(touched)
+        rows, columns = touched.indices, np.repeat(np.arange(nv), np.diff(touched.indptr))
+        entries = np.zeros(len(rows))
         for first in range(0, groups, CHUNK):
             count = min(CHUNK, groups - first)
             steps = np.zeros((count, 3 * nv + 1), complex)
             mine = np.flatnonzero((group >= first) & (group < first + count))
             steps[group[mine] - first, what * nv + mine] = 1j * STEP
             found = derivative(self._run(steps))
-            for d in mine.tolist():
-                at = seen.indices[seen.indptr[d] : seen.indptr[d + 1]]
-                x = found[group[d] - first, at]
-                used = x != 0.0
-                rows.append(at[used])
-                columns.append(np.full(used.sum(), d))
-                entries.append(x[used])
-        if not rows:
-            return sp.csr_matrix((self.width, nv))
-        where = (np.concatenate(rows), np.concatenate(columns))
-        return sp.csr_matrix((np.concatenate(entries), where), shape=(self.width, nv))
+            own = group[columns] - first
+            own = np.flatnonzero((own >= 0) & (own < count))
+            entries[own] = found[group[columns[own]] - first, rows[own]]
+        used = entries != 0.0
+        return sp.csr_matrix((entries[used], (rows[used], columns[used])), shape=(self.width, nv))
 
-    @cached_property
+    @property
     def _groups(self):
         """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together."""
-        import scipy.sparse as sp
-
         s = self.state.c.structure
-        if s.tree:
-            return sp.csc_matrix(np.ones((self.width, s.nv), bool)), np.arange(s.nv)
-        touched = sp.csc_matrix(pattern(s, self.state.c.values.system))
-        return touched, grouped(touched)
+        return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, self.width, self.state.c.values.system))
+
+
+def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
+    import scipy.sparse as sp
+
+    if s.tree:
+        return sp.csc_matrix(np.ones((width, s.nv), bool)), np.arange(s.nv)
+    touched = sp.csc_matrix(pattern(s, S))
+    return touched, grouped(touched)
+
+
+def announce(*kernels: Any) -> None:
+    """Say that the derivatives of the equations, or loops over them, are compiled first, if they are."""
+    if stepped.cold or any(k.cold for k in kernels):
+        warnings.warn(NOTICE, PerformanceNotice, stacklevel=3)
 
 
 def stepped_values(c: Compiled, name: str) -> Values:

@@ -15,11 +15,13 @@ import numpy as np
 from ...equations.tree import retract
 from ...errors import SingularityError
 from ...numerics.rank import TOLERANCE, null_space, parts
+from ...numerics.saddle import null_basis, surely_independent
 from ...tables.names import Named, velocity_names
 from ...tables.system import BODY_LAW, G_VALUE, V0
 from ..compiled import Compiled
 from .derivatives import Equations
 
+DENSE = 150  # rows up to which singular values decide; of more, where they may depend on one another
 ROUNDED = 1e-14  # entries of a basis below this are none, where its largest are about 1
 NOTHING = 1e-13  # part of the largest that rounding makes of no force, or no constraint
 CLOSED = 1e-10  # of the mechanism's length
@@ -127,7 +129,12 @@ def rank(G: np.ndarray, scale: np.ndarray) -> int:
 
 def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Orthonormal basis of the scaled motions that rows allow."""
-    return null_space(_compared(G, scale))
+    import scipy.sparse as sp
+
+    A = _compared(G, scale)
+    if DENSE < len(A) < len(scale) and surely_independent(own := sp.csr_matrix(A)):
+        return null_basis(own)
+    return null_space(A)
 
 
 def _compared(G: np.ndarray, scale: np.ndarray) -> np.ndarray:

@@ -11,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import SingularityError
+from ...numerics.saddle import surely_independent
 from ...tables.names import velocity_names
 from .derivatives import Equations, State
 from .rest import Rest
 
+DENSE = 300  # rows or columns up to which all singular values are found
 CLOSED = 1e-10  # gaps that Newton's method leaves, of the mechanism's length
 WEAK, NONE = 1e-3, 1e-11  # singular values of rows of unit length that are looked at: smaller ones carry nothing
 STEP = 1e-3  # way along which it is seen how a singular value changes, in radians or parts of the mechanism's length
@@ -31,6 +33,8 @@ def refuse_shaky(x: Rest) -> None:
         Naming the elements whose constraints depend on each other there, and what they let shake.
     """
     if not len(x.g):
+        return
+    if min(x.G.shape) > DENSE and surely_independent(x.G):  # others bend too much to be shaky
         return
     U, d, Vt = np.linalg.svd(x.G.toarray(), full_matrices=False)
     force = x.scale * Equations(State.resting(x.c, x.t, x.q)).block("r")

@@ -17,11 +17,16 @@ import numpy as np
 
 from ...equations.residual import residual_kernel
 from ...equations.scratch import work
+from ...errors import ModelError
 from ...numerics.rank import TOLERANCE
 from ...tables.names import velocity_names
 from ...tables.values import Values
 from .derivatives import Equations, State
+from .differences import whole
 from .loads import STEP, as_complex, by_reactions, complex_tables, derivative, refuse_undetermined
+
+TORN = 1e-7  # part of the gaps that a parameter opens which is left where no motion closes them
+ROUNDED = 1e-9  # part of the mechanism's length below which gaps that the whole of a parameter opens are none
 
 
 @dataclass
@@ -84,6 +89,7 @@ class Linear:
         self.size = 1.0 / np.maximum(np.sqrt((H * H).sum(axis=1)), 1e-300)
         self.H = self.size[:, None] * H
         self.A[:n, n:], self.A[n:, :n] = -self.H.T, self.H
+        self._inverses: dict[bytes, np.ndarray] = {}
 
     @cached_property
     def inverse(self) -> np.ndarray:
@@ -97,10 +103,11 @@ class Linear:
 
     def motion(self, right: np.ndarray, which: np.ndarray | None = None) -> np.ndarray:
         """The change x with G x = right that is smallest in kinetic energy."""
-        rows = slice(None) if which is None else which
-        if not len(self.H[rows]):
-            return np.zeros(len(self.M))
-        return self.scale * np.linalg.lstsq(self.H[rows], (self.size * right)[rows], rcond=TOLERANCE)[0]
+        rows = np.ones(len(self.H), bool) if which is None else which
+        key = rows.tobytes()
+        if key not in self._inverses:
+            self._inverses[key] = np.linalg.pinv(self.H[rows], rcond=TOLERANCE) if rows.any() else self.H[rows].T
+        return self.scale * (self._inverses[key] @ (self.size * right)[rows])
 
     def acceleration(self, r: np.ndarray, a: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(dvdot, dlam) that take away what is missed of the equations of motion and of the constraints."""
@@ -118,10 +125,40 @@ def friction(x: State, G: np.ndarray) -> np.ndarray:
     return F
 
 
+def nearest(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The changes of positions and velocities nearest to the given ones that keep the constraints.
+
+    Raises
+    ------
+    ModelError
+        If none keep them: with another value of the parameter the mechanism cannot be assembled.
+    """
+    at = d.e.at
+    before = d.along(x, dq, dv)[at["g"]]
+    dq = dq + lin.motion(-before, lin.which)
+    left = d.along(x, dq, dv)
+    _refuse_torn(d, x, np.abs(before), np.abs(left[at["g"]]))
+    return dq, dv + lin.motion(-left[at["n"]])
+
+
+def _refuse_torn(d: Direction, x: State, before: np.ndarray, left: np.ndarray) -> None:
+    """Refuse a parameter whose change opens gaps (rows,) that no motion closes."""
+    c = x.c
+    rounding = ROUNDED * c.values.length / whole(c.structure.model, c.parameters, d.name)
+    if left.max(initial=0.0) > max(TORN * before.max(initial=0.0), rounding):
+        names = dict.fromkeys(
+            r.element.name for r, g in zip(c.structure.rows, left, strict=True) if g > 0.1 * left.max()
+        )
+        raise ModelError(
+            f"{c.structure.model.name!r} cannot be assembled with another {d.name!r}: {', '.join(names)} would "
+            f"contradict each other (redundant joints, or a singular position), so nothing has a derivative by it. Let "
+            f"what else has to fit follow the parameter, or take the redundancy out: m.mobility() names it"
+        )
+
+
 def closed(d: Direction, x: State, lin: Linear, dq: np.ndarray, dv: np.ndarray) -> Tangent:
     """The tangent whose positions and velocities are nearest to the given ones and keep the constraints."""
     at = d.e.at
-    dq = dq + lin.motion(-d.along(x, dq, dv)[at["g"]], lin.which)
-    dv = dv + lin.motion(-d.along(x, dq, dv)[at["n"]])
+    dq, dv = nearest(d, x, lin, dq, dv)
     left = d.along(x, dq, dv)
     return Tangent(dq, dv, *lin.acceleration(left[at["r"]], left[at["a"]]))

@@ -163,6 +163,7 @@ class Variation:
         t, y, vdot, lam = (np.zeros(n, complex) for n in (1, len(start.y), self.nv, self.nr))
         self.bench = residual.Bench(t, y, vdot, lam, steps, found)
         self.plan = self._planned(values, tables)
+        self.ended = clock  # as the last run has left it
         forget(c.work.stack)
 
     def _planned(self, values: Sequence[Values], tables: np.ndarray) -> Plan:
@@ -205,6 +206,7 @@ class Variation:
             rows.append(buffer[: self._call(clock, none, buffer)].copy())
         if clock.count[ex.STATUS] != ex.DONE:
             raise self.stopped(clock)
+        self.ended = clock
         return self._varied(np.concatenate(rows))
 
     def at(self, t: np.ndarray, y: np.ndarray) -> Varied:

@@ -1,0 +1,49 @@
+"""Bases of what sparse constraints allow, by projections, against singular values; when rows are surely independent."""
+
+import numpy as np
+import pytest
+import scipy.sparse as sp
+
+from flyball.numerics.rank import null_space
+from flyball.numerics.saddle import null_basis, surely_independent
+from flyball.numerics.sparse_rank import negative_pivots, weak_pivots
+
+
+def rows(m: int, n: int, seed: int = 0) -> np.ndarray:
+    """A band of random entries, rows of unit length."""
+    random = np.random.default_rng(seed)
+    A = np.where(np.abs(np.arange(m)[:, None] * n / m - np.arange(n)) < 6, random.standard_normal((m, n)), 0.0)
+    return A / np.linalg.norm(A, axis=1)[:, None]
+
+
+def test_a_basis_by_projections_spans_what_singular_values_say():
+    A = rows(80, 120)
+    Z, N = null_basis(sp.csr_matrix(A)), null_space(A)
+    assert pytest.approx(np.eye(40), abs=1e-13) == Z.T @ Z
+    assert np.abs(A @ Z).max() < 1e-13
+    assert pytest.approx(Z, abs=1e-12) == N @ (N.T @ Z)
+    assert null_basis(sp.csr_matrix((0, 3))) == pytest.approx(np.eye(3))
+
+
+@pytest.mark.parametrize(("apart", "sure"), [(1.0, True), (1e-2, True), (1e-6, False), (0.0, False)])
+def test_rows_that_nearly_depend_on_others_are_not_sure(apart, sure):
+    A = rows(80, 120)
+    A[40] = A[41] + apart * A[40]
+    A /= np.linalg.norm(A, axis=1)[:, None]
+    assert surely_independent(sp.csr_matrix(A)) == sure
+
+
+def test_pivots_count_what_eigenvalues_count():
+    """Negative ones by Sylvester's law of inertia; of rows, those that depend on the others."""
+    A = rows(60, 90)
+    B = A @ A.T
+    w = np.linalg.eigvalsh(B)
+    for k in (5, 20, 40):
+        shift = 0.5 * (w[k - 1] + w[k])
+        assert negative_pivots(sp.csr_matrix(B - shift * np.eye(60))) == k
+    A[[10, 30]] = A[11] + A[12], A[31] - 2 * A[32]
+    A /= np.linalg.norm(A, axis=1)[:, None]
+    weak, vectors = weak_pivots(sp.csr_matrix(A) @ sp.csr_matrix(A).T)
+    assert len(weak) == vectors.shape[1] == 2
+    assert np.linalg.matrix_rank(np.delete(A, weak, axis=0)) == 58
+    assert np.abs(vectors.T @ A).max() < 1e-6
