@@ -59,7 +59,7 @@ def points(n: int, planar: bool) -> fb.Mechanism:
     m = empty(planar)
     for i in range(n):
         for j in range(n):
-            m.add(fb.Body(f"p{i}_{j}", mass=1, inertia=0.01 if planar else (0.01,) * 3, position=place(i, j, planar)))
+            m.add(fb.Body(f"p{i}_{j}", mass=1, inertia=0, position=place(i, j, planar)))
     for k, (a, b) in enumerate(lines(n)):
         ends = (f"p{a[0]}_{a[1]}", f"p{b[0]}_{b[1]}")
         m.add(fb.Distance(f"L{k}", *ends, at=(place(*a, planar), place(*b, planar))))

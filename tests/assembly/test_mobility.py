@@ -123,7 +123,7 @@ def test_size_and_units_do_not_change_the_count():
 
 
 def test_motion_without_inertia_is_refused_by_name():
-    """A thin rod on two balls may spin about itself, a point mass may turn: the message says which body, about what."""
+    """A thin rod on two balls may spin about itself, a bob that is pushed off its centre may turn: which body, about what."""
     m = fb.Mechanism("spins")
     m.add(fb.Body("rod", mass=1, inertia=(1 / 12, 1 / 12, 0), position=(0, 0, 0.5)))
     m.add(fb.Spherical("ball", "ground", "rod", at=(0, 0, 0)))
@@ -131,6 +131,7 @@ def test_motion_without_inertia_is_refused_by_name():
         m.simulate(1.0)
     m = fb.Mechanism("point", planar=True)
     m.add(fb.Body("bob", mass=1, inertia=0, position=(1, 0)), fb.Distance("wire", "ground", "bob", at=((0, 0), (1, 0))))
+    m.add(fb.PointForce("push", "bob", force=(1, 0), at=(1, 0.1)))
     with pytest.raises(fb.ModelError, match=r"body 'bob' can turn .* without any inertia"):
         m.simulate(1.0)
 
@@ -183,7 +184,12 @@ def links(end: float) -> fb.Mechanism:
 
 
 def test_a_large_mechanism_may_not_move_without_inertia_either():
-    """A point mass in its own hinge turns without inertia: refused by name; off the hinge, turning moves it."""
-    with pytest.raises(fb.ModelError, match=r"body 'b519' can turn .* without any inertia"):
-        links(0.0).simulate(0.01)
+    """A bob in its own hinge that is turned has no inertia: refused by name; off the hinge, turning moves it; left
+    alone it is a point mass, which does not turn.
+    """
+    turned = links(0.0)
+    turned.add(fb.PointTorque("torque", "b519", torque=1))
+    with pytest.raises(fb.ModelError, match=r"body 'b519' can turn .* without any inertia.*PointTorque 'torque'"):
+        turned.simulate(0.01)
     assert links(0.5).check().freedoms == 520
+    assert links(0.0).check().freedoms == 519

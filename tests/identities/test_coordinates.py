@@ -13,6 +13,8 @@ from flyball.equations.engine import MOTION
 from flyball.equations.mass import mass_entries
 from flyball.equations.records import load
 from flyball.results.records import Records
+from flyball.tables import coordinates
+from flyball.tables.cost import cost, least
 from flyball.tables.system import EFFORT, F_APPLIED, GAMMA, LAM, V0, X_SOLVED
 from tests.mechanisms import bricard, example, four_bar, planar_rod, spatial_four_bar
 from tests.verification.test_reactions import actuated
@@ -192,3 +194,80 @@ def test_joint_layer_solves_the_equations_of_motion(case):
     assert x[free] == pytest.approx(exact, abs=2e-10 * np.abs(exact).max())
     left = (M @ x - f - G.T @ W.row[LAM])[driven]
     assert W.vel[EFFORT, driven] == pytest.approx(left, rel=1e-9)
+
+
+def ladder(planar, n=45):
+    """A chain of hinges and slides about and along many axes, every third joint declared the other way round."""
+    m = fb.Mechanism("ladder", planar=planar)
+    dice = np.random.default_rng(3)
+    for k in range(n):
+        size = (
+            {"inertia": 0.1, "angle": 0.3 * k}
+            if planar
+            else {"inertia": (0.1, 0.1, 0.1), "orientation": (0.1 * k, 0.2, 0)}
+        )
+        m.add(fb.Body(f"b{k}", mass=1, position=(k, 0.1 * k) if planar else (k, 0.1 * k, 0.2), **size))
+        ends = (f"b{k - 1}" if k else "ground", f"b{k}")
+        axis = dice.normal(size=2 if planar else 3)
+        at = (k, 0.3) if planar else (k, 0.3, 0.1)
+        slide = k % 4 == 3
+        more = {} if planar and not slide else {"axis": tuple((axis / np.linalg.norm(axis)).tolist())}
+        m.add((fb.Prismatic if slide else fb.Revolute)(f"J{k}", *(ends if k % 3 else ends[::-1]), at=at, **more))
+    return m
+
+
+@pytest.mark.parametrize("planar", [True, False])
+def test_many_joints_are_read_as_few_are(planar, monkeypatch):
+    """From where the bodies are: joint coordinates come back, whichever way they are read."""
+    m = ladder(planar)
+    tree = tuple(j.name for j in m.joints)
+    plain, c = compiled(m), compiled(m, tree=tree)
+    q = c.values.q + np.random.default_rng(4).uniform(-1.5, 1.5, len(c.values.q))
+    v = np.random.default_rng(5).normal(size=len(q))
+    there = plain.take(c, 0.0, q, v)
+    back = c.take(plain, 0.0, *there)
+    assert back[0] == pytest.approx(q, abs=1e-11)
+    assert back[1] == pytest.approx(v, abs=1e-10)
+    monkeypatch.setattr(coordinates, "MANY", 10**9)
+    assert c.take(plain, 0.0, *there)[0] == pytest.approx(back[0], abs=1e-13)
+
+
+def test_a_plate_without_inertia_on_links_is_not_put_into_a_forest():
+    """It hangs by no joint that could be a tree joint, and its mass matrix would be singular: absolute coordinates."""
+
+    def runs(inertia):
+        m = fb.Mechanism("plate", planar=True, gravity=(0, -9.81))
+        m.add(fb.Body("arm", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "arm", at=(0, 0)))
+        m.add(fb.Body("plate", mass=1, inertia=inertia, position=(1, -1)))
+        m.add(fb.Distance("l1", "arm", "plate", at=((0.7, 0), (0.7, -1))))
+        m.add(fb.Distance("l2", "arm", "plate", at=((1.3, 0), (1.3, -1.2))))
+        return m.simulate(0.5, outputs=2, coordinates="joint")
+
+    none, hardly = runs(0), runs(1e-7)
+    assert "plate has no inertia" in none.health.coordinates
+    assert none["plate"].position[-1] == pytest.approx(hardly["plate"].position[-1], abs=1e-6)
+
+
+def ball_net(n):
+    """Rods on balls where they meet."""
+    m = fb.Mechanism("net", gravity=(0, 0, -9.81))
+    at = {}
+    for a, b in [((i, j), (i + di, j + 1 - di)) for i in range(n) for j in range(n) for di in (0, 1)]:
+        if max(b) < n:
+            name = f"{a}{b}".replace(" ", "")
+            p, q = (np.array([x, y, -0.3 * ((x + y) % 2)]) for x, y in (a, b))
+            m.add(fb.Body(name, mass=1, inertia=(0.1, 0.1, 0.1), position=tuple((p + q) / 2)))
+            for end, where in ((a, p), (b, q)):
+                if at.setdefault(end, name) != name:
+                    m.add(fb.Spherical(f"{name}{end}", at[end], name, at=tuple(where)))
+    m.add(fb.Spherical("peg", "ground", at[0, 0], at=(0, 0, 0)))
+    return m
+
+
+def test_a_deep_tree_with_many_loops_is_not_made_to_see_that_it_costs_more():
+    """Of a net of rods on balls the mass matrix alone costs more than absolute coordinates."""
+    small, large = ball_net(6), ball_net(21)
+    joint = small.simulate(1e-4, outputs=2, coordinates="joint").values.structure
+    assert 0.2 * cost(joint) < least(small, joint.tree) <= cost(joint)
+    assert cost(small.simulate(1e-4, outputs=2).values.structure) < cost(joint)
+    assert "the mass matrix alone" in large.simulate(1e-4, outputs=2).health.coordinates

@@ -131,7 +131,7 @@ def _of_inertia(x: Values, name: str, b: BodyReport) -> Iterator[str]:
     k = x.structure.place[name]
     arms = x.system.frame_x[x.system.frame_i == k, :3]
     size = float(np.sqrt((arms**2).sum(axis=1)).max(initial=0.0))
-    radius = float(np.sqrt(max(b.moments) / b.mass))
+    radius = float(np.sqrt(max(b.moments) / b.mass)) if b.mass > 0.0 else 0.0
     if size > 0.0 and radius > FAR * size:
         yield (
             f"body {name!r}: its inertia is that of a body {radius:.3g} m across, but its joints lie within "

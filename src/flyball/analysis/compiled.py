@@ -11,7 +11,6 @@ import numpy as np
 
 from ..equations.engine import POSITION, evaluate
 from ..equations.projection import NONE
-from ..equations.records import load
 from ..equations.scratch import work
 from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
@@ -23,6 +22,7 @@ from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
 from ..tables.values import Values, values
+from .uncollected import uncollected
 
 
 @dataclass
@@ -103,10 +103,11 @@ class Compiled:
         self.at(t, q, v)
         angles = turned_angles(self.values, W, q) if self.structure.model.planar else {}
         out = {}
+        K = W.BK.copy()
+        R = K[:, 3:12].reshape(-1, 3, 3)
         for name, b in self.structure.place.items():
             if b >= 0:
-                p, R, w, u, _, _ = (np.array(part) for part in load(W.BK, b))
-                out[name] = BodyState(p, R.reshape(3, 3), u, w, angles.get(name, 0.0))
+                out[name] = BodyState(K[b, :3], R[b], K[b, 15:18], K[b, 12:15], angles.get(name, 0.0))
         return out
 
     def take(self, other: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -175,14 +176,16 @@ class Compiled:
             J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
             translation = np.sqrt(translation)
         i, j, x = [], [], []
-        for n, used in ((3, slice(2, 3)), (6, slice(0, 3))):
+        plane = self.structure.model.planar
+        used = slice(2, 3) if plane else slice(0, 3)
+        for n in np.unique(S.body_i[:, NV]):
             b = np.flatnonzero(S.body_i[:, NV] == n)
             v0 = S.body_i[b, V0]
-            shifts, turns = np.arange(n // 3 + 1), np.arange(n // 3 + 1, n)
+            shifts, turns = np.split(np.arange(n), [2 if plane else 3])
             at = v0[:, None] + shifts
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
-            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel()]
+            x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
         nv, rows, columns, entries = self.structure.nv, np.concatenate(i), np.concatenate(j), np.concatenate(x)
         entries = entries if root is None else entries * root[rows]
         if dense:
@@ -210,7 +213,8 @@ def compiled(
     choices = Choices(
         far=far, positions=positions, holds=tuple(holds), tree=tuple(tree), coupled=coupled, solved=solved
     )
-    x = values(structure(model, choices), parameters, held)
+    with uncollected():
+        x = values(structure(model, choices), parameters, held)
     return Compiled(x, _places(x), dict(parameters or {}))
 
 

@@ -50,7 +50,7 @@ def report(model: Model, x: Values, q: np.ndarray) -> MassReport:
         bodies[b.name] = _properties(float(d.mass.real), d.com.real, c, J, d.volume, model.planar)
         placed.append((float(d.mass.real), c, R @ J @ R.T))
     mass = sum(m for m, _, _ in placed)
-    com: Any = sum(m * c for m, c, _ in placed) / mass
+    com: Any = sum(m * c for m, c, _ in placed) / mass if mass else np.mean([c for _, c, _ in placed], axis=0)
     inertia: Any = sum(K + shifted(m, c - com) for m, c, K in placed)
     volumes = [b.volume for b in bodies.values()]
     volume = None if None in volumes else sum(volumes)  # type: ignore[arg-type]
@@ -63,6 +63,11 @@ def _properties(
     volume = None if volume is None else float(volume.real)
     if planar:
         w = J[2:, 2]
-        return MassProperties(mass, com[:2], position[:2], float(w[0]), w, np.eye(3), np.sqrt(w / mass), volume)
+        return MassProperties(mass, com[:2], position[:2], float(w[0]), w, np.eye(3), _gyration(w, mass), volume)
     w, V = principal(J)
-    return MassProperties(mass, com, position, J, w, V, np.sqrt(np.maximum(w, 0.0) / mass), volume)
+    return MassProperties(mass, com, position, J, w, V, _gyration(w, mass), volume)
+
+
+def _gyration(w: np.ndarray, mass: float) -> np.ndarray:
+    """Radii of gyration; none where there is no mass."""
+    return np.sqrt(np.maximum(w, 0.0) / mass) if mass > 0.0 else 0.0 * w

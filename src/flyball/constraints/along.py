@@ -10,6 +10,7 @@ from ..math.vec import cross, dot, mv, sub
 
 KIND = 1
 OFTEN = True
+POINTS = "M"
 
 
 @formula

@@ -10,6 +10,7 @@ from ..math.vec import dot, sub
 
 KIND = 0
 OFTEN = True
+POINTS = "FM"
 
 
 @formula

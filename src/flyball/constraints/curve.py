@@ -17,6 +17,7 @@ from ..math.spline import spline
 from ..math.vec import cross, dot, mtv, mv, scale, sub
 
 KIND = 8
+POINTS = "M"
 PASSES = 8
 
 

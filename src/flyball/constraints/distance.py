@@ -8,6 +8,7 @@ from ..math.vec import dot, norm, scale, sub
 
 KIND = 3
 OFTEN = True
+POINTS = "FM"
 
 
 @formula

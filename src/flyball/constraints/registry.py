@@ -4,6 +4,8 @@ A file says ``KIND``, its number (or ``ROWS``, several numbers and their formula
 
 - ``OFTEN = True``: the kind is so frequent that compiled code has a loop for it alone; such kinds are the first;
 - ``TURNS = True``: its value is an angle, of which whole turns are counted (parameter 0 says whether to);
+- ``POINTS``: of which of its frames, ``"F"``, ``"M"`` or both, it sees the origin only and makes no
+  torque there;
 - ``foot`` and ``progress``: it leans on a place on a curve: where that is, and how fast it moves. Parameters 1 and 2
   then say where the curve's two splines stand.
 """
@@ -27,6 +29,7 @@ class Kind:
     """``row(par, F, M, hint, data)`` -> value, force on M, torque on M, torque on F, acceleration bias."""
     often: bool = False
     turns: bool = False
+    points: str = ""
     foot: Callable | None = None
     progress: Callable | None = None
 
@@ -39,9 +42,10 @@ class Kind:
 def _kinds_of(module: ModuleType) -> list[Kind]:
     rows = getattr(module, "ROWS", {module.KIND: module.row} if hasattr(module, "KIND") else {})
     often, turns = getattr(module, "OFTEN", False), getattr(module, "TURNS", False)
+    points = getattr(module, "POINTS", "")
     foot = getattr(module, "foot", None)
     progress = module.progress if foot is not None else None
-    return [Kind(number, row, often, turns, foot, progress) for number, row in rows.items()]
+    return [Kind(number, row, often, turns, points, foot, progress) for number, row in rows.items()]
 
 
 def ordered(found: list[Kind]) -> tuple[Kind, ...]:

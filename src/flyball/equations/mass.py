@@ -2,7 +2,7 @@
 
 Everything has components along the world's axes, and moments about the reference points of the tree joints, W.O: going
 from body to parent is a shift and no turn, and mechanisms far from the world's origin lose nothing. Massless bodies of
-the table are bodies like all others. Where every body hangs on ground by FREE or PLANAR, M is constant and block
+the table are bodies like all others. Where every body hangs on ground by FREE, PLANAR or POINT, M is constant and block
 diagonal and none of this runs.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..math.vec import add, cross, dot, load3, load9, put3, scale, sub
-from ..tables.system import FREE, INERTIA, MASS, NV, PARENT, PLANAR, REVOLUTE, TREE, V0
+from ..tables.system import INERTIA, MASS, NV, PARENT, POINT, REVOLUTE, TREE, V0
 from .tree import column
 
 
@@ -105,8 +105,8 @@ def shifted(J, e, d):
 
 @formula
 def root_columns(S, W, b):
-    """Twist columns of body b into W.X, where those of all others stand, if it is a root, FREE or PLANAR."""
-    if S.body_i[b, TREE] == FREE or S.body_i[b, TREE] == PLANAR:
+    """Twist columns of body b into W.X, where those of all others stand, if it is a root: FREE, PLANAR or POINT."""
+    if S.body_i[b, TREE] <= POINT:
         for k in range(S.body_i[b, NV]):
             w, v = column(S, W, b, k)
             put3(W.X, S.body_i[b, V0] + k, 0, w)

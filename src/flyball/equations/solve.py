@@ -22,6 +22,7 @@ from ..tables.system import (
     DIAGONAL,
     EFFORT,
     EXCESS,
+    EXCESS_MASS,
     FACTORISATIONS,
     GIVEN,
     INVERSE,
@@ -31,6 +32,7 @@ from ..tables.system import (
     PARTED,
     PARTITION,
     PASS,
+    PER_BULK,
     PER_COMPACT,
     PER_MASS,
     R1,
@@ -57,14 +59,15 @@ STALLED = 0.7  # a refinement that leaves more than this of the residual is the 
 def inverse_mass(S, b, x, at, out, to):
     """out[to:] = M_b^-1 x[at:] for a body with constant mass block."""
     m = S.body_x[b, PER_MASS]
-    if S.body_i[b, NV] == 3:
-        out[to] = m * x[at]
-        out[to + 1] = m * x[at + 1]
+    n = S.body_i[b, NV]
+    out[to] = m * x[at]
+    out[to + 1] = m * x[at + 1]
+    if n == 3:  # the angle of a planar body, z of a point mass
         out[to + 2] = S.body_x[b, INVERSE + 8] * x[at + 2]
-    else:
+    elif n == 6:
         r = mv(load9(S.body_x, b, INVERSE), (x[at + 3], x[at + 4], x[at + 5]))
+        out[to + 2] = m * x[at + 2]
         for i in range(3):
-            out[to + i] = m * x[at + i]
             out[to + 3 + i] = r[i]
 
 
@@ -109,13 +112,15 @@ def natural_size(S, W):
         W.row[DIAGONAL, k] = 0.0
     for e in range(S.block_i.shape[0]):
         b, at, k = S.block_i[e, 0], S.block_i[e, 1], S.block_i[e, 2]
-        if S.body_i[b, NV] == 3:
-            shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1]
-            turn = W.G[at + 2] * W.G[at + 2]
-        else:
-            shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1] + W.G[at + 2] * W.G[at + 2]
-            turn = W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
-        W.row[DIAGONAL, k] += shift * S.body_x[b, PER_MASS] + turn * S.body_x[b, PER_COMPACT]
+        n = S.body_i[b, NV]
+        shift = W.G[at] * W.G[at] + W.G[at + 1] * W.G[at + 1]
+        turn = 0.0 * shift
+        if n == 6:
+            shift += W.G[at + 2] * W.G[at + 2]
+            turn += W.G[at + 3] * W.G[at + 3] + W.G[at + 4] * W.G[at + 4] + W.G[at + 5] * W.G[at + 5]
+        elif n == 3:
+            turn += W.G[at + 2] * W.G[at + 2]
+        W.row[DIAGONAL, k] += shift * S.body_x[b, PER_BULK] + turn * S.body_x[b, PER_COMPACT]
 
 
 @formula
@@ -345,15 +350,19 @@ def excess(S, dx, rhs, x):
     size = 1e-300
     for b in range(S.body_i.shape[0]):
         v0 = S.body_i[b, V0]
-        if S.body_i[b, NV] == 3:
+        n = S.body_i[b, NV]
+        if n == 3:
             rhs[v0 + 2] = S.body_x[b, EXCESS + 8] * dx[v0 + 2]
             worst = max(worst, magnitude(rhs[v0 + 2]))
-        else:
+        elif n == 6:
             t = mv(load9(S.body_x, b, EXCESS), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
+            rhs[v0 + 2] = S.body_x[b, EXCESS_MASS] * dx[v0 + 2]
             for i in range(3):
                 rhs[v0 + 3 + i] = t[i]
                 worst = max(worst, magnitude(t[i]))
         for i in range(2):
+            rhs[v0 + i] = S.body_x[b, EXCESS_MASS] * dx[v0 + i]
+            worst = max(worst, magnitude(rhs[v0 + i]) * S.glob[LENGTH])
             size = max(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
     return worst / size
 

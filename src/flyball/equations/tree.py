@@ -1,7 +1,8 @@
 """Tree joints: how a body hangs on its parent. The coordinate layer is nothing but numbers that choose among these.
 
-Absolute coordinates are a forest in which every body hangs on ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v). The
-others act between a frame on the parent and one on the body: REVOLUTE turns about its z axis, PRISMATIC slides along
+Absolute coordinates are a forest in which every body hangs on ground by FREE (7 q, 6 v) or PLANAR (3 q, 3 v), a point
+mass by POINT: it moves along the world's axes (3 q, 3 v; in the plane 2) and stays turned as it is drawn. The others
+act between a frame on the parent and one on the body: REVOLUTE turns about its z axis, PRISMATIC slides along
 it, SPHERICAL (quaternion; velocities: angular velocity in the moved axes) turns about its origin, WELD does not move.
 
 A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``column``), what a wrench does along them
@@ -33,8 +34,10 @@ from ..tables.system import (
     BODY_R,
     BODY_TURNS,
     FREE,
+    NV,
     PARENT,
     PLANAR,
+    POINT,
     PRISMATIC,
     Q0,
     REVOLUTE,
@@ -65,6 +68,10 @@ def pose(S, W, b, q):
     elif kind == FREE:
         p = (q[q0], q[q0 + 1], q[q0 + 2])
         store_pose(W.BK, b, p, quaternion_matrix(q[q0 + 3], q[q0 + 4], q[q0 + 5], q[q0 + 6]))
+        put3(W.O, b, 0, p)
+    elif kind == POINT:
+        p = (q[q0], q[q0 + 1], q[q0 + 2] if S.body_i[b, NV] == 3 else 0.0 * q[q0])
+        store_pose(W.BK, b, p, load9(S.body_x, b, BODY_R))
         put3(W.O, b, 0, p)
     else:
         hinge(S, W, b, kind, q, q0)
@@ -129,6 +136,10 @@ def motion(S, W, b, v):
         zero = (o, o, o)
         w = mv(load9(W.BK, b, 3), (v[v0 + 3], v[v0 + 4], v[v0 + 5]))
         store_motion(W.BK, b, w, (v[v0], v[v0 + 1], v[v0 + 2]), zero, zero)
+    elif kind == POINT:
+        o = 0.0 * v[v0]
+        zero = (o, o, o)
+        store_motion(W.BK, b, zero, (v[v0], v[v0 + 1], v[v0 + 2] if S.body_i[b, NV] == 3 else o), zero, zero)
     else:
         hinge_motion(S, W, b, kind, v, v0)
 
@@ -196,6 +207,10 @@ def project(S, W, b, out, at, sign, force, torque, point):
     if kind == PRISMATIC:
         out[at] += sign * dot(load3(W.X, S.body_i[b, V0], 3), force)
         return
+    if kind == POINT:
+        for i in range(S.body_i[b, NV]):
+            out[at + i] += sign * force[i]
+        return
     t = add(torque, cross(sub(point, load3(W.O, b, 0)), force))
     if kind == PLANAR:
         out[at] += sign * force[0]
@@ -231,6 +246,8 @@ def quaternion_at(S, b):
 def lengths(S, b):
     """How many of body b's coordinates, its first, are plain: their rates are velocities."""
     kind = S.body_i[b, TREE]
+    if kind == POINT:
+        return S.body_i[b, NV]
     return 0 if kind == SPHERICAL or kind == WELD else 1 if kind >= REVOLUTE else 3
 
 

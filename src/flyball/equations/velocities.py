@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..math.scalar import atan2
-from ..math.vec import cross
+from ..math.vec import add, cross, scale
 from ..tables.coordinates import REST, BodyState, free_velocities, whole_turns
 from ..tables.forest import TreeJoint
 from ..tables.system import INERTIA, MASS, NV, PARENT, PLANAR, Q0, TREE, V0
@@ -57,12 +57,15 @@ def kinetic_energy(x: Values, v: np.ndarray) -> float:
     """Kinetic energy [J] of bodies with the velocities v (nv,) of absolute coordinates."""
     S = x.system
     total = 0.0
-    for n, shifts, turns in ((3, 2, slice(2, 3)), (6, 3, slice(0, 3))):
+    shifts, turns = (2, slice(2, 3)) if x.structure.model.planar else (3, slice(0, 3))
+    for n in np.unique(S.body_i[:, NV]):
         b = np.flatnonzero(S.body_i[:, NV] == n)
         own = v[S.body_i[b, V0, None] + np.arange(n)]
-        J = S.body_x[b, INERTIA : INERTIA + 9].reshape(-1, 3, 3)[:, turns, turns]
         u, w = own[:, :shifts], own[:, shifts:]
-        total += S.body_x[b, MASS] @ (u * u).sum(axis=1) + np.einsum("bi,bij,bj", w, J, w)
+        total += S.body_x[b, MASS] @ (u * u).sum(axis=1)
+        if n > shifts:
+            J = S.body_x[b, INERTIA : INERTIA + 9].reshape(-1, 3, 3)[:, turns, turns]
+            total += np.einsum("bi,bij,bj", w, J, w)
     return float(0.5 * total)
 
 
@@ -74,9 +77,13 @@ def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: 
     for link in t.links:
         for k in range(int(S.body_i[link, NV])):
             turn, shift = column(S, W, link, k)
-            columns.append(np.r_[np.array(shift) + _cross(turn, d.p - W.O[link]), x.length * np.array(turn)])
+            arm = d.p - W.O[link]
+            columns.append(np.array((*add(shift, cross(turn, arm)), *scale(x.length, turn))))
             at.append(int(S.body_i[link, V0]) + k)
-    if at:
+    if len(at) == 1 and not np.iscomplexobj(columns[0]):
+        rel = np.concatenate((d.v - seen, x.length * (d.w - parent.w)))
+        v[at[0]] = (columns[0] @ rel) / (columns[0] @ columns[0])
+    elif at:
         rel = np.r_[d.v - seen, x.length * (d.w - parent.w)]
         v[at] = least_squares(np.array(columns).T, rel)
 

@@ -82,3 +82,7 @@ class PointForce(BodyForce):
     def laws(self) -> tuple[Law | None, ...]:
         """The components."""
         return tuple(self.force)
+
+    def on_points(self) -> bool:
+        """In the world's axes."""
+        return self.axes == "world"

@@ -73,13 +73,16 @@ class Body(Element):
     ----------
     name : str
     mass : number [kg]
+        0, with inertia 0, for a ring or link that only joins others and moves with them, as in a gimbal.
         With shapes and no ``inertia``: shared out among the shapes by volume, or, where all have a density of their
         own, by volume times density.
     inertia : number [kg m^2]
         Planar: one number. Spatial: three principal moments (Ixx, Iyy, Izz) or the inertia tensor as a symmetric 3x3
         matrix, whose diagonal holds the moments, Ixx = sum of m (y^2 + z^2), and which off the diagonal holds *minus*
         the products of inertia, Ixy = -sum of m x y. A program that lists products with the plus sign needs its signs
-        turned. 0 for a point mass; 0 for one moment, and the others equal, for an ideal thin rod.
+        turned. 0 for a point mass: if all that acts on it acts at its centre of mass and needs no orientation, it has
+        velocities and does not turn; else joints must hold it. 0 for one moment, and the others equal, for an ideal
+        thin rod.
     inertia_about : point [m]
         Point of the reference frame that ``inertia`` is about; the centre of mass if not given.
     inertia_axes : orientation

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
+from ..constraints.registry import KINDS
 from .element import Element, Law, Point, PointPair
 from .geometry import vector
 from .joint import WorldFrame
@@ -58,6 +59,10 @@ class Force(Element):
         """Whether its energy is all that it ever takes or gives."""
         return False
 
+    def on_points(self) -> bool:
+        """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
+        return False
+
 
 @dataclass(frozen=True)
 class TwoPointForce(Force):
@@ -78,6 +83,10 @@ class TwoPointForce(Force):
             return None
         a, b = (vector(p, planar, f"'at' of {self.title}") for p in n.at)
         return {"F": (a, np.eye(3)), "M": (b, np.eye(3))}
+
+    def on_points(self) -> bool:
+        """The line is all it needs."""
+        return True
 
 
 @dataclass(frozen=True)
@@ -133,6 +142,10 @@ class CoordinateForce(Force):
     def path(self) -> tuple[tuple[str, str, Row], ...]:
         """Or the terms (role of F, role of M, formula) whose sum it acts along."""
         return ()
+
+    def on_points(self) -> bool:
+        """Its terms say."""
+        return all(set("FM") <= set(KINDS[formula.kind].points) for _, _, formula in self.path())
 
 
 @dataclass(frozen=True)

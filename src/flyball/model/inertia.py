@@ -43,8 +43,12 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
         If mass or inertia is missing, given in two ways, negative, not symmetric, or breaks the triangle inequality
         by more than 1e-9 of its size; if a shape makes no sense.
     """
-    if n.mass is not None and not n.mass.real > 0.0:
-        why = "For a massless link use Distance" if n.mass == 0.0 else "Check its sign and unit"
+    if n.mass is not None and not n.mass.real > 0.0 and not _nothing(n):
+        why = (
+            "A ring or link without mass, which joints hold, has inertia=0 too; a massless link is also a Distance"
+            if n.mass == 0.0
+            else "Check its sign and unit"
+        )
         raise ModelError(f"{body.title}: mass is {n.mass:g} kg; a mass must be greater than 0. {why}")
     positive(body, n, "density")
     shapes = checked(body, env, planar)
@@ -58,6 +62,16 @@ def mass_properties(body: Body, n: SimpleNamespace, env: Any, planar: bool) -> M
     elif not found.inertia[2, 2].real >= 0.0:
         raise ModelError(f"{body.title}: inertia is {found.inertia[2, 2]:g} kg m^2; it must be zero or greater")
     return found
+
+
+def _nothing(n: SimpleNamespace) -> bool:
+    """Whether a body has neither mass nor inertia: a part that only joins others."""
+    return (
+        n.mass == 0.0
+        and n.inertia is not None
+        and n.inertia_about is None
+        and not np.any(np.asarray(n.inertia, object) != 0)
+    )
 
 
 def principal(J: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
+from functools import cache
 from types import SimpleNamespace
 from typing import ClassVar
 
@@ -89,18 +90,11 @@ class Joint(Element):
 
     def rows(self, planar: bool) -> list[Row]:
         """The rows that count: in the plane, those that speak of the normal are fulfilled anyway."""
-        if not planar:
-            return list(self.blocks)
-        return [r for r in self.blocks if ("z" if r.world else self.planar_normal) not in r.axes]
+        return list(_rows(type(self), planar))  # type: ignore[arg-type]
 
     def primitives(self, planar: bool) -> tuple[Primitive, ...]:
         """Its chain as a tree joint: in the plane, what leaves it falls away."""
-        chain = FLOATING if self.chain is None else self.chain
-        if not planar:
-            return chain
-        normal = self.planar_normal
-        flat = (Primitive("R", normal, p.coordinate) if p.kind == "S" else p for p in chain)
-        return tuple(p for p in flat if (p.kind == "R") == (p.axis == normal))
+        return _primitives(type(self), planar)  # type: ignore[arg-type]
 
     def loose(self, planar: bool) -> list[Row]:
         """The rows that remain where it is a tree joint."""
@@ -153,3 +147,22 @@ class Joint(Element):
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
         """Splines that its rows read, as flat lists of numbers (see ``math.spline``)."""
         return ()
+
+
+@cache
+def _rows(kind: type[Joint], planar: bool) -> tuple[Row, ...]:
+    """The rows that count; of all joints of a kind the same."""
+    if not planar:
+        return kind.blocks
+    return tuple(r for r in kind.blocks if ("z" if r.world else kind.planar_normal) not in r.axes)
+
+
+@cache
+def _primitives(kind: type[Joint], planar: bool) -> tuple[Primitive, ...]:
+    """The chain as a tree joint; of all joints of a kind the same."""
+    chain = FLOATING if kind.chain is None else kind.chain
+    if not planar:
+        return chain
+    normal = kind.planar_normal
+    flat = (Primitive("R", normal, p.coordinate) if p.kind == "S" else p for p in chain)
+    return tuple(p for p in flat if (p.kind == "R") == (p.axis == normal))

@@ -18,13 +18,14 @@ from ..model.geometry import matrix_to_quaternion
 from .afresh import Afresh
 from .forest import TreeJoint
 from .specs import FrameSpec
-from .system import Q0, V0
+from .system import NQ, NV, POINT, Q0, TREE, V0
 
 if TYPE_CHECKING:
     from .values import Values
 
 AXES = {"x": np.array([1.0, 0.0, 0.0]), "y": np.array([0.0, 1.0, 0.0]), "z": np.array([0.0, 0.0, 1.0])}
 
+MANY = 30  # joints of one coordinate from which on they are read all at once
 NEXT = {"x": "y", "y": "z", "z": "x"}
 
 
@@ -59,13 +60,20 @@ def positions(
     s = x.structure
     q = new.state("q", s.nq, x.system.body_x.dtype)
     hung = {t.child: t for t in s.tree_joints.values()}
+    single = {b: t for b, t in hung.items() if len(t.primitives) == 1 and t.primitives[0].kind in "RP"}
+    if len(single) < MANY:
+        single = {}
+    _read_single(x, [t for t in single.values() if new.asks(t.joint)], bodies, hints or {}, q)
     for name, b in s.place.items():
         if b in hung:
-            if new.asks(hung[b].joint):
+            if b not in single and new.asks(hung[b].joint):
                 _read(x, hung[b], bodies, hints or {}, q)
         elif b >= 0 and new.asks(s.model[name]):
             d, q0 = bodies[name], s.tables["body_i"][b, Q0]
-            if s.model.planar:
+            if s.tables["body_i"][b, TREE] == POINT:
+                n = s.tables["body_i"][b, NQ]
+                q[q0 : q0 + n] = d.p[:n]
+            elif s.model.planar:
                 q[q0 : q0 + 3] = d.p[0], d.p[1], d.angle
             else:
                 q[q0 : q0 + 7] = np.r_[d.p, matrix_to_quaternion(d.R)]
@@ -73,18 +81,49 @@ def positions(
 
 
 def free_velocities(x: Values, bodies: Mapping[str, BodyState], new: Afresh = ALL) -> np.ndarray:
-    """Velocities (nv,) of the bodies that hang on ground by FREE or PLANAR; zero along all tree joints."""
+    """Velocities (nv,) of the bodies that hang on ground by FREE, PLANAR or POINT; zero along all tree joints."""
     s, body_i = x.structure, x.structure.tables["body_i"]
     v = new.state("v", s.nv, x.system.body_x.dtype)
     hung = {t.child for t in s.tree_joints.values()}
     for name, b in s.place.items():
         if b >= 0 and b not in hung and new.asks(s.model[name]):
             d, v0 = bodies[name], body_i[b, V0]
-            if s.model.planar:
+            if body_i[b, TREE] == POINT:
+                n = body_i[b, NV]
+                v[v0 : v0 + n] = d.v[:n]
+            elif s.model.planar:
                 v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
             else:
                 v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
     return v
+
+
+def _read_single(
+    x: Values, joints: list[TreeJoint], bodies: Mapping[str, BodyState], hints: Mapping[str, Any], q: np.ndarray
+) -> None:
+    """The same as `_read` for hinges and slides, all at once."""
+    if not joints:
+        return
+    at = x.structure.tables["body_i"][[t.child for t in joints], Q0]
+    frames = []
+    for k, role in enumerate("FM"):
+        own = np.array([x.poses.row(FrameSpec(0, t.joint, role)) for t in joints])
+        carriers = [bodies.get(_ends(x, t)[k], REST) for t in joints]
+        p, R = np.array([d.p for d in carriers]), np.array([d.R for d in carriers])
+        frames.append((p + (R @ own[:, :3, None])[..., 0], R @ own[:, 3:].reshape(-1, 3, 3)))
+    (pF, RF), (pM, RM) = frames
+    back = RF.swapaxes(1, 2)
+    rest = np.array([t.joint.rest or np.eye(3) for t in joints])
+    shift, turn = (back @ (pM - pF)[..., None])[..., 0], back @ RM @ rest.swapaxes(1, 2)
+    for name, i in (("x", 0), ("y", 1), ("z", 2)):
+        of = np.array([t.primitives[0].axis == name for t in joints])
+        slides = of & np.array([t.primitives[0].kind == "P" for t in joints])
+        q[at[slides]] = shift[slides, i]
+        j, k = (i + 1) % 3, (i + 2) % 3
+        for n in np.flatnonzero(of & ~slides):
+            t = joints[n]
+            angle = atan2(turn[n, k, j], turn[n, j, j])
+            q[at[n]] = _with_turns(x, t, t.primitives[0].coordinate, angle, bodies, hints)
 
 
 def _ends(x: Values, t: TreeJoint) -> tuple[str, str]:
@@ -149,7 +188,7 @@ def _with_turns(
         drawn = [x.bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
         now_by, drawn_by = (sign * (a[1] - a[0]) for a in (now, drawn))
         F, M = (x.poses.world(FrameSpec(0, t.joint, role))[1] for role in "FM")
-        at = _planar_angle(F.T @ M, t)
+        at = 0.0 if F is M else _planar_angle(F.T @ M, t)
         near = at + now_by - drawn_by
     else:
         return angle

@@ -6,10 +6,14 @@ which of two forms of one mechanism is faster, not how long a motion will take.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..model.model import Model
+from .forest import body_table
 from .specs import Structure
-from .system import ARTICULATED, PLANAR, SCHUR, SOLVER, TREE
+from .system import ARTICULATED, NV, PARENT, POINT, SCHUR, SOLVER, TREE
 
 BODY, LINK, TERM, ENTRY, ARTICULATE = 315.0, 112.0, 40.0, 28.0, 12.0
 FACTOR = 1.0  # a product of the factorisation: seen only where a forest's matrix is dense and large
@@ -20,7 +24,7 @@ def counts(s: Structure) -> dict[str, float]:
     t = s.tables
     body_i, solver = t["body_i"], t["kinds"][SOLVER]
     column = np.diff(s.ldl.Lp).astype(float)
-    free = body_i[:, TREE] <= PLANAR
+    free = body_i[:, TREE] <= POINT
     return {
         "constant": 1.0,
         "bodies": float(free.sum()),
@@ -49,3 +53,22 @@ def estimate(n: dict[str, float]) -> float:
         + FACTOR * n["factor"]
         + ARTICULATE * n["articulated"]
     )
+
+
+def least(model: Model, tree: Sequence[str]) -> float:
+    """What a right-hand side costs at least [ns] in a forest of these tree joints: links, and M and its factor.
+
+    For each velocity M has those of all that its body hangs on: deep trees with many loops are seen from here, without
+    their tables.
+    """
+    s = Structure(model, False, tuple(tree))
+    body_table(s)
+    body_i = s.tables["body_i"]
+    if len(tree) == len(model.joints):
+        return 0.0
+    above = [0] * (len(body_i) + 1)  # the last one: of ground
+    entries = 0
+    for b, (parent, n) in enumerate(body_i[:, [PARENT, NV]].tolist()):
+        above[b] = above[parent] + n
+        entries += n * above[parent] + n * (n + 1) // 2
+    return LINK * float((body_i[:, TREE] > POINT).sum()) + ENTRY * float(2 * entries - body_i[:, NV].sum())

@@ -1,6 +1,7 @@
 """The forest: which body hangs on which, by which chain of tree joints; the body table.
 
-Bodies that no tree joint reaches from ground hang there by FREE or PLANAR, one for each part that is connected.
+Bodies that no tree joint reaches from ground hang there by FREE or PLANAR, one for each part that is connected, and
+point masses by POINT, each of its own.
 """
 
 from __future__ import annotations
@@ -15,7 +16,8 @@ from ..errors import ModelError
 from ..model.body import GROUND
 from ..model.joint import Joint, Primitive
 from ..model.model import Model
-from .system import FREE, PLANAR, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD
+from .points import points
+from .system import FREE, NQ, NV, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD
 
 if TYPE_CHECKING:
     from .specs import Structure
@@ -123,11 +125,12 @@ def body_table(s: Structure) -> None:
     """Decide rows of bodies and massless links, their coordinates and velocities."""
     model = s.model
     plain = PLANAR if model.planar else FREE
+    s.points = frozenset(name for name, why in points(model).items() if not why)
     rows: list[tuple[int, int]] = []  # parent, kind
     place = {GROUND: -1}
     for h in hung(model, s.tree) if s.tree else [Hung(b.name) for b in model.bodies]:
         if h.joint is None:
-            rows.append((-1, plain))
+            rows.append((-1, POINT if h.body in s.points else plain))
         else:
             steps = h.joint.primitives(model.planar)
             steps = steps[::-1] if h.reversed else steps
@@ -141,11 +144,13 @@ def body_table(s: Structure) -> None:
     s.place = place
     kinds = np.array([kind for _, kind in rows])
     nq, nv = np.array(TREE_NQ)[kinds], np.array(TREE_NV)[kinds]
+    if model.planar:
+        nq[kinds == POINT] = nv[kinds == POINT] = 2
     body_i = np.full((len(rows), 8), -1, np.int64)
     body_i[:, 0] = [parent for parent, _ in rows]
     body_i[:, 1] = kinds
     body_i[:, 2], body_i[:, 3] = np.cumsum(nq) - nq, np.cumsum(nv) - nv
-    body_i[:, 4], body_i[:, 5] = nq, nv
+    body_i[:, NQ], body_i[:, NV] = nq, nv
     s.tables["body_i"] = body_i
 
 

@@ -1,4 +1,7 @@
-"""Inverse of a body's inertia; where a principal inertia is none, of the inertia with a stand-in for it."""
+"""Inverse of a body's inertia; where a principal inertia is none, of the inertia with a stand-in for it.
+
+A body without mass has a stand-in for that too, a part of what the others weigh.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,12 @@ import numpy as np
 
 THIN = 1e-9  # principal inertias below this part of the body's size count as none
 STAND_IN = 1e-6  # what is put in their place while factoring
+
+
+def usual_mass(masses: list[Any]) -> Any:
+    """What a body weighs as a rule: the mean of those that weigh anything; 1 kg where none does."""
+    heavy = [m for m in masses if m.real > 0.0]
+    return sum(heavy) / len(heavy) if heavy else 1.0
 
 
 def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from .forest import steps
 from .specs import Structure
-from .system import NV, V0
+from .system import NV, POINT, TREE, V0
 
 AXES = ("x", "y", "z")
 
@@ -23,8 +23,8 @@ def velocity_names(s: Structure) -> list[Named]:
     """What each velocity is the rate of, (nv,).
 
     Bodies that hang on ground freely: ``x``, ``y``, ``z`` of the centre of mass along the world's axes; ``angle`` in
-    the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes. Tree joints: the joint's
-    coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
+    the plane, in space ``turn x``, ``turn y``, ``turn z`` about the body's own axes, which point masses do not
+    have. Tree joints: the joint's coordinates; what has no name of its own is a ``turn`` or ``shift`` along an axis.
     """
     body_i = s.tables["body_i"]
     out = [Named("", "m")] * s.nv
@@ -39,7 +39,7 @@ def velocity_names(s: Structure) -> list[Named]:
             out[v0 + k] = Named(f"{t.joint.name}.{what}", unit, c.sign if c is not None else 1.0)
     own = ["x", "y", "angle"] if s.model.planar else [*AXES, *(f"turn {a}" for a in AXES)]
     for name, b in s.place.items():
-        if b >= 0 and b not in hung and int(body_i[b, NV]) == len(own):
-            for k, what in enumerate(own):
+        if b >= 0 and b not in hung and int(body_i[b, TREE]) <= POINT:
+            for k, what in enumerate(own[: int(body_i[b, NV])]):
                 out[int(body_i[b, V0]) + k] = Named(f"{name}.{what}", "m" if what in AXES else "rad")
     return out

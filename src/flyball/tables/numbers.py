@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Hashable, Iterator, Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -34,6 +34,8 @@ class Numbers:
     placed: dict[str, Any]  # element -> its frames in the world as drawn, found when asked for
     since: Kept  # stands for the numbers that were found first
     changed: frozenset[str] = frozenset()  # elements whose numbers are not those
+    world: dict[Hashable, Any] = field(default_factory=dict)  # the same of one frame, with its carrier
+    local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
 
     @property
     def complex(self) -> bool:
@@ -68,7 +70,10 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     first: Numbers | None = model.kept.known("first numbers")
     if first is None or first.key[1] != key[1]:  # type: ignore[index]
         new = _all(model, env, key)
-        return new if new.complex else model.kept.get("first numbers", None, 1, lambda: new)
+        if new.complex:
+            return new
+        model.kept.drop("first numbers", None)  # of files as they were
+        return model.kept.get("first numbers", None, 1, lambda: new)
     named = model.kept.get("named", None, 1, lambda: _named(model))
     other = {k for k, x in env.items() if not _same(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
@@ -120,10 +125,11 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
     R = b.rotation(n)
     p = vector(n.position, planar, b.name)
     w = np.zeros(3)
+    arm = R @ m.com
+    v = np.zeros(3) if n.velocity is None else vector(n.velocity, planar, b.name)
     if n.angular_velocity is not None:
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
-    arm = R @ m.com
-    v = np.cross(w, arm) if n.velocity is None else vector(n.velocity, planar, b.name) + np.cross(w, arm)
+        v = v + np.cross(w, arm)
     return SimpleNamespace(
         p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
     )

@@ -7,22 +7,22 @@ import numpy as np
 from ..errors import ModelError
 from ..numerics.ldl import analyse
 from .specs import Structure, ints
-from .system import BODY_LAW, COUPLED, SCHUR, SOLVER
+from .system import BODY_LAW, COUPLED, NV, SCHUR, SOLVER, V0
 
 
 def patterns(s: Structure, solved: bool = True) -> None:
     """Entries of G, of the matrix that is factored (if something is ``solved``), and who adds to them."""
     body_i = s.tables["body_i"]
-    chains = _chains(body_i)
-    touched = _touched(s, chains)
+    parents = body_i[:, 0].tolist()
+    ways = [apart(parents, s.frames[t.F].body, s.frames[t.M].body) for t in s.terms]
+    touched = _touched(s, ways)
     at, row_p, col_i, block_i = _entries(body_i, touched, len(s.rows))
     term_i: list[tuple] = []
     seg_i: list[tuple] = []
-    for t in s.terms:
-        on_F, on_M = chains[s.frames[t.F].body], chains[s.frames[t.M].body]
+    for t, (on_F, on_M) in zip(s.terms, ways, strict=True):
         first = len(seg_i)
-        seg_i += [(b, 1, at[t.row, b]) for b in sorted(on_M - on_F)]
-        seg_i += [(b, -1, at[t.row, b]) for b in sorted(on_F - on_M)]
+        seg_i += [(b, 1, at[t.row, b]) for b in on_M]
+        seg_i += [(b, -1, at[t.row, b]) for b in on_F]
         term_i.append((t.row, t.F, t.M, first, len(seg_i), t.hint))
     mix_i = [
         (k, m, at[k, b], at[len(s.rows) + m, b], body_i[b, 5])
@@ -46,17 +46,16 @@ def patterns(s: Structure, solved: bool = True) -> None:
     elif solver == SCHUR:
         _schur(s)
     elif solver == COUPLED:
-        _coupled(s, chains)
+        _coupled(s, parents)
     else:
         _nothing(s)
 
 
-def _touched(s: Structure, chains: dict[int, frozenset[int]]) -> list[set[int]]:
+def _touched(s: Structure, ways: list[tuple[list[int], list[int]]]) -> list[set[int]]:
     """Bodies that each row, then each measured quantity, depends on."""
     touched: list[set[int]] = [set() for _ in range(len(s.rows) + len(s.measured))]
-    for t in s.terms:
-        F, M = s.frames[t.F].body, s.frames[t.M].body
-        touched[t.row] |= chains[F] ^ chains[M]
+    for t, (on_F, on_M) in zip(s.terms, ways, strict=True):
+        touched[t.row].update(on_F, on_M)
     for k, r in enumerate(s.rows):
         for m in r.sensors:
             touched[k] |= touched[len(s.rows) + m]
@@ -82,44 +81,54 @@ def _entries(
     return at, row_p, col_i, block_i
 
 
-def _chains(body_i: np.ndarray) -> dict[int, frozenset[int]]:
-    """Each body and all it hangs on."""
-    chains: dict[int, frozenset[int]] = {-1: frozenset()}
-    for b, parent in enumerate(body_i[:, 0].tolist()):
-        chains[b] = chains[parent] | {b}
-    return chains
+def apart(parents: list[int], F: int, M: int) -> tuple[list[int], list[int]]:
+    """Bodies that one of two hangs on and the other does not, themselves included, parents first: of F, of M."""
+    on_F: list[int] = []
+    on_M: list[int] = []
+    while F != M:  # parents have smaller numbers
+        if F > M:
+            on_F.append(F)
+            F = parents[F]
+        else:
+            on_M.append(M)
+            M = parents[M]
+    return on_F[::-1], on_M[::-1]
 
 
 def _schur(s: Structure) -> None:
     """S = G M^-1 G^T: for each body, every pair of its rows."""
     body_i = s.tables["body_i"]
-    of_body: dict[int, list[tuple[int, int]]] = {}
-    for b, at, row in s.tables["block_i"].tolist():
-        of_body.setdefault(b, []).append((row, at))
-    pairs = [
-        (i, j, int(body_i[b, 5]), at, to)
-        for b, blocks in of_body.items()
-        for k, (i, at) in enumerate(blocks)
-        for j, to in blocks[: k + 1]
-    ]
-    table = ints(pairs, 5)
-    s.ldl, place = analyse(len(s.rows), table[:, 0], table[:, 1])
-    table = np.column_stack([table[:, 3], table[:, 4], table[:, 2], place[: len(table)]])
+    block_i = s.tables["block_i"]
+    block_i = block_i[np.argsort(block_i[:, 0], kind="stable")]
+    first, count = np.unique(block_i[:, 0], return_index=True, return_counts=True)[1:]
+    one, other = [np.zeros(0, np.int64)], [np.zeros(0, np.int64)]
+    for n in np.unique(count).tolist():  # bodies with as many rows have the same pairs
+        i, j = np.tril_indices(n)
+        starts = first[count == n, None]
+        one.append((starts + i).ravel())
+        other.append((starts + j).ravel())
+    a, b = block_i[np.concatenate(one)], block_i[np.concatenate(other)]
+    s.ldl, place = analyse(len(s.rows), a[:, 2], b[:, 2])
+    table = np.column_stack([a[:, 1], b[:, 1], body_i[a[:, 0], NV], place[: len(a)]])
+    table = table[np.argsort(a[:, 0], kind="stable")]
     s.tables["pair_i"] = np.ascontiguousarray(table[np.argsort(table[:, 3], kind="stable")])
     s.tables["mass_i"] = np.zeros((0, 3), np.int64)
 
 
-def _coupled(s: Structure, chains: dict[int, frozenset[int]]) -> None:
+def _coupled(s: Structure, parents: list[int]) -> None:
     """[M G^T; G -delta]: entries of M in the order in which ``mass_entries`` makes them, then those of G.
 
     What couples a prescribed velocity to others goes to an entry behind the matrix that nobody reads: it is no unknown.
     """
     body_i = s.tables["body_i"]
+    own = [range(v0, v0 + n) for v0, n in zip(body_i[:, V0].tolist(), body_i[:, NV].tolist(), strict=True)]
     entries = []
     for b in range(len(body_i)):
-        for k in range(body_i[b, 3], body_i[b, 3] + body_i[b, 5]):
-            for a in sorted(chains[b], reverse=True):
-                entries += [(k, i) for i in range(body_i[a, 3], body_i[a, 3] + body_i[a, 5]) if i <= k]
+        for k in own[b]:
+            a = b
+            while a >= 0:
+                entries += [(k, i) for i in own[a] if i <= k]
+                a = parents[a]
     row_p, nv = s.tables["row_p"][: len(s.rows) + 1], s.nv
     col_i = s.tables["col_i"][: row_p[-1]]
     rows = np.repeat(np.arange(len(s.rows)), np.diff(row_p)) + nv

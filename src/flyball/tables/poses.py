@@ -23,20 +23,35 @@ class Poses:
     def __init__(self, s: Structure, given: Numbers) -> None:
         self.s, self.numbers, self.bodies = s, given.of, given.bodies
         self.model = s.model
-        self._found = given.placed
+        self._given = given
+
+    def row(self, f: FrameSpec) -> np.ndarray:
+        """Position (3) from the body's centre of mass and rotation (9), in body axes."""
+        key = (f.element.name, f.role, f.coordinate) if f.element is not None else ()
+        found = self._given.local.get(key)
+        if found is None:
+            p, R, name = self.world(f)
+            b = self.bodies[name]
+            back = b.R.T
+            found = self._given.local[key] = np.concatenate((back @ (p - b.c), (back @ R).ravel()))
+        return found
 
     def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
         """Position from the body's centre of mass and rotation, in body axes."""
-        if f.element is None:
-            return np.zeros(3), np.eye(3)
-        p, R, name = self.world(f)
-        b = self.bodies[name]
-        return b.R.T @ (p - b.c), b.R.T @ R
+        row = self.row(f)
+        return row[:3], row[3:].reshape(3, 3)
 
     def world(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         """Position, rotation and carrier of a frame in the drawn configuration."""
         if f.element is None:
             return np.zeros(3), np.eye(3), GROUND
+        key = f.element.name, f.role, f.coordinate
+        found = self._given.world.get(key)
+        if found is None:
+            found = self._given.world[key] = self._drawn(f)
+        return found
+
+    def _drawn(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray, str]:
         e = f.element
         n = self.numbers[e.name]
         end = e.ends()[f.role]
@@ -53,9 +68,10 @@ class Poses:
         return p, R, name
 
     def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        if e.name not in self._found:
-            self._found[e.name] = e.placed(n, self.model.planar)
-        return self._found[e.name]
+        found = self._given.placed.get(e.name)
+        if found is None:
+            found = self._given.placed[e.name] = e.placed(n, self.model.planar)
+        return found
 
     def named(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Drawn pose of a body's reference frame or of a named frame."""

@@ -13,6 +13,7 @@ from ..model.body import GROUND
 from ..model.joint import Joint
 from ..model.model import Model
 from .forest import ends
+from .points import points
 
 MOST = 8  # choices that are kept of a mechanism
 
@@ -23,13 +24,16 @@ def saved(joint: Joint, planar: bool) -> int:
 
 
 def candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
-    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows."""
+    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows, and those of
+    point masses, which turn with nothing.
+    """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
+    single = {name for name, why in points(model).items() if not why}
     out = {}
     for joint in model.joints:
         worth = saved(joint, model.planar)
         a, b = ends(model, joint)
-        if worth > 0 and a != b and joint.name not in needed and joint.name not in avoided:
+        if worth > 0 and a != b and not {a, b} & single and joint.name not in needed and joint.name not in avoided:
             out[joint.name] = worth
     return out
 

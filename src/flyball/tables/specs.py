@@ -70,6 +70,7 @@ class Structure:
     coupled: bool = False  # the coupled matrix in absolute coordinates too
     place: dict[str, int] = field(default_factory=dict)  # body name -> row of the body table
     tree_joints: dict[str, TreeJoint] = field(default_factory=dict)
+    points: frozenset[str] = frozenset()  # bodies that are point masses
     prescribed: dict[str, int] = field(default_factory=dict)  # driver -> row of the body table it prescribes
     frames: list[FrameSpec] = field(default_factory=list)
     frame_at: dict[tuple[str, str, str], int] = field(default_factory=dict)  # (element, role, coordinate) -> frame

@@ -16,13 +16,15 @@ from ..numerics.ldl import Pattern
 # columns of System.body_i
 # (law and work state: of the driver that prescribes the body's one coordinate, or -1)
 PARENT, TREE, Q0, V0, NQ, NV, BODY_LAW, BODY_WORK = range(8)
-# kinds of tree joints, and how many coordinates and velocities each has
-FREE, PLANAR, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(6)
-TREE_NQ, TREE_NV = (7, 3, 1, 1, 4, 0), (6, 3, 1, 1, 3, 0)
+# kinds of tree joints, and how many coordinates and velocities each has (POINT in the plane: 2)
+FREE, PLANAR, POINT, REVOLUTE, PRISMATIC, SPHERICAL, WELD = range(7)
+TREE_NQ, TREE_NV = (7, 3, 3, 1, 1, 4, 0), (6, 3, 3, 1, 1, 3, 0)
 # columns of System.body_x
 MASS, INERTIA, INVERSE, EXCESS, TREE_P, TREE_R, BODY_P, BODY_R = 0, 1, 10, 19, 28, 31, 40, 43
 # (whether TREE_R and BODY_R differ from the identity: what does not need not be multiplied)
-PER_MASS, PER_COMPACT, OFFSET, TREE_TURNS, BODY_TURNS, BODY_WIDTH = 52, 53, 54, 55, 56, 57
+PER_MASS, PER_COMPACT, OFFSET, TREE_TURNS, BODY_TURNS = 52, 53, 54, 55, 56
+# (what was added to a mass that is none, and the inverse of what its body would weigh if it were like the others)
+EXCESS_MASS, PER_BULK, BODY_WIDTH = 57, 58, 59
 # columns of System.term_i
 TERM_ROW, TERM_F, TERM_M, TERM_SEG, TERM_SEG_END, TERM_HINT = range(6)
 # columns of System.row_i
@@ -59,7 +61,7 @@ class System(NamedTuple):
     """A mechanism in arrays. Nothing in it changes during an analysis."""
 
     body_i: np.ndarray  # (nb, 8): parent, tree joint kind, first q, first v, number of q, of v, law, its work
-    body_x: np.ndarray  # (nb, 57): mass properties, their inverses and stand-ins; frames of tree joints, their offset
+    body_x: np.ndarray  # (nb, 59): mass properties, their inverses and stand-ins; frames of tree joints, their offset
     frame_i: np.ndarray  # (nf,): body; frames on ground (-1) come first
     frame_x: np.ndarray  # (nf, 12): position from the body's centre of mass and rotation, in body axes
     term_i: np.ndarray  # (nt, 6): row (measured quantities after the rows), frame F, M, segments, state it leans on

@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
-from ..math.scalar import absolute, maximum
 from ..model.body import GROUND
 from ..model.coupling import Coupling
 from ..model.force import TwoPointForce
@@ -23,34 +22,16 @@ from ..model.joint import Joint
 from ..model.kept import Kept, bits
 from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
-from .inertia import inverse_inertia
+from .hinges import tree_frames
+from .masses import mass_table
 from .numbers import Numbers, numbers
+from .points import check_centred
 from .poses import Poses
-from .specs import FrameSpec, Structure, TermSpec
-from .system import (
-    BODY_P,
-    BODY_R,
-    BODY_TURNS,
-    BODY_WIDTH,
-    EXCESS,
-    INERTIA,
-    INVERSE,
-    MASS,
-    OFFSET,
-    PER_COMPACT,
-    PER_MASS,
-    REVOLUTE,
-    TREE,
-    TREE_P,
-    TREE_R,
-    TREE_TURNS,
-    System,
-)
+from .specs import Structure, TermSpec
+from .system import EXCESS, EXCESS_MASS, System
 
 MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
-TO_AXIS = {"x": np.roll(np.eye(3), 2, axis=1), "y": np.roll(np.eye(3), 1, axis=1), "z": np.eye(3)}  # z goes there
-BACK = np.diag([1.0, -1.0, -1.0])  # turns an axis round
 
 
 @dataclass
@@ -124,12 +105,13 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     pose = Poses(s, given)
     frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
     length = _length(s, frame_x, bodies)
-    body_x = _body_x(s, bodies, frame_x, length, new)
-    _tree_frames(s, pose, numbers, body_x, new)
+    _check_points(s, frame_x, length, new)
+    body_x = mass_table(s, bodies, frame_x, length, new)
+    tree_frames(s, pose, numbers, body_x, new)
     const, curve_at = _constants(s, numbers, env, dtype)
     term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
-    semidefinite = 1.0 if body_x[:, EXCESS : EXCESS + 9].any() else 0.0
+    semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
     system = System(
@@ -146,9 +128,16 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
 def _frame_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarray:
     for k, f in enumerate(s.frames):
         if new.asks(f.element):
-            p, R = pose.local(f)
-            x[k, :3], x[k, 3:] = p, R.ravel()
+            x[k] = pose.row(f)
     return x
+
+
+def _check_points(s: Structure, frame_x: np.ndarray, length: Any, new: Afresh) -> None:
+    """Refuse ends that miss the centre of a point mass with these numbers."""
+    single = {s.place[name]: name for name in s.points}
+    for f, way in zip(s.frames, frame_x[:, :3], strict=True) if single else ():
+        if f.body in single and new.asks(f.element):
+            check_centred(s.model, single[f.body], f.element, way, length)
 
 
 def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
@@ -158,78 +147,6 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     longest = ways[np.argmax((ways.real**2).sum(axis=1))]
     length = np.sqrt((longest**2).sum())
     return length if length.real > 0.0 else 1.0
-
-
-def _reach(ways: np.ndarray) -> Any:
-    """The largest component of some ways, taken positive."""
-    flat = ways.ravel()
-    return absolute(flat[np.argmax(np.abs(flat.real))]) if len(flat) else 0.0
-
-
-def _body_x(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any, new: Afresh) -> np.ndarray:
-    """Mass, inertia, its inverse; where a principal inertia is none, a stand-in that the solve takes out again."""
-    body_x = new.table("body_x", (len(s.tables["body_i"]), BODY_WIDTH), frame_x.dtype)
-    moved = {f.body for f in s.frames if new.asks(f.element)}
-    rescaled = new.base is None or new.base.system.glob[-1] != length
-    for name, b in s.place.items():
-        if b < 0 or not (rescaled or b in moved or new.asks(s.model[name])):
-            continue
-        reach = _reach(frame_x[s.tables["frame_i"] == b, :3])
-        d = bodies[name]
-        J = np.diag([0.0, 0.0, d.inertia[2, 2]]) if s.model.planar else d.inertia
-        size = maximum(d.inertia[2, 2] if s.model.planar else np.trace(d.inertia) / 2, d.mass * reach**2)
-        size = size if size.real > 0.0 else d.mass * length**2
-        inverse, more = inverse_inertia(J, size, s.model.planar)
-        body_x[b, MASS] = d.mass
-        body_x[b, PER_MASS], body_x[b, PER_COMPACT] = 1.0 / d.mass, 1.0 / size
-        for at, A in ((INERTIA, J), (INVERSE, inverse), (EXCESS, more)):
-            body_x[b, at : at + 9] = A.ravel()
-    return body_x
-
-
-def _tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray, new: Afresh) -> None:
-    """Frames of the tree joints, each with z along its own axis: on what comes before, and seen from what comes after.
-
-    A chain leads from F to M; where the body beyond carries F it is gone back, every step about the axis turned round.
-    """
-    for t in s.tree_joints.values():
-        joint = t.joint
-        if not new.asks(joint):
-            continue
-        rest = np.array(joint.rest or np.eye(3))
-        (pF, RF), (pM, RM) = (pose.local(FrameSpec(0, joint, role)) for role in "FM")
-        start, end = (pF, RF), (-rest @ RM.T @ pM, rest @ RM.T)
-        if t.reversed:
-            start, end = (pM, RM @ rest.T), (-RF.T @ pF, RF.T)
-        turns = [TO_AXIS[p.axis] @ (BACK if t.reversed and p.kind != "S" else np.eye(3)) for p in t.primitives] or [
-            np.eye(3)
-        ]
-        for k, (link, turn) in enumerate(zip(t.links, turns, strict=True)):
-            p, R = start if k == 0 else (np.zeros(3), np.eye(3))
-            body_x[link, TREE_P : TREE_P + 3], body_x[link, TREE_R : TREE_R + 9] = p, (R @ turn).ravel()
-            p, R = end if k == len(turns) - 1 else (np.zeros(3), np.eye(3))
-            body_x[link, BODY_P : BODY_P + 3], body_x[link, BODY_R : BODY_R + 9] = turn.T @ p, (turn.T @ R).ravel()
-        for link in t.links:
-            _leave_out(body_x[link], s.tables["body_i"][link, TREE])
-        for link, step in zip(t.links, t.primitives, strict=False):
-            if step.coordinate in joint.coordinates:
-                body_x[link, OFFSET] = joint.offset(numbers[joint.name], step.coordinate)
-
-
-def _leave_out(x: np.ndarray, kind: int) -> None:
-    """Note in a body's row which of its joint's constant rotations are none: they need not be multiplied.
-
-    One about the axis of a hinge may as well come after the hinge's own, and becomes one with what stands there.
-    """
-    tree, body = slice(TREE_R, TREE_R + 9), slice(BODY_R, BODY_R + 9)
-    T = x[tree].reshape(3, 3).copy()
-    if kind == REVOLUTE and T[2, 2] == 1.0 and not T[2, :2].any() and not T[:2, 2].any():
-        x[BODY_P : BODY_P + 3] = T @ x[BODY_P : BODY_P + 3]
-        x[body], x[tree] = (T @ x[body].reshape(3, 3)).ravel(), np.eye(3).ravel()
-    for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
-        if not x[rotation].imag.any() and np.abs(x[rotation] - np.eye(3).ravel()).max() < 1e-15:
-            x[rotation] = np.eye(3).ravel()
-        x[turns] = (x[rotation] != np.eye(3).ravel()).any()
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:

@@ -90,9 +90,9 @@ class Looks:
             self.points[body].append(p)
 
     def _mass(self, name: str) -> tuple[np.ndarray, np.ndarray, float]:
-        """Centre of mass, inertia and mass of a body."""
+        """Centre of mass, inertia and mass of a body; 1 kg where it has none, and so no inertia."""
         b = self.result.values.bodies[name]
-        return b.com.real, np.asarray(b.inertia).real, float(np.real(b.mass))
+        return b.com.real, np.asarray(b.inertia).real, float(np.real(b.mass)) or 1.0
 
     def _reach(self, name: str) -> float:
         """How long a body is, from the points that are known on it."""

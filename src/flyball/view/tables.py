@@ -87,7 +87,7 @@ def bodies(result: Result) -> Table:
         centres.append(centre)
         rows.append((e.name, fixed(b.mass), triple(b.com, p), ", ".join(map(fixed, moments)), triple(centre, p)))
     total = float(np.sum(masses))
-    middle = np.average(centres, axis=0, weights=masses) if rows else np.zeros(3)
+    middle = np.average(centres, axis=0, weights=masses if total > 0.0 else None) if rows else np.zeros(3)
     inertia = "inertia [kg m²]" if p else "principal inertias [kg m²]"
     columns = ("body", "mass [kg]", "centre of mass in body [m]", inertia, "centre of mass at start [m]")
     return Table("bodies", "Bodies", columns, tuple(rows), ("all", fixed(total), "", "", triple(middle, p)))

@@ -14,7 +14,7 @@ import numpy as np
 from ...math.vec import cross
 from ...model.geometry import quaternion_to_matrix, rotation_about
 from ...results.departure import Departure
-from ...tables.system import EXCESS, INERTIA, NV, Q0, V0
+from ...tables.system import EXCESS, INERTIA, NV, POINT, Q0, TREE, V0
 from ...tables.values import Values
 from ..compiled import Compiled
 
@@ -28,7 +28,8 @@ class Given:
 
     name: str
     at: int  # its first velocity
-    n: int  # how many it has
+    shifts: int  # how many of its velocities are translations
+    turns: int  # and how many are not
     origin: bool  # whether the velocity of its reference frame's origin is given
     turning: bool  # whether its angular velocity is
     as_drawn: bool
@@ -36,22 +37,28 @@ class Given:
     @property
     def whole(self) -> bool:
         """Whether nothing of it is free."""
-        return self.origin and self.turning
+        return self.origin and (self.turning or not self.turns)
 
     @property
-    def shifts(self) -> int:
-        """How many of its velocities are translations."""
-        return 2 if self.n == 3 else 3
+    def n(self) -> int:
+        """How many velocities it has."""
+        return self.shifts + self.turns
+
+    @property
+    def planar(self) -> bool:
+        """Whether it moves in the plane."""
+        return self.shifts == 2
 
 
 def given(x: Values) -> list[Given]:
     """Bodies that are told how they move; of a mechanism in absolute coordinates."""
     out = []
+    shifts = 2 if x.structure.model.planar else 3
     for b in x.structure.model.bodies:
         origin, turning = b.velocity is not None, b.angular_velocity is not None
         if origin or turning:
             row = x.system.body_i[x.structure.place[b.name]]
-            out.append(Given(b.name, int(row[V0]), int(row[NV]), origin, turning, b.as_drawn))
+            out.append(Given(b.name, int(row[V0]), shifts, int(row[NV]) - shifts, origin, turning, b.as_drawn))
     return out
 
 
@@ -69,9 +76,11 @@ def described(x: Values, q: np.ndarray) -> np.ndarray:
 def _own(x: Values, g: Given, q: np.ndarray) -> list[Any]:
     """Velocities of one body as described: the mass centre of one that is told its turn only rests."""
     d, R = x.bodies[g.name], _rotation(x, g.name, q)
+    if not g.turns:
+        return list(_origin(d)[: g.shifts])
     w = d.w if g.turning else R @ _blow(x, g, R.T @ _origin(d))
     u = _origin(d) + _cross(w, R @ d.com) if g.origin else np.zeros(3)
-    return [u[0], u[1], w[2]] if g.n == 3 else [*u, *(R.T @ w)]
+    return [u[0], u[1], w[2]] if g.planar else [*u, *(R.T @ w)]
 
 
 def _blow(x: Values, g: Given, u: np.ndarray) -> np.ndarray:
@@ -83,7 +92,7 @@ def _blow(x: Values, g: Given, u: np.ndarray) -> np.ndarray:
     J = (row[INERTIA : INERTIA + 9] + row[EXCESS : EXCESS + 9]).reshape(3, 3)
     about = J + d.mass * ((d.com @ d.com) * np.eye(3) - np.outer(d.com, d.com))
     moment = d.mass * _cross(u, d.com)
-    return np.array([0.0, 0.0, moment[2] / about[2, 2]]) if g.n == 3 else np.linalg.solve(about, moment)
+    return np.array([0.0, 0.0, moment[2] / about[2, 2]]) if g.planar else np.linalg.solve(about, moment)
 
 
 def _cross(a: Any, b: Any) -> np.ndarray:
@@ -98,7 +107,10 @@ def _origin(d: Any) -> np.ndarray:
 
 def _rotation(x: Values, name: str, q: np.ndarray) -> np.ndarray:
     """Rotation of a body at q; to the bit as it is drawn where it was not turned."""
-    at = int(x.system.body_i[x.structure.place[name], Q0])
+    row = x.system.body_i[x.structure.place[name]]
+    if row[TREE] == POINT:
+        return x.bodies[name].R
+    at = int(row[Q0])
     here = q[at + 2 : at + 3] if x.structure.model.planar else q[at + 3 : at + 7]
     drawn = x.q[at + 2 : at + 3] if x.structure.model.planar else x.q[at + 3 : at + 7]
     if np.array_equal(here, drawn):
@@ -116,10 +128,10 @@ def deviation(x: Values, g: Given, q: np.ndarray, v: np.ndarray) -> np.ndarray:
     if g.whole:
         return own - np.array(_own(x, g, q))
     if g.origin:
-        w = np.array([0.0, 0.0, own[2]]) if g.n == 3 else R @ own[3:]
-        moved = np.r_[own[:2], 0.0] if g.n == 3 else own[:3]
+        w = np.array([0.0, 0.0, own[2]]) if g.planar else R @ own[3:]
+        moved = np.r_[own[:2], 0.0] if g.planar else own[:3]
         return (moved - _cross(w, R @ d.com) - _origin(d))[: g.shifts]
-    return own[2:] - d.w[2:] if g.n == 3 else own[3:] - R.T @ d.w
+    return own[2:] - d.w[2:] if g.planar else own[3:] - R.T @ d.w
 
 
 def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
@@ -130,7 +142,7 @@ def gradient(x: Values, g: Given, q: np.ndarray) -> np.ndarray:
         return np.eye(g.n)[g.shifts :]
     d, R = x.bodies[g.name], _rotation(x, g.name, q)
     a = R @ d.com
-    if g.n == 3:
+    if g.planar:
         return np.array([[1.0, 0.0, a[1]], [0.0, 1.0, -a[0]]])
     return np.hstack([np.eye(3), np.array([_cross(a, k) for k in R.T]).T])
 
@@ -142,8 +154,8 @@ def not_kept(c: Compiled, q: np.ndarray, v: np.ndarray) -> list[Departure]:
     for g in told:
         d, R = x.bodies[g.name], _rotation(x, g.name, q)
         own = v[g.at : g.at + g.n]
-        planar = g.n == 3
-        w = np.array([0.0, 0.0, own[2]]) if planar else R @ own[3:]
+        planar = g.planar
+        w = np.zeros(3) if not g.turns else np.array([0.0, 0.0, own[2]]) if planar else R @ own[3:]
         u = (np.r_[own[:2], 0.0] if planar else own[:3]) - _cross(w, R @ d.com)
         pairs = [("velocity", _origin(d)[: g.shifts], u[: g.shifts], "m/s", 1.0)] if g.origin else []
         turns = slice(2, 3) if planar else slice(0, 3)

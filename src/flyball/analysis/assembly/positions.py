@@ -53,9 +53,9 @@ def inverse_weights(c: Compiled) -> np.ndarray:
     """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
     body_i = c.structure.tables["body_i"]
     w = np.ones(c.structure.nv)
+    shifts = 2 if c.structure.model.planar else 3
     for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True):
-        k = {3: 2, 6: 3}.get(int(n), 0)
-        w[v0 + k : v0 + n] = 1.0 / c.values.length**2
+        w[v0 + min(n, shifts) : v0 + n] = 1.0 / c.values.length**2
     return w * movable(c)
 
 

@@ -183,18 +183,17 @@ def _repositioned(c: Compiled, before: np.ndarray, after: np.ndarray, near: floa
             continue
         at, n = int(x.system.body_i[b, Q0]), int(x.system.body_i[b, NQ])
         was, now = before[at : at + n], after[at : at + n]
-        com = x.bodies[name].com
-        p, o = (_origin(z, com, k) for z in (was, now))
+        p, o = (_origin(z, x.bodies[name], k) for z in (was, now))
         what, unit = ("angle", "rad") if k == 2 else ("orientation", "1")
         turned = Departure(name, what, tuple(was[k:].tolist()), tuple(now[k:].tolist()), unit)
         if np.linalg.norm(o - p) > small:
             out.append(Departure(name, "position", tuple(p.tolist()), tuple(o.tolist()), "m"))
-        if turned.distance > 1e-12:
+        if n > k and turned.distance > 1e-12:
             out.append(turned)
     return out
 
 
-def _origin(q: np.ndarray, com: np.ndarray, k: int) -> np.ndarray:
-    """Origin of a body's reference frame from its coordinates."""
-    R = rotation_about(2, q[2]) if k == 2 else quaternion_to_matrix(q[3:7])
-    return q[:k] - (R @ com)[:k]
+def _origin(q: np.ndarray, drawn: Any, k: int) -> np.ndarray:
+    """Origin of a body's reference frame from its coordinates; a point mass stays turned as it is drawn."""
+    R = drawn.R if len(q) == k else rotation_about(2, q[2]) if k == 2 else quaternion_to_matrix(q[3:7])
+    return q[:k] - (R @ drawn.com)[:k]

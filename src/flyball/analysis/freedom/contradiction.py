@@ -20,7 +20,7 @@ from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .freedoms import free_motions
 from .geometry import positions_nearby
-from .jacobian import scaled_jacobian
+from .jacobian import DENSE, scaled_jacobian
 
 PART = 1e-6  # part of the largest share in a contradiction below which an element has none
 MOVES = 1e-6  # part of its own gradient by which what is free moves a coordinate, below which it does not
@@ -68,6 +68,8 @@ def story(c: Compiled, t: float, q: np.ndarray, v: np.ndarray, right: np.ndarray
     case = Case(c, t, q, v, right, per)
     c.at(t, q, v)
     G, size, _ = scaled_jacobian(c)
+    if max(G.shape) > DENSE:  # singular values would take minutes
+        return ""
     Y = parts(G.toarray()).dependencies
     over = Y @ (Y.T @ (right / np.maximum(size, 1e-300)))
     s = c.structure

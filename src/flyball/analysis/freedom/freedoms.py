@@ -9,7 +9,7 @@ import numpy as np
 from ...model.body import Body, Initial
 from ...model.joint import Joint
 from ...results.freedoms import FreeMotion
-from ...tables.system import NV, V0
+from ...tables.system import NV, POINT, TREE, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from .jacobian import lengths
@@ -120,6 +120,8 @@ def _spin(c: Compiled, b: int) -> np.ndarray:
     """Rows that give the angular velocity of a spatial body in world axes."""
     out = np.zeros((3, c.structure.nv))
     v0 = int(c.values.system.body_i[b, V0])
+    if c.values.system.body_i[b, TREE] == POINT:
+        return out
     out[:, v0 + 3 : v0 + 6] = c.work.BK[b, 3:12].reshape(3, 3)
     return out
 
@@ -138,7 +140,7 @@ def _motion(a: Assembly, velocity: np.ndarray, coordinate: str) -> FreeMotion:
     moving = tuple(name for name, x in fast.items() if x > STILL * largest)
     if coordinate:
         return FreeMotion(coordinate, coordinate, moving, velocity)
-    name = max(moving, key=fast.__getitem__)
+    name = max((n for n in moving if n not in s.points), key=fast.__getitem__)
     own = velocity[body_i[s.place[name], V0] :][: body_i[s.place[name], NV]]
     others = f"; {', '.join(n for n in moving if n != name)} with it" if len(moving) > 1 else ""
     return FreeMotion(f"{name} {_turning(a, name, own)}{others}", "", moving, velocity)

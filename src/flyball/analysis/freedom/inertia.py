@@ -9,8 +9,11 @@ import numpy as np
 from ...errors import ModelError
 from ...model.model import Model
 from ...numerics.sparse_rank import sparse_null_space
+from ...tables.points import points
 from ...tables.system import NV, V0
 from ..assembly.start import Assembly
+
+FEW = 1e-3  # part of a motion that is no turn
 
 
 def massless(a: Assembly, G: Any, scale: np.ndarray) -> np.ndarray:
@@ -41,9 +44,17 @@ def check_inertia(model: Model, a: Assembly, motions: np.ndarray) -> None:
     b = int(np.argmax(size))
     name = next(k for k, v in a.compiled.structure.place.items() if v == b)
     v0, n = int(body_i[b, V0]), int(body_i[b, NV])
-    turns = motion[v0 + (2 if n == 3 else 3) : v0 + n]
-    about = "turn" if n == 3 else f"turn about ({', '.join(f'{x:.3g}' for x in turns / np.linalg.norm(turns))})"
+    shifts = 2 if model.planar else 3
+    turns = motion[v0 + shifts : v0 + n]
+    if np.abs(turns).max(initial=0.0) < FEW * size[b]:
+        raise ModelError(
+            f"body {name!r} can move without any mass resisting it, so its motion is not determined. Give it a "
+            f"mass, or joints that make it move with bodies that have one"
+        )
+    about = "turn" if shifts == 2 else f"turn about ({', '.join(f'{x:.3g}' for x in turns / np.linalg.norm(turns))})"
+    why = points(model).get(name, "")
     raise ModelError(
         f"body {name!r} can {about} (its own axes) without any inertia resisting it, so its motion is not determined. "
         f"Give it a moment of inertia, or joints that prevent this motion"
+        + (f"; it is no point mass, which would not turn, since {why}" if why else "")
     )

@@ -7,7 +7,7 @@ import numpy as np
 from ...math.vec import mtv
 from ...model.geometry import matrix_to_quaternion
 from ...results.result import Result
-from ...tables.system import NV, Q0, V0
+from ...tables.system import NV, PLANAR, POINT, Q0, TREE, V0
 from ..compiled import Compiled
 
 
@@ -38,7 +38,10 @@ def _moved(result: Result, name: str, row: np.ndarray, q: np.ndarray, v: np.ndar
     b = result.values.structure.place[name]
     p, R, w, u, _, _ = result.records.body(b)
     q0, v0 = int(row[Q0]), int(row[V0])
-    if row[NV] == 3:
+    if row[TREE] == POINT:
+        n = int(row[NV])
+        q[:, q0 : q0 + n], v[:, v0 : v0 + n] = np.stack(p[:n], axis=1), np.stack(u[:n], axis=1)
+    elif row[TREE] == PLANAR:
         q[:, q0 : q0 + 3] = np.stack([p[0], p[1], result.records.angle(b)], axis=1)
         v[:, v0 : v0 + 3] = np.stack([u[0], u[1], w[2]], axis=1)
     else:

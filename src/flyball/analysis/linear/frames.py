@@ -88,7 +88,8 @@ def generator(x: State, turning: np.ndarray) -> np.ndarray:
     for b in range(len(S.body_i)):
         v0, n = int(S.body_i[b, V0]), int(S.body_i[b, NV])
         own = _of_body(np.array(x.c.work.BK[b, 3:12]).reshape(3, 3), np.array(x.c.work.BK[b, 12:15]), turning)
-        H[v0 : v0 + n, v0 : v0 + n] = own if n == 6 else own[np.ix_(IN_PLANE, IN_PLANE)]
+        kept = (IN_PLANE if s.model.planar else range(6))[:n]  # a point mass has no turn
+        H[v0 : v0 + n, v0 : v0 + n] = own[np.ix_(kept, kept)]
     return H
 
 

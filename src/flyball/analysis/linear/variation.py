@@ -25,7 +25,19 @@ from ...numerics.integrators.tableaux import Tableau, tableau
 from ...results.health import Health
 from ...results.result import Result
 from ...tables.specs import Structure
-from ...tables.system import BODY_TURNS, INVERSE, PER_COMPACT, PER_MASS, TREE_P, TREE_TURNS, V0, System, Work
+from ...tables.system import (
+    BODY_TURNS,
+    EXCESS_MASS,
+    INVERSE,
+    PER_BULK,
+    PER_COMPACT,
+    PER_MASS,
+    TREE_P,
+    TREE_TURNS,
+    V0,
+    System,
+    Work,
+)
 from ...tables.values import Values
 from ..motion.driven import integrals, nodes
 from ..motion.reasons import reason
@@ -264,7 +276,9 @@ class Variation:
 def _seen(s: Structure, system: System) -> list[np.ndarray]:
     """The tables that the residuals look at, and records of frames, of which those on ground hold numbers."""
     body_x = system.body_x.copy()
-    body_x[:, INVERSE:TREE_P] = body_x[:, PER_MASS : PER_COMPACT + 1] = 0.0  # for the solve alone
+    body_x[:, INVERSE:TREE_P] = body_x[:, PER_MASS : PER_COMPACT + 1] = body_x[:, EXCESS_MASS : PER_BULK + 1] = (
+        0.0  # for the solve alone
+    )
     return [body_x, *(getattr(system, name) for name in TABLES[1:]), work(s, system, complex).FK]
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from ...equations.engine import MOTION
 from ...errors import AnalysisError, ModelError
 from ...results.doubts import open_loads
-from ...tables.cost import cost
+from ...tables.cost import cost, least
 from ...tables.spanning import spanning
-from ...tables.system import COUPLED, MASS, NV, SEMIDEFINITE, SOLVER, V0
+from ...tables.system import COUPLED, MASS, NV, POINT, SEMIDEFINITE, SOLVER, TREE, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
 from ..mobility import mobility
@@ -52,11 +52,12 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
                 f"{a.compiled.structure.model.name!r} has no motion of its own in joint coordinates: {why}"
             )
         return a, f"absolute: {why}"
-    c, why = _forest(a, parameters)
+    here = cost(a.compiled.structure)
+    c, why = _forest(a, parameters, here if wish == "auto" else np.inf)
     if c is None:
         return a, f"absolute: {why}"
     if wish == "auto":
-        here, there = cost(a.compiled.structure), cost(c.structure)
+        there = cost(c.structure)
         if here <= there:
             return a, f"absolute: {_counts(a.compiled)} cost less than {_counts(c)} in joint coordinates"
         why = f"{_counts(c)} cost less than {_counts(a.compiled)} in absolute coordinates"
@@ -102,8 +103,8 @@ def _cuts(c: Compiled) -> str:
     return f"; rows remain for {', '.join(cut[:8])}" + (f" and {len(cut) - 8} more" if len(cut) > 8 else "")
 
 
-def _forest(a: Assembly, parameters: Mapping[str, float] | None) -> tuple[Compiled | None, str]:
-    """A forest that is sound where the mechanism starts; else none, and why."""
+def _forest(a: Assembly, parameters: Mapping[str, float] | None, most: float = np.inf) -> tuple[Compiled | None, str]:
+    """A forest that is sound where the mechanism starts and may cost less than ``most``; else none, and why."""
     model = a.compiled.structure.model
     avoided: list[str] = []
     for _ in range(MOST):
@@ -111,31 +112,47 @@ def _forest(a: Assembly, parameters: Mapping[str, float] | None) -> tuple[Compil
         if not tree:
             what = " that has inertia along its coordinates" if avoided else ""
             return None, f"no joint{what} can be a tree joint"
+        if least(model, tree) > most:
+            return None, f"{_counts(a.compiled)} cost less than the mass matrix alone in joint coordinates"
         c = compiled(model, parameters=parameters, tree=tree)
         bad = _unsound(c, a)
         if bad is None:
             return c, ""
+        if bad not in c.structure.tree_joints:
+            return None, f"{bad} has no inertia, and no joint that could be a tree joint"
         avoided.append(bad)
     return None, f"along {', '.join(avoided)} hardly any inertia moves"
 
 
 def _unsound(c: Compiled, a: Assembly) -> str | None:
-    """A tree joint along whose coordinates hardly any inertia moves, if there is one."""
+    """A tree joint along whose coordinates hardly any inertia moves, or a body that hangs by none and has none."""
     s, S = c.structure, c.values.system
     if S.glob[SEMIDEFINITE] == 0.0 or S.kinds[SOLVER] != COUPLED:
         return None
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     c.at(a.t, q, v, MOTION)
-    M = np.zeros((s.nv, s.nv))
+    names = [*s.tree_joints, *s.place]
+    roots = [(b,) if b >= 0 and S.body_i[b, TREE] <= POINT else () for b in s.place.values()]
+    of = np.full(s.nv, -1)
+    for k, links in enumerate([*(t.links for t in s.tree_joints.values()), *roots]):
+        for b in links:
+            of[S.body_i[b, V0] : S.body_i[b, V0] + S.body_i[b, NV]] = k
     row, column, _ = S.mass_i.T
-    M[row, column] = c.work.M
+    own = of[row] == of[column]
+    M: dict[int, dict[tuple[int, int], float]] = {}
+    for i, j, x in zip(
+        row[own].tolist(),
+        column[own].tolist(),
+        (c.work.M[own] / c.sizes[row[own]] / c.sizes[column[own]]).tolist(),
+        strict=True,
+    ):
+        M.setdefault(int(of[i]), {})[i, j] = x
     size = S.body_x[:, MASS].sum()
-    for name, t in s.tree_joints.items():
-        at = [int(S.body_i[k, V0]) + i for k in t.links for i in range(int(S.body_i[k, NV]))]
-        scale = np.array(
-            [1.0 if p.kind == "P" else c.values.length for p in t.primitives for _ in range(3 if p.kind == "S" else 1)]
-        )
-        own = M[np.ix_(at, at)] / np.outer(scale, scale)
-        if at and np.linalg.eigvalsh(np.tril(own) + np.tril(own, -1).T)[0] < THIN * size:
-            return name
+    for k in sorted(M):
+        first = min(i for i, _ in M[k])
+        block = np.zeros((max(i for i, _ in M[k]) - first + 1,) * 2)
+        for (i, j), x in M[k].items():
+            block[i - first, j - first] = block[j - first, i - first] = x
+        if np.linalg.eigvalsh(block)[0] < THIN * size:
+            return names[k]
     return None

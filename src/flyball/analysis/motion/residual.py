@@ -50,13 +50,14 @@ def acceleration_violation(result: Result) -> float:
 def _accelerations(result: Result, c: Compiled) -> np.ndarray:
     """Accelerations of all bodies at all output times, as c's velocities go, (n, nv)."""
     out = np.zeros((len(result.t), c.structure.nv))
+    planar = c.structure.model.planar
     for name, b in c.structure.place.items():
         if b < 0:
             continue
         _, R, _, _, alpha, a = result.records.body(result.values.structure.place[name])
         v0, n = int(c.values.system.body_i[b, V0]), int(c.values.system.body_i[b, NV])
-        turns = [alpha[2]] if n == 3 else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
-        out[:, v0 : v0 + n] = np.stack([*(a[:2] if n == 3 else a), *turns], axis=1)
+        turns = [alpha[2]] if planar else [sum(R[3 * i + k] * alpha[i] for i in range(3)) for k in range(3)]
+        out[:, v0 : v0 + n] = np.stack([*(a[:2] if planar else a), *turns][:n], axis=1)
     return out
 
 
@@ -88,6 +89,6 @@ def _unconstrained(c: Compiled) -> np.ndarray:
     per = np.zeros(c.structure.nv)
     for row, x in zip(S.body_i, S.body_x, strict=True):
         v0, n = int(row[V0]), int(row[NV])
-        k = 2 if n == 3 else 3
+        k = min(n, 2 if c.structure.model.planar else 3)
         per[v0 : v0 + k], per[v0 + k : v0 + n] = x[PER_MASS], x[PER_COMPACT]
     return per * c.work.vel[F_APPLIED]

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...equations.tree import quaternion_at, retract
-from ...tables.system import G_VALUE, GAMMA, V0
+from ...equations.tree import retract
+from ...tables.system import G_VALUE, GAMMA, PLANAR, TREE, V0
 from ..compiled import Compiled
 from ..steps import tangent_step
 
@@ -159,7 +159,7 @@ class Closure:
         S = self.c.values.system
         d = np.append(tangent_step(self.c, x.q, y.q), y.a - x.a)
         for b in range(len(S.body_i)):
-            if quaternion_at(S, b)[0] < 0:
+            if S.body_i[b, TREE] == PLANAR:
                 turn = S.body_i[b, V0] + 2
                 d[turn] = np.arctan2(np.sin(d[turn]), np.cos(d[turn]))
         d[:-1] /= self.scale
