@@ -200,7 +200,7 @@ def _motion(job: _Task, start: Start, o: Integration) -> tuple[Result | None, st
     """The motion, as far as it goes, and why it goes no further."""
     clock, rows, _ = _run(job, start, o, job.times)
     try:
-        return outcome(job.model, start, clock, rows, o), ""
+        return outcome(start, clock, rows, o), ""
     except SimulationError as stopped:
         return stopped.result, str(stopped).partition(" The motion up to")[0]  # type: ignore[return-value]
 

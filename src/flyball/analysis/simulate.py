@@ -21,11 +21,12 @@ from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
-from ..tables.system import ALPHA, BETA, MASS, PASS, STABILIZE, TOL_G, TOL_V
+from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
+from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
@@ -89,12 +90,14 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
+    later = open_until_asked(begun, o, task)
+    begun.assembly.compiled.work.option[LATER] = float(later)
     rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
-    return outcome(begun.base.compiled.structure.model, begun, clock, rows, o, interrupted, owed)
+    return outcome(begun, clock, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
 
 
 def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:

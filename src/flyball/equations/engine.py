@@ -22,7 +22,7 @@ from .follow import follow
 from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
 from .residual import residual
-from .tasks import ARRIVE, FOLLOW, INSPECT, INTEGRATE, MOTION, POSITION, REPORT, RESIDUAL, SOLVE, TANGENT
+from .tasks import ARRIVE, COMPLETE, FOLLOW, INSPECT, INTEGRATE, MOTION, POSITION, REPORT, RESIDUAL, SOLVE, TANGENT
 from .within import ROWS, inspect
 
 
@@ -46,8 +46,19 @@ def perform(S, W, R, clock, out, task):
         status, moved = arrive(t, y, clock.K[0], S, W)
         out[0, 0] = moved
         return status
-    if task == REPORT:
-        return report(t, y, out[0], S, W)
+    if task == REPORT or task == COMPLETE:
+        status = 0
+        for n in range(out.shape[0] if task == COMPLETE else 1):
+            if task == COMPLETE:
+                t = out[n, 0]
+                for i in range(y.shape[0]):
+                    y[i] = out[n, 1 + i]
+            found = report(t, y, out[n], S, W)
+            status = max(status, found)
+            if found != 0 and task == COMPLETE:
+                for i in range(1 + y.shape[0], out.shape[1]):
+                    out[n, i] = np.nan
+        return status
     if task == RESIDUAL:
         for i in range(y.shape[0]):
             W.y[0, i] = y[i]
@@ -104,7 +115,8 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
     task : int
         POSITION: kinematics and rows; the state's turns and places on curves are brought up to it. MOTION: also its
         derivative, in ``clock.K[0]``. ARRIVE: the state is put on the constraints, and how far that moved it goes to
-        ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. RESIDUAL: of the equations at the accelerations
+        ``out[0, 0]``. REPORT: its row of output, in ``out[0]``. COMPLETE: rows of
+        ``out`` whose accelerations and multipliers were left for later. RESIDUAL: of the equations at the accelerations
         ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
         ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
         make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:

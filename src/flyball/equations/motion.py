@@ -22,11 +22,13 @@ from ..tables.system import (
     GAMMA,
     GIVEN,
     LAM,
+    LATER,
     LENGTH,
     NU,
     OFFSET,
     PARTED,
     PASS,
+    PLACED,
     Q0,
     R2,
     REVOLUTE,
@@ -225,13 +227,17 @@ def arrive(t, y, dy, S, W):
         place(S, W, t, q, z)
         move(S, W, t, v, z)
     remember(S, W, z)
+    if W.option[PLACED] > 0.0:
+        return 0, max(found, astray_by)
     return accelerate(S, W, t, y, dy, factored), max(found, astray_by)
 
 
 @formula
 def report(t, y, out, S, W):
-    """Write t, the state (projected first), vdot and lam to a row of the output."""
+    """Write t, the state (projected first), vdot and lam to a row of the output; with LATER these two stay open."""
+    W.option[PLACED] = W.option[LATER]
     status, _ = arrive(t, y, W.y[1], S, W)
+    W.option[PLACED] = 0.0
     write_row(t, y, out, S, W)
     return status
 

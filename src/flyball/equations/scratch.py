@@ -25,7 +25,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(8, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n),
-        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(9), np.zeros(8, np.int64),
+        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(11), np.zeros(8, np.int64),
     )  # fmt: skip
     ground_frames(system, W)
     return W

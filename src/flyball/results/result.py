@@ -63,12 +63,31 @@ class Result:
         health: Health,
     ) -> None:
         self.model, self.values, self.health = model, values, health
-        self.t, self.q, self.v, self.vdot, self.multipliers = t, q, v, vdot, multipliers
+        self.t, self.q, self.v = t, q, v
+        self._vdot, self._multipliers = vdot, multipliers
+        self.unsolved: Owed | None = None  # finds accelerations and multipliers that are not there yet
         self.owed: Owed | None = None  # finds works that are not there yet
         self._states = states
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
         self.energy = Energy(self)
+
+    @property
+    def vdot(self) -> np.ndarray:
+        """Accelerations, (n, nv): solved for when something first asks for them."""
+        self._solve()
+        return self._vdot
+
+    @property
+    def multipliers(self) -> np.ndarray:
+        """Of the constraint rows, then efforts of drivers that prescribe a coordinate."""
+        self._solve()
+        return self._multipliers
+
+    def _solve(self) -> None:
+        if (find := self.unsolved) is not None:
+            self._vdot, self._multipliers = find()
+            self.unsolved = None
 
     @property
     def states(self) -> np.ndarray:

@@ -44,7 +44,7 @@ VALUE, RATE, BIAS = range(3)
 # scratch; and the inverse Jacobian of the gaps
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
-STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED = range(9)
+STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED, LATER, PLACED = range(11)
 # entries of Work.info
 STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT, EXCHANGES = range(8)
 
@@ -108,7 +108,7 @@ class Work(NamedTuple):
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
     stack: np.ndarray  # law evaluation
     y: np.ndarray  # (3, ny): states in the making
-    option: np.ndarray  # (9,): choices of the analysis, largest violations reported, what is solved for
+    option: np.ndarray  # (11,): choices of the analysis, largest violations reported, what is solved for
     info: np.ndarray  # (8,): status, guilty row, counters, how many loads' slopes are known, one more counter
 
 

@@ -91,7 +91,8 @@ def assembled(
     """
     plain = compiled(model, parameters=parameters)
     x = plain.values
-    found = x.kept.get("assembled", float(t).hex(), MOST, lambda: _found(x.structure.model, plain, t, parameters, why))
+    model = x.structure.model
+    found = x.kept.get("assembled", float(t).hex(), MOST, lambda: _found(model, plain, t, parameters, why).again())
     return found.again()
 
 

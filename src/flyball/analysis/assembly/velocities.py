@@ -23,6 +23,7 @@ from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
 CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
 WRONG = 1e-9  # the same, above which rows contradict one another
 BLOCKED = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
+NOTHING = 1e-200  # terms below this have no digits to compare
 SMALL = 100  # velocities up to which matrices are dense
 SOFT = 1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
 
@@ -255,7 +256,8 @@ def consistent(
 def terms(w: Wanted, v: np.ndarray) -> float:
     """What terms of the hard rows may be: a body that spins fast about its own axis leaves rounding in them all."""
     largest = float(abs(w.G).max()) if w.G.shape[0] else 0.0
-    return max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
+    found = max(largest * float(np.abs(v).max(initial=0.0)), float(np.abs(w.nu).max(initial=0.0)))
+    return max(found, NOTHING)
 
 
 def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:

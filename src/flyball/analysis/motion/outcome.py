@@ -8,7 +8,6 @@ from functools import partial
 import numpy as np
 
 from ...errors import SimulationError
-from ...model.model import Model
 from ...numerics.integrators import clock as ex
 from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
@@ -23,22 +22,24 @@ from .start import Start
 
 
 def outcome(
-    model: Model,
     start: Start,
     clock: ex.Clock,
     rows: np.ndarray,
     o: Integration,
     interrupted: bool = False,
     owed: Owed | None = None,
+    unsolved: Owed | None = None,
 ) -> Result:
-    """Result and health; a failed run raises with its partial result. ``owed`` finds works when they are asked for.
+    """Result and health; a failed run raises with its partial result.
+
+    ``owed`` finds works when they are asked for, ``unsolved`` accelerations and multipliers.
 
     Raises
     ------
     SimulationError
         If the integration could not go on.
     """
-    a = start.assembly
+    a, model = start.assembly, start.base.compiled.structure.model
     status = int(clock.count[ex.STATUS])
     t = float(clock.real[ex.T])
     message, cause = "reached the end", None
@@ -53,7 +54,7 @@ def outcome(
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
-    result.owed = owed
+    result.owed, result.unsolved = owed, unsolved
     result.wound = start.wound
     health.late = {
         "mobility": partial(mobility, model, start.base),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -86,7 +86,8 @@ def begin_at(
 
 def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None) -> Start:
     a, why = in_coordinates(base, wish, parameters)
-    return Start(base, a, a.y, why, _wound(base, a, a.y))
+    found = Start(base, a, a.y, why, _wound(base, a, a.y))
+    return replace(found, base=base.again(), assembly=a.again())  # without the scratch
 
 
 def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:

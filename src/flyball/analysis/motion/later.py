@@ -1,0 +1,46 @@
+"""Accelerations and reactions at output times, solved for when something first asks for them.
+
+Positions and velocities are put on the constraints at once; to solve for the rest there takes as long as much of the
+motion, and many never look at it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...equations.engine import COMPLETE, INTEGRATE, motion_kernel
+from ...equations.within import ROWS
+from ...numerics.integrators import clock as ex
+from ...numerics.integrators.tableaux import tableau
+from ...tables.system import LATER
+from .options import Integration
+from .start import Start
+
+
+def open_until_asked(start: Start, o: Integration, task: int) -> bool:
+    """Whether accelerations can be left for later: they would be the same then.
+
+    Friction starts from the loads found last, and a Python function may have a memory.
+    """
+    s = start.assembly.compiled.structure
+    return task == INTEGRATE and o.stabilization == "projection" and not s.loads and not s.functions
+
+
+def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Accelerations (n, nv) and multipliers (n, nr) at the states of rows of output."""
+    c = start.assembly.compiled
+    s, W, rows = c.structure, c.work, rows.copy()
+    ny = s.nq + s.nv + len(s.states)
+    none = np.zeros(0, np.int64)
+    clock = ex.Clock(
+        np.zeros(ex.REALS),
+        np.zeros(ex.COUNTS, np.int64),
+        np.zeros(0),
+        np.zeros((ex.STATES, ny)),
+        np.zeros((1, ny)),
+        none,
+        np.zeros((ROWS, 0)),
+    )
+    W.option[LATER] = 0.0
+    motion_kernel(c.values.system, W, tableau("rk45"), clock, rows, COMPLETE)
+    return np.ascontiguousarray(rows[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(rows[:, 1 + ny + s.nv :])
