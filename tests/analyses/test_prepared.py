@@ -125,7 +125,7 @@ def test_wrong_arguments_are_refused():
         m.prepare().acceleration(2.0, p.q, p.v)
 
 
-@pytest.mark.parametrize("layer", ("absolute", "joint"))
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
 def test_mass_matrix_of_bodies_that_only_drivers_keep_from_being_points(layer):
     m = fb.Mechanism("driven point", planar=True, gravity=(0, -9.81))
     m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Body("b", mass=2, inertia=0, position=(1, 0)))

@@ -23,7 +23,7 @@ def acceleration(m: fb.Mechanism) -> float:
     return float(m.simulate(0.01, outputs=2)["A"].angle_acceleration[0])
 
 
-@pytest.mark.parametrize("kind", (list, np.array))
+@pytest.mark.parametrize("kind", [list, np.array])
 def test_gravity_that_is_changed_in_place(kind):
     m = pendulum()
     m.forces.clear()
@@ -72,5 +72,5 @@ def test_a_part_put_into_a_list_is_the_one_that_counts():
     assert acceleration(m) == acceleration(other)
     assert m.snapshot()["tip"] is m.frames[0]
     m.bodies[0] = replace(m.bodies[0], name="bar")
-    with pytest.raises(fb.ModelError, match="no body or frame named 'rod'|no body named 'rod'"):
+    with pytest.raises(fb.ModelError, match="named 'rod'"):
         m.simulate(0.01)
