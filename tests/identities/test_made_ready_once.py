@@ -123,8 +123,8 @@ def test_analyses_leave_the_tables_as_they_are():
     assert not m.mobility().sets
     steady = m.equilibrium(turning=["bearing.angle"])
     m.modes(about=steady)
-    m.simulate(0.02, stabilization="partitioning")
-    m.simulate(0.02, stabilization="baumgarte", alpha=5.0)
+    m.simulate(0.02, coordinates="absolute", stabilization="partitioning")
+    m.simulate(0.02, coordinates="absolute", stabilization="baumgarte", alpha=5.0)
     assert compiled(m).values is x
     assert bits(x) == before
     assert answers(m) == wanted
