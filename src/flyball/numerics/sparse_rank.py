@@ -23,7 +23,8 @@ def rank_by_pivots(G: Any) -> int:
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     """Rank, basis of the dependencies among rows (n, n - rank), basis of what the rows allow (m, m - rank).
 
-    G is sparse, or an array. Of a large matrix up to `SHOWN` dependencies are given and nothing of what is allowed: there would be too much.
+    G is sparse, or an array. Of a large matrix up to `SHOWN` dependencies are given and nothing of what is allowed:
+    there would be too much.
     """
     if max(G.shape) <= DENSE:
         p = parts(G if isinstance(G, np.ndarray) else G.toarray())
