@@ -33,6 +33,12 @@ def points(model: Model) -> Mapping[str, str]:
     return model.kept.get("points", None, 1, lambda: _found(model))
 
 
+def single(model: Model) -> frozenset[str]:
+    """Names of the point masses. They are all that structures take from values of parameters."""
+    model = model.snapshot()
+    return model.kept.get("single", None, 1, lambda: frozenset(k for k, why in points(model).items() if not why))
+
+
 def _found(model: Model) -> dict[str, str]:
     found = {
         b.name: "its angular velocity is given" if b.angular_velocity is not None else ""
