@@ -70,6 +70,6 @@ def _refuse(before: Result, c: Compiled, off: dict[str, float], most: float, wha
     if not off[worst] <= most:
         raise ModelError(
             f"the result of {before.model.name!r} cannot be gone on with: {worst} of {c.structure.model.name!r} is "
-            f"{off[worst] * size:.3g}{what} from where the result ended. Were parameters or parts changed? A change must "
-            "leave every body where it is, and as fast"
+            f"{off[worst] * size:.3g}{what} from where the result ended. Were parameters or parts changed? A change "
+            "must leave every body where it is, and as fast"
         )
