@@ -130,3 +130,14 @@ def test_wrong_arguments_are_refused():
     m.add(fb.Motor("M", "A", torque="sqrt(1 - t)"))
     with pytest.raises(fb.AnalysisError, match="at t = 2 s"):
         m.prepare().acceleration(2.0, p.q, p.v)
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_mass_matrix_of_bodies_that_only_drivers_keep_from_being_points(layer):
+    m = fb.Mechanism("driven point", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Body("b", mass=2, inertia=0, position=(1, 0)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
+    m.add(fb.Driver("spin", "B.angle", "t"))
+    p = m.prepare(coordinates=layer)
+    wanted = np.diag([1.0, 1.0, 0.1, 2.0, 2.0, 0.0]) if layer == "absolute" else np.diag([0.35 + 2.0, 0.0])
+    assert p.mass_matrix(p.q) == pytest.approx(wanted, abs=1e-12)

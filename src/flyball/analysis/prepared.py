@@ -6,6 +6,7 @@ M(q) vdot = f(t, q, v) + G(t, q)^T lam + effort        g(t, q) = 0        qdot =
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..laws.functions import fault
 from ..model.body import GROUND, Frame
 from ..results.result import Result
 from ..tables.names import velocity_names
+from ..tables.points import points
 from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
 from .compiled import Compiled, compiled
 from .motion.start import Start
@@ -197,6 +199,9 @@ class Prepared:
         c = self._start.compiled
         bare = self.model.copy()
         bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
+        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)  # told to spin, a body is no point mass without what turns it
+        rigid = {name for name, why in points(self.model).items() if why}
+        bare.bodies = [replace(b, angular_velocity=still) if b.name in rigid else b for b in bare.bodies]
         return compiled(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
 
     def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> Compiled:

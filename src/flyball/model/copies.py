@@ -40,13 +40,28 @@ def snapshot(model: Model) -> Any:
     vars(out).update({"_resolved": None, "gravity": _gravity(model)})
     out.environment()  # worked out now: nothing is stored in it later
     vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
-    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(out.by_name)})
+    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(_by_name(out))})
     vars(out).update({"kept": Kept(), "frozen": True})
     if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
         out.kept.take("spanning", last.kept, lambda tree: tree)
         out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
     vars(model)["_snapshot"] = out
     return out
+
+
+def _by_name(model: Model) -> dict[str, Element]:
+    """The parts that are in the lists, in the order that they were added: lists may be changed by themselves."""
+    there: dict[str, Element] = {}
+    for category in CATEGORIES:
+        parts = getattr(model, category)
+        if any(getattr(e, "category", None) != category for e in parts):
+            raise ModelError(f"{category} of {model.name!r} hold something else: {parts!r}; use m.add")
+        names = [e.name for e in parts]
+        if len(set(names)) < len(names) or (category != Initial.category and not there.keys().isdisjoint(names)):
+            twice = next(x for k, x in enumerate(names) if x in names[:k] or x in there)
+            raise ModelError(f"{model.name!r} has two parts named {twice!r}; names must be unique")
+        there |= dict(zip(names, parts, strict=True)) if category != Initial.category else {}
+    return {name: there[name] for name in model.by_name if name in there} | there
 
 
 def thawed(state: Mapping[str, Any]) -> dict[str, Any]:
@@ -76,7 +91,12 @@ def refuse_changes(model: Model, what: str) -> None:
 
 def _same(model: Model, last: Model) -> bool:
     """Whether every part is the same object still, and every parameter and setting the same to the bit."""
-    return _same_parts(model, last) and all(_alike(v, last.parameters[k]) for k, v in model.parameters.items())
+    return _same_parts(model, last) and same_values(model.parameters, last.parameters)
+
+
+def same_values(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Whether the same names in the same order have the same values, to the bit and of the same kind."""
+    return list(a) == list(b) and all(_alike(v, b[k]) for k, v in a.items())
 
 
 def _same_parts(model: Model, last: Model) -> bool:
