@@ -48,6 +48,13 @@ def test_double_pendulum():
     np.testing.assert_allclose(R[:2, 0], [np.cos(-0.3), np.sin(-0.3)])
 
 
+@pytest.mark.parametrize("wrong", [[1j, 0.0], ["a", "b"], [True, False], [None, 0.0]])
+def test_what_is_no_real_number_is_refused(wrong):
+    p = double_pendulum().prepare(coordinates="joint")
+    with pytest.raises(fb.ModelError, match=r"v holds \w+ numbers; coordinates and velocities are real"):
+        p.acceleration(0.0, p.q, np.array(wrong))
+
+
 def somewhere(p) -> tuple[np.ndarray, np.ndarray]:
     random = np.random.default_rng(1)
     return p.step(p.q, 1e-3 * random.normal(size=len(p.v))), random.normal(size=len(p.v))

@@ -221,13 +221,15 @@ class Prepared:
         """Copies as floats, refused if there are more or less than there must be."""
         out = []
         for name, x, known in (("q", q, self.q), ("v", v, self.v)):
-            found = np.array(x, float)
+            found = np.array(x)
+            if found.dtype.kind not in "iuf":
+                raise ModelError(f"{name} holds {found.dtype.name} numbers; coordinates and velocities are real")
             if found.shape != known.shape:
                 raise ModelError(
                     f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
                     f"coordinates, as p.{name} has"
                 )
-            out.append(found)
+            out.append(found.astype(float))
         return out[0], out[1]
 
     def _carried(self, c: Compiled, name: str) -> tuple[int, np.ndarray, np.ndarray]:

@@ -46,7 +46,7 @@ def snapshot(model: Model) -> Any:
     vars(out).update({"kept": Kept(), "frozen": True})
     if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
         out.kept.take("spanning", last.kept, lambda tree: tree)
-        out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out, kept=Kept()))
+        out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
     vars(model)["_snapshot"] = out
     return out
 

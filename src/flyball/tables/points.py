@@ -18,6 +18,7 @@ from ..constraints.registry import KINDS
 from ..errors import FlyballError, ModelError
 from ..model.body import Body, Frame
 from ..model.element import Element, si_numbers
+from ..model.expressions import Expression, is_number_text
 from ..model.force import BodyForce, CoordinateForce, Force
 from ..model.geometry import vector
 from ..model.joint import Joint
@@ -68,8 +69,10 @@ def _zero(value: Any) -> bool:
     if not isinstance(value, str):
         return bool(value == 0)
     try:
+        if not is_number_text(value) and Expression.parse(value).names:
+            return False  # said here: a message about unknown names asks for all the world's units
         return bool(si_numbers(value, {}, "kg*m^2", "inertia") == 0)
-    except FlyballError:  # it names parameters
+    except FlyballError:  # no number
         return False
 
 
