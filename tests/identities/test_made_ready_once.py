@@ -158,6 +158,12 @@ def test_a_snapshot_is_the_same_until_something_changes():
     assert "x" not in s.names()
 
 
+def test_tables_that_differ_keep_nothing_of_the_others():
+    x = compiled(mechanisms.example("slider_crank.toml")).values
+    for made in (x, x.structure):
+        assert dataclasses.replace(made).kept is not made.kept
+
+
 def test_what_was_made_of_earlier_values_is_let_go():
     m = mechanisms.example("slider_crank.toml")
     seen = []
