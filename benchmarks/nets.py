@@ -1,7 +1,7 @@
 """Nets: how the time a point grows with their size, in the plane and in space.
 
 ``points``: point masses joined by rods without mass. ``rods``: rigid rods on hinges or balls where they meet. Both hang
-by two corners, folded a little, and fall for 0.3 s. The time of a motion is that of the call less that of a call that
+by two corners, folded a little, and fall for 0.3 s. The time of a motion is that of the call less that of one that
 ends where it begins; ``exponent`` is that of the time a point in the number of points, from the row above.
 Usage: ``python nets.py [n ...]``: n x n points, 20 40 60 unless given.
 """
@@ -103,6 +103,7 @@ def row(build: Callable[[int, bool], fb.Mechanism], n: int, planar: bool, last: 
     made = time.process_time() - begin
     m = build(n, planar)
     start, _ = motion(m, 1e-9)
+    again, _ = motion(m, 1e-9)  # knows where it starts
     whole, run = motion(m, T_END)
     out = {
         "net": f"{build.__name__}, {'plane' if planar else 'space'}",
@@ -111,7 +112,7 @@ def row(build: Callable[[int, bool], fb.Mechanism], n: int, planar: bool, last: 
         "structure": made,
         "start": start,
         "steps": run.health.steps,
-        "point": 1e3 * (whole - start) / T_END / n**2,
+        "point": 1e3 * (whole - again) / T_END / n**2,
         "work": work["factor"] / n**2,
     }
     if last:

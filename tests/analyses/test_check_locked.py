@@ -30,6 +30,18 @@ def test_a_driven_crank_is_not():
     assert "locked" not in said
 
 
+def test_it_is_assembled_without_its_drivers_only_where_something_is_redundant(monkeypatch):
+    asked = []
+    monkeypatch.setattr("flyball.analysis.check._locked", lambda model: asked.append(model.name))
+    m = triangle("t")
+    m.bodies[1:] = []
+    m.joints[1:] = []
+    m.check()
+    assert not asked
+    triangle().check()
+    assert asked == ["triangle"]
+
+
 def test_an_equilibrium_of_what_cannot_move_is_json():
     m = triangle()
     m.drivers.clear()

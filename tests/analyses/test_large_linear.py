@@ -52,6 +52,11 @@ def test_a_damped_line_of_masses():
     assert found[found.imag > 0][:3] == pytest.approx(expected[:3], rel=1e-9)
     near = line_eigenvalues()[60]
     assert L.descriptor.nearest(1, near=near + 0.01)[0] == pytest.approx(near, rel=1e-9)
+    for wrong in (0, 2.5, "3"):
+        with pytest.raises(fb.ModelError, match="count must be a whole number of at least 1"):
+            L.descriptor.nearest(wrong)
+    with pytest.raises(fb.ModelError, match="near must be a finite number"):
+        L.descriptor.nearest(2, near=complex("nan"))
     w = [0.3, 2.0, 7.0]
     x = np.array([line_response(s) for s in w])
     assert L.response(w, output="m3.x") == pytest.approx(x[:, 2], rel=1e-9)

@@ -257,3 +257,15 @@ def test_how_far_a_body_was_turned(angle):
     m.add(fb.Initial("hinge.angle", value=f"{angle} deg"))
     turned = [d for d in m.simulate(0.01).health.departures if d.what == "orientation"]
     assert [d.distance for d in turned] == [pytest.approx(np.radians(angle), rel=1e-6)] if angle > 1e-6 else True
+
+
+def test_rates_of_a_very_long_chain():
+    """Link k turns k + 1 times as fast as the hinges do; multipliers of so many rows swing before they settle."""
+    n, rate = 1500, 0.01
+    m = fb.Mechanism("chain", planar=True)
+    for k in range(n):
+        m.add(fb.Body(f"b{k}", mass=1, inertia=1 / 12, position=(k + 0.5, 0)))
+        m.add(fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)))
+        m.add(fb.Initial(f"J{k}.angle", rate=rate))
+    turning = m.assemble().v[2::3]
+    assert turning == pytest.approx(rate * np.arange(1, n + 1), rel=1e-9)

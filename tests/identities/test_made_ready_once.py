@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
+import gc
 import random
+import weakref
 from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 
+import numpy as np
 import pytest
 
 import flyball as fb
 from flyball.analysis.compiled import compiled
 from flyball.errors import FlyballError
+from flyball.model.kept import Kept
+from flyball.tables.numbers import numbers
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
 from flyball.tables.values import Values, values
@@ -118,8 +123,8 @@ def test_analyses_leave_the_tables_as_they_are():
     assert not m.mobility().sets
     steady = m.equilibrium(turning=["bearing.angle"])
     m.modes(about=steady)
-    m.simulate(0.02, stabilization="partitioning")
-    m.simulate(0.02, stabilization="baumgarte", alpha=5.0)
+    m.simulate(0.02, coordinates="absolute", stabilization="partitioning")
+    m.simulate(0.02, coordinates="absolute", stabilization="baumgarte", alpha=5.0)
     assert compiled(m).values is x
     assert bits(x) == before
     assert answers(m) == wanted
@@ -151,6 +156,60 @@ def test_a_snapshot_is_the_same_until_something_changes():
     c = s.copy()
     c.add(fb.Body("x", mass=1, inertia=1))
     assert "x" not in s.names()
+
+
+def test_tables_that_differ_keep_nothing_of_the_others():
+    x = compiled(mechanisms.example("slider_crank.toml")).values
+    for made in (x, x.structure):
+        assert dataclasses.replace(made).kept is not made.kept
+
+
+def test_what_was_made_of_earlier_values_is_let_go():
+    m = mechanisms.example("slider_crank.toml")
+    seen = []
+    for k in range(12):  # each kind of tables is asked for at every other value only
+        m.parameters["speed"] = 10.0 + k
+        structure(m, Choices(far=bool(k % 2)))
+        seen.append(weakref.ref(m.snapshot()))
+    gc.collect()
+    assert sum(s() is not None for s in seen) <= 2
+
+
+@pytest.mark.parametrize("wrap", [list, np.array])
+def test_gravity_that_is_changed_in_place(wrap):
+    m = fb.Mechanism("stone", planar=True, gravity=(0, -10))
+    m.add(fb.Body("b", mass=1, inertia=1))
+    m.gravity = wrap([0.0, -10.0])
+    assert m.simulate(1.0)["b"].y[-1] == pytest.approx(-5.0)
+    m.gravity[1] = -2.0
+    assert m.simulate(1.0)["b"].y[-1] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_a_parameter_of_the_model_can_make_another_thing_of_a_point_mass(coordinates):
+    m = fb.Mechanism("bob", planar=True, gravity=(0, -9.81), parameters={"off": 0.0})
+    m.add(fb.Body("bob", mass=1, inertia=0, position=(1, 0)))
+    m.add(fb.Revolute("pin", "ground", "bob", at=("1 + off", 0)))
+    m.add(fb.PointForce("push", "bob", force=(1, 0)))
+    for off in (0.0, 0.5, 0.0):  # held where it is, hung beside it
+        m.parameters["off"] = off
+        assert answers(m, off=off) == answers(deepcopy(m), off=off)
+        assert compiled(m).structure.nv == compiled(deepcopy(m)).structure.nv == (2 if off == 0.0 else 3)
+
+
+def test_numbers_that_another_thread_finds_first_are_not_taken_for_ours(monkeypatch):
+    m = mechanisms.example("slider_crank.toml")
+    drop = Kept.drop
+
+    def meanwhile(self, kind, key):
+        drop(self, kind, key)
+        if kind == "first numbers":
+            monkeypatch.undo()
+            numbers(m, {"speed": 3.0})
+
+    monkeypatch.setattr(Kept, "drop", meanwhile)
+    assert numbers(m, {"speed": 7.0}).env["speed"] == 7.0
+    assert numbers(m, {"speed": 3.0}).env["speed"] == 3.0
 
 
 def test_functions_whose_globals_change_are_made_again():

@@ -103,6 +103,13 @@ def test_what_a_method_does_not_have_is_refused_by_name():
         m.simulate(1.0, rtoll=1e-3)  # type: ignore[call-arg]
 
 
+def test_nothing_to_stabilise():
+    m = fb.Mechanism("stone", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    with pytest.raises(fb.ModelError, match=r"does nothing: no constraint is left to be kept; leave it out$"):
+        m.simulate(1.0, coordinates="absolute", stabilization="none")
+
+
 @pytest.mark.parametrize(
     ("ask", "told"),
     [

@@ -114,6 +114,8 @@ def chains(d: Dice) -> Case:
     case, m = _case(d, "chain", 0.5)
     tree(d, m, case, d.whole(1, 6), chain=True)
     case.options["stabilization"] = d.pick(["projection", "projection", "projection-steps", "baumgarte"])
+    if case.options["stabilization"] != "projection":  # in joint coordinates nothing would be left to stabilize
+        case.options["coordinates"] = "absolute"
     return case
 
 

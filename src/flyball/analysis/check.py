@@ -15,6 +15,7 @@ from ..model.model import Model
 from ..results.check import BodyReport, Report
 from ..results.departure import changed_velocities, not_allowed
 from ..results.mass import MassProperties
+from ..results.mobility import Mobility
 from ..tables.values import Values
 from .assemble import assemble
 from .assembly.start import Assembly
@@ -65,7 +66,7 @@ def check(model: Model) -> Report:
         departures=a.departures,
         mass=weights.total.mass,
         com=tuple(weights.total.com.tolist()),
-        warnings=tuple(_warnings(model, a, bodies, m.freedoms)),
+        warnings=tuple(_warnings(model, a, bodies, m)),
     )
 
 
@@ -74,7 +75,7 @@ def _body(b: MassProperties, planar: bool) -> BodyReport:
     return BodyReport(b.mass, tuple(b.com.tolist()), tuple(b.moments.tolist()), axes)
 
 
-def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms: int) -> Iterator[str]:
+def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobility) -> Iterator[str]:
     for b in model.bodies:
         yield from _of_inertia(a.compiled.values, b.name, bodies[b.name])
     yield from (not_allowed(d) for d in changed_velocities(a.departures))
@@ -86,7 +87,9 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], freedoms
     if not model.gravity_told and not model.gravity_vector().any():
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         yield f"no gravity; if that is not meant, give gravity={example}"
-    if model.drivers and freedoms == 0 and _locked(model):
+    freedoms = m.freedoms
+    # a mechanism that is locked anyway makes its drivers redundant
+    if model.drivers and freedoms == 0 and m.redundancy and _locked(model):
         yield "no freedom is left even without the drivers: it is locked as it is drawn and will not move"
     elif model.drivers and freedoms == 0:
         yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"

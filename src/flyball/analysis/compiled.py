@@ -155,6 +155,11 @@ class Compiled:
         """Sparse mass matrix of absolute coordinates, (nv, nv)."""
         return self._blocks(INERTIA, self.values.system.body_x[:, MASS])
 
+    def kinetic_energy(self, v: np.ndarray) -> float:
+        """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
+        i, j, M = self._entries(INERTIA, self.values.system.body_x[:, MASS])
+        return float(0.5 * (v[i] * M * v[j]).sum())
+
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):
         """R, sparse if not told, with R R^T the inverse mass matrix of absolute coordinates; 0 for the fixed.
 
@@ -163,13 +168,28 @@ class Compiled:
         return self._blocks(INVERSE, self.values.system.body_x[:, PER_MASS], movable, dense)
 
     def _blocks(self, column: int, translation: np.ndarray, root: np.ndarray | None = None, dense: bool = False):
-        """One block a body: ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of its table.
+        """The matrix of `_entries`, sparse if not told. With ``root`` its square root, rows times these numbers."""
+        rows, columns, entries = self._entries(column, translation, root is not None)
+        entries = entries if root is None else entries * root[rows]
+        nv = self.structure.nv
+        if dense:
+            out = np.zeros((nv, nv), entries.dtype)
+            out[rows, columns] = entries
+            return out
+        import scipy.sparse as sp
 
-        With ``root`` the square root of that, its rows times these numbers.
+        return sp.csr_matrix((entries, (rows, columns)), shape=(nv, nv))
+
+    def _entries(
+        self, column: int, translation: np.ndarray, root: bool = False
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows, columns and entries of a matrix with one block a body, or of its square root.
+
+        A block is ``translation`` times the identity, and the 3 x 3 matrix from ``column`` of the body table.
         """
         S = self.values.system
         J = S.body_x[:, column : column + 9].reshape(-1, 3, 3)
-        if root is not None:
+        if root:
             if np.iscomplexobj(J):
                 raise TypeError("the root of complex inertias is not known; give real parameters")
             w, V = np.linalg.eigh(J)
@@ -186,15 +206,7 @@ class Compiled:
             i += [at.ravel(), np.repeat(v0[:, None] + turns, len(turns), axis=1).ravel()]
             j += [at.ravel(), np.tile(v0[:, None] + turns, len(turns)).ravel()]
             x += [np.repeat(translation[b], len(shifts)), J[b, used, used].ravel() if len(turns) else np.zeros(0)]
-        nv, rows, columns, entries = self.structure.nv, np.concatenate(i), np.concatenate(j), np.concatenate(x)
-        entries = entries if root is None else entries * root[rows]
-        if dense:
-            out = np.zeros((nv, nv), entries.dtype)
-            out[rows, columns] = entries
-            return out
-        import scipy.sparse as sp
-
-        return sp.csr_matrix((entries, (rows, columns)), shape=(nv, nv))
+        return np.concatenate(i), np.concatenate(j), np.concatenate(x)
 
 
 def compiled(

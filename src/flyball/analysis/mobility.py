@@ -21,7 +21,7 @@ from .assembly.start import Assembly, assembled
 from .freedom.freedoms import free_motions
 from .freedom.geometry import geometry
 from .freedom.inertia import check_inertia, massless
-from .freedom.jacobian import Found, scaled_jacobian
+from .freedom.jacobian import Found, few, scaled_jacobian
 from .freedom.redundancy import redundant_sets
 from .freedom.stresses import undetermined
 
@@ -94,7 +94,7 @@ def mobility(
     c = a.compiled
     c.at(a.t, a.q, a.v)
     s, S = c.structure, c.values.system
-    G, size, scale = scaled_jacobian(c)
+    G, size, scale = scaled_jacobian(c, few(c))
     nr, nv = (int(n) for n in G.shape)
     rank, dependent, motions = null_spaces(G)
     if inertia and S.glob[SEMIDEFINITE] > 0.0:

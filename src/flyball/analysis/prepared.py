@@ -5,7 +5,9 @@ M(q) vdot = f(t, q, v) + G(t, q)^T lam + effort        g(t, q) = 0        qdot =
 
 from __future__ import annotations
 
+import numbers
 import threading
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,7 @@ from ..laws.functions import fault
 from ..model.body import GROUND, Frame
 from ..results.result import Result
 from ..tables.names import velocity_names
+from ..tables.points import points
 from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
 from .compiled import Compiled, compiled
 from .motion.start import Start
@@ -163,6 +166,12 @@ class Prepared:
             b = int(S.body_i[b, PARENT])
         return J
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: x for k, x in vars(self).items() if k != "_here"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _here=threading.local())
+
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
         s = self._start.compiled.structure
@@ -197,6 +206,9 @@ class Prepared:
         c = self._start.compiled
         bare = self.model.copy()
         bare.drivers, bare.forces, bare.sensors, bare.initial = [], [], [], []
+        still = 0.0 if bare.planar else (0.0, 0.0, 0.0)  # told to spin, a body is no point mass without what turns it
+        rigid = {name for name, why in points(self.model).items() if why}
+        bare.bodies = [replace(b, angular_velocity=still) if b.name in rigid else b for b in bare.bodies]
         return compiled(bare, parameters=c.parameters, tree=c.structure.tree, coupled=True)
 
     def _moving(self, t: float, q: np.ndarray, v: np.ndarray) -> Compiled:
@@ -209,6 +221,8 @@ class Prepared:
 
     def _at(self, c: Compiled, t: float, q: np.ndarray, v: np.ndarray, task: int | None = None) -> Compiled:
         q, v = self._state(q, v)
+        if not (isinstance(t, numbers.Real) and np.isfinite(t)):
+            raise ModelError(f"t is a finite number of seconds, not {t!r}")
         c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
         return c
 
@@ -216,13 +230,17 @@ class Prepared:
         """Copies as floats, refused if there are more or less than there must be."""
         out = []
         for name, x, known in (("q", q, self.q), ("v", v, self.v)):
-            found = np.array(x, float)
+            found = np.array(x)
+            if found.dtype.kind not in "iuf":
+                raise ModelError(f"{name} holds {found.dtype.name} numbers; coordinates and velocities are real")
             if found.shape != known.shape:
                 raise ModelError(
                     f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
                     f"coordinates, as p.{name} has"
                 )
-            out.append(found)
+            if not np.isfinite(found).all():
+                raise ModelError(f"{name} of {self.model.name!r} is not finite: {found}")
+            out.append(found.astype(float))
         return out[0], out[1]
 
     def _carried(self, c: Compiled, name: str) -> tuple[int, np.ndarray, np.ndarray]:

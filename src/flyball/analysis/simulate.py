@@ -12,7 +12,6 @@ import numpy as np
 
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
-from ..equations.velocities import kinetic_energy
 from ..equations.within import kept
 from ..errors import ModelError, StartWarning
 from ..laws.functions import forget, interrupts_kept
@@ -56,11 +55,8 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     times = output_times(t_start, o.t_end, o.outputs)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
-    if o.stabilization != "projection" and not len(begun.assembly.compiled.values.system.row_i):
-        raise ModelError(
-            f"stabilization={o.stabilization!r} does nothing: in joint coordinates no constraint is left to be kept; "
-            "leave it out, or give coordinates='absolute'"
-        )
+    if o.stabilization != "projection":
+        _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
         warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)
@@ -100,6 +96,17 @@ def moved(
     return outcome(begun, clock, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
 
 
+def _refuse_idle(begun: Start, stabilization: str) -> None:
+    """Refuse to keep states on constraints where there are none."""
+    if not len(begun.assembly.compiled.values.system.row_i):
+        joint = len(begun.base.compiled.values.system.row_i) > 0
+        where, remedy = ("in joint coordinates ", ", or give coordinates='absolute'") if joint else ("", "")
+        raise ModelError(
+            f"stabilization={stabilization!r} does nothing: {where}no constraint is left to be kept; leave it out"
+            f"{remedy}"
+        )
+
+
 def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:
     """Everything the compiled loop needs to start, and the choices of the solve."""
     a, y = start.assembly, start.y
@@ -137,7 +144,7 @@ def _energy_size(a: Assembly, span: float) -> float:
     S, length = a.compiled.values.system, a.compiled.values.length
     mass = S.body_x[:, MASS].sum()
     g = np.sqrt((S.glob[:3] ** 2).sum())
-    moving = kinetic_energy(a.compiled.values, a.v)
+    moving = a.compiled.kinetic_energy(a.v)
     return float(mass * (g * length + (length / span) ** 2) + moving)
 
 

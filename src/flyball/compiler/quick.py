@@ -1,4 +1,4 @@
-"""Numba's slowest spots, taken out while a kernel of ours compiles: the same answers, a third less time to wait.
+"""Numba's slowest spots, taken out while a kernel of ours compiles: the same answers, a fifth less time to wait.
 
 Found by profiling cold compilation. Nearly all of it is Numba's own work in Python, and the most of that was to compare
 the same compiler flags option by option, for each call of each function, and to look for variables in numbers, texts

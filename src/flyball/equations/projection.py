@@ -14,6 +14,7 @@ from ..tables.system import (
     NU,
     PARTED,
     PASS,
+    PLACED,
     PROJECTIONS,
     R2,
     RESIDUAL,
@@ -106,9 +107,13 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
     OLD, of poses NEARby or of those HERE).
     """
     W.option[PARTED] = 1.0 if W.option[STABILIZE] == PARTITIONING else 0.0
+    still = W.option[PLACED] > 0.0  # nobody asks for accelerations there
+    if S.row_i.shape[0] == 0 and still and S.angle_i.shape[0] == 0:
+        return 0, 0.0, OLD
     place(S, W, t, q, z)
     if S.row_i.shape[0] == 0:
-        move(S, W, t, v, z)
+        if not still:
+            move(S, W, t, v, z)
         return 0, 0.0, OLD
     status = 0
     found = 0.0
@@ -124,7 +129,8 @@ def settle(S, W, t, q, v, z, tol_g, tol_v):
             return status, found, OLD
     else:  # positions follow the violated velocities and are put back: that is no error of the step
         found = 0.0
-    move(S, W, t, v, z)
+    if not still:
+        move(S, W, t, v, z)
     return 0, max(found / S.glob[LENGTH], lost), factored
 
 

@@ -11,7 +11,7 @@ from ..math.scalar import atan2
 from ..math.vec import add, cross, scale
 from ..tables.coordinates import REST, BodyState, free_velocities, whole_turns
 from ..tables.forest import TreeJoint
-from ..tables.system import INERTIA, MASS, NV, PARENT, PLANAR, Q0, TREE, V0
+from ..tables.system import NV, PARENT, PLANAR, Q0, TREE, V0
 from ..tables.values import Values
 from .tree import column
 
@@ -51,22 +51,6 @@ def turned_angles(x: Values, W: Any, q: np.ndarray) -> dict[str, Any]:
             near, angle = x.bodies[name].angle + since[b], atan2(W.BK[b, 6], W.BK[b, 3])
             out[name] = angle + whole_turns(near, angle)
     return out
-
-
-def kinetic_energy(x: Values, v: np.ndarray) -> float:
-    """Kinetic energy [J] of bodies with the velocities v (nv,) of absolute coordinates."""
-    S = x.system
-    total = 0.0
-    shifts, turns = (2, slice(2, 3)) if x.structure.model.planar else (3, slice(0, 3))
-    for n in np.unique(S.body_i[:, NV]):
-        b = np.flatnonzero(S.body_i[:, NV] == n)
-        own = v[S.body_i[b, V0, None] + np.arange(n)]
-        u, w = own[:, :shifts], own[:, shifts:]
-        total += S.body_x[b, MASS] @ (u * u).sum(axis=1)
-        if n > shifts:
-            J = S.body_x[b, INERTIA : INERTIA + 9].reshape(-1, 3, 3)[:, turns, turns]
-            total += np.einsum("bi,bij,bj", w, J, w)
-    return float(0.5 * total)
 
 
 def _rates(x: Values, W: Any, t: TreeJoint, d: BodyState, parent: BodyState, v: np.ndarray) -> None:

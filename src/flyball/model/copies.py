@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
 import operator
 from collections.abc import Iterable, Mapping
+from copy import copy
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ModelError
 from .body import Initial
+from .element import plain
 from .kept import Kept
 
 if TYPE_CHECKING:
@@ -16,8 +19,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
-STRUCTURAL = ("structure", "spanning")  # kinds of what is kept that no parameter changes
-SETTINGS = ("name", "planar", "gravity", "gravity_told")
+SETTINGS = ("name", "planar", "gravity_told")
 
 
 def copied(model: Model) -> Any:
@@ -26,6 +28,7 @@ def copied(model: Model) -> Any:
     vars(out).update(vars(model))
     vars(out).pop("kept", None)
     vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
+    vars(out)["gravity"] = copy(model.gravity)  # it may be a list
     vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
     return out
 
@@ -36,15 +39,31 @@ def snapshot(model: Model) -> Any:
     if model.frozen or (last is not None and _same(model, last)):
         return model if model.frozen else last
     out = copied(model)
+    vars(out).update({"_resolved": None, "gravity": _gravity(model)})
     out.environment()  # worked out now: nothing is stored in it later
     vars(out).update({name: tuple(getattr(model, name)) for name in CATEGORIES})
-    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(out.by_name)})
+    vars(out).update({"parameters": MappingProxyType(out.parameters), "by_name": MappingProxyType(_by_name(out))})
     vars(out).update({"kept": Kept(), "frozen": True})
     if last is not None and _same_parts(model, last):  # another value of a parameter leaves every structure as it is
-        for kind in STRUCTURAL:
-            out.kept.take(kind, last.kept)
+        out.kept.take("spanning", last.kept, lambda tree: tree)
+        out.kept.take("structure", last.kept, lambda s: dataclasses.replace(s, model=out))
     vars(model)["_snapshot"] = out
     return out
+
+
+def _by_name(model: Model) -> dict[str, Element]:
+    """The parts that are in the lists, in the order that they were added: lists may be changed by themselves."""
+    there: dict[str, Element] = {}
+    for category in CATEGORIES:
+        parts = getattr(model, category)
+        if any(getattr(e, "category", None) != category for e in parts):
+            raise ModelError(f"{category} of {model.name!r} hold something else: {parts!r}; use m.add")
+        names = [e.name for e in parts]
+        if len(set(names)) < len(names) or (category != Initial.category and not there.keys().isdisjoint(names)):
+            twice = next(x for k, x in enumerate(names) if x in names[:k] or x in there)
+            raise ModelError(f"{model.name!r} has two parts named {twice!r}; names must be unique")
+        there |= dict(zip(names, parts, strict=True)) if category != Initial.category else {}
+    return {name: there[name] for name in model.by_name if name in there} | there
 
 
 def thawed(state: Mapping[str, Any]) -> dict[str, Any]:
@@ -74,7 +93,12 @@ def refuse_changes(model: Model, what: str) -> None:
 
 def _same(model: Model, last: Model) -> bool:
     """Whether every part is the same object still, and every parameter and setting the same to the bit."""
-    return _same_parts(model, last) and all(_alike(v, last.parameters[k]) for k, v in model.parameters.items())
+    return _same_parts(model, last) and same_values(model.parameters, last.parameters)
+
+
+def same_values(a: Mapping[str, Any], b: Mapping[str, Any]) -> bool:
+    """Whether the same names in the same order have the same values, to the bit and of the same kind."""
+    return list(a) == list(b) and all(_alike(v, b[k]) for k, v in a.items())
 
 
 def _same_parts(model: Model, last: Model) -> bool:
@@ -82,9 +106,15 @@ def _same_parts(model: Model, last: Model) -> bool:
     return (
         all(_identical(getattr(model, k), getattr(last, k)) for k in CATEGORIES)
         and all(_alike(getattr(model, k), getattr(last, k)) for k in SETTINGS)
+        and _alike(_gravity(model), last.gravity)
         and type(model) is type(last)
         and list(model.parameters) == list(last.parameters)
     )
+
+
+def _gravity(model: Model) -> tuple[Any, ...]:
+    """Gravity as a tuple: a user may have put a list or an array there, and change it."""
+    return model.gravity if isinstance(model.gravity, tuple) else tuple(plain(model.gravity))
 
 
 def _identical(a: Iterable[Any], b: Iterable[Any]) -> bool:

@@ -47,10 +47,11 @@ class Kept:
         with self._lock:
             self._found.get(kind, OrderedDict()).pop(key, None)
 
-    def take(self, kind: str, other: Kept) -> None:
-        """Begin with what another has of a kind."""
+    def take(self, kind: str, other: Kept, made: Callable[[Any], Any]) -> None:
+        """Begin with what is made of all that another has of a kind."""
         with other._lock:
-            self._found[kind] = other._found.get(kind, OrderedDict()).copy()
+            found = other._found.get(kind, OrderedDict()).copy()
+        self._found[kind] = OrderedDict((key, made(x)) for key, x in found.items())
 
     def __reduce__(self) -> Any:
         return Kept, ()

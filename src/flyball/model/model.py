@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
-from .copies import CATEGORIES, changed, copied, refuse_changes, snapshot, thawed
+from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
 from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
@@ -26,7 +26,7 @@ from .sensor import IMU, Sensor
 from .summary import summary
 from .table import Table
 from .units import same_kind
-from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins
+from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins, told_gravity
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -69,14 +69,10 @@ class Model:
             )
         try:
             self.parameters = {k: plain(v) for k, v in (parameters or {}).items()}
-            g = plain(gravity) if gravity is not None else (0.0,) * (2 if planar else 3)
         except (ValueError, TypeError, AttributeError) as error:
-            raise ModelError(f"parameters or gravity of {name!r}: {error}") from None
+            raise ModelError(f"parameters of {name!r}: {error}") from None
         self.environment()
-        if not isinstance(g, (tuple, list)):
-            example = "(0, -9.81)" if planar else "(0, 0, -9.81)"
-            raise ModelError(f"gravity of {name!r} is a vector, for instance {example}, not {g!r}")
-        self.gravity = tuple(g)
+        self.gravity = tuple(told_gravity(self, (0.0,) * (2 if planar else 3) if gravity is None else gravity))
         self.gravity_told = gravity is not None
         self.gravity_vector()
         self.bodies: list[Body] = []
@@ -108,7 +104,7 @@ class Model:
                 same_kind(old, value, f"parameter {name!r} of {self.name!r}")
         if changed:
             return resolve_parameters({**self.parameters, **changed})
-        if self._resolved is None or self._resolved[0] != self.parameters:
+        if self._resolved is None or not same_values(self._resolved[0], self.parameters):
             vars(self)["_resolved"] = dict(self.parameters), resolve_parameters(self.parameters)
         return dict(self._resolved[1])  # type: ignore[index]
 
@@ -134,6 +130,8 @@ class Model:
 
     def __setattr__(self, name: str, value: Any) -> None:
         refuse_changes(self, f"{name!r} cannot be set")
+        if name == "gravity":  # the caller's list stays the caller's
+            value = told_gravity(self, value)
         super().__setattr__(name, value)
 
     def gravity_vector(self, env: Mapping[str, float] | None = None) -> np.ndarray:

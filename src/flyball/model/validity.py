@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body
-from .element import Element, Vector, fields_with
+from .element import Element, Vector, fields_with, plain
 from .force import TwoFrameForce
 from .geometry import vector
 from .inertia import mass_properties
@@ -84,3 +84,15 @@ def refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[
         ]
         if len(meant) > 1:
             raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")
+
+
+def told_gravity(model: Model, value: Any) -> tuple | list:
+    """A vector of numbers and texts, not yet in SI units, of the model's own: a list if it may be changed in place."""
+    try:
+        found = plain(value)
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ModelError(f"gravity of {model.name!r}: {error}") from None
+    if not isinstance(found, (tuple, list)):
+        example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
+        raise ModelError(f"gravity of {model.name!r} is a vector, for instance {example}, not {value!r}")
+    return found if isinstance(value, tuple) else list(found)

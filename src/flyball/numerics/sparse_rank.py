@@ -23,10 +23,11 @@ def rank_by_pivots(G: Any) -> int:
 def null_spaces(G: Any) -> tuple[int, np.ndarray, np.ndarray | None]:
     """Rank, basis of the dependencies among rows (n, n - rank), basis of what the rows allow (m, m - rank).
 
-    Of a large matrix up to `SHOWN` dependencies are given and nothing of what is allowed: there would be too much.
+    G is sparse, or an array. Of a large matrix up to `SHOWN` dependencies are given and nothing of what is allowed:
+    there would be too much.
     """
     if max(G.shape) <= DENSE:
-        p = parts(G.toarray())
+        p = parts(G if isinstance(G, np.ndarray) else G.toarray())
         return p.rank, p.dependencies, p.null
     count, dependent = sparse_null_space(G @ G.T)
     return G.shape[0] - count, dependent, None

@@ -149,12 +149,17 @@ class Descriptor:
         Raises
         ------
         ModelError
-            If the mechanism moves, or has constraints on velocities: ask `LinearModel.eigenvalues`.
+            If the mechanism moves, or has constraints on velocities: ask `LinearModel.eigenvalues`; or if these are
+            no such numbers.
         AnalysisError
             If they are not found.
         """
         import scipy.sparse as sp
 
+        if not isinstance(count, (int, np.integer)) or count < 1:
+            raise ModelError(f"count must be a whole number of at least 1, got {count!r}")
+        if not np.isfinite(near):
+            raise ModelError(f"near must be a finite number, got {near!r}")
         if not self.on_positions.all() or self.kinematic.nnz or self.turning.nnz:
             raise ModelError(
                 "few eigenvalues of the descriptor form are found at rest, of constraints on positions; ask for all of "

@@ -19,6 +19,7 @@ from .measured import Measured
 from .numbers import span
 from .reactions import Reactions
 from .records import Records
+from .turn import Turn
 from .views import view
 from .views.base import Curves
 
@@ -65,6 +66,7 @@ class Result:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v = t, q, v
         self._vdot, self._multipliers = vdot, multipliers
+        self._turn = Turn()
         self.unsolved: Owed | None = None  # finds accelerations and multipliers that are not there yet
         self.owed: Owed | None = None  # finds works that are not there yet
         self._states = states
@@ -85,9 +87,10 @@ class Result:
         return self._multipliers
 
     def _solve(self) -> None:
-        if (find := self.unsolved) is not None:
-            self._vdot, self._multipliers = find()
-            self.unsolved = None
+        with self._turn:  # there is one scratch
+            if (find := self.unsolved) is not None:
+                self._vdot, self._multipliers = find()
+                self.unsolved = None
 
     @property
     def states(self) -> np.ndarray:
@@ -113,10 +116,11 @@ class Result:
 
     def _settle(self) -> None:
         """Find the works of a motion that was followed, not integrated."""
-        if self.owed is not None:
-            find, self.owed = self.owed, None
-            self._states, y = find()
-            self._final = (self._final[0], y)
+        with self._turn:
+            if (find := self.owed) is not None:  # owed still if it is interrupted
+                self._states, y = find()
+                self._final = (self._final[0], y)
+                self.owed = None
 
     @property
     def planar(self) -> bool:

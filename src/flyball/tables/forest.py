@@ -16,7 +16,7 @@ from ..errors import ModelError
 from ..model.body import GROUND
 from ..model.joint import Joint, Primitive
 from ..model.model import Model
-from .points import points
+from .points import single
 from .system import FREE, NQ, NV, PLANAR, POINT, PRISMATIC, REVOLUTE, SPHERICAL, TREE_NQ, TREE_NV, WELD
 
 if TYPE_CHECKING:
@@ -125,7 +125,7 @@ def body_table(s: Structure) -> None:
     """Decide rows of bodies and massless links, their coordinates and velocities."""
     model = s.model
     plain = PLANAR if model.planar else FREE
-    s.points = frozenset(name for name, why in points(model).items() if not why)
+    s.points = single(model)
     rows: list[tuple[int, int]] = []  # parent, kind
     place = {GROUND: -1}
     for h in hung(model, s.tree) if s.tree else [Hung(b.name) for b in model.bodies]:

@@ -73,7 +73,8 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
         if new.complex:
             return new
         model.kept.drop("first numbers", None)  # of files as they were
-        return model.kept.get("first numbers", None, 1, lambda: new)
+        model.kept.get("first numbers", None, 1, lambda: new)
+        return new  # another thread's may be there by now, with other values
     named = model.kept.get("named", None, 1, lambda: _named(model))
     other = {k for k, x in env.items() if not _same(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]

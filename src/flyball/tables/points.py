@@ -18,6 +18,7 @@ from ..constraints.registry import KINDS
 from ..errors import FlyballError, ModelError
 from ..model.body import Body, Frame
 from ..model.element import Element, si_numbers
+from ..model.expressions import Expression, is_number_text
 from ..model.force import BodyForce, CoordinateForce, Force
 from ..model.geometry import vector
 from ..model.joint import Joint
@@ -31,6 +32,12 @@ def points(model: Model) -> Mapping[str, str]:
     """Bodies without inertia -> why each is no point mass; "" for one that is."""
     model = model.snapshot()
     return model.kept.get("points", None, 1, lambda: _found(model))
+
+
+def single(model: Model) -> frozenset[str]:
+    """Names of the point masses. They are all that structures take from values of parameters."""
+    model = model.snapshot()
+    return model.kept.get("single", None, 1, lambda: frozenset(k for k, why in points(model).items() if not why))
 
 
 def _found(model: Model) -> dict[str, str]:
@@ -62,8 +69,10 @@ def _zero(value: Any) -> bool:
     if not isinstance(value, str):
         return bool(value == 0)
     try:
+        if not is_number_text(value) and Expression.parse(value).names:
+            return False  # said here: a message about unknown names asks for all the world's units
         return bool(si_numbers(value, {}, "kg*m^2", "inertia") == 0)
-    except FlyballError:  # it names parameters
+    except FlyballError:  # no number
         return False
 
 

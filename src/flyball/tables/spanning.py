@@ -13,7 +13,7 @@ from ..model.body import GROUND
 from ..model.joint import Joint
 from ..model.model import Model
 from .forest import ends
-from .points import points
+from .points import single
 
 MOST = 8  # choices that are kept of a mechanism
 
@@ -28,12 +28,12 @@ def candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
     point masses, which turn with nothing.
     """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
-    single = {name for name, why in points(model).items() if not why}
+    alone = single(model)
     out = {}
     for joint in model.joints:
         worth = saved(joint, model.planar)
         a, b = ends(model, joint)
-        if worth > 0 and a != b and not {a, b} & single and joint.name not in needed and joint.name not in avoided:
+        if worth > 0 and a != b and alone.isdisjoint((a, b)) and joint.name not in needed and joint.name not in avoided:
             out[joint.name] = worth
     return out
 
@@ -48,7 +48,7 @@ def spanning(model: Model, avoided: Collection[str] = ()) -> tuple[str, ...]:
         Joints that must stay rows.
     """
     model = model.snapshot()
-    return model.kept.get("spanning", tuple(avoided), MOST, lambda: _forest(model, avoided))
+    return model.kept.get("spanning", (tuple(avoided), single(model)), MOST, lambda: _forest(model, avoided))
 
 
 def _forest(model: Model, avoided: Collection[str]) -> tuple[str, ...]:

@@ -92,7 +92,7 @@ class Structure:
     functions: list[Any] = field(default_factory=list)  # Python functions that laws call
     depth: int = 1
     ldl: Pattern = None  # type: ignore[assignment]
-    kept: Kept = field(default_factory=Kept)  # values of it, what they cost
+    kept: Kept = field(default_factory=Kept, init=False)  # values of it, what they cost; a changed copy has its own
 
     @property
     def nq(self) -> int:

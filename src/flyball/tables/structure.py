@@ -6,16 +6,16 @@ in ``terms``, forces in ``forces``, patterns of matrices in ``patterns``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import ModelError
 from ..model.body import Initial
-from ..model.kept import Kept
 from ..model.model import Model
 from . import forces, patterns, terms
 from .forest import body_table
+from .points import single
 from .specs import FrameSpec, Structure
 
 MOST = 8  # structures of one mechanism that are kept
@@ -61,11 +61,11 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
         If there are no bodies.
     """
     model = model.snapshot()
-    found = model.kept.get("structure", choices, MOST, lambda: _decided(model, choices))
-    if found.model is not model or any(f.native.stale for f in found.functions):
-        model.kept.drop("structure", choices)
-        fresh = replace(found, model=model, kept=Kept()) if found.model is not model else _decided(model, choices)
-        found = model.kept.get("structure", choices, MOST, lambda: fresh)
+    key = choices, single(model)
+    found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
+    if any(f.native.stale for f in found.functions):
+        model.kept.drop("structure", key)
+        found = model.kept.get("structure", key, MOST, lambda: _decided(model, choices))
     return found
 
 

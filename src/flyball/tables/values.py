@@ -45,7 +45,7 @@ class Values:
     given: Numbers
     length: float  # a typical length of the mechanism [m]
     poses: Poses  # where frames are when it is drawn
-    kept: Kept = field(default_factory=Kept)  # where motions of it start
+    kept: Kept = field(default_factory=Kept, init=False)  # where motions of it start; a changed copy has its own
 
     @property
     def numbers(self) -> Mapping[str, SimpleNamespace]:

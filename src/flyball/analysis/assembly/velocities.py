@@ -23,6 +23,7 @@ from .positions import DENSE, ITERATIONS, NO_PART, NO_PIVOT
 CONSISTENT = 1e-13  # part of the terms of a row that its residual may be
 WRONG = 1e-9  # the same, above which rows contradict one another
 BLOCKED = 1e-8  # given velocities that the constraints allow by less than this part only are held by them
+PATIENCE = 5  # steps of large mechanisms that may gain nothing: multipliers swing before they settle
 NOTHING = 1e-200  # terms below this have no digits to compare
 SMALL = 100  # velocities up to which matrices are dense
 SOFT = 1e-10  # of large mechanisms: how much what is free is held in each iteration, compared with what is given
@@ -264,14 +265,20 @@ def _approach(w: Wanted, v: np.ndarray, soft: bool = True) -> np.ndarray:
     """Step after step, each from the residuals that the last one has left, down to rounding."""
     step = w.steps(soft)
     last = moved = np.inf
+    patience = 1 if isinstance(w.G, np.ndarray) or w.G.shape[0] <= DENSE else PATIENCE
+    best, left = v, patience
     for _ in range(ITERATIONS):
         missed = w.missed(v)
         d = step(missed, w.lost(v) if soft else np.zeros(0))
         worst, way = float(np.abs(missed).max()), float(np.abs(d).max(initial=0.0))
-        if way <= CONSISTENT * float(np.abs(v).max(initial=0.0)) or (worst > 0.9 * last and way > 0.9 * moved):
+        if worst > 0.9 * last and way > 0.9 * moved:
+            left -= 1
+        else:
+            best, last, moved, left = v, worst, way, patience
+        if left == 0 or way <= CONSISTENT * float(np.abs(v).max(initial=0.0)):
             break
-        v, last, moved = v + d, worst, way
-    return v
+        v = v + d
+    return v if patience == 1 else best
 
 
 def contradiction(w: Wanted, v: np.ndarray) -> dict[str, float]:

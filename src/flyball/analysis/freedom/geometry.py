@@ -15,7 +15,6 @@ import numpy as np
 
 from ...equations.tree import retract
 from ...model.geometry import orientation_matrix
-from ...model.kept import Kept
 from ...results.freedoms import Geometry
 from ...tables.system import NQ, Q0
 from ..assembly.positions import closed_near
@@ -99,7 +98,7 @@ def _shaken_rank(a: Assembly) -> int:
             shift[2] = turn[0] = turn[1] = 0.0
         S.frame_x[k, :3] += shift
         S.frame_x[k, 3:] = (S.frame_x[k, 3:].reshape(3, 3) @ orientation_matrix(turn, "turn")).ravel()
-    shaken = Compiled(replace(c.values, system=S, kept=Kept()), c.z)
+    shaken = Compiled(replace(c.values, system=S), c.z)
     shaken.follow(a.compiled.hints)
     shaken.at(a.t, a.q, a.v)
     return rank_of(shaken)

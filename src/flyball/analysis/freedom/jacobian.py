@@ -38,20 +38,24 @@ def lengths(c: Compiled) -> np.ndarray:
     return c.sizes / c.values.length
 
 
-def scaled_jacobian(c: Compiled) -> tuple[Any, np.ndarray, np.ndarray]:
+def scaled_jacobian(c: Compiled, dense: bool = False) -> tuple[Any, np.ndarray, np.ndarray]:
     """The Jacobian last evaluated with turns counted in lengths and rows of unit size, and both scales.
 
     Returns
     -------
-    G : sparse (nr, nv)
+    G : sparse (nr, nv), or an array if that is wanted
     size : ndarray (nr,)
         What rows were divided by.
     scale : ndarray (nv,)
         What columns were multiplied with: velocities are ``scale`` times those that G takes.
     """
+    scale = lengths(c)
+    if dense:
+        A = c.jacobian() * scale
+        size = np.sqrt((A * A).sum(axis=1))
+        return A / np.maximum(size, 1e-300)[:, None], size, scale
     import scipy.sparse as sp
 
-    scale = lengths(c)
     G = c.sparse_jacobian() @ sp.diags(scale)
     size = np.sqrt(np.asarray(G.multiply(G).sum(axis=1)).ravel())
     return (sp.diags(1.0 / np.maximum(size, 1e-300)) @ G).tocsr(), size, scale
@@ -59,7 +63,11 @@ def scaled_jacobian(c: Compiled) -> tuple[Any, np.ndarray, np.ndarray]:
 
 def rank_of(c: Compiled) -> int:
     """Rank of the Jacobian last evaluated."""
-    if max(len(c.structure.rows), c.structure.nv) > DENSE:
-        return rank_by_pivots(scaled_jacobian(c)[0])
-    G = c.jacobian() * lengths(c)
-    return rank(G / np.maximum(np.sqrt((G * G).sum(axis=1, keepdims=True)), 1e-300))
+    dense = few(c)
+    G = scaled_jacobian(c, dense)[0]
+    return rank(G) if dense else rank_by_pivots(G)
+
+
+def few(c: Compiled) -> bool:
+    """Whether the Jacobian is so small that its rank is found from all of it, as an array."""
+    return max(len(c.structure.rows), c.structure.nv) <= DENSE

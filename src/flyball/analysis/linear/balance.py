@@ -95,8 +95,12 @@ def at_rest(e: Equations) -> Equations:
 
 def settled(e: Equations, part: float) -> bool:
     """Whether every equation of motion is balanced, but for a part of what acts in it, and rounding."""
-    left, may = np.abs(e.block("r")), part * acting(e)
-    return bool((left <= may).all() or (left <= may + rounding(e)).all())
+    return clearly_settled(e, part) or bool((np.abs(e.block("r")) <= part * acting(e) + rounding(e)).all())
+
+
+def clearly_settled(e: Equations, part: float) -> bool:
+    """The same without rounding, which where a force jumps may be all of it."""
+    return bool((np.abs(e.block("r")) <= part * acting(e)).all())
 
 
 def unbalanced(e: Equations) -> float:

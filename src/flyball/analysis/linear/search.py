@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import NotConverged
 from ...tables.names import velocity_names
+from .balance import clearly_settled
 from .free import free
 from .kinks import kinks
 from .rest import Rest
@@ -57,10 +58,15 @@ def arrived(x: Rest) -> Rest | None:
     if not x.open() <= CLOSED:
         return None
     best = Rest.at(x.c, x.t, x.q)  # the smallest reactions: self-stress would hide what is left
-    if not best.settled(BALANCED):
+    if not best.settled(BALANCED) or _on_a_jump(best):
         return None
     refuse_shaky(best)
     return best
+
+
+def _on_a_jump(x: Rest) -> bool:
+    """Whether other last digits alone balance it, because a force jumps there."""
+    return not clearly_settled(x.equations, BALANCED) and any(k.jump for k in kinks(x.equations))
 
 
 def pushed(x: Rest, later: Rest | None = None) -> Rest:

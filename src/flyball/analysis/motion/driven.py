@@ -137,7 +137,8 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
     ends = np.stack([t[:-1] - middle, t[1:] - middle], axis=1) / half[:, None]
     powers = np.arange(m)
     moments = (ends[:, 1:] ** (powers + 1) - ends[:, :1] ** (powers + 1)) / (powers + 1)
-    V = x[:, None, :] ** powers[:, None]
+    V = np.ones((n, m, m))
+    np.cumprod(np.broadcast_to(x[:, None, :], (n, m - 1, m)), axis=1, out=V[:, 1:])
     weights = np.empty((n, m))
     crowded = np.diff(x, axis=1).min(axis=1) < CROWDED
     weights[~crowded] = np.linalg.solve(V[~crowded], moments[~crowded, :, None])[..., 0]

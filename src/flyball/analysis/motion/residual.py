@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,15 +68,22 @@ def missed(
     Rows in metres count as parts of the mechanism's length. The state (velocities v) is the one in c's scratch,
     evaluated with forces; ``sizes`` are c's, ``o`` the options of the motion.
     """
-    G, gamma = c.sparse_jacobian(), c.work.row[GAMMA].copy()
+    S, n = c.values.system, len(c.structure.rows)
+    row_p = S.row_p[: n + 1]
+    row, column, G = np.repeat(np.arange(n), np.diff(row_p)), S.col_i[: row_p[-1]], c.work.G[: row_p[-1]]
+
+    def times(entries: np.ndarray, x: np.ndarray) -> np.ndarray:
+        return np.bincount(row, entries * x[column], n)
+
+    gamma = c.work.row[GAMMA].copy()
     if o is not None and o.get("stabilization") == "baumgarte":
-        gamma -= 2 * o["alpha"] * (G @ v - c.work.row[NU]) + o["beta"] ** 2 * c.work.row[G_VALUE]
-    rates = (np.abs(v) / sizes)[G.indices]
-    turning = np.array([rates[i:j].max(initial=0.0) for i, j in pairwise(G.indptr)])
-    asked = abs(G) @ np.abs(_unconstrained(c)) + np.abs(gamma) + (abs(G) @ np.abs(v)) * turning
+        gamma -= 2 * o["alpha"] * (times(G, v) - c.work.row[NU]) + o["beta"] ** 2 * c.work.row[G_VALUE]
+    turning = np.zeros(n)
+    np.maximum.at(turning, row, (np.abs(v) / sizes)[column])
+    asked = times(abs(G), np.abs(_unconstrained(c))) + np.abs(gamma) + times(abs(G), np.abs(v)) * turning
     metre = np.where(c.metric, c.values.length, 1.0)
-    size = asked + abs(G) @ np.abs(x)
-    return np.abs(G @ x - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
+    size = asked + times(abs(G), np.abs(x))
+    return np.abs(times(G, x) - gamma) / metre, float((size / metre).max()), float((asked / metre).max())
 
 
 def _unconstrained(c: Compiled) -> np.ndarray:
