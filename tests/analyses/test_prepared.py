@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
 from concurrent.futures import ThreadPoolExecutor
+from copy import deepcopy
 
 import numpy as np
 import pytest
@@ -141,3 +143,31 @@ def test_mass_matrix_of_bodies_that_only_drivers_keep_from_being_points(layer):
     p = m.prepare(coordinates=layer)
     wanted = np.diag([1.0, 1.0, 0.1, 2.0, 2.0, 0.0]) if layer == "absolute" else np.diag([0.35 + 2.0, 0.0])
     assert p.mass_matrix(p.q) == pytest.approx(wanted, abs=1e-12)
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+def test_what_is_not_finite_is_refused(layer):
+    """Fully driven, nothing is solved for, and nothing came of it but zeros."""
+    m = fb.Mechanism("driven", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+    m.add(fb.Driver("spin", "A.angle", "t**2"))
+    p = m.prepare(coordinates=layer)
+    assert p.acceleration(0, p.q, p.v)[-1] == pytest.approx(2.0)
+    for ask in (p.acceleration, p.multipliers, p.efforts, p.forces):
+        with pytest.raises(fb.ModelError, match="q of 'driven' is not finite"):
+            ask(0.0, p.q * np.nan, p.v)
+        with pytest.raises(fb.ModelError, match="v of 'driven' is not finite"):
+            ask(0.0, p.q, p.v + np.inf)
+        for t in (np.nan, np.inf, "1 s", None):
+            with pytest.raises(fb.ModelError, match="t is a finite number of seconds"):
+                ask(t, p.q, p.v)
+    with pytest.raises(fb.ModelError, match="q of 'driven' is not finite"):
+        p.mass_matrix(p.q * np.nan)
+
+
+def test_pickled_and_copied():
+    p = double_pendulum().prepare()
+    wanted = p.acceleration(0.0, p.q, p.v)
+    for other in (pickle.loads(pickle.dumps(p)), deepcopy(p)):
+        assert np.array_equal(other.acceleration(0.0, p.q, p.v), wanted)
+        assert np.array_equal(other.mass_matrix(p.q), p.mass_matrix(p.q))

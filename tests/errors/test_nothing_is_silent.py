@@ -70,6 +70,32 @@ def test_going_on_with_another_mechanism_is_refused():
         m.simulate(2.0, start=r, parameters={"x": 2.0})
 
 
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+def test_going_on_elsewhere_than_a_result_ended_is_refused(coordinates):
+    """In joint coordinates another length closes as well, with all bodies beyond it somewhere else."""
+    m = fb.Mechanism("two", planar=True, gravity=(0, -9.81), parameters={"L": 1.0, "k": 20.0, "w": 1.0, "u": 0.0})
+    m.add(
+        fb.Body("a", mass=1, inertia=0.1, position=("L/2", 0)), fb.Body("b", mass=1, inertia=0.1, position=("1.5*L", 0))
+    )
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=("L", 0)))
+    m.add(fb.SpringDamper("s", "ground", "b", at=((0, 1), ("2*L", 0)), stiffness="k", length=1))
+    m.add(fb.Driver("d", "A.angle", "w*t + u*(t - 0.5)"))
+    r = m.simulate(0.5, outputs=3, coordinates=coordinates)
+    far = "cannot be gone on with.* from where the result ended"
+    for changed in ({"L": 1.3}, {"w": 1.3}, {"u": 4.0}):  # lengths, an angle, a velocity
+        with pytest.raises(fb.ModelError, match=far):
+            m.simulate(1.0, start=r, parameters=changed, coordinates=coordinates)
+    if coordinates == "joint":
+        other = m.copy()
+        other.drivers.clear()
+        free = other.simulate(0.5, outputs=3, coordinates=coordinates)
+        other.replace(fb.Revolute("B", "b", "a", at=("L", 0)))  # turns the other way
+        with pytest.raises(fb.ModelError, match=far):
+            other.simulate(1.0, start=free, coordinates=coordinates)
+    on = m.simulate(1.0, outputs=3, start=r, parameters={"k": 30.0}, coordinates=coordinates)
+    assert on["b"].position[0] == pytest.approx(r["b"].position[-1], abs=1e-12)
+
+
 def test_units_of_initial_conditions_and_times():
     m = block()
     m.add(fb.Revolute("J", "ground", "b", at=(0, 0)))

@@ -5,6 +5,7 @@ M(q) vdot = f(t, q, v) + G(t, q)^T lam + effort        g(t, q) = 0        qdot =
 
 from __future__ import annotations
 
+import numbers
 import threading
 from dataclasses import replace
 from typing import Any
@@ -165,6 +166,12 @@ class Prepared:
             b = int(S.body_i[b, PARENT])
         return J
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {k: x for k, x in vars(self).items() if k != "_here"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, _here=threading.local())
+
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
         s = self._start.compiled.structure
@@ -214,6 +221,8 @@ class Prepared:
 
     def _at(self, c: Compiled, t: float, q: np.ndarray, v: np.ndarray, task: int | None = None) -> Compiled:
         q, v = self._state(q, v)
+        if not (isinstance(t, numbers.Real) and np.isfinite(t)):
+            raise ModelError(f"t is a finite number of seconds, not {t!r}")
         c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
         return c
 
@@ -229,6 +238,8 @@ class Prepared:
                     f"{name} has the shape {found.shape}; {self.model.name!r} has {len(known)} numbers there in these "
                     f"coordinates, as p.{name} has"
                 )
+            if not np.isfinite(found).all():
+                raise ModelError(f"{name} of {self.model.name!r} is not finite: {found}")
             out.append(found.astype(float))
         return out[0], out[1]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import operator
 from collections.abc import Iterable, Mapping
+from copy import copy
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +28,7 @@ def copied(model: Model) -> Any:
     vars(out).update(vars(model))
     vars(out).pop("kept", None)
     vars(out).update({"_snapshot": None, "frozen": False, "parameters": dict(model.parameters)})
+    vars(out)["gravity"] = copy(model.gravity)  # it may be a list
     vars(out).update({name: list(getattr(model, name)) for name in CATEGORIES} | {"by_name": dict(model.by_name)})
     return out
 

@@ -72,7 +72,7 @@ class Model:
         except (ValueError, TypeError, AttributeError) as error:
             raise ModelError(f"parameters of {name!r}: {error}") from None
         self.environment()
-        self.gravity = gravity if gravity is not None else (0.0,) * (2 if planar else 3)
+        self.gravity = tuple(told_gravity(self, (0.0,) * (2 if planar else 3) if gravity is None else gravity))
         self.gravity_told = gravity is not None
         self.gravity_vector()
         self.bodies: list[Body] = []
@@ -130,7 +130,7 @@ class Model:
 
     def __setattr__(self, name: str, value: Any) -> None:
         refuse_changes(self, f"{name!r} cannot be set")
-        if name == "gravity":  # a list of the caller's would be changed unseen
+        if name == "gravity":  # the caller's list stays the caller's
             value = told_gravity(self, value)
         super().__setattr__(name, value)
 

@@ -86,8 +86,8 @@ def refuse_twins(names: Iterable[str], inputs: Iterable[str], sensors: Iterable[
             raise ExpressionError(f"{name!r} is {' and also '.join(meant)}; rename the {meant[-1].split(' ', 1)[1]}")
 
 
-def told_gravity(model: Model, value: Any) -> tuple:
-    """A vector of numbers and texts, not yet in SI units, of the model's own."""
+def told_gravity(model: Model, value: Any) -> tuple | list:
+    """A vector of numbers and texts, not yet in SI units, of the model's own: a list if it may be changed in place."""
     try:
         found = plain(value)
     except (ValueError, TypeError, AttributeError) as error:
@@ -95,4 +95,4 @@ def told_gravity(model: Model, value: Any) -> tuple:
     if not isinstance(found, (tuple, list)):
         example = "(0, -9.81)" if model.planar else "(0, 0, -9.81)"
         raise ModelError(f"gravity of {model.name!r} is a vector, for instance {example}, not {value!r}")
-    return tuple(found)
+    return found if isinstance(value, tuple) else list(found)

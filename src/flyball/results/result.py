@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import threading
 from collections.abc import Callable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -20,6 +19,7 @@ from .measured import Measured
 from .numbers import span
 from .reactions import Reactions
 from .records import Records
+from .turn import Turn
 from .views import view
 from .views.base import Curves
 
@@ -66,9 +66,9 @@ class Result:
         self.model, self.values, self.health = model, values, health
         self.t, self.q, self.v = t, q, v
         self._vdot, self._multipliers = vdot, multipliers
+        self._turn = Turn()
         self.unsolved: Owed | None = None  # finds accelerations and multipliers that are not there yet
         self.owed: Owed | None = None  # finds works that are not there yet
-        self._lock = threading.RLock()  # either is found in scratch that threads would share
         self._states = states
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
@@ -87,11 +87,9 @@ class Result:
         return self._multipliers
 
     def _solve(self) -> None:
-        if self.unsolved is None:
-            return
-        with self._lock:
-            if self.unsolved is not None:
-                self._vdot, self._multipliers = self.unsolved()
+        with self._turn:  # there is one scratch
+            if (find := self.unsolved) is not None:
+                self._vdot, self._multipliers = find()
                 self.unsolved = None
 
     @property
@@ -118,21 +116,17 @@ class Result:
 
     def _settle(self) -> None:
         """Find the works of a motion that was followed, not integrated."""
-        if self.owed is None:
-            return
-        with self._lock:
-            if self.owed is not None:
-                self._states, y = self.owed()
-                self._final, self.owed = (self._final[0], y), None
+        with self._turn:
+            if (find := self.owed) is not None:  # owed still if it is interrupted
+                self._states, y = find()
+                self._final = (self._final[0], y)
+                self.owed = None
 
     def __getstate__(self) -> dict[str, Any]:
         """All is found before it is pickled or copied: of what it is found with nothing goes along."""
         self._solve()
         self._settle()
-        return {k: v for k, v in vars(self).items() if k != "_lock"}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        vars(self).update(state, _lock=threading.RLock())
+        return vars(self)
 
     @property
     def planar(self) -> bool:
