@@ -9,6 +9,7 @@ import pytest
 
 import flyball as fb
 from flyball.results.result import Result
+from flyball.view.drawing import handed_out, stacked
 from flyball.view.figures import MOST, figures, hidden, label, panels, spread
 from flyball.view.plots import plot, standard_plots
 from flyball.view.recording import Channel, Panel
@@ -97,3 +98,11 @@ def test_legends_lie_beside_the_curves(result: Result) -> None:
         box, legend = ax.get_window_extent(), ax.get_legend().get_window_extent()
         assert legend.x0 >= box.x1 - 1
         assert legend.x1 <= figure.bbox.x1 + 1
+
+
+@pytest.mark.parametrize(("size", "text"), [(1e-6, "×10⁻⁶"), (3e12, "×10¹²"), (2.0, "")])
+def test_a_common_power_of_ten_is_told_at_the_axis(size: float, text: str) -> None:
+    drawing = stacked(T, (Panel("x", (Channel("a", "m", size * np.linspace(-1.0, 1.0, len(T))),)),))
+    handed_out(drawing, None)
+    drawing.canvas.draw()
+    assert drawing.axes[0].yaxis.get_offset_text().get_text() == text

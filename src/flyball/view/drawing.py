@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Drawing
 
-    from ..results.result import Result
-
 # Okabe and Ito's palette, which people with any colour vision can tell apart, darkest first.
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#4D4D4D", "#B8A800")
 DASHES: tuple[Any, ...] = ("-", (0, (4, 4)), (0, (1.5, 3)), (0, (6, 2, 1.5, 2)))
@@ -53,6 +51,8 @@ STYLE: dict[str, Any] = {
     "axes.formatter.limits": (-3, 5),
     "svg.hashsalt": "flyball",
 }
+RAISED = str.maketrans("\N{MINUS SIGN}-0123456789", "⁻⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+SHIPPED = "DejaVu Sans"  # with Matplotlib; not every font has raised figures
 SUFFIXES = (".png", ".svg", ".pdf")
 PRETTY = {"N*m": "N m", "m/s^2": "m/s²", "rad/s^2": "rad/s²", "1": "-"}
 BESIDE: dict[str, Any] = {"loc": "upper left", "bbox_to_anchor": (1.0, 1.04), "borderaxespad": 0.4}
@@ -141,6 +141,7 @@ def _plainly_numbered(drawing: Drawing) -> None:
         for axis in (ax.xaxis, ax.yaxis):
             if type(axis.get_major_formatter()) is ScalarFormatter:
                 axis.set_major_formatter(plain())
+                axis.get_offset_text().set_fontfamily(SHIPPED)
 
 
 @cache
@@ -148,26 +149,23 @@ def _plain_numbers() -> Any:
     from matplotlib.ticker import ScalarFormatter
 
     class PlainNumbers(ScalarFormatter):
-        """Numbers as text, their common power of ten as a formula."""
+        """Numbers as text, their common power of ten too."""
 
         def get_offset(self) -> str:
-            self.set_useMathText(True)
-            try:
-                return super().get_offset()
-            finally:
-                self.set_useMathText(False)
+            text = super().get_offset()
+            return f"\N{MULTIPLICATION SIGN}10{text[2:].translate(RAISED)}" if text.startswith("1e") else text
 
     return PlainNumbers
 
 
-def stacked(result: Result, parts: Sequence[Panel], ratios: Sequence[float] = ()) -> Drawing:
-    """Panels one below the other; high enough for their legends."""
+def stacked(t: np.ndarray, parts: Sequence[Panel], ratios: Sequence[float] = ()) -> Drawing:
+    """Panels over the times ``t``, one below the other; high enough for their legends."""
     each = [max(2.3, 0.5 + 0.19 * len(p.curves)) for p in parts]
     heights = [h * r for h, r in zip(each, ratios or [1.0] * len(each), strict=False)]
     drawing = new_figure(0.9 + sum(heights))
     axes = drawing.subplots(len(parts), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for ax, panel in zip(axes, parts, strict=True):
-        _over_time(ax, result.t, panel)
+        _over_time(ax, t, panel)
     axes[-1].set_xlabel("time [s]")
     return drawing
 

@@ -54,7 +54,7 @@ def plot_efforts(found: InverseDynamics, path: str | os.PathLike | None = None) 
             f"{found.result.model.name!r}: there is no drive, and the motion determines no reaction to draw"
         )
     with styled():
-        drawing = stacked(found.result, parts)
+        drawing = stacked(found.result.t, parts)
         if note := _undrawn(rest):
             drawing.supxlabel(note, fontsize=8, x=0.012, ha="left")
         headed(drawing, f"{found.result.model.name}: inverse dynamics")

@@ -172,6 +172,25 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class PointPaths:
+    """Paths of points by name, each (n, 3) [m], world axes."""
+
+    points: dict[str, np.ndarray]
+    planar: bool
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a picture shows, and under which title: curves over the times ``t`` (n,) [s], or paths."""
+
+    name: str
+    title: str
+    t: np.ndarray
+    shown: Figure | PointPaths
+
+
+@dataclass(frozen=True)
 class RecordedMode:
     """A mode: one period of it, from ``begin`` to ``end`` of the recorded times, and what it is.
 

@@ -1,0 +1,86 @@
+"""Pictures drawn by a second process while this one computes and writes the rest.
+
+Importing Matplotlib and drawing take longer than a short motion. The second process gets numbers and names, never the
+result; whatever goes wrong in it, this one draws the pictures itself, so that a user is told the same.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from threading import Thread
+from typing import Any
+
+from .artist import draw, files
+from .recording import Picture
+
+# Modules are found where this process finds them, and an interrupt is this process' to answer.
+CODE = """import signal, sys
+signal.signal(signal.SIGINT, signal.SIG_IGN)
+sys.path[:] = {path!r}
+from flyball.view.artist import main
+main()
+"""
+
+
+class Artist:
+    """Draws pictures beside this process while its ``with`` block lasts; not ``beside``, or on one core, within it."""
+
+    def __init__(self, beside: bool = True) -> None:
+        self._process = _started() if beside else None
+        self._asked: tuple[Sequence[Picture], Path] | None = None
+        self._talk: Thread | None = None
+
+    def __enter__(self) -> Artist:
+        return self
+
+    def begin(self, pictures: Sequence[Picture], folder: Path) -> None:
+        """Ask for pictures, once, to be drawn as PNG files into a folder that is there."""
+        self._asked = pictures, folder
+        if self._process is not None:
+            self._talk = Thread(target=self._process.communicate, args=(pickle.dumps(self._asked),))
+            self._talk.start()
+
+    def finish(self) -> list[Path]:
+        """Wait until they are drawn; returns their paths, none if none were asked for.
+
+        Raises
+        ------
+        ModelError
+            If a file cannot be written.
+        """
+        if self._asked is None:
+            return []
+        if self._process is not None and self._talk is not None:
+            self._talk.join()
+            if self._process.returncode == 0:
+                return files(*self._asked)
+        return draw(*self._asked)
+
+    def __exit__(self, *_: Any) -> None:
+        if self._process is not None:
+            self._process.kill()
+            if self._talk is not None:
+                self._talk.join()
+            else:
+                self._process.communicate()
+
+
+def _started() -> subprocess.Popen | None:
+    """The second process, importing already; None where it would not help, or cannot be had."""
+    if _cores() < 2 or "matplotlib" in sys.modules or getattr(sys, "frozen", False) or not sys.executable:
+        return None
+    command = [sys.executable, "-P", "-c", CODE.format(path=sys.path)]
+    try:
+        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
+    except OSError:
+        return None
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

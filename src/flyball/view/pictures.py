@@ -1,0 +1,40 @@
+"""The standard pictures of a motion as data: what they show, ready to be drawn, here or by another process."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..model.body import GROUND
+from .figures import centre, few, figures, some
+from .recording import Figure, Picture, PointPaths
+
+if TYPE_CHECKING:
+    from ..results.result import Result
+
+ORDER = ("energy", "coordinates", "positions", "paths", "reactions", "actuation", "sensors")
+
+
+def standard_pictures(result: Result) -> list[Picture]:
+    """The pictures that tell most of a motion, of those that have something to show.
+
+    ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
+    in the plane or from three sides), ``reactions``, ``actuation`` and ``sensors``.
+    """
+    found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(result)}
+    if len(result.t):
+        found["paths"] = _paths(result)
+    return [Picture(k, f"{result.model.name}: {k}", result.t, found[k]) for k in ORDER if k in found]
+
+
+def _paths(result: Result) -> PointPaths:
+    """Paths of centres of mass and named frames."""
+    bodies = some(result.model.bodies)
+    points = {b.name: centre(result, b.name) for b in bodies}
+    for frame in result.model.frames if len(points) < 6 else ():
+        if frame.body != GROUND:
+            p = result[frame.name].position
+            points[frame.name] = np.column_stack([p, np.zeros((len(p), 3 - p.shape[1]))])
+    note = "; ".join(x for x in (few(len(bodies), len(result.model.bodies), "bodies"), "dots: start") if x)
+    return PointPaths(points, result.planar, note)
