@@ -64,6 +64,20 @@ row_biases = written(
 )
 """Gamma of all constraint rows and rates of what is measured, from poses and velocities."""
 
+whole_rows = written(
+    __name__,
+    "whole_rows",
+    "S, W, t, v, z, whole",
+    [
+        "begin_rows(S, W)",
+        *(f"each_row(S, W, z, whole, {k.number}, row_{k.number})" for k in OFTEN),
+        f"rare_rows(S, W, z, {RARE}, {TERM_KINDS}, rare)",
+        "end_rows(S, W, t, v)",
+    ],
+    _ROWS | {name: getattr(rows, name) for name in ("begin_rows", "each_row", "rare_rows", "end_rows")},
+)
+"""Both in one pass, where poses and motions are there; without biases of what is measured unless ``whole``."""
+
 _PLACES = [k for k in KINDS if k.place]
 _FEET = {f"foot_{k.number}": k.foot for k in _PLACES}
 

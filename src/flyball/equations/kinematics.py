@@ -36,6 +36,15 @@ def frame_motions(S, W):
 
 
 @formula
+def frames(S, W):
+    """Poses and motions of the frames in one pass."""
+    for k in range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES]):
+        p, R, w, u, alpha, a = carried(load(W.BK, S.frame_i[k]), load3(S.frame_x, k, 0), load9(S.frame_x, k, 3))
+        store_pose(W.FK, k, p, R)
+        store_motion(W.FK, k, w, u, alpha, a)
+
+
+@formula
 def ground_frames(S, W):
     """Records of the frames on ground, written once."""
     for k in range(S.kinds[GROUND_FRAMES]):

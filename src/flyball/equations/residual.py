@@ -38,14 +38,14 @@ from ..tables.system import (
     V2,
     VALUE,
 )
-from .dispatch import row_biases, row_values
+from .dispatch import row_biases, row_values, whole_rows
 from .friction import reaction_loads
-from .kinematics import frame_motions, poses
+from .kinematics import frame_motions, frames, poses
 from .loads import efforts, forces, gather, inertial
 from .prescribed import prepare
 from .rows import measured, row_times
-from .tasks import GAPS, STEPS
-from .tree import column, motion, retract
+from .tasks import ALONG, GAPS, STEPS
+from .tree import column, motion, pose, retract
 
 
 class Bench(NamedTuple):
@@ -92,23 +92,45 @@ def residuals(S, W, bench, task):
                 bench.out[n, nv + k] = W.row[G_VALUE, k]
                 bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.row[NU, k]
         else:
-            residual(S, W, t, p, a, bench.lam, bench.out[n])
+            at_once(S, W, t, p, a, task != ALONG or S.mix_i.shape[0] > 0)
+            missed(S, W, t, p, bench.lam, bench.out[n])
     return 0
 
 
 @formula
 def residual(S, W, t, p, vdot, lam, out):
-    """The residual at one state."""
+    """The residual at one state, by the engine's own loops: no more of its code."""
+    nq = S.kinds[COORDINATES]
+    v = p[nq : nq + W.vel.shape[1]]
+    z = p[nq + W.vel.shape[1] :]
+    poses(S, W, p[:nq])
+    row_values(S, W, t, z)
+    for b in range(S.body_i.shape[0]):
+        accelerated(S, W, b, v, vdot)
+    frame_motions(S, W)
+    row_biases(S, W, t, v, z)  # the bias at true accelerations is the acceleration itself
+    missed(S, W, t, p, lam, out)
+
+
+@formula
+def at_once(S, W, t, p, vdot, whole):
+    """The same kinematics and rows in one pass; without accelerations of what is measured unless ``whole``."""
+    nq = S.kinds[COORDINATES]
+    v = p[nq : nq + W.vel.shape[1]]
+    for b in range(S.body_i.shape[0]):
+        pose(S, W, b, p[:nq])
+        accelerated(S, W, b, v, vdot)
+    frames(S, W)
+    whole_rows(S, W, t, v, p[nq + W.vel.shape[1] :], whole)
+
+
+@formula
+def missed(S, W, t, p, lam, out):
+    """What the equations miss with these multipliers, kinematics and rows being known."""
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     nr = S.row_i.shape[0]
     v = p[nq : nq + nv]
-    z = p[nq + nv :]
-    poses(S, W, p[:nq])
-    row_values(S, W, t, z)
-    accelerated(S, W, v, vdot)
-    frame_motions(S, W)
-    row_biases(S, W, t, v, z)  # the bias at true accelerations is the acceleration itself
     for k in range(nr):
         W.row[LAM, k] = lam[k]
         out[nv + k] = W.row[G_VALUE, k]
@@ -135,29 +157,28 @@ def residual(S, W, t, p, vdot, lam, out):
 
 
 @formula
-def accelerated(S, W, v, vdot):
-    """Velocities and true accelerations of all bodies at the poses in W, parents first."""
-    for b in range(S.body_i.shape[0]):
-        motion(S, W, b, v)
-        kind = S.body_i[b, TREE]
-        v0 = S.body_i[b, V0]
-        alpha = load3(W.BK, b, 18)
-        a = load3(W.BK, b, 21)
-        if kind == PLANAR:
-            a = add(a, (vdot[v0], vdot[v0 + 1], 0.0 * vdot[v0]))
-            alpha = add(alpha, (0.0 * vdot[v0], 0.0 * vdot[v0], vdot[v0 + 2]))
-        elif kind == FREE:
-            a = add(a, (vdot[v0], vdot[v0 + 1], vdot[v0 + 2]))
-            alpha = add(alpha, mv(load9(W.BK, b, 3), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
-        else:
-            arm = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
-            for k in range(S.body_i[b, NV]):
-                x, u = column(S, W, b, k)
-                turn = scale(vdot[v0 + k], x)
-                alpha = add(alpha, turn)
-                a = add(a, add(scale(vdot[v0 + k], u), cross(turn, arm)))
-        put3(W.BK, b, 18, alpha)
-        put3(W.BK, b, 21, a)
+def accelerated(S, W, b, v, vdot):
+    """Velocity and true acceleration of body b at its pose in W, its parent's being known."""
+    motion(S, W, b, v)
+    kind = S.body_i[b, TREE]
+    v0 = S.body_i[b, V0]
+    alpha = load3(W.BK, b, 18)
+    a = load3(W.BK, b, 21)
+    if kind == PLANAR:
+        a = add(a, (vdot[v0], vdot[v0 + 1], 0.0 * vdot[v0]))
+        alpha = add(alpha, (0.0 * vdot[v0], 0.0 * vdot[v0], vdot[v0 + 2]))
+    elif kind == FREE:
+        a = add(a, (vdot[v0], vdot[v0 + 1], vdot[v0 + 2]))
+        alpha = add(alpha, mv(load9(W.BK, b, 3), (vdot[v0 + 3], vdot[v0 + 4], vdot[v0 + 5])))
+    else:
+        arm = sub(load3(W.BK, b, 0), load3(W.O, b, 0))
+        for k in range(S.body_i[b, NV]):
+            x, u = column(S, W, b, k)
+            turn = scale(vdot[v0 + k], x)
+            alpha = add(alpha, turn)
+            a = add(a, add(scale(vdot[v0 + k], u), cross(turn, arm)))
+    put3(W.BK, b, 18, alpha)
+    put3(W.BK, b, 21, a)
 
 
 @door

@@ -126,6 +126,19 @@ def each_bias(S, W, z, kind, row):
 
 
 @formula
+def each_row(S, W, z, whole, kind, row):
+    """``each_value`` and ``each_bias`` in one; what is measured has no bias unless ``whole``."""
+    for k in range(S.kinds[kind], S.kinds[kind + 1]):
+        F = load(W.FK, S.term_i[k, TERM_F])
+        M = load(W.FK, S.term_i[k, TERM_M])
+        hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+        g, force, torque_M, torque_F, bias = row(parameters(S.term_x, k), F, M, hint, S.const)
+        add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
+        if whole or S.term_i[k, TERM_ROW] < S.row_i.shape[0]:
+            add_bias(S, W, k, bias)
+
+
+@formula
 def rare_values(S, W, z, first, last, row):
     """``each_value`` for kinds that share one loop, ``row(kind, par, F, M, hint, data)``: less to compile."""
     for kind in range(first, last):
@@ -147,6 +160,39 @@ def rare_biases(S, W, z, first, last, row):
             hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
             _, _, _, _, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
             add_bias(S, W, k, bias)
+
+
+@formula
+def rare_rows(S, W, z, first, last, row):
+    """``each_row`` for kinds that share one loop, biases always."""
+    for kind in range(first, last):
+        for k in range(S.kinds[kind], S.kinds[kind + 1]):
+            F = load(W.FK, S.term_i[k, TERM_F])
+            M = load(W.FK, S.term_i[k, TERM_M])
+            hint = hint_of(S, z, k, 0.0 * S.term_x[k, 0])
+            g, force, torque_M, torque_F, bias = row(kind, parameters(S.term_x, k), F, M, hint, S.const)
+            add_value(S, W, k, g, force, torque_M, torque_F, F[0], M[0])
+            add_bias(S, W, k, bias)
+
+
+@formula
+def begin_rows(S, W):
+    """Start rows and measured quantities, their biases too, from nothing."""
+    begin(S, W)
+    for k in range(S.row_i.shape[0]):
+        W.row[GAMMA, k] = 0.0
+    for m in range(measured(S)):
+        W.sensed[BIAS, m] = 0.0
+
+
+@formula
+def end_rows(S, W, t, v):
+    """Laws of time, rates of the measured quantities, and gamma of the laws."""
+    end(S, W, t)
+    rates(S, W, v)
+    for k in range(S.row_i.shape[0]):
+        W.row[GAMMA, k] += W.row[NU_DOT, k]
+    end_biases(S, W, t)
 
 
 @formula
@@ -173,6 +219,16 @@ def end(S, W, t):
 @formula
 def begin_biases(S, W, v):
     """Rates of the measured quantities; gamma of the laws as far as they follow time."""
+    rates(S, W, v)
+    for m in range(measured(S)):
+        W.sensed[BIAS, m] = 0.0
+    for k in range(S.row_i.shape[0]):
+        W.row[GAMMA, k] = W.row[NU_DOT, k]
+
+
+@formula
+def rates(S, W, v):
+    """Rates of the measured quantities."""
     nr = S.row_i.shape[0]
     nm = measured(S)
     for m in range(nm):
@@ -181,9 +237,6 @@ def begin_biases(S, W, v):
             s += W.G[e] * v[S.col_i[e]]
         W.sensed[RATE, m] = s
         W.sensed[VALUE, nm + m] = s
-        W.sensed[BIAS, m] = 0.0
-    for k in range(nr):
-        W.row[GAMMA, k] = W.row[NU_DOT, k]
 
 
 @formula
