@@ -8,10 +8,12 @@ import re
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 import flyball as fb
 from flyball.analysis import linearize, modes
 from flyball.analysis.linear import large
+from flyball.numerics.pencil import Pencil
 from tests.analyses.made import G, chain, parallelogram, rod
 from tests.layers import LAYERS
 
@@ -41,6 +43,18 @@ def line_response(w: float, damping: float = 0.3) -> np.ndarray:
     """What a push at the first mass does to all."""
     T = 2 * np.eye(N) - np.eye(N, k=1) - np.eye(N, k=-1)
     return np.linalg.solve((50 + 1j * w * damping) * T - 2 * w * w * np.eye(N), np.eye(N)[0])
+
+
+@pytest.mark.parametrize(("k", "d"), [(1e12, 1.0), (50.0, 0.3), (1e-12, 1e-20)])
+def test_how_little_damping_is_none_depends_on_how_fast_it_swings(k, d):
+    """s^2 + (d s + k) 4 sin^2(j pi / 2 (n + 1)) = 0, from stiff to soft."""
+    n = 120
+    mu = 4.0 * np.sin(np.arange(1, n + 1) * np.pi / (2 * (n + 1))) ** 2
+    T = sp.diags([2.0 * np.ones(n), -np.ones(n - 1), -np.ones(n - 1)], [0, 1, -1]).tocsr()
+    w = Pencil(sp.identity(n, format="csr"), d * T, k * T, sp.csr_matrix((0, n))).nearest(4)[0]
+    exact = (-d * mu + np.sqrt((d * mu) ** 2 - 4.0 * k * mu + 0j)) / 2.0
+    assert w[w.imag > 0][:2] == pytest.approx(exact[:2], rel=1e-9)
+    assert w[w.imag > 0][:2].real == pytest.approx(exact[:2].real, rel=1e-3)
 
 
 def test_a_damped_line_of_masses():

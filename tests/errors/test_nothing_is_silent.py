@@ -136,3 +136,16 @@ def test_places_beyond_all_measure():
     for parameters in (5, "x", [1]):
         with pytest.raises(fb.ModelError, match="maps names to values"):
             fb.Mechanism("m", parameters=parameters)
+
+
+def test_parameters_and_times_that_are_none():
+    m = block(parameters={"x": 1.0})
+    for wrong in ({1: 1.0}, {None: 1.0}):
+        with pytest.raises(fb.ModelError, match="parameters maps names to values"):
+            m.simulate(1.0, parameters=wrong)
+    for ask in (lambda **k: m.simulate(1.0, **k), m.prepare, m.mobility, m.modes):
+        with pytest.raises(fb.ModelError, match=r"parameter 'x': .* is complex"):
+            ask(parameters={"x": 1 + 0j})
+    with pytest.raises(fb.ModelError, match="t_end"):
+        m.simulate(None)
+    assert m.simulate(1e-300, outputs=2).t[-1] == 1e-300

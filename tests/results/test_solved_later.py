@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import pickle
 import threading
 from concurrent.futures import ThreadPoolExecutor
@@ -40,6 +41,32 @@ def test_order_of_asking_does_not_matter():
     assert force.tobytes() == other.tobytes()
     three = pickle.loads(pickle.dumps(mechanisms.example("andrews.toml").simulate(0.02, outputs=7)))
     assert three.multipliers.tobytes() == one.multipliers.tobytes()
+
+
+@pytest.mark.parametrize(("name", "what"), [("andrews.toml", "vdot"), ("slider_crank.toml", "states")])
+def test_threads_that_ask_at_once_are_told_the_same(name, what):
+    m = mechanisms.example(name)
+    alone = getattr(m.simulate(0.03, outputs=400), what).tobytes()
+    for _ in range(5):
+        r = m.simulate(0.03, outputs=400)
+        begin = threading.Barrier(4)
+
+        def ask(_, r=r, begin=begin):
+            begin.wait()
+            return getattr(r, what).tobytes()
+
+        with ThreadPoolExecutor(4) as pool:
+            assert set(pool.map(ask, range(4))) == {alone}
+
+
+@pytest.mark.parametrize("again", [copy.copy, copy.deepcopy, lambda r: pickle.loads(pickle.dumps(r))])
+def test_a_copy_has_found_all_and_leaves_the_scratch_behind(again):
+    m = mechanisms.example("andrews.toml")
+    r = m.simulate(0.02, outputs=7)
+    made = again(r)
+    assert made.unsolved is None
+    assert made.owed is None
+    assert made.vdot.tobytes() == m.simulate(0.02, outputs=7).vdot.tobytes()
 
 
 def test_a_function_with_a_memory_is_asked_in_order():

@@ -32,7 +32,7 @@ class Options:
     def __post_init__(self) -> None:
         for f in fields(self):
             value = getattr(self, f.name)
-            if f.name in TIMES and value is not None:
+            if f.name in TIMES and (value is not None or f.type == "float"):
                 value = seconds(value, f.name)
             elif f.type == "tuple[str, ...]" or (f.type == "tuple[str, ...] | None" and value is not None):
                 value = names(value, f.name)
@@ -48,8 +48,9 @@ class Options:
                 raise ModelError(f"{f.name} is a function, not {value!r}")
             elif f.type == "bool" and not isinstance(value, bool):
                 raise ModelError(f"{f.name} is True or False, not {value!r}")
-            elif f.name == "parameters" and value is not None and not isinstance(value, Mapping):
-                raise ModelError(f"parameters maps names to values, for instance {{'mass': 2}}; {value!r} does not")
+            elif f.name == "parameters" and value is not None:
+                _check_parameters(value)
+                continue
             elif f.name != "parameters" and str(f.type).startswith("Mapping") and not isinstance(value, Mapping | None):
                 raise ModelError(f"{f.name} maps names to what is given for each, not {value!r}")
             elif f.name == "progress" and not (isinstance(value, bool) or callable(value)):
@@ -57,6 +58,14 @@ class Options:
             else:
                 continue
             object.__setattr__(self, f.name, value)
+
+
+def _check_parameters(value: Any) -> None:
+    if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
+        raise ModelError(f"parameters maps names to values, for instance {{'mass': 2}}; {value!r} does not")
+    for name, x in value.items():
+        if isinstance(x, complex):
+            raise ModelError(f"parameter {name!r}: {x!r} is complex; a real number is wanted")
 
 
 @dataclass(frozen=True, kw_only=True)

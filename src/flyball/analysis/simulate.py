@@ -145,7 +145,8 @@ def _energy_size(a: Assembly, span: float) -> float:
     mass = S.body_x[:, MASS].sum()
     g = np.sqrt((S.glob[:3] ** 2).sum())
     moving = a.compiled.kinetic_energy(a.v)
-    return float(mass * (g * length + (length / span) ** 2) + moving)
+    fast = min(length / span, 1e150)  # its square is a number, however short the span
+    return float(mass * (g * length + fast * fast) + moving)
 
 
 def _width(a: Assembly) -> int:

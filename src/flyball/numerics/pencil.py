@@ -59,7 +59,7 @@ class Pencil:
     def conservative(self) -> bool:
         """Whether nothing damps or turns, and the stiffness is that of a potential."""
         size = abs(self.K).max() if self.K.nnz else 0.0
-        still = abs(self.D).max() <= UNDAMPED * max(size, 1e-300) if self.D.nnz else True
+        still = abs(self.D).max() * self.fastest <= UNDAMPED * max(size, 1e-300) if self.D.nnz else True
         return bool(still and (not self.K.nnz or abs(self.K - self.K.T).max() <= SYMMETRIC * size))
 
     def solver(self, s: complex) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:

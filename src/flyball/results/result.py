@@ -122,6 +122,12 @@ class Result:
                 self._final = (self._final[0], y)
                 self.owed = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        """All is found before it is pickled or copied: of what it is found with nothing goes along."""
+        self._solve()
+        self._settle()
+        return vars(self)
+
     @property
     def planar(self) -> bool:
         """Whether the mechanism moves in the plane."""
