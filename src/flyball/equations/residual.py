@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..compiler.door import door, enter
+from ..compiler.door import enter, stepped_door
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..math.vec import add, cross, load3, load9, mv, put3, scale, sub
@@ -181,7 +181,7 @@ def accelerated(S, W, b, v, vdot):
     put3(W.BK, b, 21, a)
 
 
-@door
+@stepped_door
 def stepped(S, W, bench, _, __, task):
     """`residuals` behind an address; compiled for complex numbers, when first needed."""
     return residuals(S, W, bench, task)
