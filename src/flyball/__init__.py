@@ -29,7 +29,7 @@ Ask how it moves
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
     m.compare(t_end)              -> Comparison of formulations of the equations of motion
-    m.prepare(coordinates)        -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
+    m.prepare()                   -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
 
 Ask where it rests, and what small motions do
     m.equilibrium()               -> Equilibrium, stable or not; m.equilibria(parameter, values) -> EquilibriumSeries

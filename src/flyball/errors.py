@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+import warnings
+from pathlib import Path
 from typing import Any
+
+PACKAGE = Path(__file__).parent
 
 
 class FlyballError(Exception):
@@ -19,6 +24,14 @@ class UnitError(ModelError):
 
 class ExpressionError(ModelError):
     """An expression cannot be read, or uses a name that is not known."""
+
+
+def warn(text: str, category: type[Warning]) -> None:
+    """Warn at the line outside flyball that asked."""
+    depth, frame = 1, sys._getframe(0)
+    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
+        depth, frame = depth + 1, frame.f_back
+    warnings.warn(text, category, stacklevel=depth)
 
 
 class PerformanceNotice(UserWarning):

@@ -269,3 +269,12 @@ def test_rates_of_a_very_long_chain():
         m.add(fb.Initial(f"J{k}.angle", rate=rate))
     turning = m.assemble().v[2::3]
     assert turning == pytest.approx(rate * np.arange(1, n + 1), rel=1e-9)
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_the_warning_is_of_the_user_s_line(layer):
+    m = hinged(velocity=(5, 0))
+    for ask in (m, m.prepare(coordinates=layer)):
+        with pytest.warns(fb.StartWarning) as seen:
+            ask.simulate(0.01, outputs=2)
+        assert [w.filename for w in seen] == [__file__]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.view.tables import health
 
 G = 9.81
 
@@ -121,3 +122,16 @@ def test_warnings_and_creep_are_kept_in_files(tmp_path):
     assert again.health.creep == r.health.creep
     assert again.health.warnings == r.health.warnings
     assert again.health.as_dict() == r.health.as_dict()
+
+
+@pytest.mark.parametrize("coordinates", ["auto", "absolute"])
+def test_a_report_says_each_thing_of_a_run_once(coordinates):
+    r = incline(0.4, 0.45, 0.1).simulate(0.1, outputs=2, coordinates=coordinates, rtol=1e-7)
+    labels = [label for label, _ in health(r).rows]
+    assert len(set(labels)) == len(labels)
+    said = dict(health(r).rows)
+    assert said["coordinates"] == r.health.coordinates
+    assert said["rtol"] == "1e-07"
+    assert "max step" not in said  # there is none
+    capped = dict(health(incline(0.4, 0.45, 0.1).simulate(0.1, outputs=2, max_step=0.01)).rows)
+    assert capped["max step"] == "0.01"

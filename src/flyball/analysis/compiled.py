@@ -65,7 +65,7 @@ class Compiled:
             raise TypeError("the compiled code takes floats; complex tables are for the formulas")
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
-        y = np.r_[q, v, self.z]
+        y = np.concatenate([q, v, self.z])
         out = evaluate(self.values.system, self.work, float(t), y, task)
         z = y[len(q) + len(v) :]
         if np.isfinite(z).all():

@@ -21,6 +21,7 @@ from ..results.result import Result
 from ..tables.names import velocity_names
 from ..tables.points import points
 from ..tables.system import EFFORT, F_APPLIED, G_VALUE, LAM, NU, NV, PARENT, V0, X_SOLVED
+from .assembly.start import Assembly
 from .compiled import Compiled, compiled
 from .motion.start import Start
 
@@ -35,8 +36,6 @@ class Prepared:
     ----------
     model : Mechanism
         As it was when it was prepared; additions to the original are not seen.
-    parameters : dict
-        Values of its parameters [SI].
     coordinates : str
         Which they are, and why.
     q, v : ndarray (nq,), (nv,)
@@ -50,16 +49,33 @@ class Prepared:
         The element and what it restrains, for each constraint row, (nr,).
     """
 
+    model: Any
+    coordinates: str
+    q: np.ndarray
+    v: np.ndarray
+    names: tuple[str, ...]
+    rows: tuple[str, ...]
+    _start: Assembly
+    _here: threading.local
+
     def __init__(self, start: Start) -> None:
         c = start.assembly.compiled
-        self._start, self._here = start.assembly.again(), threading.local()
-        self.model: Any = c.structure.model
-        self.parameters, self.coordinates = c.values.told, start.coordinates
-        self.q, self.v = start.assembly.q.copy(), start.assembly.v.copy()
-        for a in (self.q, self.v):
+        q, v = start.assembly.q.copy(), start.assembly.v.copy()
+        for a in (q, v):
             a.setflags(write=False)
-        self.names = tuple(n.name for n in velocity_names(c.structure))
-        self.rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
+        names = tuple(n.name for n in velocity_names(c.structure))
+        rows = tuple(f"{r.element.name}: {r.label}" for r in c.structure.rows)
+        vars(self).update(model=c.structure.model, coordinates=start.coordinates, q=q, v=v, names=names, rows=rows)
+        vars(self).update(_start=start.assembly.again(), _here=threading.local())
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Refused."""
+        raise ModelError(f"{name!r} cannot be set: what is prepared does not change; prepare the changed mechanism")
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Values of its parameters [SI]."""
+        return self._start.compiled.values.told
 
     def simulate(self, t_end: float | str, **options: Any) -> Result:
         """The same as `Mechanism.simulate` in these coordinates, with these values of the parameters.
@@ -89,7 +105,8 @@ class Prepared:
         M = np.zeros((len(self.v), len(self.v)))
         row, at, _ = c.values.system.mass_i.T
         M[row, at] = c.work.M
-        return np.tril(M) + np.tril(M, -1).T
+        M[at, row] = c.work.M
+        return M
 
     def acceleration(self, t: float, q: np.ndarray, v: np.ndarray) -> np.ndarray:
         """Vdot, (nv,) [m/s^2, rad/s^2], with the constraints' reactions.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -13,7 +12,7 @@ import numpy as np
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
-from ..errors import ModelError, StartWarning
+from ..errors import ModelError, StartWarning, warn
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..numerics.integrators import clock as ex
@@ -58,7 +57,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
-        warnings.warn(not_allowed(d), StartWarning, stacklevel=3)
+        warn(not_allowed(d), StartWarning)
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)

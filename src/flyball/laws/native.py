@@ -8,12 +8,10 @@ global name, an enclosing function) has changed: compiled code would go on with 
 from __future__ import annotations
 
 import ctypes
-import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
 from inspect import CO_VARARGS
-from pathlib import Path
 from types import BuiltinFunctionType, CellType, CodeType, FunctionType, ModuleType
 from typing import Any
 from weakref import WeakKeyDictionary, WeakValueDictionary, ref
@@ -21,8 +19,7 @@ from weakref import WeakKeyDictionary, WeakValueDictionary, ref
 import numpy as np
 
 from ..compiler.jit import LOCK, start_numba
-from ..compiler.stamp import PACKAGE
-from ..errors import PerformanceNotice
+from ..errors import PerformanceNotice, warn
 from ..model.expressions import Expression
 from ..model.function import MOST, function_name
 from .call import NATIVE
@@ -225,14 +222,10 @@ def _tell(expression: Expression, function: Any, reason: str) -> None:
         return
     with suppress(TypeError):  # of what cannot be referred to weakly it is told again
         _told[id(owner)] = owner
-    depth, frame = 1, sys._getframe(0)
-    while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
-        depth, frame = depth + 1, frame.f_back
-    warnings.warn(
+    warn(
         f"{expression.where + ': ' if expression.where else ''}the Python function '{function_name(function)}' cannot "
         f"be compiled ({reason}). It is called back in Python: each call takes about a microsecond where compiled code "
         f"takes ten nanoseconds, and simulations on several threads wait for each other there. Use only numbers, "
         f"arrays, math and NumPy in it, or give an expression or a Table",
         PerformanceNotice,
-        stacklevel=depth,
     )

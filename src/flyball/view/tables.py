@@ -65,7 +65,9 @@ def triple(a: Any, planar: bool) -> str:
 def health(result: Result) -> Table:
     """What the run says of itself, and with what it was made."""
     options = {k: v for k, v in result.health.options.items() if v is not None}
-    rows = [*result.health.lines(), *((k.replace("_", " "), str(v)) for k, v in options.items())]
+    said = dict(result.health.lines())
+    asked = {k.replace("_", " "): f"{v:.4g}" if isinstance(v, float) else str(v) for k, v in options.items()}
+    rows = [*said.items(), *((k, v) for k, v in asked.items() if k not in said and v != "inf")]
     return Table("run", "Run", ("", ""), tuple(rows))
 
 

@@ -8,7 +8,6 @@ nothing in them is solved. Directions that no equation sees together are taken i
 
 from __future__ import annotations
 
-import warnings
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -18,7 +17,7 @@ import numpy as np
 from ...equations.engine import MOTION
 from ...equations.residual import residual_kernel, stepped
 from ...equations.scratch import work
-from ...errors import AnalysisError, ModelError, PerformanceNotice
+from ...errors import AnalysisError, ModelError, PerformanceNotice, warn
 from ...laws.evaluation import evaluate_jet
 from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
@@ -222,7 +221,7 @@ def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
 def announce(*kernels: Any) -> None:
     """Say that the derivatives of the equations, or loops over them, are compiled first, if they are."""
     if stepped.cold or any(k.cold for k in kernels):
-        warnings.warn(NOTICE, PerformanceNotice, stacklevel=3)
+        warn(NOTICE, PerformanceNotice)
 
 
 def stepped_values(c: Compiled, name: str) -> Values:
