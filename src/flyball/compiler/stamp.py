@@ -13,7 +13,18 @@ from functools import cache
 from pathlib import Path
 
 PACKAGE = Path(__file__).parent.parent
-COMPILED = ("compiler", "constraints", "equations", "forces", "laws", "math", "numerics", "tables/system.py")
+COMPILED = (
+    "compiler",
+    "constraints",
+    "contact",
+    "equations",
+    "forces",
+    "laws",
+    "math",
+    "numerics",
+    "stepping",
+    "tables/system.py",
+)
 """Files and folders that hold formulas and kernels, and all constants that these take from elsewhere."""
 TEXTS: dict[str, str] = {}
 """Sources of formulas that were put together at import (`written`): module and name -> text."""

@@ -1,0 +1,57 @@
+"""Shapes that may touch, in arrays, and the contacts found between them.
+
+A *mover* is whatever carries shapes and moves: a pose and velocities. This room knows nothing else of it. Shapes that
+stand still have mover -1. Planar mechanisms stay at z = 0; their shapes have kinds of their own, whose normals lie in
+the plane.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# columns of Geometry.shape_i
+KIND, MOVER, FIRST, COUNT, FACE_FIRST, FACE_COUNT, MEMBER, MASK, MATERIAL = range(9)
+# columns of Geometry.shape_x
+PLACE, AXES, PAR, RADIUS = 0, 3, 12, 20
+# columns of Contacts.at
+SHAPE_1, SHAPE_2, FEATURE, BEFORE = range(4)
+# columns of Contacts.x
+POINT, NORMAL, GAP = 0, 3, 6
+# entries of Contacts.count
+FOUND, STATUS, REBUILT, PAIRS = range(4)
+# what a search may return: FULL_* says what to enlarge before it is called again at the same state
+DONE, FULL_CONTACTS, FULL_PAIRS, FULL_CELLS, NOT_FINITE = range(5)
+# entries of Search.real: largest gap that is a contact; by how much pairs are looked for further than that; time that
+# movers move on for before the next search (what may meet within it is a contact too)
+MARGIN, SKIN, AHEAD = range(3)
+
+
+class Geometry(NamedTuple):
+    """Shapes. Nothing in it changes during a run."""
+
+    shape_i: np.ndarray  # (ns, 9): kind, mover or -1, first vertex and count, first face and count, groups that it is
+    # of and groups that it meets (bits; two meet if each meets a group of the other), material
+    shape_x: np.ndarray  # (ns, 24): its origin from its mover's and its axes, in the mover's axes; parameters of its
+    # kind (at 12); radius of a sphere about its origin that holds it (inf for what is unbounded)
+    vertex: np.ndarray  # (nv, 3): of hulls and the like, in the shape's axes
+    face: np.ndarray  # (nf,): their faces: count of corners, then the corners counter-clockwise from outside, and so on
+    apart: np.ndarray  # (nx, 2): pairs of movers (the smaller first; -1 what stands still) that never touch, sorted
+
+
+class Movers(NamedTuple):
+    """How what carries the shapes is placed and moves, along the world's axes."""
+
+    pose: np.ndarray  # (n, 12): position [m], rotation (rows; takes mover's components to the world's)
+    twist: np.ndarray  # (n, 6): velocity [m/s] of its origin, angular velocity [rad/s]
+
+
+class Contacts(NamedTuple):
+    """Contacts at one time; two of these are used in turn, so that a contact can be found again in the one before."""
+
+    count: np.ndarray  # (8,): how many, status, how often pairs were looked for afresh, how many pairs there are
+    at: np.ndarray  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
+    # to step), place of the same contact in the contacts before or -1. Those of a pair stand together.
+    x: np.ndarray  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:
+    # overlap), all in the world

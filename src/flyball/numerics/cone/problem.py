@@ -1,0 +1,97 @@
+"""The problem: min 1/2 p' N p + b' p, p in the cones, and N = D' K^-1 D as a product of arrays.
+
+A contact c has three impulses p = (normal, two tangential) with |p_t| <= mu p_n, and velocities u = D v + bias; the
+solution has u in the dual cone and u . p = 0 (Anitescu and Tasora 2010). It acts on up to two sides with velocities of
+their own, reversed on side 1:
+
+- a *node* has six velocities (v, w) and an inverse mass matrix of its own: (1/m) 1, and a symmetric 3 x 3 block. The
+  impulse f = frame' p acts at ``arm``: it changes v by f/m and w by B (arm x f).
+- a *group* has any number of velocities that depend on each other (what joints hold together): D' of the contact's
+  side is the block J (3, n), and what its impulses change the group's velocities by is p Y, Y (3, n) = D K^-1. Where
+  both sides are in one group, J and Y are those of the difference, and stand on side 2.
+
+Besides contacts there are *lines*: single impulses s in [low, high] on a group with u = J v + bias + soft s: limits
+(0, inf), joint friction (-bound, bound), stiff springs (soft = 1 / (h^2 k + h c), unbounded).
+
+Contacts of one island (what touches each other, over whatever nodes and groups) stand together; a solver is called
+with one island or with all.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+NONE = -1  # in Problem.at: nothing there moves; n >= 0: node n; -2 - k: group k
+# columns of Problem.node
+PER_MASS, BLOCK, ROUND = 0, 1, 7
+# columns of Problem.line_x
+BIAS, SOFT, LOW, HIGH = range(4)
+# entries of Choices.count: most iterations (sweeps), island that is meant or -1 for all, keep a history or not;
+# and what comes back: iterations used, how the solver ended, rows of the history written
+# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be)
+MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES = range(9)
+CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # Choices.count[ENDED]; SMALL: enlarge what is needed, call again
+# entries of Choices.real: residual [m/s] that is enough; and what comes back: the residual reached as a velocity
+# [m/s], and as a force (what is left of an impulse over the largest impulse) [1]
+ENOUGH, RESIDUAL, FORCE_RESIDUAL = range(3)
+# columns of Choices.history
+H_ITERATION, H_VELOCITY, H_FORCE, H_OBJECTIVE = range(4)
+
+
+class Problem(NamedTuple):
+    """What does not change while impulses are looked for. Capacity may be larger than ``size`` says."""
+
+    size: np.ndarray  # (4,): contacts, nodes, groups, lines
+    at: np.ndarray  # (nc, 2): side 1, side 2
+    frame: np.ndarray  # (nc, 9): rows n (from 1 to 2), t1, t2 in the world; anisotropic friction scales t2
+    arm: np.ndarray  # (nc, 6): from the node's centre to the contact, side 1, side 2, in the world
+    bias: np.ndarray  # (nc, 3): what is added to the velocities D v: max(gap, 0) / h, surface velocities
+    mu: np.ndarray  # (nc,): friction coefficient
+    soft: np.ndarray  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
+    turn: np.ndarray  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
+    node: np.ndarray  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
+    group: np.ndarray  # (ng + 1,): first velocity of each group in State.wide
+    block: np.ndarray  # (nc, 2): where J and Y of a side that is in a group begin, or -1
+    J: np.ndarray
+    Y: np.ndarray
+    line_at: np.ndarray  # (nl, 2): group, where its J and Y (n numbers each) begin
+    line_x: np.ndarray  # (nl, 4): bias, compliance, least, largest impulse
+    island: np.ndarray  # (ni + 1,): first contact of each island; one island if nothing is known
+    member: np.ndarray  # (nn,): nodes by island
+    member_p: np.ndarray  # (ni + 1,): where those of an island begin in ``member``
+
+
+class State(NamedTuple):
+    """Impulses and velocities; on entry the warm start and the velocities without any impulse, on exit both solved."""
+
+    p: np.ndarray  # (nc, 3)
+    torque: np.ndarray  # (nc, 3) or (0, 3): about n, t1, t2
+    line: np.ndarray  # (nl,)
+    v: np.ndarray  # (nn, 8): v, w in the world, two unused
+    wide: np.ndarray  # velocities of the groups
+
+
+class Choices(NamedTuple):
+    """How it is solved, and what came of it."""
+
+    count: np.ndarray  # (16,)
+    real: np.ndarray  # (16,)
+    history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
+
+
+class Scratch(NamedTuple):
+    """Rooms to work in, as large as the problem; compiled code allocates nothing."""
+
+    rows: np.ndarray  # (12, nc, 3)
+    nodes: np.ndarray  # (6, nn, 8)
+    wide: np.ndarray  # (6, nw): of the groups' velocities
+    lines: np.ndarray  # (6, nl)
+
+
+class Factor(NamedTuple):
+    """Rooms of solvers that factor matrices; empty for the others. What stands in them lasts from call to call."""
+
+    numbers: np.ndarray
+    places: np.ndarray
