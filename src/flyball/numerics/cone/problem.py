@@ -77,7 +77,7 @@ class State(NamedTuple):
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: np.ndarray  # (16,)
+    count: np.ndarray  # type: ignore[assignment]  # (16,)
     real: np.ndarray  # (16,)
     history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
 
