@@ -51,6 +51,7 @@ class Problem(NamedTuple):
     mu: np.ndarray  # (nc,): friction coefficient
     soft: np.ndarray  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
     turn: np.ndarray  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
+    least: np.ndarray  # (nc,) or (0,): least normal impulse (what a restitution gives back); 0 if there is none
     node: np.ndarray  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
     group: np.ndarray  # (ng + 1,): first velocity of each group in State.wide
     block: np.ndarray  # (nc, 2): where J and Y of a side that is in a group begin, or -1
@@ -77,7 +78,7 @@ class State(NamedTuple):
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: np.ndarray  # (16,)
+    count: np.ndarray  # type: ignore[assignment]  # (16,)
     real: np.ndarray  # (16,)
     history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
 
