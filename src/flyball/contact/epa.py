@@ -138,8 +138,8 @@ def deepest(G, i, j, p, R, room, at, count, size, best, along):
     """Separation (less than zero: the depth) and its direction from 1 to 2, of cores whose difference holds the origin.
 
     Rows from ``at`` hold ``count`` (at most 4) corners of the difference, and are scratch (`ROWS`). ``best`` and
-    ``along`` are a separation and direction known before; the depth found is larger by no more than `NEAR` of itself than
-    the smallest, where `CORNERS` suffice.
+    ``along`` are a separation and direction known before; the depth found is larger by no more than `NEAR` of itself
+    than the smallest, where `CORNERS` suffice.
     """
     count, best, along = solid(G, i, j, p, R, room, at, count, size, best, along)
     if count < 4:

@@ -63,7 +63,7 @@ def nearest(G, i, j, p, R, start, far, room, at):
     Where the cores overlap the separation is the largest s met (less than zero), a bound of the depth from above.
     """
     d, best, along, size, count, vv = start, -1e300, start, 0.0, 0, 1e300
-    for step in range(MOST):
+    for _step in range(MOST):
         length = sqrt(dot(d, d))
         if not length > 0.0:
             return MEET, best, along, size, count

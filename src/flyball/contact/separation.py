@@ -29,7 +29,7 @@ def onward(G, i, j, p, R, room, s, n, d):
     """From n, a step to d made the separation s; go on that way in doubled steps while it grows."""
     step = sub(d, n)
     best = d
-    for k in range(ONWARD):
+    for _k in range(ONWARD):
         step = scale(2.0, step)
         e = add(n, step)
         e = scale(1.0 / norm(e), e)
@@ -68,7 +68,7 @@ def separation(G, i, j, p, R, start, far, room, at):
         elif better:
             best, n = onward(G, i, j, p, R, room, s, n, d)
         if look > 0 and (not better or look == EARLY):
-            if asked and not better or -best <= SHALLOW * size:
+            if (asked and not better) or -best <= SHALLOW * size:
                 return best, n, a
             if not asked:
                 s, d = deepest(G, i, j, p, R, room, at + 8, corners, size, best, n)
