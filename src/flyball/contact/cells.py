@@ -1,4 +1,4 @@
-"""A hashed grid with levels by size: every shape stands in one cell, that of its hull's middle.
+"""A hashed grid with levels by size: every shape stands in one cell, that of its envelope's middle.
 
 Shapes of a level differ by no more than a factor of two (of ten with what has gained speed), and its cells are as wide
 as the largest. So a shape looks at the cells about it at each level, and what it costs is linear in the number of
@@ -64,7 +64,7 @@ def size_of(largest, whole):
 
 @formula
 def along(sums, g, c, edge):
-    """Over how many cells the shapes of a group lie along axis c (without those far from the rest); where these begin."""
+    """Over how many cells a group lies along axis c (without shapes far from the rest); where these begin."""
     n = sums[g, 0]
     mean = sums[g, 2 + c] / n
     spread = 6.0 * sqrt(max(0.0, sums[g, 5 + c] / n - mean * mean)) / edge
@@ -111,7 +111,7 @@ def cell_of(B, s, l):
 
 @formula
 def unlink(B, s):
-    """Take a slot out of its cell (before its hull changes)."""
+    """Take a slot out of its cell (before its envelope changes)."""
     l = B.slot[s, LEVEL]
     B.level_i[l, SHAPES] -= 1
     _, at = cell_of(B, s, l)
@@ -139,9 +139,9 @@ def level_for(B, of, whole):
     """The finest level of a class that takes a shape of this size, or -1."""
     best = -1
     for l in range(B.count[LEVELS]):
-        if B.level_i[l, OF] == of and 2.0 * whole <= B.level_x[l, EDGE]:
-            if best < 0 or B.level_x[l, EDGE] < B.level_x[best, EDGE]:
-                best = l
+        takes = B.level_i[l, OF] == of and 2.0 * whole <= B.level_x[l, EDGE]
+        if takes and (best < 0 or B.level_x[l, EDGE] < B.level_x[best, EDGE]):
+            best = l
     return best
 
 

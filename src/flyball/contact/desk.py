@@ -3,10 +3,11 @@
 Shapes stand in *slots*, first the bounded ones in the order of their cells, then the *wide* ones (unbounded). All that
 is asked for often is kept by slot, so that neighbours in space are neighbours in memory.
 
-Every bounded shape has a *hull*: a capsule that holds all of it for a while. A pair of shapes is listed where their
-hulls meet, and the list stays true as long as every shape, with what it covers in `AHEAD` seconds, is within its hull.
-One that has left it (or turned too far) gets another, and only its own pairs are looked for again. Hulls live in a
-*frame* that goes with all movers where these move together, so that a pile that falls lists what a pile at rest lists.
+Every bounded shape has an *envelope*: a capsule that holds all of it for a while. A pair of shapes is listed where
+their envelopes meet, and the list stays true as long as every shape, with what it covers in `AHEAD` seconds, is within
+its envelope. One that has left it (or turned too far) gets another, and only its own pairs are looked for again.
+Envelopes live in a *frame* that goes with all movers where these move together, so that a pile that falls lists what a
+pile at rest lists.
 """
 
 from __future__ import annotations
@@ -15,16 +16,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-# entries of Search.real, after MARGIN, SKIN, AHEAD of `tables`: where the frame is, by how much it goes on with the next
-# search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about
+# entries of Search.real, after MARGIN, SKIN, AHEAD of `tables`: where the frame is, by how much it goes on with the
+# next search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about
 FRAME, STRIDE, DRIFT, LAG, USUAL, REACH = 3, 6, 9, 12, 15, 16
 REALS = 20
-# entries of Search.count: bounded and wide slots; whether the list of pairs is true; which half of `seen` is read; number
-# of the search whose contacts it speaks of; pairs, pairs when all were looked for; levels; address of the narrow phase
-# and the two shapes that it is asked about; whether classes tell all about groups
+# entries of Search.count: bounded and wide slots; whether the list of pairs is true; which half of `seen` is read;
+# number of the search whose contacts it speaks of; pairs, pairs when all were looked for; levels; address of the narrow
+# phase and the two shapes that it is asked about; whether classes tell all about groups
 BOUNDED, WIDE, TRUE, HALF, SEARCHES, LISTED, LISTED_ALL, LEVELS, NARROW, ASKED_1, ASKED_2, TOLD = range(12)
-# shapes that have left their hulls; whether the frame moves; pairs in the table; and of all searches so far: pairs of
-# hulls compared, hulls made anew, how often all were, pairs looked at
+# shapes that have left their envelopes; whether the frame moves; pairs in the table; and of all searches so far: pairs
+# of envelopes compared, envelopes made anew, how often all were, pairs looked at
 MOVED, DRIFTS, KEPT, COMPARED, REMADE, AFRESH_SO_FAR, LOOKED_AT = range(12, 19)
 COUNTS = 24
 # columns of Search.hold: centre (in the mover's axes), radius, half edges of a box about it (along the shape's axes)
@@ -61,7 +62,7 @@ class Search(NamedTuple):
     slot: np.ndarray  # (ns, 6)
     now: np.ndarray  # (ns, 8): by slot
     fat: np.ndarray  # (ns, 8): by slot
-    turn: np.ndarray  # (ns, 9): the box's axes when the hull was made, by slot
+    turn: np.ndarray  # (ns, 9): the box's axes when the envelope was made, by slot
     wide: np.ndarray  # (wide, 20)
     raw: np.ndarray  # (ns, 18): now, fat, and how large it may become, by shape
     key: np.ndarray  # (ns,): cells, by slot
@@ -72,7 +73,7 @@ class Search(NamedTuple):
     sums: np.ndarray  # (classes * SIZES, 10): of the shapes of one size
     pair: np.ndarray  # (capacity, 3): slots, that of the smaller shape first; in which way they are looked at
     seen: np.ndarray  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
-    mark: np.ndarray  # (ns,): by slot, whether it has left its hull
+    mark: np.ndarray  # (ns,): by slot, whether it has left its envelope
     moved: np.ndarray  # (ns,): slots that have
     names: np.ndarray  # (places,): a table of pairs, by hashing
     firsts: np.ndarray  # (places,): their first contacts

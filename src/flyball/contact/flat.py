@@ -1,4 +1,4 @@
-"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, but only when they have moved."""
+"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .desk import (
     UP_0,
     USUAL,
 )
-from .hulls import rotated
+from .envelopes import rotated
 from .tables import AHEAD, AXES, PLACE, SKIN
 
 
@@ -83,7 +83,7 @@ def settle(B, w, still):
 
 @formula
 def reaches(B, w, form, s):
-    """Whether a wide shape and the hull of slot s meet."""
+    """Whether a wide shape and the envelope of slot s meet."""
     if form != FLAT:
         return True
     x, gap, lead = B.wide, 0.0, 0.0

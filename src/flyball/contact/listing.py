@@ -1,4 +1,4 @@
-"""The list of pairs: all looked for, or only those of shapes that have left their hulls."""
+"""The list of pairs: all looked for, or only those of shapes that have left their envelopes."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ from .desk import (
     WHOLE,
     WIDE,
 )
+from .envelopes import axes_now, fatten
 from .flat import reaches, settle
-from .hulls import axes_now, fatten
-from .meeting import allowed, hulls_meet
+from .meeting import allowed, envelopes_meet
 from .same import keep, kept
 
 LATER, EVERY, FRESH = range(3)
@@ -68,7 +68,7 @@ def chain(G, B, s, t, key, which):
     while t >= 0:
         if B.key[t] == key and t != s and not (which == FRESH and t < s and B.mark[t] != 0):
             compared += 1
-            if hulls_meet(B, s, t) and allowed(G, B, s, t) and not offer(G, B, s, t):
+            if envelopes_meet(B, s, t) and allowed(G, B, s, t) and not offer(G, B, s, t):
                 return False
         t = B.link[t]
     B.count[COMPARED] += compared
@@ -81,7 +81,7 @@ def everyone(G, B, s, l, which):
     for t in range(B.count[BOUNDED]):
         if B.slot[t, LEVEL] == l and t != s and not (which == FRESH and t < s and B.mark[t] != 0):
             B.count[COMPARED] += 1
-            if hulls_meet(B, s, t) and allowed(G, B, s, t) and not offer(G, B, s, t):
+            if envelopes_meet(B, s, t) and allowed(G, B, s, t) and not offer(G, B, s, t):
                 return False
     return True
 
@@ -119,9 +119,9 @@ def with_wide(G, B, w):
     of = B.slot[w, CLASS]
     settle(B, w - B.count[BOUNDED], B.slot[w, MOVES] < 0)
     for s in range(B.count[BOUNDED]):
-        if B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], B.slot[w, FORM], s):
-            if allowed(G, B, s, w) and not offer(G, B, s, w):
-                return False
+        near = B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], B.slot[w, FORM], s)
+        if near and allowed(G, B, s, w) and not offer(G, B, s, w):
+            return False
     return True
 
 
@@ -137,7 +137,7 @@ def list_all(G, B):
                 coarser = B.level_x[l, EDGE] > edge or (B.level_x[l, EDGE] == edge and l >= own)
                 if coarser and not visit(G, B, s, l, LATER if l == own else EVERY):
                     return False
-    for w in range(B.count[BOUNDED], B.count[BOUNDED] + B.count[WIDE]):
+    for w in range(B.count[BOUNDED], B.count[BOUNDED] + B.count[WIDE]):  # noqa: SIM110
         if not with_wide(G, B, w):
             return False
     return True
@@ -161,7 +161,7 @@ def drop(G, B):
 
 @formula
 def refit(G, M, B, s):
-    """Another hull for slot s, in its cell: whether a level takes it."""
+    """Another envelope for slot s, in its cell: whether a level takes it."""
     i = B.slot[s, SHAPE]
     for c in range(8):
         B.raw[i, c] = B.now[s, c]
@@ -181,7 +181,7 @@ def refit(G, M, B, s):
 
 @formula
 def list_moved(G, B):
-    """The pairs of shapes that have left their hulls, at the end of the list: whether there was room."""
+    """The pairs of shapes that have left their envelopes, at the end of the list: whether there was room."""
     wide = B.count[BOUNDED]
     for k in range(B.count[MOVED]):
         s = B.moved[k]
@@ -193,7 +193,7 @@ def list_moved(G, B):
             if B.meets[B.slot[s, CLASS], B.level_i[l, OF]] != 0 and not visit(G, B, s, l, FRESH):
                 return False
         for w in range(wide, wide + B.count[WIDE]):
-            if B.mark[w] == 0 and B.meets[B.slot[w, CLASS], B.slot[s, CLASS]] != 0:
-                if reaches(B, w - wide, B.slot[w, FORM], s) and allowed(G, B, s, w) and not offer(G, B, s, w):
-                    return False
+            may = B.mark[w] == 0 and B.meets[B.slot[w, CLASS], B.slot[s, CLASS]] != 0
+            if may and reaches(B, w - wide, B.slot[w, FORM], s) and allowed(G, B, s, w) and not offer(G, B, s, w):
+                return False
     return True

@@ -1,13 +1,13 @@
-"""Whether two shapes are a pair: what the description allows, and hulls that meet."""
+"""Whether two shapes are a pair: what the description allows, and envelopes that meet."""
 
 from __future__ import annotations
 
 from ..compiler.jit import formula
 from .desk import BALL, BOX_HALF, FORM, MIDDLE, MOVES, ROUND, SHAPE, SIZE, TOLD, WHOLE
-from .hulls import to_box
+from .envelopes import to_box
 from .tables import MASK, MEMBER
 
-FAST = 0.5  # a hull longer than this, in radii, is looked at as a capsule
+FAST = 0.5  # an envelope longer than this, in radii, is looked at as a capsule
 
 
 @formula
@@ -40,7 +40,7 @@ def allowed(G, B, s, t):
 
 @formula
 def between(fat, s, t, x, y, z):
-    """Squared distance of the lines of two hulls; (x, y, z) from the middle of s to that of t.
+    """Squared distance of the lines of two envelopes; (x, y, z) from the middle of s to that of t.
 
     The parameters are found in turn, as for two segments (Ericson 2005, 5.1.9).
     """
@@ -68,7 +68,7 @@ def between(fat, s, t, x, y, z):
 
 @formula
 def boxes_meet(B, s, t, x, y, z):
-    """Whether boxes about two shapes, as thick as their hulls, meet along the six axes of their faces."""
+    """Whether boxes about two shapes, as thick as their envelopes, meet along the six axes of their faces."""
     i, j = B.slot[s, SHAPE], B.slot[t, SHAPE]
     more = B.fat[s, WHOLE] - B.now[s, SIZE] + B.fat[t, WHOLE] - B.now[t, SIZE]
     for side in range(2):
@@ -86,8 +86,8 @@ def boxes_meet(B, s, t, x, y, z):
 
 
 @formula
-def hulls_meet(B, s, t):
-    """Whether the hulls of two bounded slots meet."""
+def envelopes_meet(B, s, t):
+    """Whether the envelopes of two bounded slots meet."""
     fat = B.fat
     x = fat[t, MIDDLE] - fat[s, MIDDLE]
     y = fat[t, MIDDLE + 1] - fat[s, MIDDLE + 1]

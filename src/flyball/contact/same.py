@@ -60,7 +60,7 @@ def keep_all(G, O, B):
 
 @formula
 def before(O, pair, first, feature, point, size, used):
-    """The contact before of ``pair`` (two shapes) that is the one at ``point`` now; bits of ``used`` say which are taken.
+    """The contact before of a pair of shapes that is the one at ``point`` now; bits of ``used`` say which are taken.
 
     Returns its place and its bit, or -1 and 0.
     """

@@ -36,11 +36,11 @@ from .same import forget, keep_all
 from .sorting import sort_all
 from .tables import DONE, FOUND, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE, NUMBER, PAIRS, REBUILT, STATUS
 from .touching import touch
-from .watch import follow, look, not_finite
+from .watch import census, follow, look
 
 STEP, AFRESH = range(2)
 """Tasks: contacts at new poses, with the list of pairs mended where it must be; the same, all pairs looked for anew."""
-MANY = 0.3  # where more shapes than this part have left their hulls, all pairs are looked for anew
+MANY = 0.3  # where more shapes than this part have left their envelopes, all pairs are looked for anew
 
 
 @formula
@@ -64,7 +64,7 @@ def anew(G, M, O, B):
 
 @formula
 def mend(G, M, B):
-    """Look again for the pairs of what has left its hull: 1 if that was done, 0 if there was no room, -1 if all must."""
+    """Look again for pairs of what has left its envelope: 1 if that was done, 0 without room, -1 if all must."""
     if B.count[MOVED] > MANY * B.count[BOUNDED] + 8.0:
         return -1
     B.count[TRUE] = 0
@@ -86,7 +86,7 @@ def pairs(G, M, O, B, task):
         B.real[FRAME + c] += B.real[STRIDE + c]
     if B.count[TRUE] == 0:
         return anew(G, M, O, B)
-    n, v, v2, way = look(G, M, B)
+    n, way = look(G, M, B)
     mended = 1
     if task == AFRESH or O.count[NUMBER] != B.count[SEARCHES] or B.count[LISTED] > 2 * B.count[LISTED_ALL] + 64:
         mended = -1
@@ -94,14 +94,14 @@ def pairs(G, M, O, B, task):
         mended = mend(G, M, B)
     if mended < 0:
         return anew(G, M, O, B)
-    follow(B, n, v, v2, way)
+    follow(B, n, way)
     return mended == 1
 
 
 @formula
 def find(G, M, C, O, B, task):
     """See `search`."""
-    bad = not_finite(M)
+    bad = census(M, B)
     if bad >= 0:
         C.count[FOUND] = bad
         return NOT_FINITE

@@ -1,4 +1,4 @@
-"""All bounded shapes into slots in the order of their cells, with new hulls."""
+"""All bounded shapes into slots in the order of their cells, with new envelopes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from .desk import (
     BALL,
     BOUNDED,
     CLASS,
+    DRIFT,
     FAT_RAW,
     FORM,
     FRAME,
@@ -23,14 +24,14 @@ from .desk import (
     STRIDE,
     WHOLE,
 )
-from .hulls import axes_now, fatten, locate
+from .envelopes import axes_now, fatten, locate
 from .kinds import SPHERE
-from .tables import KIND, MOVER
+from .tables import AHEAD, KIND, MOVER
 
 
 @formula
-def make_hulls(G, M, B):
-    """Hulls of all bounded shapes, by shape, in ``raw``; sums over shapes of one class and size in ``sums``."""
+def make_envelopes(G, M, B):
+    """Envelopes of all bounded shapes, by shape, in ``raw``; sums over shapes of one class and size in ``sums``."""
     for g in range(B.sums.shape[0]):
         for c in range(B.sums.shape[1]):
             B.sums[g, c] = 0.0
@@ -104,10 +105,11 @@ def fill_slots(G, M, B):
 
 @formula
 def sort_all(G, M, B):
-    """New slots and hulls for all bounded shapes; the frame begins anew."""
+    """New slots and envelopes for all bounded shapes; the frame begins anew."""
     for c in range(3):
-        B.real[FRAME + c] = B.real[STRIDE + c] = B.real[LAG + c] = 0.0
-    make_hulls(G, M, B)
+        B.real[FRAME + c] = B.real[LAG + c] = 0.0
+        B.real[STRIDE + c] = B.real[AHEAD] * B.real[DRIFT + c]
+    make_envelopes(G, M, B)
     number_slots(B, lay_out(B))
     fill_slots(G, M, B)
     B.count[REMADE] += B.count[BOUNDED]

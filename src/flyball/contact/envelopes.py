@@ -1,4 +1,4 @@
-"""Hulls of shapes: what a shape, with what it covers, stays in for a while. See `desk`."""
+"""Envelopes of shapes: what a shape, with what it covers, stays in for a while. See `desk`."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .desk import (
 from .tables import AHEAD, AXES, MARGIN, MOVER, SKIN
 
 LARGE = 3.0  # in usual radii: larger shapes have no thicker skins
-STEPS = 8.0  # a hull reaches this many steps ahead
+STEPS = 8.0  # an envelope reaches this many steps ahead
 LEAD = 0.5  # but no further than this, in radii
 
 
@@ -64,7 +64,7 @@ def locate(M, B, i, m, ball, row, s):
 
 @formula
 def axes_now(G, M, i, out, s):
-    """The shape's axes in the world, into row s: what is left of them when hulls are looked at again."""
+    """The shape's axes in the world, into row s: what is left of them when envelopes are looked at again."""
     m = G.shape_i[i, MOVER]
     for c in range(3):
         a = (G.shape_x[i, AXES + c], G.shape_x[i, AXES + 3 + c], G.shape_x[i, AXES + 6 + c])
@@ -75,7 +75,7 @@ def axes_now(G, M, i, out, s):
 
 @formula
 def chord(G, M, B, s, i):
-    """How far the surface has gone by turning since the hull was made, as a part of the radius: 2 sin(angle / 2)."""
+    """How far the surface has turned since the envelope was made, as a part of the radius: 2 sin(angle / 2)."""
     m = G.shape_i[i, MOVER]
     if m < 0:
         return 0.0
@@ -90,7 +90,7 @@ def chord(G, M, B, s, i):
 
 @formula
 def fatten(B, rows, s, at, still):
-    """Make a hull from what stands in row s (columns as `Search.now`): into columns from ``at`` on, as `Search.fat`.
+    """Make an envelope from row s (columns as `Search.now`), into columns from ``at`` on (as `Search.fat`).
 
     Returns the radius that the ball about it may have got when the shape has gained some speed.
     """
@@ -133,7 +133,7 @@ def off(fat, s, x, y, z):
 
 @formula
 def within(G, M, B, s, i, ball):
-    """Whether a shape, with what it covers in `AHEAD` seconds, is still within its hull."""
+    """Whether a shape, with what it covers in `AHEAD` seconds, is still within its envelope."""
     now, fat, real = B.now, B.fat, B.real
     allowed = fat[s, ROUND] - now[s, SIZE] - 0.5 * real[MARGIN]
     if not ball:
@@ -153,10 +153,9 @@ def within(G, M, B, s, i, ball):
 
 @formula
 def to_box(B, s, i, x, y, z):
-    """Squared distance of a point, from the middle of the hull of slot s (shape i), to the shape's box."""
+    """Squared distance of a point, from the middle of the envelope of slot s (shape i), to the shape's box."""
     total = 0.0
     for c in range(3):
         a = abs(B.turn[s, c] * x + B.turn[s, 3 + c] * y + B.turn[s, 6 + c] * z) - B.hold[i, BOX_HALF + c]
         total += a * a if a > 0.0 else 0.0
     return total
-
