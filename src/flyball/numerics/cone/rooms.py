@@ -38,6 +38,7 @@ def unfilled(contacts: int, nodes: int = 0, groups: int = 0, lines: int = 0, num
         bias=np.zeros((nc, 3)),
         mu=np.zeros(nc),
         soft=np.zeros(nc),
+        least=np.zeros(0),
         turn=np.zeros((nc if turning else 0, 2)),
         node=np.zeros((nn, 8)),
         group=np.zeros(groups + 1, whole),
@@ -50,8 +51,6 @@ def unfilled(contacts: int, nodes: int = 0, groups: int = 0, lines: int = 0, num
         member=np.arange(nn),
         member_p=ends(nn),
         line_p=ends(lines),
-        team=np.arange(groups),
-        team_p=ends(groups),
     )
 
 
