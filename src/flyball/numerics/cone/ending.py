@@ -5,7 +5,6 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .problem import (
     BROKEN,
-    CONVERGED,
     CUT,
     ENDED,
     FORCE_RESIDUAL,
@@ -13,7 +12,6 @@ from .problem import (
     H_ITERATION,
     H_OBJECTIVE,
     H_VELOCITY,
-    HISTORY,
     ISLAND,
     RESIDUAL,
     WRITTEN,
@@ -39,9 +37,17 @@ def finish(P, X, W, O, used, last):
     part = 1.0
     if not (velocity == velocity and square == square):
         part, O.count[ENDED] = 0.0, BROKEN
-    elif 0.5 * square + linear > 0.0 and O.count[ENDED] == CUT:
-        part = 0.0 if linear >= 0.0 else min(1.0, -linear / square)  # the best there is along these impulses
+    elif 0.5 * square + linear > 0.0 and O.count[ENDED] == CUT and P.least.shape[0] == 0:
+        part = 0.0 if linear >= 0.0 else -linear / square  # the best there is along these impulses
     hand_back(P, X, W, O, part)
+
+
+@formula
+def between(part, a, b):
+    """A if the part is 0, b if it is 1, whatever the other is."""
+    if part == 1.0:
+        return b
+    return a + part * (b - a) if part > 0.0 else a
 
 
 @formula
@@ -52,18 +58,18 @@ def hand_back(P, X, W, O, part):
     for e in range(begin, end):
         i = P.member[e]
         for s in range(6):
-            X.v[i, s] = W.own[i, s] if part == 1.0 else (X.v[i, s] + part * (W.own[i, s] - X.v[i, s]) if part > 0.0 else X.v[i, s])
+            X.v[i, s] = between(part, X.v[i, s], W.own[i, s])
     if part == 1.0:
         return
     for s in range(X.wide.shape[0]):
-        X.wide[s] = W.wide[0, s] + part * (X.wide[s] - W.wide[0, s]) if part > 0.0 else W.wide[0, s]
+        X.wide[s] = between(part, W.wide[0, s], X.wide[s])
     first, last = contacts_of(P, O)
     for c in range(first, last):
         for s in range(3):
-            X.p[c, s] = part * X.p[c, s] if part > 0.0 else 0.0
+            X.p[c, s] = between(part, 0.0, X.p[c, s])
         if P.turn.shape[0] > 0:
             for s in range(3):
-                X.torque[c, s] = part * X.torque[c, s] if part > 0.0 else 0.0
+                X.torque[c, s] = between(part, 0.0, X.torque[c, s])
     first, last = lines_of(P, O)
     for e in range(first, last):
-        X.line[e] = part * X.line[e] if part > 0.0 else 0.0
+        X.line[e] = between(part, 0.0, X.line[e])

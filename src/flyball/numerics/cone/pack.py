@@ -13,6 +13,7 @@ from ...math.vec import cross, dot
 from .diagonal import axis, diagonal, turned
 from .operator import push, push_turning
 from .problem import COULOMB, NONE, ROUND
+from .projection import least_of
 
 SMOOTH_BALL, BALL, SMOOTH, ROUGH, ANY, KINDS = range(6)
 WIDTH_BALL, WIDTH_SMOOTH = 16, 20  # numbers of a contact; the rest have 32
@@ -21,11 +22,12 @@ PARALLEL = 1e-20  # square of the sine below which an arm is along the normal: p
 # columns of Scratch.own
 SLOW, SPUN, INNER = 6, 7, 8  # 1/m, mean of the block's diagonal, the block
 # where a ball's numbers stand
-N, R1, R2, B_BIAS, B_SOFT, B_IN, B_IT, B_MU, B_RATIO, B_P, B_T = 0, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12
+R1, R2, B_BIAS, B_SOFT, B_IN, B_IT, B_MU, B_RATIO, B_P, B_T, B_LEAST = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15
 # of a smooth contact: normal, torques of a unit impulse on both sides, what they turn by
-C1, C2, G1, G2, S_BIAS, S_SOFT, S_IN, S_P = 3, 6, 9, 12, 15, 16, 17, 18
-# of a rough one: frame, arms, bias; the inverse of nn; ns, nt; the inverse of the tangential block
-ARM1, ARM2, BIAS, SOFT, IN, NS, NT, ISS, IST, ITT, MU, RATIO, IMPULSE = 9, 12, 15, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27
+C1, C2, G1, G2, S_BIAS, S_SOFT, S_IN, S_P, S_LEAST = 3, 6, 9, 12, 15, 16, 17, 18, 19
+# of a rough one: frame, arms, bias; what `local_steps` says; impulse
+ARM1, ARM2, BIAS, SOFT, IN, NS, NT = 9, 12, 15, 18, 19, 20, 21
+ISS, IST, ITT, SLIDE, RATIO, MU, IMPULSE, LEAST = 22, 23, 24, 25, 26, 27, 28, 31
 
 
 @formula
@@ -137,36 +139,31 @@ def pack_rough(P, O, W, c, place):
         k[place + BIAS + s] = P.bias[c, s]
     k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
     steps = local_steps(D, P.soft[c], O.count[COULOMB])
-    for s in range(7):
-        k[place + IN + s if s < 6 else place + RATIO] = steps[s]
+    for s in range(8):
+        k[place + IN + s] = steps[s]
 
 
 @formula
 def local_steps(D, soft, coulomb):
-    """Inverse of nn, then ns, nt, the inverse of the tangential block, the ratio of tangential to normal.
+    """Inverse of nn, ns, nt, the inverse of the tangential block, a step of one size for it, its ratio to nn.
 
-    For the convex form (``coulomb`` 0) of a diagonal block that is nowhere less than D: with c = |(ns, nt)| and l the
-    larger eigenvalue of the tangential block, D <= (1 + c / sqrt(nn l)) diag(nn, l, l).
+    For the convex form (``coulomb`` 0) those of a diagonal block that is nowhere less than D: with c = |(ns, nt)| and l
+    the larger eigenvalue of the tangential block, D <= (1 + c / sqrt(nn l)) diag(nn, l, l).
     """
     nn, ns, nt, ss, st, tt = D[0] + soft, D[1], D[2], D[3], D[4], D[5]
-    if nn <= soft:
-        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    if coulomb:
-        det, least = ss * tt - st * st, 1e-12 * (ss + tt)
-        if det > least * (ss + tt):
-            return 1.0 / nn, ns, nt, tt / det, -st / det, ss / det, 0.0
-        # one direction, or none, in which it can slide
-        size = ss + tt
-        back = size * size if size > 1e-12 * nn else 0.0
-        if back == 0.0:
-            return 1.0 / nn, ns, nt, 0.0, 0.0, 0.0, 0.0
-        return 1.0 / nn, ns, nt, ss / back, st / back, tt / back, 0.0
+    if not nn > soft:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     half = 0.5 * (ss - tt)
     most = 0.5 * (ss + tt) + sqrt(half * half + st * st)
     if most <= 1e-12 * nn:
-        return 1.0 / nn, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    more = 1.0 + sqrt((ns * ns + nt * nt) / (nn * most))
-    return 1.0 / (more * nn), 0.0, 0.0, 1.0 / (more * most), 0.0, 1.0 / (more * most), most / nn
+        return 1.0 / nn, ns, nt, 0.0, 0.0, 0.0, 0.0, 0.0
+    if not coulomb:
+        more = 1.0 + sqrt((ns * ns + nt * nt) / (nn * most))
+        return 1.0 / (more * nn), ns, nt, 0.0, 0.0, 0.0, 1.0 / (more * most), most / nn
+    det = ss * tt - st * st
+    if det <= 1e-12 * most * most:  # one direction only in which it can slide
+        det, ss, st, tt = most * most, tt, -st, ss
+    return 1.0 / nn, ns, nt, tt / det, -st / det, ss / det, 1.0 / most, most / nn
 
 
 @formula
@@ -211,18 +208,22 @@ def put(P, X, W, O, c, kind, visit, place):
     W.sides[visit, 1] = P.at[c, 1] if P.at[c, 1] >= 0 else P.size[1]
     W.sides[visit, 2] = c
     p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    least = least_of(P, c)
     if kind == SMOOTH_BALL or kind == SMOOTH:
         p = p[0], 0.0, 0.0
     if kind == SMOOTH_BALL or kind == BALL:
         pack_ball(P, W, c, place)
+        W.pack[place + B_LEAST] = least
         W.pack[place + B_P] = p[0]
         for s in range(3):
             W.pack[place + B_T + s] = P.frame[c, 3 + s] * p[1] + P.frame[c, 6 + s] * p[2]
     elif kind == SMOOTH:
         pack_smooth(P, W, c, place)
+        W.pack[place + S_LEAST] = least
         W.pack[place + S_P] = p[0]
     else:
         pack_rough(P, O, W, c, place)
+        W.pack[place + LEAST] = least
         for s in range(3):
             W.pack[place + IMPULSE + s] = p[s]
     if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:

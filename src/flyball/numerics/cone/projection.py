@@ -48,17 +48,35 @@ def normal_of_three(mu, rho, sigma, n, r, q, w):
 
 
 @formula
-def projected_turning(mu, rho, sigma, p, q):
+def projected_turning(mu, rho, sigma, least, p, q):
     """The nearest point with rolling and spinning friction.
 
     Parameters
     ----------
     mu, rho, sigma : float
         Friction, rolling and spinning: |p_t| <= mu p_n, |q_t| <= rho p_n, |q_n| <= sigma p_n.
+    least : float
+        p_n is not below it.
     p, q : tuple
         Impulse and torque, in one unit: normal, two tangential.
     """
     r, a, w = sqrt(p[1] * p[1] + p[2] * p[2]), sqrt(q[1] * q[1] + q[2] * q[2]), abs(q[0])
-    n = normal_of_three(mu, rho, sigma, p[0], r, a, w)
+    n = max(normal_of_three(mu, rho, sigma, p[0], r, a, w), least)
     x, y, z = share(n, mu, r), share(n, rho, a), share(n, sigma, w)
     return (n, x * p[1], x * p[2]), (z * q[0], y * q[1], y * q[2])
+
+
+@formula
+def least_of(P, c):
+    """The least normal impulse of contact c."""
+    return P.least[c] if P.least.shape[0] > 0 else 0.0
+
+
+@formula
+def projected_above(mu, least, n, s, t):
+    """The point of the cone with a normal component of at least ``least`` nearest to (n, s, t)."""
+    near, a, b = projected(mu, n, s, t)
+    if near >= least:
+        return near, a, b
+    part = share(least, mu, sqrt(s * s + t * t))
+    return least, part * s, part * t

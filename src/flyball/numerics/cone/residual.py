@@ -14,7 +14,7 @@ from ...math.scalar import sqrt
 from .diagonal import diagonal, diagonal_turning
 from .operator import diagonal_of_line, seen, seen_line, seen_turning
 from .problem import BIAS, COULOMB, HIGH, ISLAND, LOW, SOFT
-from .projection import projected, projected_turning
+from .projection import least_of, projected_above, projected_turning
 
 
 @formula
@@ -48,7 +48,7 @@ def of_contact(P, X, c, u, coulomb):
     s = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
     n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     more = coulomb * P.mu[c] * sqrt(u[1] * u[1] + u[2] * u[2])  # De Saxce and Feng 1998
-    x, y, z = projected(P.mu[c], n - s * (u[0] + more), a - s * u[1], b - s * u[2])
+    x, y, z = projected_above(P.mu[c], least_of(P, c), n - s * (u[0] + more), a - s * u[1], b - s * u[2])
     lack = (x - n) * (x - n) + (y - a) * (y - a) + (z - b) * (z - b)
     return lack, s, n * n + a * a + b * b
 
@@ -65,7 +65,8 @@ def of_turning(P, X, c, u, w, coulomb):
     w = w[0] * size, w[1] * size, w[2] * size
     more = mu * sqrt(u[1] * u[1] + u[2] * u[2]) + rho * sqrt(w[1] * w[1] + w[2] * w[2]) + sigma * abs(w[0])
     f = n - s * (u[0] + coulomb * more), a - s * u[1], b - s * u[2]
-    p, q = projected_turning(mu, rho, sigma, f, (k - s * w[0], l - s * w[1], m - s * w[2]))
+    q = k - s * w[0], l - s * w[1], m - s * w[2]
+    p, q = projected_turning(mu, rho, sigma, least_of(P, c), f, q)
     lack = (p[0] - n) * (p[0] - n) + (p[1] - a) * (p[1] - a) + (p[2] - b) * (p[2] - b)
     lack += (q[0] - k) * (q[0] - k) + (q[1] - l) * (q[1] - l) + (q[2] - m) * (q[2] - m)
     return lack, s, n * n + a * a + b * b

@@ -15,6 +15,7 @@ from .pack import (
     B_BIAS,
     B_IN,
     B_IT,
+    B_LEAST,
     B_MU,
     B_P,
     B_RATIO,
@@ -31,6 +32,7 @@ from .pack import (
     ISS,
     IST,
     ITT,
+    LEAST,
     MU,
     NS,
     NT,
@@ -39,8 +41,10 @@ from .pack import (
     RATIO,
     S_BIAS,
     S_IN,
+    S_LEAST,
     S_P,
     S_SOFT,
+    SLIDE,
     SLOW,
     SOFT,
     SPUN,
@@ -48,14 +52,14 @@ from .pack import (
 
 
 @formula
-def limited(n, r, mu, ratio, coulomb):
+def limited(n, r, mu, ratio, coulomb, least):
     """Normal impulse and the part of the tangential one that is kept, of a step to (n, r): see above."""
-    near = n if n > 0.0 else 0.0
+    near = n if n > least else least
     if r <= mu * near:
         return near, 1.0
     if not coulomb:
         near = (n + ratio * mu * r) / (1.0 + ratio * mu * mu)
-        near = near if near > 0.0 else 0.0
+        near = near if near > least else least
     return near, mu * near / r
 
 
@@ -65,7 +69,7 @@ def visit_smooth_ball(k, v, i, j, at):
     x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + B_P]
     u = x * (v[j, 0] - v[i, 0]) + y * (v[j, 1] - v[i, 1]) + z * (v[j, 2] - v[i, 2])
     q = p - (u + k[at + B_BIAS] + k[at + B_SOFT] * p) * k[at + B_IN]
-    q = q if q > 0.0 else 0.0
+    q = q if q > k[at + B_LEAST] else k[at + B_LEAST]
     d = q - p
     if d == 0.0:
         return 0.0
@@ -88,7 +92,7 @@ def visit_smooth(k, v, i, j, at):
     u += k[at + C2] * v[j, 3] + k[at + C2 + 1] * v[j, 4] + k[at + C2 + 2] * v[j, 5]
     u -= k[at + C1] * v[i, 3] + k[at + C1 + 1] * v[i, 4] + k[at + C1 + 2] * v[i, 5]
     q = p - (u + k[at + S_BIAS] + k[at + S_SOFT] * p) * k[at + S_IN]
-    q = q if q > 0.0 else 0.0
+    q = q if q > k[at + S_LEAST] else k[at + S_LEAST]
     d = q - p
     if d == 0.0:
         return 0.0
@@ -116,7 +120,7 @@ def visit_ball(k, v, i, j, at, coulomb):
     a, b, c = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
     un = x * a + y * b + z * c
     n = p - (un + k[at + B_BIAS] + k[at + B_SOFT] * p) * k[at + B_IN]
-    if n <= 0.0 and p == 0.0 and coulomb:
+    if n <= 0.0 and p == 0.0 and coulomb and k[at + B_LEAST] == 0.0:
         return 0.0
     r1, r2 = k[at + R1], k[at + R2]
     e, f, g = r2 * v[j, 3] + r1 * v[i, 3], r2 * v[j, 4] + r1 * v[i, 4], r2 * v[j, 5] + r1 * v[i, 5]
@@ -125,7 +129,7 @@ def visit_ball(k, v, i, j, at, coulomb):
     a = s - it * (a - un * x - (f * z - g * y))
     b = t - it * (b - un * y - (g * x - e * z))
     c = w - it * (c - un * z - (e * y - f * x))
-    q, part = limited(n, sqrt(a * a + b * b + c * c), k[at + B_MU], k[at + B_RATIO], coulomb)
+    q, part = limited(n, sqrt(a * a + b * b + c * c), k[at + B_MU], k[at + B_RATIO], coulomb, k[at + B_LEAST])
     a, b, c = part * a, part * b, part * c
     k[at + B_P], k[at + B_T], k[at + B_T + 1], k[at + B_T + 2] = q, a, b, c
     n, a, b, c = q - p, a - s, b - t, c - w
@@ -176,12 +180,16 @@ def stepped(k, at, u, coulomb):
     n = p - (u[0] + k[at + BIAS] + k[at + SOFT] * p) * k[at + IN]
     us, ut = u[1] + k[at + BIAS + 1], u[2] + k[at + BIAS + 2]
     if coulomb:
-        n = n if n > 0.0 else 0.0
+        n = n if n > k[at + LEAST] else k[at + LEAST]
         us += k[at + NS] * (n - p)
         ut += k[at + NT] * (n - p)
-    a = s - (k[at + ISS] * us + k[at + IST] * ut)
-    b = t - (k[at + IST] * us + k[at + ITT] * ut)
-    q, part = limited(n, sqrt(a * a + b * b), k[at + MU], k[at + RATIO], coulomb)
+        a = s - (k[at + ISS] * us + k[at + IST] * ut)
+        b = t - (k[at + IST] * us + k[at + ITT] * ut)
+        if a * a + b * b <= (k[at + MU] * n) ** 2:
+            return n, a, b
+    # it slides: only a step of one size in all directions ends with friction against the velocity
+    a, b = s - k[at + SLIDE] * us, t - k[at + SLIDE] * ut
+    q, part = limited(n, sqrt(a * a + b * b), k[at + MU], k[at + RATIO], coulomb, k[at + LEAST])
     return q, part * a, part * b
 
 

@@ -6,7 +6,7 @@ from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from .diagonal import diagonal_turning
 from .operator import diagonal_of_line, push, push_line, push_turning, seen, seen_line, seen_turning
-from .pack import BIAS, IMPULSE, IN, ISS, ITT, MU, SOFT, local_steps
+from .pack import BIAS, IMPULSE, IN, LEAST, MU, SLIDE, SOFT, local_steps
 from .problem import BIAS as LINE_BIAS
 from .problem import COULOMB, HIGH, LOW
 from .problem import SOFT as LINE_SOFT
@@ -54,7 +54,7 @@ def visit_turning(P, X, W, O, c, at):
     impulses are the nearest point of the cone, in the metric of twice the diagonal blocks.
     """
     steps = local_steps(diagonal_turning(P, c), 0.0, 0)
-    spin, roll = steps[0], steps[3]
+    spin, roll = steps[0], steps[6]
     u = seen(P, W.own, X.wide, c)
     if O.count[COULOMB]:
         put(P, X, W, c, at, stepped(W.pack, at, u, 1))
@@ -72,7 +72,7 @@ def visit_turning(P, X, W, O, c, at):
 @formula
 def nearest(P, X, k, c, at, u, w, steps):
     """Impulse and torque of the convex form after a step at velocities u and w."""
-    spin, roll, slide, press = 0.5 * steps[0], 0.5 * steps[1], 0.5 * k[at + ISS], 0.5 * k[at + IN]
+    spin, roll, slide, press = 0.5 * steps[0], 0.5 * steps[1], 0.5 * k[at + SLIDE], 0.5 * k[at + IN]
     n = k[at + IMPULSE] - press * (u[0] + k[at + BIAS] + k[at + SOFT] * k[at + IMPULSE])
     s = k[at + IMPULSE + 1] - slide * (u[1] + k[at + BIAS + 1])
     t = k[at + IMPULSE + 2] - slide * (u[2] + k[at + BIAS + 2])
@@ -81,6 +81,7 @@ def nearest(P, X, k, c, at, u, w, steps):
     # in units in which the metric is 1
     a, b, d = relative(press, slide), relative(press, roll), relative(press, spin)
     near = normal_of_three(mu * a, rho * b, sigma * d, n, r * a, q * b, abs(z) * d)
+    near = max(near, k[at + LEAST])
     a, b, d = share(near, mu, r), share(near, rho, q), share(near, sigma, abs(z))
     return (near, a * s, a * t), (d * z, b * x, b * y)
 
