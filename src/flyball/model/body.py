@@ -19,6 +19,7 @@ from .element import (
     Flag,
     Law,
     Mass,
+    Name,
     Number,
     Point,
     Unit,
@@ -109,6 +110,8 @@ class Body(Element):
     as_drawn : bool
         Assembly must not change the pose, nor the velocities given here. It holds nothing during the motion: to weld a
         body to ground add a `Fixed` joint.
+    material : str
+        `Material` that its shapes touch others with, where they name none of their own.
     color : str
         Colour in pictures: a name of CSS such as ``"steelblue"``, or ``"#rgb"`` or ``"#rrggbb"``.
     """
@@ -126,6 +129,7 @@ class Body(Element):
     shape: Shapes = field(default=None)
     density: Density | None = None
     as_drawn: Flag = False
+    material: Name | None = None
     color: str | None = None
 
     category: ClassVar[str] = "bodies"

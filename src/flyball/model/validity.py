@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body
+from .bulk import Bodies
 from .element import Element, Vector, fields_with, plain
 from .force import TwoFrameForce
 from .geometry import vector
+from .ground import Ground
 from .inertia import mass_properties
 from .joint import Joint
+from .weighing import checked
 
 if TYPE_CHECKING:
     from .model import Model
@@ -47,6 +50,18 @@ def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
         wanted = "one number" if model.planar else "three components"
         raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {given}")
     check_frame(model, e, n)
+
+
+def check_still(model: Model, e: Bodies | Ground, n: Any, env: dict[str, float]) -> None:
+    """Many bodies, or what stands on ground: shapes, poses and velocities."""
+    if isinstance(e, Bodies):
+        e.weight(n, env, model.planar)
+        e.start(model.planar)
+        e.sizes()
+    else:
+        checked(e, env, model.planar)
+        vector(n.position, model.planar, f"position of {e.title}")
+        check_frame(model, e, n)
 
 
 def check_joint(model: Model, e: Joint, n: Any) -> None:
