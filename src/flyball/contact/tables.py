@@ -50,7 +50,7 @@ class Movers(NamedTuple):
 class Contacts(NamedTuple):
     """Contacts at one time; two of these are used in turn, so that a contact can be found again in the one before."""
 
-    count: np.ndarray  # (8,): how many, status, how often pairs were looked for afresh, how many pairs there are
+    count: np.ndarray  # type: ignore[assignment]  # (8,): how many, status, how often pairs were looked for afresh, how many pairs there are
     at: np.ndarray  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
     # to step), place of the same contact in the contacts before or -1. Those of a pair stand together.
     x: np.ndarray  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:

@@ -13,8 +13,8 @@ their own, reversed on side 1:
 Besides contacts there are *lines*: single impulses s in [low, high] on a group with u = J v + bias + soft s: limits
 (0, inf), joint friction (-bound, bound), stiff springs (soft = 1 / (h^2 k + h c), unbounded).
 
-Contacts of one island (what touches each other, over whatever nodes and groups) stand together; a solver is called
-with one island or with all.
+Contacts of one island (what touches each other, over whatever nodes and groups) stand together, and so do its lines; a
+solver is called with one island or with all.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ class Problem(NamedTuple):
     mu: np.ndarray  # (nc,): friction coefficient
     soft: np.ndarray  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
     turn: np.ndarray  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
+    least: np.ndarray  # (nc,) or (0,): least normal impulse (what a restitution gives back); 0 if there is none
     node: np.ndarray  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
     group: np.ndarray  # (ng + 1,): first velocity of each group in State.wide
     block: np.ndarray  # (nc, 2): where J and Y of a side that is in a group begin, or -1
@@ -61,6 +62,7 @@ class Problem(NamedTuple):
     island: np.ndarray  # (ni + 1,): first contact of each island; one island if nothing is known
     member: np.ndarray  # (nn,): nodes by island
     member_p: np.ndarray  # (ni + 1,): where those of an island begin in ``member``
+    line_p: np.ndarray  # (ni + 1,): first line of each island (an island may have lines and no contacts)
 
 
 class State(NamedTuple):
@@ -76,7 +78,7 @@ class State(NamedTuple):
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: np.ndarray  # (16,)
+    count: np.ndarray  # type: ignore[assignment]  # (16,)
     real: np.ndarray  # (16,)
     history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
 
