@@ -58,6 +58,13 @@ Inertia = Annotated[
 Shapes = Annotated[Solid | tuple[Solid, ...] | None, BeforeValidator(_solids)]
 
 
+def listed(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
+    """Shapes as a tuple, however many were given."""
+    if shape is None:
+        return ()
+    return shape if isinstance(shape, tuple) else (shape,)
+
+
 @element
 class Body(Element):
     """A rigid body.
@@ -149,9 +156,7 @@ class Body(Element):
 
     def shapes(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
-        if self.shape is None:
-            return ()
-        return self.shape if isinstance(self.shape, tuple) else (self.shape,)
+        return listed(self.shape)
 
     def solids(self) -> tuple[Solid, ...]:
         """Its shapes that are seen: all but holes."""

@@ -12,9 +12,10 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..rotations.checks import unit_quaternions
-from .body import Body, Inertia, Shapes
+from .body import Body, Inertia, Shapes, listed
 from .element import LARGEST, Density, Element, Mass, Name, element
 from .inertia import MassProperties, mass_properties
+from .shapes import Solid
 
 
 def _numbers(value: Any) -> Any:
@@ -27,7 +28,7 @@ def _numbers(value: Any) -> Any:
         raise ValueError("give an array of numbers, as long in every row") from None
     if a.dtype.kind not in "iuf":
         raise ValueError("give an array of numbers, in SI units")
-    a = np.ascontiguousarray(a, float)
+    a = np.array(a, float, order="C")
     a.setflags(write=False)
     return a
 
@@ -84,8 +85,6 @@ class Bodies(Element):
     color: str | None = None
 
     category: ClassVar[str] = "bulk"
-    shapes = Body.shapes
-    solids = Body.solids
 
     def __eq__(self, other: object) -> bool:
         """Equal if everything is, to the bit."""
@@ -120,6 +119,10 @@ class Bodies(Element):
             color=self.color,
         )
 
+    def shapes(self) -> tuple[Solid, ...]:
+        """Its shapes, as a tuple."""
+        return listed(self.shape)
+
     def check(self, n: SimpleNamespace) -> None:
         """Arrays of as many finite numbers as there are bodies; what depends on the plane is looked at later."""
         self.one.check(n)
@@ -137,10 +140,9 @@ class Bodies(Element):
                     f"{self.title}: {name}[{', '.join(map(str, k))}] is {a[tuple(k)]:g}; give finite numbers, "
                     f"{LARGEST:g} at most"
                 )
-        if self.scale is not None:
-            if not (self.scale > 0.0).all():
-                k = int(np.argmin(self.scale > 0.0))
-                raise ModelError(f"{self.title}: scale[{k}] is {self.scale.flat[k]:g}; it must be greater than 0")
+        if self.scale is not None and not (self.scale > 0.0).all():
+            k = int(np.argmin(self.scale > 0.0))
+            raise ModelError(f"{self.title}: scale[{k}] is {self.scale.flat[k]:g}; it must be greater than 0")
 
     def weight(self, n: SimpleNamespace, env: Any, planar: bool) -> MassProperties:
         """Mass properties of one of them with ``scale`` 1.

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from dataclasses import field
 from types import SimpleNamespace
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import ModelError
-from .body import Body, Shapes
+from .body import Shapes, listed
 from .color import check_color
 from .element import Angle, Element, Name, Point, element
+from .geometry import orientation_matrix, rotation_about
 from .orientation import Orientation
 from .shapes import Solid
 
@@ -46,9 +47,16 @@ class Ground(Element):
     color: str | None = None
 
     category: ClassVar[str] = "ground"
-    rotation = Body.rotation
-    shapes = Body.shapes
-    solids = Body.solids
+
+    def shapes(self) -> tuple[Solid, ...]:
+        """Its shapes, as a tuple."""
+        return listed(self.shape)
+
+    def rotation(self, n: Any) -> np.ndarray:
+        """Rotation matrix of its frame."""
+        if n.orientation is not None:
+            return orientation_matrix(n.orientation, f"orientation of {self.title}")
+        return rotation_about(2, n.angle)
 
     def check(self, n: SimpleNamespace) -> None:
         """A shape, and nothing that has no effect on ground."""

@@ -32,37 +32,30 @@ def check_surface(e: Element, n: SimpleNamespace) -> None:
     Raises
     ------
     ModelError
-        If a friction or length is negative, restitution is not from 0 to 1, or static friction is below the kinetic.
+        If friction or a length is negative, restitution not from 0 to 1, or static friction below that of sliding.
     """
-    nonnegative(e, n, "restitution", "rolling_friction", "spinning_friction")
+    nonnegative(e, n, "static_friction", "restitution", "rolling_friction", "spinning_friction")
     if n.restitution is not None and not n.restitution.real <= 1.0:
         raise ModelError(
             f"{e.title}: restitution is {n.restitution:g}; it must be from 0 to 1, since no impact makes energy"
         )
-    for name in ("friction", "static_friction"):
-        for x in pair(getattr(n, name)):
-            if x is not None and not x.real >= 0.0:
-                raise ModelError(f"{e.title}: {name} is {x:g}; it must be zero or greater")
+    for x in pair(n.friction):
+        if x is not None and not x.real >= 0.0:
+            raise ModelError(f"{e.title}: friction is {x:g}; it must be zero or greater")
     if n.static_friction is not None:
         if n.friction is None:
             raise ModelError(f"{e.title}: static_friction needs friction, that of sliding, which is not greater")
-        for at_rest, sliding in zip(pair(n.static_friction), pair(n.friction), strict=True):
-            if at_rest.real < sliding.real:
-                raise ModelError(
-                    f"{e.title}: static_friction is {at_rest:g}, below friction (that of sliding), {sliding:g}; what "
-                    f"slides would stop and what rests would slide"
-                )
+        sliding = pair(n.friction)[0]
+        if n.static_friction.real < sliding.real:
+            raise ModelError(
+                f"{e.title}: static_friction is {n.static_friction:g}, below friction (that of sliding), {sliding:g}; "
+                f"what slides would stop and what rests would slide"
+            )
 
 
 def pair(x: Any) -> tuple[Any, Any]:
     """Along the grain and across it."""
     return (x[0], x[1]) if isinstance(x, tuple) else (x, x)
-
-
-def _check_two(e: Element, n: SimpleNamespace, name: str) -> None:
-    x = getattr(n, name)
-    if isinstance(x, tuple) and (len(x) != 2 or any(isinstance(v, tuple) for v in x)):
-        raise ModelError(f"{e.title}: {name} must be one number, or two, along the grain and across it; got {x}")
 
 
 @element
@@ -72,17 +65,19 @@ class Material(Element):
     What touches has a material on either side. Of friction and restitution the geometric mean of both holds, so that
     what is slippery or dead on one side is on both (as in Box2D and Jolt); of the lengths of rolling and spinning
     friction the greater, since the softer gives way (as in MuJoCo); surface velocities add up. What a material leaves
-    out is that of the `Contact`. Where a pair is known by measurement, a `MaterialPair` says it.
+    out is that of the `Contact`, or else that of the other side. Where a pair is known by measurement, a
+    `MaterialPair` says it.
 
     Parameters
     ----------
     name : str
     friction : number, or two numbers [1]
-        Coefficient of sliding friction. Two: along the grain and across it.
-    static_friction : number, or two numbers [1]
-        Of what sticks, not less; the same as ``friction`` if not given.
+        Coefficient of sliding friction. Two: along the grain (greater than 0) and across it.
+    static_friction : number [1]
+        Of what sticks, not less; the same as ``friction`` if not given. With a grain: along it; across it greater or
+        smaller as ``friction`` is.
     restitution : number [1]
-        From 0 (dead) to 1 (elastic); 0 if neither the material nor the `Contact` says it.
+        From 0 (dead) to 1 (elastic); 0 if nothing says it.
     rolling_friction : number [m]
         Lever arm of the resistance to rolling: the greatest torque over the normal force.
     spinning_friction : number [m]
@@ -96,7 +91,7 @@ class Material(Element):
     """
 
     friction: Friction | None = None
-    static_friction: Friction | None = None
+    static_friction: Ratio | None = None
     restitution: Ratio | None = None
     rolling_friction: Length | None = None
     spinning_friction: Length | None = None
@@ -107,18 +102,25 @@ class Material(Element):
 
     def check(self, n: SimpleNamespace) -> None:
         """Numbers that a surface can have; a grain where, and only where, two numbers of friction ask for it."""
-        two = False
-        for name in ("friction", "static_friction"):
-            _check_two(self, n, name)
-            two = two or isinstance(getattr(n, name), tuple)
+        two = isinstance(n.friction, tuple)
+        if two and (len(n.friction) != 2 or any(isinstance(x, tuple) for x in n.friction)):
+            raise ModelError(
+                f"{self.title}: friction must be one number, or two, along the grain and across it; got {n.friction}"
+            )
         check_surface(self, n)
-        if two and n.grain is None:
-            raise ModelError(f"{self.title}: friction has two numbers; say the direction of the first: grain=(1, 0, 0)")
-        if n.grain is not None:
-            if not two:
-                raise ModelError(f"{self.title}: grain has no effect, since friction is one number; leave it out")
-            if not any(abs(x) > 0.0 for x in n.grain):
-                raise ModelError(f"{self.title}: grain has no length; a direction must not be zero")
+        if two and not n.friction[0].real > 0.0:
+            raise ModelError(
+                f"{self.title}: friction along the grain is 0; it must be greater than 0. What is smooth one way only "
+                f"has its grain the other way: swap the numbers and turn the grain"
+            )
+        if two != (n.grain is not None):
+            raise ModelError(
+                f"{self.title}: friction has two numbers; say the direction of the first: grain=(1, 0, 0)"
+                if two
+                else f"{self.title}: grain has no effect, since friction is one number; leave it out"
+            )
+        if two and not any(abs(x) > 0.0 for x in n.grain):
+            raise ModelError(f"{self.title}: grain has no length; a direction must not be zero")
 
 
 @element

@@ -18,7 +18,7 @@ from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
 from .expressions import folded, law_expression, number, resolve_parameters
-from .force import Force, TwoFrameForce
+from .force import Force
 from .function import function_name
 from .geometry import vector
 from .ground import Ground
@@ -30,7 +30,7 @@ from .sensor import IMU, Sensor
 from .summary import summary
 from .table import Table
 from .units import same_kind
-from .validity import check_body, check_by_frames, check_frame, check_joint, check_still, check_vectors, refuse_twins, told_gravity
+from .validity import check_kind, check_vectors, refuse_twins, told_gravity
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -320,19 +320,8 @@ class Model:
         check_vectors(e, n, self.planar)
         self._check_laws(e)
         check_units(self, e, env)
-        if isinstance(e, Body):
-            check_body(self, e, n, env)
-        elif isinstance(e, (Bodies, Ground)):
-            check_still(self, e, n, env)
-        elif isinstance(e, Frame):
-            check_frame(self, e, n)
-        elif isinstance(e, Joint):
-            check_joint(self, e, n)
-        elif isinstance(e, Force):
-            e.placed(n, self.planar)
-            if isinstance(e, TwoFrameForce) and n.at is None:
-                check_by_frames(self, e)
-        elif isinstance(e, Initial):
+        check_kind(self, e, n, env)
+        if isinstance(e, Initial):
             unit = self.unit(e.name, e)
             for name, value, wanted in (("value", e.value, unit), ("rate", e.rate, f"{unit}/s")):
                 if value is not None:

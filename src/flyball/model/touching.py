@@ -47,9 +47,9 @@ def check_touching(model: Model, e: Element) -> None:
             _touching(model, name, e)
         _refuse_second(model, e)
     elif isinstance(e, (Body, Bodies, Ground)):
-        for name in (e.material, *(s.material for s in e.shapes())):
-            if name is not None:
-                _material(model, name, e)
+        for material in (e.material, *(s.material for s in e.shapes())):
+            if material is not None:
+                _material(model, material, e)
 
 
 def named(e: Contact) -> Iterator[str]:
@@ -65,7 +65,9 @@ def _material(model: Model, name: str, e: Element) -> None:
     if not isinstance(found, Material):
         known = [x.name for x in model.materials]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(f"{e.title}: there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}")
+        raise ModelError(
+            f"{e.title}: there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}"
+        )
 
 
 def _touching(model: Model, name: str, e: Contact) -> None:

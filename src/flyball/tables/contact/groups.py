@@ -5,12 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from ...errors import ModelError
 from ...model.body import GROUND, Body
 from ...model.contact import Contact
-from ...model.ground import Ground
 from ...model.model import Model
 from ...model.touching import Owner
 
@@ -63,8 +60,8 @@ def groups(model: Model, owners: Iterable[Owner]) -> Groups:
     number = {s: k for k, s in enumerate(dict.fromkeys(signature.values()))}
     if len(number) > MOST:
         raise ModelError(
-            f"the contacts of {model.name!r} tell {len(number)} groups of bodies apart; {MOST} are possible. Name fewer "
-            f"bodies in between=, others= and exclude=, and give them materials where only friction differs"
+            f"the contacts of {model.name!r} tell {len(number)} groups of bodies apart; {MOST} are possible. Name "
+            f"fewer bodies in between=, others= and exclude=, and give them materials where only friction differs"
         )
     holds = {}
     for s, a in number.items():

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...contact import kinds, tables as ct
+from ...contact import kinds
+from ...contact import tables as ct
 from ...contact.surfaces import Surfaces
-from ...model.body import Body
+from ...model.body import GROUND, Body
 from ...model.bulk import Bodies
 from ...model.element import resolve
 from ...model.ground import Ground, frame_of
@@ -20,7 +21,7 @@ from ...model.touching import Owner
 from ..numbers import Numbers
 from .carriers import Carriers, carriers
 from .groups import Groups, groups
-from .pairs import Surface, own, pairs
+from .pairs import Surface, own_of, pairs
 
 
 @dataclass(frozen=True)
@@ -75,10 +76,11 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
     rows = _Rows(model, given, at, g)
     for k, e in enumerate(owners):
         rows.add(k, e)
-    surfaces = Surfaces(pairs(model, given, g, list(rows.surfaces)), _joined(rows.own, (0, 6)))
-    apart = np.array(
-        sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.apart), np.int64
-    ).reshape(-1, 2)
+    own = _joined(rows.own, (0, 2, 3))
+    surfaces = Surfaces(pairs(model, given, g, rows.surfaces), own[:, 0].copy(), own[:, 1].copy())
+    apart = np.array(sorted(sorted((at.slices[a].start, at.slices[b].start)) for a, b in g.apart), np.int64).reshape(
+        -1, 2
+    )
     geometry = ct.Geometry(
         _joined(rows.ints, (0, 9), np.int64),
         _joined(rows.reals, (0, 24)),
@@ -86,9 +88,7 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
         _joined(rows.face, (0,), np.int64),
         apart,
     )
-    return Touching(
-        geometry, surfaces, at, tuple(e.name for e in owners), _joined(rows.part, (0,), np.int64)
-    )
+    return Touching(geometry, surfaces, at, tuple(e.name for e in owners), _joined(rows.part, (0,), np.int64))
 
 
 def _joined(parts: list[np.ndarray], empty: tuple[int, ...], dtype: type = float) -> np.ndarray:
@@ -100,7 +100,7 @@ class _Rows:
 
     def __init__(self, model: Model, given: Numbers, at: Carriers, g: Groups) -> None:
         self.model, self.given, self.at, self.groups = model, given, at, g
-        self.surfaces: dict[Surface, int] = {}
+        self.surfaces: dict[Surface, set[str]] = {}  # what carries each; of ground there is one
         self.ints: list[np.ndarray] = []
         self.reals: list[np.ndarray] = []
         self.own: list[np.ndarray] = []
@@ -115,7 +115,7 @@ class _Rows:
         forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(s)]
         count, n = len(movers), len(forms)
         ints, reals = np.zeros((count, n, 9), np.int64), np.zeros((count, n, 24))
-        mine = np.zeros((n, 6))
+        mine = np.zeros((n, 2, 3))
         for j, (s, form) in enumerate(forms):
             f = form if where is None else form.carried(*where)
             ints[:, j] = self._ints(e, s, f, sizes)
@@ -124,7 +124,7 @@ class _Rows:
         ints[:, :, ct.MOVER] = movers[:, None]
         self.ints.append(ints.reshape(-1, 9))
         self.reals.append(reals.reshape(-1, 24))
-        self.own.append(np.broadcast_to(mine, (count, n, 6)).reshape(-1, 6))
+        self.own.append(np.broadcast_to(mine, (count, n, 2, 3)).reshape(-1, 2, 3))
         self.part.append(np.full(count * n, k))
 
     def _frame(self, e: Owner) -> tuple:
@@ -158,13 +158,16 @@ class _Rows:
             self._corners += len(copies) * len(f.vertex)
             self._places += len(f.face)
         row[:, ct.MEMBER], row[:, ct.MASK] = 1 << group, self.groups.meets(group)
-        row[:, ct.MATERIAL] = self.surfaces.setdefault((group, material), len(self.surfaces))
+        surface = group, material
+        on = self.surfaces.setdefault(surface, set())
+        on |= {GROUND} if isinstance(e, Ground) else {e.name, f"{e.name}[1]"} if len(sizes) > 1 else {e.name}
+        row[:, ct.MATERIAL] = list(self.surfaces).index(surface)
         return row
 
     def _own(self, e: Owner, s: Solid, where: tuple | None) -> np.ndarray:
         name = s.material or e.material
-        out = own(self.model.find(name) if name else None, self.given.of)  # type: ignore[arg-type]
-        return out if where is None else np.concatenate([where[1] @ out[:3], where[1] @ out[3:]])
+        out = own_of(self.model.find(name) if name else None, self.given.of)  # type: ignore[arg-type]
+        return out if where is None else out @ where[1].T
 
 
 def _reals(f: Form, com: np.ndarray, sizes: np.ndarray) -> np.ndarray:
