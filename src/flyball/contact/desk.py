@@ -77,5 +77,5 @@ class Search(NamedTuple):
     moved: np.ndarray  # (ns,): slots that have
     names: np.ndarray  # (places,): a table of pairs, by hashing
     firsts: np.ndarray  # (places,): their first contacts
-    taken: np.ndarray  # (places,): places that are not empty
+    taken: np.ndarray  # (places / 2,): places that are not empty
     room: np.ndarray  # (ROOM, 8): of the narrow phase

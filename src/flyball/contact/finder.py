@@ -82,7 +82,7 @@ def _power(least: int) -> int:
 def _hashing(contacts: int) -> dict[str, np.ndarray]:
     """A table of pairs that as many contacts never fill by more than half."""
     n = _power(2 * contacts)
-    return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int64), "taken": np.zeros(n, np.int64)}
+    return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int32), "taken": np.zeros(n // 2, np.int32)}
 
 
 def search_room(G: Geometry, pairs: int, contacts: int) -> Search:

@@ -56,7 +56,7 @@ def offer(G, B, s, t):
     elif a == BALL and b == FLAT:
         way = BALL_FLAT
     B.pair[n, 0], B.pair[n, 1], B.pair[n, 2] = s, t, way
-    B.seen[B.count[HALF], n] = kept(B, i * G.shape_i.shape[0] + j)
+    B.seen[B.count[HALF], n] = kept(B, i, j)
     B.count[LISTED] = n + 1
     return True
 
@@ -144,7 +144,7 @@ def list_all(G, B):
 
 
 @formula
-def drop(G, B):
+def drop(B):
     """Take the pairs of marked slots off the list, and keep in the table which contacts they had."""
     n, half = 0, B.count[HALF]
     for k in range(B.count[LISTED]):
@@ -155,7 +155,7 @@ def drop(G, B):
                 B.pair[n, 0], B.pair[n, 1], B.pair[n, 2], B.seen[half, n] = s, t, B.pair[k, 2], first
             n += 1
         elif first >= 0:
-            keep(B, B.slot[s, SHAPE] * G.shape_i.shape[0] + B.slot[t, SHAPE], first)
+            keep(B, B.slot[s, SHAPE], B.slot[t, SHAPE], first)
     B.count[LISTED] = n
 
 
