@@ -8,13 +8,14 @@ their own, reversed on side 1:
   impulse f = frame' p acts at ``arm``: it changes v by f/m and w by B (arm x f).
 - a *group* has any number of velocities that depend on each other (what joints hold together): D' of the contact's
   side is the block J (3, n), and what its impulses change the group's velocities by is p Y, Y (3, n) = D K^-1. Where
-  both sides are in one group, J and Y are those of the difference, and stand on side 2.
+  both sides are in one group, J and Y are those of the difference, and stand on side 2. J of side 1 is the plain
+  velocity there: solvers reverse it. With rolling friction (``turn``) J and Y have six rows: three of turning.
 
 Besides contacts there are *lines*: single impulses s in [low, high] on a group with u = J v + bias + soft s: limits
 (0, inf), joint friction (-bound, bound), stiff springs (soft = 1 / (h^2 k + h c), unbounded).
 
-Contacts of one island (what touches each other, over whatever nodes and groups) stand together; a solver is called
-with one island or with all.
+Contacts of one island (what touches each other, over whatever nodes and groups) stand together, and so do its lines; a
+solver is called with one island or with all.
 """
 
 from __future__ import annotations
@@ -51,6 +52,7 @@ class Problem(NamedTuple):
     mu: np.ndarray  # (nc,): friction coefficient
     soft: np.ndarray  # (nc,): compliance of the normal impulse [velocity per impulse], 0 if it is hard
     turn: np.ndarray  # (nc, 2) or (0, 2): rolling and spinning friction [m]: torques (about t1 and t2, about n)
+    least: np.ndarray  # (nc,) or (0,): least normal impulse (what a restitution gives back); 0 if there is none
     node: np.ndarray  # (nn, 8): 1/m, symmetric block xx yy zz xy xz yz in the world, 1 if the block is a multiple of 1
     group: np.ndarray  # (ng + 1,): first velocity of each group in State.wide
     block: np.ndarray  # (nc, 2): where J and Y of a side that is in a group begin, or -1
@@ -61,6 +63,7 @@ class Problem(NamedTuple):
     island: np.ndarray  # (ni + 1,): first contact of each island; one island if nothing is known
     member: np.ndarray  # (nn,): nodes by island
     member_p: np.ndarray  # (ni + 1,): where those of an island begin in ``member``
+    line_p: np.ndarray  # (ni + 1,): first line of each island (an island may have lines and no contacts)
 
 
 class State(NamedTuple):
@@ -76,7 +79,7 @@ class State(NamedTuple):
 class Choices(NamedTuple):
     """How it is solved, and what came of it."""
 
-    count: np.ndarray  # (16,)
+    count: np.ndarray  # type: ignore[assignment]  # (16,)
     real: np.ndarray  # (16,)
     history: np.ndarray  # (rows, 4): iteration, velocity residual, force residual, objective
 
@@ -88,6 +91,11 @@ class Scratch(NamedTuple):
     nodes: np.ndarray  # (6, nn, 8)
     wide: np.ndarray  # (6, nw): of the groups' velocities
     lines: np.ndarray  # (6, nl)
+    own: np.ndarray  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
+    inner: np.ndarray  # (nn + 1, 8): its block, two unused
+    free: np.ndarray  # (nn + 1, 8): v, w without impulses, two unused
+    pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
+    sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
 
 
 class Factor(NamedTuple):
