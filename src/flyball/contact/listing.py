@@ -148,8 +148,7 @@ def drop(B):
     """Take the pairs of marked slots off the list, and keep in the table which contacts they had."""
     n, half = 0, B.count[HALF]
     for k in range(B.count[LISTED]):
-        s, t = B.pair[k, 0], B.pair[k, 1]
-        first = B.seen[half, k]
+        s, t, first = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.seen[half, k] + 0  # all integers of one type
         if B.mark[s] == 0 and B.mark[t] == 0:
             if n < k:
                 B.pair[n, 0], B.pair[n, 1], B.pair[n, 2], B.seen[half, n] = s, t, B.pair[k, 2], first

@@ -198,7 +198,8 @@ def touch(G, M, C, O, B):
     """All contacts: how many there are, also where there is no room for them all."""
     n, half = 0, B.count[HALF]
     for k in range(B.count[LISTED]):
-        s, t, way, first = B.pair[k, 0], B.pair[k, 1], B.pair[k, 2], B.seen[half, k]
+        s, t, way = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.pair[k, 2]  # + 0: all integers of one type
+        first = B.seen[half, k] + 0
         if way == ANY:
             found = others(G, M, C, O, B, s, t, first, n)
         else:
