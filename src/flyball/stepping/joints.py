@@ -18,6 +18,8 @@ from ..tables.system import (
     NU,
     PLACED,
     ROW_WORK,
+    SCHUR,
+    SOLVER,
     V0,
 )
 from .contact_rows import contact_rows
@@ -148,8 +150,34 @@ def keep(A, P, X):
         A.lam[1, r] = A.sheet.rows[3, r]
     for d in range(nv):
         A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
-        X.wide[d] = A.wide[V_AFTER, d]
     account(A, h)
+    turn_on(A, h)
+    for d in range(nv):
+        X.wide[d] = A.wide[V_AFTER, d]
+
+
+@formula
+def turn_on(A, h):
+    """Velocity-dependent forces of the second half of the step at velocities after impacts, in joint coordinates.
+
+    Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
+    give energy. In absolute coordinates the projection that ends the step does that.
+    """
+    S, y, nq = A.S, A.clock.y, A.S.kinds[COORDINATES]
+    size = 0.0
+    for d in range(A.wide.shape[1]):
+        size += A.wide[STRUCK, d] * A.wide[STRUCK, d]
+        y[0, nq + d] = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d] + A.wide[STRUCK, d]
+    if S.kinds[SOLVER] == SCHUR or size == 0.0:
+        return
+    z = nq + A.wide.shape[1]
+    for i in range(z, y.shape[1]):
+        y[2, i] = A.clock.K[0, i]
+    if enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, MOTION) == 0:
+        for d in range(A.wide.shape[1]):
+            A.wide[V_AFTER, d] += 0.5 * (h * A.clock.K[0, nq + d] - A.wide[SMOOTH, d])
+    for i in range(z, y.shape[1]):
+        A.clock.K[0, i] = y[2, i]
 
 
 @formula

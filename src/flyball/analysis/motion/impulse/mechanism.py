@@ -8,11 +8,9 @@ from ....equations.engine import Sheet
 from ....equations.projection import STEPS
 from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
 from ....model.force import CoordinateForce, TwoPointForce
-from ....model.model import Model
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from ....numerics.integrators.tableaux import tableau
 from ....stepping.joined import FIRST, STEP, TIME, Joined
-from ....stepping.joints import joined
 from ....stepping.smooth import MIXED, MIXING
 from ....tables.system import FORCE_ALONG, FORCE_F, FORCE_M, LATER, NV, PARENT, STABILIZE, V0, System
 from ..start import Start
