@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.stepping.joined import EVALUATED, UNSETTLED
+from flyball.stepping.joined import EVALUATED, UNSETTLED, no_mechanism
 from tests.layers import LAYERS
 
 from .stepped import Stepped
@@ -103,3 +103,10 @@ def test_a_top_spins_several_radians_in_a_step(spin, coordinates):
     assert p[2] == pytest.approx(0.1 * c, abs=0.004)
     assert top.A.count[UNSETTLED] == 0
     assert top.A.count[EVALUATED] < 200 * 8
+
+
+def test_no_mechanism_has_the_types_of_all_others():
+    """So that the loop of steps is compiled once, and what has no joints compiles nothing of this."""
+    from numba import typeof
+
+    assert typeof(no_mechanism()) == typeof(Stepped(oscillator(1.0), H).A)

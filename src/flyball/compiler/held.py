@@ -3,7 +3,8 @@
 Numba passes a tuple of arrays as its parts, some two hundred numbers for a mechanism, which every callee puts together
 again: half of all the code a kernel is made of, before the optimiser throws it away. ``held(S)`` leaves the tuple where
 it is and passes its address; ``S.field`` then reads the field there. Nothing writes to the tuple itself, so that the
-optimiser may read each part once and keep it (`invariant.load`). A tuple in a tuple is held as well. In plain Python ``held(S)`` is ``S``.
+optimiser may read each part once and keep it (`invariant.load`). A tuple in a tuple is held as well. In plain Python
+``held(S)`` is ``S``.
 """
 
 from __future__ import annotations

@@ -137,8 +137,8 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
         ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
         ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
         make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
-        see ``within.inspect``; in and out by the clock. SLOPES: of every force, see ``slopes.slopes``. INTEGRATE: go on with the integration; FOLLOW: go on with
-        what the drivers prescribe.
+        see ``within.inspect``; in and out by the clock. SLOPES: of every force, see
+        ``slopes.slopes``. INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
 
     Returns
     -------

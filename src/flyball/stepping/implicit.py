@@ -6,8 +6,8 @@ A force s along J v, with stiffness k and damping c, is taken at
 
 x being where it is at half the step, r- and r+ its rates before and after. With b = 0 that is the trapezoidal rule,
 which keeps the energy of a linear spring; with b = 1 whatever is stiff is at rest after two steps. Between them it is
-stable for any h, k, c, as the matrix of one step has the determinant (1 - a z) / (1 + b' z) with -a <= b', z = h^2 k / m.
-b goes with the square of z, so that the step stays of second order.
+stable for any h, k, c: with z = h^2 k / m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z),
+where b' = (1 + 3 b) / 4. b goes with the square of z, so that the step stays of second order.
 
 M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by Sherman, Morrison and Woodbury's formula.
 """

@@ -7,13 +7,14 @@ neighbours; group g has those from ``group[g]`` to ``group[g + 1]``.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..equations.engine import Sheet
 from ..numerics.integrators.clock import Clock
 from ..numerics.integrators.tableaux import Tableau
+from ..numerics.ldl import Pattern
 from ..tables.system import System, Work
 
 # what may be asked at the door (`joints.joined`), in the order of a step: the start of a motion; velocities without
@@ -23,9 +24,8 @@ from ..tables.system import System, Work
 START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES = range(8)
 # entries of Joined.real: time and step
 TIME, STEP = range(2)
-# entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far, steps whose
-# velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a
-# step has begun
+# entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
+# steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has begun
 FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
 # rows of Joined.wide: velocities at the start of the step; their change without impulses of contact, as far as known,
 # and what the evaluation at half the change makes of it, and of the drivers' efforts; generalised impulses of contacts
@@ -63,3 +63,21 @@ class Joined(NamedTuple):
     weight: np.ndarray  # (MIXED + 1, MIXED + 1)
     job: np.ndarray  # (2 contacts + lines, 3)
     queue: np.ndarray  # (ng,): the next job of each group
+
+
+def _none(of: type, dimensions: str, **parts: Any) -> Any:
+    """A named tuple of empty arrays: of floats with so many dimensions, of integers where that is a letter."""
+    names = [n for n in of._fields if n not in parts]  # type: ignore[attr-defined]
+    for name, d in zip(names, dimensions, strict=True):
+        whole = d in "abc"
+        parts[name] = np.zeros((0,) * ("abc".index(d) + 1 if whole else int(d)), np.int64 if whole else float)
+    return of(**parts)
+
+
+def no_mechanism() -> Joined:
+    """Tables of no mechanism, of the types of all others: what the loop of steps is compiled for."""
+    S = _none(System, "b2a2b2bbaabb2bbaa11bbb", ldl=_none(Pattern, "aaaaaaaa"))
+    W = _none(Work, "2222221112222112221a")
+    clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
+    sheet = Sheet(np.zeros((0, 0)))
+    return _none(Joined, "a1aba22222222ba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)

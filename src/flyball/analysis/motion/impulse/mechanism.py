@@ -31,6 +31,7 @@ def tables(start: Start, bodies: list[str], first: int, h: float) -> Joined:
     c = start.assembly.compiled
     s, S = c.structure, c.values.system
     of, group = groups(S, s.nv)
+    rows = [s.place[name] for name in bodies]
     y = np.zeros((STATES, len(start.y)))
     y[0] = start.y
     width = max(len(start.y) + 1, s.nv, len(S.row_i), 1)
@@ -44,7 +45,7 @@ def tables(start: Start, bodies: list[str], first: int, h: float) -> Joined:
     A = Joined(
         S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
         real=np.zeros(8), count=np.zeros(16, np.int64),
-        mover=np.array([(s.place[b], of[s.place[b]] if s.place[b] >= 0 else -1) for b in bodies], np.int64).reshape(-1, 2),
+        mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
         group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((2, len(S.row_i))),
         spring_x=np.zeros((springs, 8)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
         stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING, s.nv)), weight=np.zeros((MIXED + 1, MIXED + 1)),
