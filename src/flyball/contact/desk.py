@@ -79,3 +79,4 @@ class Search(NamedTuple):
     firsts: np.ndarray  # (places,): their first contacts
     taken: np.ndarray  # (places / 2,): places that are not empty
     room: np.ndarray  # (ROOM, 8): of the narrow phase
+    kept: np.ndarray  # (2, 12): poses of a pair that is carried on

@@ -22,6 +22,7 @@ from .desk import (
     OTHER,
     REALS,
     SHAPE,
+    SIZE,
     SIZES,
     TOLD,
     USUAL,
@@ -99,6 +100,8 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
         form = FLAT if G.shape_i[i, KIND] == PLANE else OTHER
         slot[s, [SHAPE, MOVES, FORM, CLASS]] = i, G.shape_i[i, MOVER], form, kin[i]
+    now = np.zeros((ns, 8))
+    now[bounded.sum() :, SIZE] = np.inf
     return Search(
         real=real,
         count=count,
@@ -106,7 +109,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
         kin=np.where(bounded, kin, -1),
         meets=meets,
         slot=slot,
-        now=np.zeros((ns, 8)),
+        now=now,
         fat=np.zeros((ns, 8)),
         turn=np.zeros((ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0, 9)),
         wide=np.zeros((ns - int(bounded.sum()), 20)),
@@ -122,6 +125,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
         mark=np.zeros(ns, np.int64),
         moved=np.zeros(ns, np.int64),
         room=np.zeros((ROOM, 8)),
+        kept=np.zeros((2, 12)),
         **_hashing(contacts),
     )
 

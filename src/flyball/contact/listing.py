@@ -119,7 +119,7 @@ def with_wide(G, B, w):
     of = B.slot[w, CLASS]
     settle(B, w - B.count[BOUNDED], B.slot[w, MOVES] < 0)
     for s in range(B.count[BOUNDED]):
-        near = B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], B.slot[w, FORM], s)
+        near = B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], s)
         if near and allowed(G, B, s, w) and not offer(G, B, s, w):
             return False
     return True
@@ -193,6 +193,6 @@ def list_moved(G, B):
                 return False
         for w in range(wide, wide + B.count[WIDE]):
             may = B.mark[w] == 0 and B.meets[B.slot[w, CLASS], B.slot[s, CLASS]] != 0
-            if may and reaches(B, w - wide, B.slot[w, FORM], s) and allowed(G, B, s, w) and not offer(G, B, s, w):
+            if may and reaches(B, w - wide, s) and allowed(G, B, s, w) and not offer(G, B, s, w):
                 return False
     return True
