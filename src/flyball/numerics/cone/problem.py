@@ -13,8 +13,8 @@ their own, reversed on side 1:
 Besides contacts there are *lines*: single impulses s in [low, high] on a group with u = J v + bias + soft s: limits
 (0, inf), joint friction (-bound, bound), stiff springs (soft = 1 / (h^2 k + h c), unbounded).
 
-Contacts of one island (what touches each other, over whatever nodes and groups) stand together; a solver is called
-with one island or with all.
+Contacts of one island (what touches each other, over whatever nodes and groups) stand together, and so do its lines; a
+solver is called with one island or with all.
 """
 
 from __future__ import annotations
@@ -62,6 +62,7 @@ class Problem(NamedTuple):
     island: np.ndarray  # (ni + 1,): first contact of each island; one island if nothing is known
     member: np.ndarray  # (nn,): nodes by island
     member_p: np.ndarray  # (ni + 1,): where those of an island begin in ``member``
+    line_p: np.ndarray  # (ni + 1,): first line of each island (an island may have lines and no contacts)
 
 
 class State(NamedTuple):

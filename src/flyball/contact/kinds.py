@@ -1,0 +1,27 @@
+"""Kinds of shapes that may touch, and what their parameters (`PAR` of the shape table) are.
+
+A convex shape is a *core* and a rounding radius: all points within that radius of its core. A sphere is a point with a
+radius, a capsule a line with one. What a core is, `shapes/` says, one file a kind.
+
+====  =========  =====================================================================================================
+kind  name       parameters, in the shape's axes
+====  =========  =====================================================================================================
+0     SPHERE     radius
+1     PLANE      none: the half-space z <= 0; its normal is +z
+2     BOX        three half edges
+3     CAPSULE    radius, half length of the line between its two centres, which lies along z
+4     CYLINDER   radius, half length along z
+5     CONE       radius, height: the middle of its base at the origin, its tip at +z
+6     HULL       rounding radius; vertices and faces stand in `Geometry.vertex` and `Geometry.face`
+7     FIELD      a height field (`shapes/field.py`)
+8     POLYGON    rounding radius; a convex polygon in z = 0, vertices counter-clockwise about z; one of two is a segment
+9     ELLIPSOID  three half axes
+====  =========  =====================================================================================================
+
+In planar mechanisms circles are SPHERE, and what has corners is POLYGON; a PLANE's z axis lies in the plane there.
+"""
+
+from __future__ import annotations
+
+SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID = range(10)
+"""Numbers of the kinds; a further kind takes the next one."""

@@ -1,0 +1,70 @@
+"""The narrow phase: where two shapes touch, or nearly.
+
+The list of pairs is written from ``pairs``, so no kind is named here.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..compiler.written import written
+from ..math.vec import add, load3, load9, mm, mv, sub
+from .pairs.registry import WAYS
+from .tables import AXES, KIND, MOVER, PLACE
+
+
+def _by_kinds():
+    names, lines = {}, []
+    for number, pair in enumerate(sorted(WAYS, key=lambda p: (p[1] is None, p))):
+        names[f"way_{number}"] = WAYS[pair]
+        test = f"a == {pair[0]}" + ("" if pair[1] is None else f" and b == {pair[1]}")
+        lines += [f"if {test}:", f"    return way_{number}(G, i, j, A, B, reach, room)"]
+    lines.append("return 0")
+    return written(__name__, "by_kinds", "a, b, G, i, j, A, B, reach, room", lines, names)
+
+
+by_kinds = _by_kinds()
+"""Contacts of two shapes of kinds a <= b, from the first one's origin."""
+
+
+@formula
+def place(G, M, i):
+    """Where a shape's origin is, and its axes (rows take its components to the world's)."""
+    m = G.shape_i[i, MOVER]
+    p, R = load3(G.shape_x, i, PLACE), load9(G.shape_x, i, AXES)
+    if m < 0:
+        return p, R
+    Q = load9(M.pose, m, 3)
+    return add(load3(M.pose, m, 0), mv(Q, p)), mm(Q, R)
+
+
+@formula
+def collide(G, M, i, j, reach, room):
+    """Contacts of shapes i and j: how many were written into the first rows of ``room``.
+
+    A row is a point midway between the surfaces, the unit normal from i to j, the gap and the feature, a whole number
+    that tells the points of this pair apart and lasts. Points whose gap is above ``reach`` are no contacts.
+
+    Parameters
+    ----------
+    G : Geometry
+    M : Movers
+    i, j : int
+        Two shapes.
+    reach : float
+        Largest gap [m].
+    room : array (ROOM, 8)
+        Contacts come first; the rest is scratch (``room.py``).
+    """
+    a, b = G.shape_i[i, KIND], G.shape_i[j, KIND]
+    turned = a > b
+    if turned:
+        i, j, a, b = j, i, b, a
+    p, R = place(G, M, i)
+    q, Q = place(G, M, j)
+    count = by_kinds(a, b, G, i, j, ((0.0, 0.0, 0.0), R), (sub(q, p), Q), reach, room)
+    for k in range(count):
+        for c in range(3):
+            room[k, c] += p[c]
+            if turned:
+                room[k, 3 + c] = -room[k, 3 + c]
+    return count

@@ -1,0 +1,1 @@
+"""What every kind of shape must say of itself, one file a kind: see ``registry``."""
