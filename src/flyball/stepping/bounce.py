@@ -53,12 +53,9 @@ def elasticity(G, C, L, c):
 def bounce(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
     """Impacts; velocities in ``X.v`` and ``X.wide`` are those after them. Returns whether there were any.
 
-    ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares its
-    velocities with ``X``, ``E`` that of expansion.
+    ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares
+    its velocities with ``X``, ``E`` that of expansion.
     """
-    for c in range(C.count[FOUND]):
-        for i in range(3):
-            now[c, KICK + i] = 0.0
     if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, bias, R, X, L, pace, now):
         return False
     poisson = pace.count[LAW] == POISSON
@@ -97,6 +94,8 @@ def hits(G, C, bias, R, X, L, pace, now):
     law = pace.count[LAW]
     for c in range(C.count[FOUND]):
         R.least[c] = 0.0
+        for i in range(3):
+            now[c, KICK + i] = 0.0
         u = seen(R, X.v, X.wide, c)
         for i in range(3):
             now[c, BEFORE_KICK + i] = u[i]

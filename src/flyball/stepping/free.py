@@ -1,6 +1,8 @@
-"""Free bodies: their turning, which keeps angular momentum and energy exactly, and their inverse inertia in the world."""
+"""Free bodies: turning that keeps angular momentum and energy exactly, and the inverse inertia in the world."""
 
 from __future__ import annotations
+
+import numpy as np
 
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
@@ -129,3 +131,8 @@ def inverse_in_world(R, J, k, node):
     node[k, 4] = R[0] * c1[0] + R[1] * c1[1] + R[2] * c1[2]
     node[k, 5] = R[0] * c2[0] + R[1] * c2[1] + R[2] * c2[2]
     node[k, 6] = R[3] * c2[0] + R[4] * c2[1] + R[5] * c2[2]
+
+
+def rotation_matrices(turn: np.ndarray) -> np.ndarray:
+    """Rotations (n, 9), row by row, of unit quaternions (n, 4)."""
+    return np.stack(matrix(turn.T), axis=1)

@@ -105,7 +105,7 @@ def step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
 
 
 @formula
-def march(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U, out):
+def march(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
     """See `march_kernel`."""
     while pace.count[LEFT] > 0:
         if pace.count[TAKEN] % 2 == 0:
@@ -118,9 +118,9 @@ def march(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U, out):
 
 
 @kernel
-def march_kernel(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U, out):
+def march_kernel(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
     """Take ``pace.count[LEFT]`` steps. Returns what the search said last."""
     return march(
         held(G), held(M), held(C), held(D), held(B), held(P), held(Q), held(R), held(X), held(Y), held(Z), held(E),
-        held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U), held(out),
+        held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
     )  # fmt: skip

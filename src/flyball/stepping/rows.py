@@ -5,7 +5,8 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
-from .tables import ACROSS, IMPULSE, KINETIC, ROLLING, SLIDES, SPINNING, STATIC, STEP
+from ..numerics.cone.operator import seen
+from .tables import ACROSS, GRAVITY, IMPULSE, KINETIC, ROLLING, SLIDES, SPINNING, STATIC, STEP
 
 
 @formula
@@ -21,6 +22,7 @@ def fill_rows(G, M, C, P, L, pace):
     """Everything of the problem but impulses and masses; its sizes too."""
     h = pace.real[STEP]
     P.size[0] = C.count[FOUND]
+    P.island[0], P.island[1] = 0, C.count[FOUND]
     belts, turns = L.belt.shape[0] > 0, P.turn.shape[0] > 0
     for c in range(C.count[FOUND]):
         i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
@@ -74,7 +76,7 @@ def along_world(M, a, g):
 
 @formula
 def cross_frame(frame, c, t, ratio):
-    """Rows t1 = t and t2 = ratio n x t: with impulses in a circular cone, forces across are ``ratio`` times as large."""
+    """Rows t1 = t and t2 = ratio n x t: in a circular cone, forces across are ``ratio`` times as large."""
     n0, n1, n2 = frame[c, 0], frame[c, 1], frame[c, 2]
     frame[c, 3], frame[c, 4], frame[c, 5] = t
     frame[c, 6] = ratio * (n1 * t[2] - n2 * t[1])
@@ -113,9 +115,15 @@ def warm(C, P, X, now, before):
 
 
 @formula
-def static_where_stuck(G, C, P, L, X, now):
+def static_where_stuck(G, C, P, L, X, pace, now):
     """The static coefficient for contacts that stuck before, and for new ones that hardly slide."""
+    h = pace.real[STEP]
+    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
+    slow = h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
     for c in range(C.count[FOUND]):
         law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
         if law[STATIC] > law[KINETIC] and now[c, SLIDES] < 0.5:
-            P.mu[c] = law[STATIC]
+            u = seen(P, X.v, X.wide, c)
+            s, t = u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
+            if now[c, SLIDES] == 0.0 or s * s + t * t <= slow * slow:
+                P.mu[c] = law[STATIC]

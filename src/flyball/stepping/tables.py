@@ -1,4 +1,4 @@
-"""What a step by impulses works on, beside shapes, contacts and the cone problem: free bodies, laws, records.
+"""What a step by impulses works on, beside shapes, contacts and the cone problem: free bodies, laws, the pace.
 
 Movers (``contact.tables``) are numbered: first the free bodies, each a node of the cone problem with the same number,
 then bodies of the mechanism. All vectors are along the world's axes where nothing else is said.
@@ -18,27 +18,19 @@ STATIC, KINETIC, RESTITUTION, ROLLING, SPINNING, ACROSS = range(6)
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
 # impact, impulse of that in the world, and its velocities before
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
-# columns of Out.touch: mover 1, mover 2, shape 1, shape 2, point, normal, gap, force on 2, state, friction coefficient
-T_MOVERS, T_SHAPES, T_POINT, T_NORMAL, T_GAP, T_FORCE, T_STATE, T_FRICTION = 0, 2, 4, 7, 10, 11, 14, 15
-STICKS, SLIPS, OPEN = range(3)  # Out.touch[T_STATE]
-# entries of Pace.real: time, step, where the part ends; gravity; speed below which nothing bounces; overlap [m] that is
+# entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
 # none; residual [m/s] that is enough for velocities and for positions
 TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
-# ... and sums: work lost in friction, in impacts, given by surfaces that move; lifting by the position solve; worst
-# overlap and residuals seen
-LOST_FRICTION, LOST_IMPACT, GIVEN, LIFTED, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE = 10, 11, 12, 13, 14, 15, 16
+# ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen
+LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE = 10, 11, 12, 13, 14, 15
 REALS = 24
-# entries of Pace.count: steps still to take, steps taken, rows of output written, contacts written; most iterations
-# for velocities and positions; law of restitution; iterations done, solves cut off, most contacts; how many impacts,
-# and in how many of them expansion was cut
-LEFT, TAKEN, ROWS, TOUCHES, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED = range(12)
+# entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
+# restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut
+LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED = range(10)
 COUNTS = 16
 # places in Pace.door: addresses of the search and of the solvers of velocities, positions, impacts
 SEARCHING, VELOCITIES, POSITIONS, BOUNCE = range(4)
 NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # Pace.count[LAW]
-# what a call of the loop returns: all steps are taken; a table is full or a pose no number (and what the search said);
-# the rows of output are full
-READY, SEARCH, OUTPUT = range(3)
 
 
 class Free(NamedTuple):
@@ -70,11 +62,3 @@ class Pace(NamedTuple):
     real: np.ndarray  # (REALS,)
     count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
     door: np.ndarray  # (8,)
-
-
-class Out(NamedTuple):
-    """Rows of output."""
-
-    row: np.ndarray  # (rows, n, 13): position, quaternion, velocity, angular velocity of the free bodies
-    sums: np.ndarray  # (rows, 16): time, contacts, and the sums
-    touch: np.ndarray  # (capacity, 16): contacts of one row after the other
