@@ -17,26 +17,8 @@ from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.operator import across, seen
 from ..numerics.cone.problem import ENOUGH, MOST
-from .tables import (
-    BEFORE_KICK,
-    BOUNCE,
-    ENOUGH_V,
-    GRAVITY,
-    HIT,
-    IMPACTS,
-    KICK,
-    LAW,
-    LOST_FRICTION,
-    LOST_IMPACT,
-    MOREAU,
-    NO_RESTITUTION,
-    POISSON,
-    REDUCED,
-    RESTITUTION,
-    SLOWEST,
-    STEP,
-    SWEEPS,
-)
+from ..contact.surfaces import RESTITUTION
+from .tables import BEFORE_KICK, BOUNCE, ENOUGH_V, GRAVITY, HIT, IMPACTS, KICK, LAW, LOST_FRICTION, LOST_IMPACT, MOREAU, NO_RESTITUTION, POISSON, REDUCED, SLOWEST, STEP, SWEEPS
 
 ROUNDING = 1e-12
 MORE = 4  # times as many iterations as for velocities that are warm started

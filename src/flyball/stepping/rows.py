@@ -6,7 +6,8 @@ from ..compiler.jit import formula
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.operator import seen
-from .tables import ACROSS, GRAVITY, IMPULSE, KINETIC, ROLLING, SLIDES, SPINNING, STATIC, STEP
+from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
+from .tables import GRAVITY, IMPULSE, SLIDES, STEP
 
 
 @formula

@@ -12,6 +12,7 @@ from ..numerics.cone.problem import COULOMB, Choices, Factor, Problem, Scratch, 
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
 from .march import march_kernel
+from ..contact.surfaces import Surfaces
 from .tables import (
     COUNTS,
     FREE_INERTIA,
@@ -24,7 +25,6 @@ from .tables import (
     STEP,
     TAKEN,
     Free,
-    Laws,
     Pace,
     Tracks,
 )
@@ -116,13 +116,13 @@ class Stepper:
         Of the mass centres.
     velocity : (n, 6) [m/s, rad/s]
         Of the mass centres, and angular velocities, along the world's axes.
-    laws : Laws
+    laws : Surfaces
     pace : Pace
         With time, choices and the solvers' addresses; that of the search is put in here.
     """
 
     def __init__(
-        self, geometry: Geometry, free: Free, position: np.ndarray, velocity: np.ndarray, laws: Laws, pace: Pace
+        self, geometry: Geometry, free: Free, position: np.ndarray, velocity: np.ndarray, laws: Surfaces, pace: Pace
     ) -> None:
         n = len(free.body)
         self.geometry, self.free, self.laws, self.pace = geometry, free, laws, pace
@@ -157,3 +157,9 @@ class Stepper:
             f.enlarge(status)
             if f.capacity > len(r.P.mu):
                 self.rooms = make_rooms(f.capacity, r.P.node, self.turning, r)
+
+    def last(self) -> tuple[Contacts, np.ndarray]:
+        """Contacts of the last step, and what is remembered of them."""
+        if self.pace.count[TAKEN] % 2 == 1:
+            return self.finder.now, self.rooms.T.kept
+        return self.finder.before, self.rooms.U.kept

@@ -13,8 +13,6 @@ import numpy as np
 # columns of Free.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy zz xy
 # xz yz), 1 if the inertia is the same about every axis
 FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
-# columns of Laws.pair
-STATIC, KINETIC, RESTITUTION, ROLLING, SPINNING, ACROSS = range(6)
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
 # impact, impulse of that in the world, and its velocities before
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
@@ -40,14 +38,6 @@ class Free(NamedTuple):
     turn: np.ndarray  # (n, 4): unit quaternion, body axes to the world
     before: np.ndarray  # (n, 8): velocities at the start of the step
     move: np.ndarray  # (n, 8): velocities that bodies are displaced with
-
-
-class Laws(NamedTuple):
-    """Materials: what two of them do to each other."""
-
-    pair: np.ndarray  # (k, k, 8): static, kinetic friction, restitution, rolling, spinning friction [m], ratio across
-    belt: np.ndarray  # (ns, 3) or (0, 3): velocity [m/s] of a shape's surface on its mover, in the mover's axes
-    grain: np.ndarray  # (ns, 3) or (0, 3): direction along which anisotropic friction is meant, in the mover's axes
 
 
 class Tracks(NamedTuple):
