@@ -14,4 +14,5 @@ FACE_2 = FACE_1 + CORNERS
 CUT_1 = FACE_2 + CORNERS
 CUT_2 = CUT_1 + 3 * CORNERS
 NEAREST = CUT_2 + 3 * CORNERS  # simplex and polytope
+PIECE = NEAREST + 400  # corners of the part of a height field that is at work
 ROOM = NEAREST + 512
