@@ -18,7 +18,8 @@ from ..math.scalar import sqrt
 from ..numerics.cone.operator import across, seen
 from ..numerics.cone.problem import ENOUGH, MOST
 from ..contact.surfaces import RESTITUTION
-from .tables import BEFORE_KICK, BOUNCE, ENOUGH_V, GRAVITY, HIT, IMPACTS, KICK, LAW, LOST_FRICTION, LOST_IMPACT, MOREAU, NO_RESTITUTION, POISSON, REDUCED, SLOWEST, STEP, SWEEPS
+from .sequence import one_after_the_other
+from .tables import BEFORE_KICK, BOUNCE, ENOUGH_V, GRAVITY, HIT, IMPACTS, KICK, LAW, LOST_FRICTION, LOST_IMPACT, MOREAU, NO_RESTITUTION, POISSON, REDUCED, SEQUENTIAL, SLOWEST, STEP, SWEEPS
 
 ROUNDING = 1e-12
 MORE = 4  # times as many iterations as for velocities that are warm started
@@ -41,6 +42,13 @@ def bounce(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
     if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, bias, R, X, L, pace, now):
         return False
     poisson = pace.count[LAW] == POISSON
+    if pace.count[SEQUENTIAL] != 0:
+        for c in range(C.count[FOUND]):
+            R.least[c] = elasticity(G, C, L, c)
+        if not one_after_the_other(R, Z, X, C, now):
+            pace.count[REDUCED] += 1
+        close(R, Z, X, C, pace, now)
+        return True
     solve_afresh(pace.door[BOUNCE], R, Z, W, O, F, pace)
     spent = power(R, Z, X.v, X.wide, C, now)
     if poisson:
@@ -84,9 +92,10 @@ def hits(G, C, bias, R, X, L, pace, now):
             R.bias[c, i] = bias[c, i]
         e = elasticity(G, C, L, c)
         now[c, HIT] = 0.0
-        if e > 0.0 and C.x[c, GAP] + h * u[0] <= 0.0:
+        plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[FLAT]
+        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= 0.0:
             now[c, HIT] = 1.0
-            found = found or u[0] < -slowest
+            found = found or (e > 0.0 and u[0] < -slowest)
             R.bias[c, 0] = 0.0
             if law != POISSON and u[0] < 0.0:
                 R.bias[c, 0] = e * u[0]

@@ -23,8 +23,9 @@ TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
 LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE = 10, 11, 12, 13, 14, 15
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
-# restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut
-LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED = range(10)
+# restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
+# whether they are one after the other
+LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL = range(11)
 COUNTS = 16
 # places in Pace.door: addresses of the search and of the solvers of velocities, positions, impacts
 SEARCHING, VELOCITIES, POSITIONS, BOUNCE = range(4)

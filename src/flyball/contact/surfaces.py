@@ -1,0 +1,23 @@
+"""What surfaces are to each other, in arrays: carried beside the geometry, for whoever makes impulses of contacts."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# columns of Surfaces.pair
+STATIC, KINETIC, RESTITUTION, ROLLING, SPINNING, ACROSS = range(6)
+
+
+class Surfaces(NamedTuple):
+    """Numbers of every pair of surfaces; which surface a shape has is its MATERIAL in the geometry.
+
+    Friction with a grain is that along it. Where the grain stands square on the surface, that across it holds all
+    around.
+    """
+
+    pair: np.ndarray  # (k, k, 8): static and kinetic friction, restitution, rolling and spinning friction [m], how many
+    # times as great both frictions are across the grain of one of the two (1: there is none); nan: they do not touch
+    belt: np.ndarray  # (ns, 3): velocity [m/s] of a shape's surface relative to its mover, in the mover's axes
+    grain: np.ndarray  # (ns, 3): direction (a unit vector, or 0) of its grain, in the mover's axes
