@@ -8,7 +8,8 @@ their own, reversed on side 1:
   impulse f = frame' p acts at ``arm``: it changes v by f/m and w by B (arm x f).
 - a *group* has any number of velocities that depend on each other (what joints hold together): D' of the contact's
   side is the block J (3, n), and what its impulses change the group's velocities by is p Y, Y (3, n) = D K^-1. Where
-  both sides are in one group, J and Y are those of the difference, and stand on side 2.
+  both sides are in one group, J and Y are those of the difference, and stand on side 2. J of side 1 is the plain
+  velocity there: solvers reverse it. With rolling friction (``turn``) J and Y have six rows: three of turning.
 
 Besides contacts there are *lines*: single impulses s in [low, high] on a group with u = J v + bias + soft s: limits
 (0, inf), joint friction (-bound, bound), stiff springs (soft = 1 / (h^2 k + h c), unbounded).
@@ -90,6 +91,9 @@ class Scratch(NamedTuple):
     nodes: np.ndarray  # (6, nn, 8)
     wide: np.ndarray  # (6, nw): of the groups' velocities
     lines: np.ndarray  # (6, nl)
+    own: np.ndarray  # (nn + 1, 16): of each node v, w, 1/m, mean of its block, the block; the last is what stands still
+    pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
+    sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
 
 
 class Factor(NamedTuple):

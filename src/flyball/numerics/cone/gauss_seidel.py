@@ -1,0 +1,163 @@
+"""Projected Gauss-Seidel: contacts one after the other, forward and backward in turn.
+
+Jean and Moreau 1992 (as non-smooth contact dynamics), Tasora and Anitescu 2011 (in the convex form). What a visit does
+stands in `sweeps`, how contacts are laid out for it in `pack`. A solve that is cut gives what it has, scaled down
+where that would be worse than no impulse at all: p' N p / 2 + b' p is never above 0, so that no energy is made.
+"""
+
+from __future__ import annotations
+
+from ...compiler.door import door
+from ...compiler.jit import formula
+from .ending import finish
+from .operator import push_line
+from .pack import (
+    B_P,
+    B_T,
+    BALL,
+    IMPULSE,
+    ROUGH,
+    S_P,
+    SMOOTH,
+    SMOOTH_BALL,
+    WIDTH_BALL,
+    WIDTH_SMOOTH,
+    count_kinds,
+    pack,
+    take_nodes,
+)
+from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, ISLAND, MOST, USED, WRITTEN
+from .residual import contacts_of, lines_of
+from .sweeps import visit_ball, visit_rough, visit_smooth, visit_smooth_ball
+from .sweeps_any import visit_any, visit_line
+
+
+@formula
+def nodes_of(P, O):
+    """First node of what is meant and the one after its last, in ``member``."""
+    k = O.count[ISLAND]
+    if k < 0:
+        return 0, P.size[1]
+    return P.member_p[k], P.member_p[k + 1]
+
+
+@formula
+def placed(e, m, turned):
+    """The e-th of m visits: from the end in a backward sweep."""
+    return m - 1 - e if turned else e
+
+
+@formula
+def sweep_balls(W, O, many, turned):
+    """All contacts of balls."""
+    worst = 0.0
+    for e in range(many[SMOOTH_BALL]):
+        s = placed(e, many[SMOOTH_BALL], turned)
+        worst = max(worst, visit_smooth_ball(W.pack, W.own, W.sides[s, 0], W.sides[s, 1], WIDTH_BALL * s))
+    begin = many[SMOOTH_BALL]
+    for e in range(many[BALL]):
+        s = begin + placed(e, many[BALL], turned)
+        worst = max(worst, visit_ball(W.pack, W.own, W.sides[s, 0], W.sides[s, 1], WIDTH_BALL * s, O.count[COULOMB]))
+    return worst
+
+
+@formula
+def sweep_others(P, X, W, O, many, turned):
+    """All other contacts."""
+    worst, begin = 0.0, many[SMOOTH_BALL] + many[BALL]
+    at = WIDTH_BALL * begin
+    for e in range(many[SMOOTH]):
+        s = placed(e, many[SMOOTH], turned)
+        i, j = W.sides[begin + s, 0], W.sides[begin + s, 1]
+        worst = max(worst, visit_smooth(W.pack, W.own, i, j, at + WIDTH_SMOOTH * s))
+    begin, at = begin + many[SMOOTH], at + WIDTH_SMOOTH * many[SMOOTH]
+    for e in range(many[ROUGH]):
+        s = placed(e, many[ROUGH], turned)
+        i, j = W.sides[begin + s, 0], W.sides[begin + s, 1]
+        worst = max(worst, visit_rough(W.pack, W.own, i, j, at + 32 * s, O.count[COULOMB]))
+    begin, at = begin + many[ROUGH], at + 32 * many[ROUGH]
+    for e in range(many[4]):
+        s = placed(e, many[4], turned)
+        worst = max(worst, visit_any(P, X, W, O, W.sides[begin + s, 2], at + 32 * s))
+    return worst
+
+
+@formula
+def sweep_lines(P, X, O, turned):
+    """All lines."""
+    worst = 0.0
+    first, last = lines_of(P, O)
+    for e in range(last - first):
+        worst = max(worst, visit_line(P, X, first + placed(e, last - first, turned)))
+    return worst
+
+
+@formula
+def sweep(P, X, W, O, many, turned):
+    """Visit everything once; the largest change of a velocity."""
+    if turned:
+        a = sweep_lines(P, X, O, turned)
+        b = sweep_others(P, X, W, O, many, turned)
+        return max(max(a, b), sweep_balls(W, O, many, turned))
+    a = sweep_balls(W, O, many, turned)
+    b = sweep_others(P, X, W, O, many, turned)
+    return max(max(a, b), sweep_lines(P, X, O, turned))
+
+
+@formula
+def unpack(P, X, W, many):
+    """Impulses back to where they belong."""
+    at = 0
+    for s in range(many[0] + many[1] + many[2] + many[3] + many[4]):
+        c = W.sides[s, 2]
+        if s < many[0] + many[1]:
+            a, b, d = W.pack[at + B_T], W.pack[at + B_T + 1], W.pack[at + B_T + 2]
+            X.p[c, 0] = W.pack[at + B_P]
+            if s < many[0]:
+                X.p[c, 1], X.p[c, 2] = 0.0, 0.0
+            else:
+                X.p[c, 1] = P.frame[c, 3] * a + P.frame[c, 4] * b + P.frame[c, 5] * d
+                X.p[c, 2] = P.frame[c, 6] * a + P.frame[c, 7] * b + P.frame[c, 8] * d
+            at += WIDTH_BALL
+        elif s < many[0] + many[1] + many[2]:
+            X.p[c, 0], X.p[c, 1], X.p[c, 2] = W.pack[at + S_P], 0.0, 0.0
+            at += WIDTH_SMOOTH
+        else:
+            for k in range(3):
+                X.p[c, k] = W.pack[at + IMPULSE + k]
+            at += 32
+
+
+@formula
+def prepare(P, X, W, O):
+    """Lay everything out, with the impulses that are there acting; how many contacts of each kind."""
+    first, last = contacts_of(P, O)
+    take_nodes(P, X, W, nodes_of(P, O))
+    for k in range(X.wide.shape[0]):
+        W.wide[0, k] = X.wide[k]
+    many = count_kinds(P, W, first, last)
+    pack(P, X, W, O, first, many)
+    begin, end = lines_of(P, O)
+    for k in range(begin, end):
+        push_line(P, X.wide, k, X.line[k])
+    return many
+
+
+@door
+def gauss_seidel(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+    """Sweeps until velocities change by less than `ENOUGH`, at most `MOST` of them; how many there were."""
+    many = prepare(P, X, W, O)
+    used, O.count[ENDED], O.count[WRITTEN] = 0, CUT, 0
+    while used < O.count[MOST]:
+        worst = sweep(P, X, W, O, many, used % 2 == 1)
+        used += 1
+        if O.count[HISTORY]:
+            unpack(P, X, W, many)
+            finish(P, X, W, O, used, False)
+        if worst <= O.real[ENOUGH]:
+            O.count[ENDED] = CONVERGED
+            break
+    O.count[USED] = used
+    unpack(P, X, W, many)
+    finish(P, X, W, O, used, True)
+    return used

@@ -1,0 +1,128 @@
+"""How far impulses are from a solution, as a velocity and as a force, and the objective.
+
+The natural map: a solution is a fixed point of p -> P(p - s u), with P the nearest point of the cone. What p differs
+from it by, over s, is a velocity [m/s]; over the largest impulse of all it is a number, the force residual. s is a
+contact's own: three over the trace of its diagonal block (for torques likewise, counted in lengths so that both blocks
+have the same size), so that light and heavy contacts count alike. The velocity residual is the largest of all
+contacts and lines; on stacks of large mass ratios a harmless one may hide impulses that are wrong, hence the other.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from ...math.scalar import sqrt
+from .diagonal import diagonal, diagonal_turning
+from .operator import diagonal_of_line, seen, seen_line, seen_turning
+from .problem import BIAS, COULOMB, HIGH, ISLAND, LOW, SOFT
+from .projection import least_of, projected_above, projected_turning
+
+
+@formula
+def contacts_of(P, O):
+    """First contact of what is meant, and the one after its last."""
+    k = O.count[ISLAND]
+    if k < 0:
+        return 0, P.size[0]
+    return P.island[k], P.island[k + 1]
+
+
+@formula
+def lines_of(P, O):
+    """First line of what is meant, and the one after its last."""
+    k = O.count[ISLAND]
+    if k < 0:
+        return 0, P.size[3]
+    return P.line_p[k], P.line_p[k + 1]
+
+
+@formula
+def larger(a, b):
+    """The larger of two; nan if one is, so that none is lost."""
+    return a if a >= b or a != a else b
+
+
+@formula
+def of_contact(P, X, c, u, coulomb):
+    """Squares of the impulse that contact c lacks and of its step, and of the impulse, without turning."""
+    D = diagonal(P, c)
+    s = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
+    n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    more = coulomb * P.mu[c] * sqrt(u[1] * u[1] + u[2] * u[2])  # De Saxce and Feng 1998
+    x, y, z = projected_above(P.mu[c], least_of(P, c), n - s * (u[0] + more), a - s * u[1], b - s * u[2])
+    lack = (x - n) * (x - n) + (y - a) * (y - a) + (z - b) * (z - b)
+    return lack, s, n * n + a * a + b * b
+
+
+@formula
+def of_turning(P, X, c, u, w, coulomb):
+    """As `of_contact` for a contact with rolling and spinning friction."""
+    D, E = diagonal(P, c), diagonal_turning(P, c)
+    whole = D[0] + D[3] + D[5] + P.soft[c]
+    s, size = 3.0 / whole, sqrt(whole / (E[0] + E[3] + E[5]))  # torques are counted as size * force
+    n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    k, l, m = X.torque[c, 0] / size, X.torque[c, 1] / size, X.torque[c, 2] / size
+    mu, rho, sigma = P.mu[c], P.turn[c, 0] / size, P.turn[c, 1] / size
+    w = w[0] * size, w[1] * size, w[2] * size
+    more = mu * sqrt(u[1] * u[1] + u[2] * u[2]) + rho * sqrt(w[1] * w[1] + w[2] * w[2]) + sigma * abs(w[0])
+    f = n - s * (u[0] + coulomb * more), a - s * u[1], b - s * u[2]
+    q = k - s * w[0], l - s * w[1], m - s * w[2]
+    p, q = projected_turning(mu, rho, sigma, least_of(P, c), f, q)
+    lack = (p[0] - n) * (p[0] - n) + (p[1] - a) * (p[1] - a) + (p[2] - b) * (p[2] - b)
+    lack += (q[0] - k) * (q[0] - k) + (q[1] - l) * (q[1] - l) + (q[2] - m) * (q[2] - m)
+    return lack, s, n * n + a * a + b * b
+
+
+@formula
+def with_bias(P, X, c, u):
+    """Velocity of contact c with bias and compliance."""
+    return u[0] + P.bias[c, 0] + P.soft[c] * X.p[c, 0], u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
+
+
+@formula
+def residuals(P, X, O, v, wide, free, free_wide):
+    """Residual [m/s], force residual [1], b . p and p' N p of impulses in X with velocities v, wide.
+
+    Parameters
+    ----------
+    v, wide
+        Velocities with the impulses.
+    free, free_wide
+        Those without.
+    """
+    worst, lacking, largest, linear, square = 0.0, 0.0, 0.0, 0.0, 0.0
+    coulomb = 1.0 * O.count[COULOMB]
+    first, last = contacts_of(P, O)
+    for c in range(first, last):
+        n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+        d, e = seen(P, v, wide, c), seen(P, free, free_wide, c)
+        u = with_bias(P, X, c, d)
+        linear += n * (e[0] + P.bias[c, 0]) + a * (e[1] + P.bias[c, 1]) + b * (e[2] + P.bias[c, 2])
+        square += n * (d[0] - e[0] + P.soft[c] * n) + a * (d[1] - e[1]) + b * (d[2] - e[2])
+        if P.turn.shape[0] > 0:
+            w, o = seen_turning(P, v, wide, c), seen_turning(P, free, free_wide, c)
+            for k in range(3):
+                linear += X.torque[c, k] * o[k]
+                square += X.torque[c, k] * (w[k] - o[k])
+            lack, s, size = of_turning(P, X, c, u, w, coulomb)
+        else:
+            lack, s, size = of_contact(P, X, c, u, coulomb)
+        lack = sqrt(lack)
+        worst, lacking, largest = larger(worst, lack / s), larger(lacking, lack), larger(largest, size)
+    worst, lacking, largest, more, again = of_lines(P, X, O, wide, free_wide, (worst, lacking, largest))
+    return worst, lacking / sqrt(largest) if largest > 0.0 else lacking, linear + more, square + again
+
+
+@formula
+def of_lines(P, X, O, wide, free_wide, sofar):
+    """As `residuals`, of lines; ``sofar``: residual, lacking impulse, square of the largest impulse."""
+    worst, lacking, largest = sofar
+    linear, square = 0.0, 0.0
+    first, last = lines_of(P, O)
+    for k in range(first, last):
+        p, d, e = X.line[k], seen_line(P, wide, k), seen_line(P, free_wide, k)
+        linear += p * (e + P.line_x[k, BIAS])
+        square += p * (d - e + P.line_x[k, SOFT] * p)
+        s = 1.0 / diagonal_of_line(P, k)
+        q = min(max(p - s * (d + P.line_x[k, BIAS] + P.line_x[k, SOFT] * p), P.line_x[k, LOW]), P.line_x[k, HIGH])
+        worst, lacking, largest = larger(worst, abs(q - p) / s), larger(lacking, abs(q - p)), larger(largest, p * p)
+    return worst, lacking, largest, linear, square
