@@ -19,7 +19,27 @@ from ..numerics.cone.operator import across, seen
 from ..numerics.cone.problem import ENOUGH, MOST
 from ..contact.surfaces import RESTITUTION
 from .sequence import one_after_the_other
-from .tables import BEFORE_KICK, BOUNCE, ENOUGH_V, GRAVITY, HIT, IMPACTS, KICK, LAW, LOST_FRICTION, LOST_IMPACT, MOREAU, NO_RESTITUTION, POISSON, REDUCED, SEQUENTIAL, SLOWEST, STEP, SWEEPS
+from .tables import (
+    BEFORE_KICK,
+    BOUNCE,
+    ENOUGH_V,
+    FLAT,
+    GRAVITY,
+    HIT,
+    IMPACTS,
+    KICK,
+    LAW,
+    LOST_FRICTION,
+    LOST_IMPACT,
+    MOREAU,
+    NO_RESTITUTION,
+    POISSON,
+    REDUCED,
+    SEQUENTIAL,
+    SLOWEST,
+    STEP,
+    SWEEPS,
+)
 
 ROUNDING = 1e-12
 MORE = 4  # times as many iterations as for velocities that are warm started
