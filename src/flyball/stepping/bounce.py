@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from ..compiler.door import enter
 from ..compiler.jit import formula
+from ..contact.surfaces import RESTITUTION
 from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.operator import across, seen
 from ..numerics.cone.problem import ENOUGH, MOST
-from ..contact.surfaces import RESTITUTION
 from .sequence import one_after_the_other
 from .tables import (
     BEFORE_KICK,

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.operator import seen
-from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from .tables import GRAVITY, IMPULSE, SLIDES, STEP
 
 

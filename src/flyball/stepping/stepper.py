@@ -7,21 +7,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..contact.finder import Finder
-from ..contact.tables import FOUND, Geometry, Movers
-from ..numerics.cone.problem import COULOMB, Choices, Factor, Problem, Scratch, State
+from ..contact.surfaces import Surfaces
+from ..contact.tables import Contacts, Geometry, Movers
+from ..numerics.cone.problem import Choices, Factor, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
 from .march import march_kernel
-from ..contact.surfaces import Surfaces
 from .tables import (
-    COUNTS,
     FREE_INERTIA,
     FREE_INVERSE,
     FREE_MASS,
     FREE_PER_MASS,
     FREE_ROUND,
     LEFT,
-    REALS,
     STEP,
     TAKEN,
     Free,
@@ -119,19 +117,28 @@ class Stepper:
     laws : Surfaces
     pace : Pace
         With time, choices and the solvers' addresses; that of the search is put in here.
+    margin : float [m]
+        Gap up to which what does not approach is a contact.
     """
 
     def __init__(
-        self, geometry: Geometry, free: Free, position: np.ndarray, velocity: np.ndarray, laws: Surfaces, pace: Pace
+        self,
+        geometry: Geometry,
+        free: Free,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        laws: Surfaces,
+        pace: Pace,
+        margin: float,
     ) -> None:
         n = len(free.body)
         self.geometry, self.free, self.laws, self.pace = geometry, free, laws, pace
         self.movers = Movers(np.zeros((n, 12)), velocity.copy())
         self.movers.pose[:, :3] = position
         self.movers.pose[:, 3:] = rotation_matrices(free.turn)
-        self.finder = Finder(geometry, self.movers)
+        self.finder = Finder(geometry, margin=margin)
         turning = bool((laws.pair[..., 3:5] > 0.0).any())
-        self.rooms = make_rooms(self.finder.capacity, nodes(free), turning)
+        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning)
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
 
@@ -154,9 +161,9 @@ class Stepper:
             )  # fmt: skip
             if status == 0:
                 return
-            f.enlarge(status)
-            if f.capacity > len(r.P.mu):
-                self.rooms = make_rooms(f.capacity, r.P.node, self.turning, r)
+            f.enlarge(status, (a if self.pace.count[TAKEN] % 2 == 0 else b).count)
+            if len(f.now.at) > len(r.P.mu):
+                self.rooms = make_rooms(len(f.now.at), r.P.node, self.turning, r)
 
     def last(self) -> tuple[Contacts, np.ndarray]:
         """Contacts of the last step, and what is remembered of them."""
