@@ -15,6 +15,7 @@ KEEP = (
     1e-6  # a corner so little beyond an edge, as part of the edge's length, is not cut off: equal boxes on each other
 )
 STEEP = 0.1  # a face is not used where it leans so far that its normal has this cosine with the contact's
+POINT = 1e-9  # parts of a line that are as good as a point
 PARALLEL = 3e-3  # lines are as one where they differ by less [rad]
 
 
@@ -83,6 +84,16 @@ def cut_face(room, at, count, tool, corners, turn):
 
 
 @formula
+def part(room, at, first, last):
+    """Write a part of a line from ``CUT_1`` on: two corners, one where it is as good as a point, none."""
+    if first > last:
+        return 0
+    between(room, at, at + 1, first, CUT_1, 0.0)
+    between(room, at, at + 1, last, CUT_1 + 1, 1.0)
+    return 2 if last - first > POINT else 1
+
+
+@formula
 def cut_line(room, at, tool, corners, turn):
     """A line cut by all edges of a face: where it is, two corners or none; its ends keep their names."""
     first, last = 0.0, 1.0
@@ -100,11 +111,7 @@ def cut_line(room, at, tool, corners, turn):
         elif d1 < least:
             last = min(last, d0 / (d0 - d1))
         a = b
-    if first > last:
-        return CUT_1, 0
-    between(room, at, at + 1, first, CUT_1, 0.0)
-    between(room, at, at + 1, last, CUT_1 + 1, 1.0)
-    return CUT_1, 2
+    return CUT_1, part(room, at, first, last)
 
 
 @formula
@@ -119,9 +126,5 @@ def along_line(room, at, other):
     s0 = ((room[other, X] - room[at, X]) * x + (room[other, Y] - room[at, Y]) * y) / xx
     s1 = s0 + (x * u + y * v) / xx
     first, last = max(0.0, min(s0, s1)), min(1.0, max(s0, s1))
-    if first > last:
-        return 0, 0.0, 0.0
-    between(room, at, at + 1, first, CUT_1, 0.0)
-    between(room, at, at + 1, last, CUT_1 + 1, 1.0)
     rise = (room[other + 1, Z] - room[other, Z]) / uu
-    return 2, rise * u, rise * v
+    return part(room, at, first, last), rise * u, rise * v

@@ -25,7 +25,12 @@ PAIRS_OF_FACES = 65536.0
 
 @formula
 def axes_of(n):
-    """Two unit vectors square to the unit vector n and to each other (Duff et al. 2017)."""
+    """Two unit vectors square to the unit vector n and to each other, and n (Duff et al. 2017).
+
+    Where n lies in z = 0, z is one of them, so that planar contacts stay at z = 0 to the last bit.
+    """
+    if n[2] == 0.0:
+        return (-n[1], n[0], 0.0), (0.0, 0.0, 1.0), n
     s = 1.0 if n[2] >= 0.0 else -1.0
     a = -1.0 / (s + n[2])
     b = n[0] * n[1] * a

@@ -1,6 +1,7 @@
 """The narrow phase: where two shapes touch, or nearly.
 
-The list of pairs is written from ``pairs``, so no kind is named here.
+The list of pairs that have a way of their own is written from ``pairs``, so no kind is named here. For any other pair
+the nearest points are sought (``nearest``), then the faces that meet there are cut (``manifold``).
 """
 
 from __future__ import annotations
@@ -8,17 +9,28 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..compiler.written import written
 from ..math.vec import add, load3, load9, mm, mv, sub
+from .manifold import manifold
+from .nearest import closest
 from .pairs.registry import WAYS
 from .tables import AXES, KIND, MOVER, PLACE
 
 
+@formula
+def any_pair(G, i, j, A, B, reach, room):
+    """Contacts of two convex shapes of any kind: see ``pairs.registry``."""
+    gap, n, p = closest(G, i, j, A, B, reach, room)
+    if not gap <= reach:
+        return 0
+    return manifold(G, i, j, A, B, n, (gap, p), reach, room)
+
+
 def _by_kinds():
-    names, lines = {}, []
+    names, lines = {"any_pair": any_pair}, []
     for number, pair in enumerate(sorted(WAYS, key=lambda p: (p[1] is None, p))):
         names[f"way_{number}"] = WAYS[pair]
         test = f"a == {pair[0]}" + ("" if pair[1] is None else f" and b == {pair[1]}")
         lines += [f"if {test}:", f"    return way_{number}(G, i, j, A, B, reach, room)"]
-    lines.append("return 0")
+    lines.append("return any_pair(G, i, j, A, B, reach, room)")
     return written(__name__, "by_kinds", "a, b, G, i, j, A, B, reach, room", lines, names)
 
 

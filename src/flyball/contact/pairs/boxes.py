@@ -14,6 +14,7 @@ from ...math.scalar import sqrt
 from ...math.vec import cross, dot, load3, mm, mtv, mv, neg, scale, transpose
 from ..kinds import BOX
 from ..manifold import manifold
+from ..nearest import closest
 from ..tables import PAR
 
 KINDS = (BOX, BOX)
@@ -86,4 +87,15 @@ def collide(G, i, j, A, B, reach, room):
     if far > reach:
         return 0
     n = mv(A[1], along(axis, C, c))
-    return manifold(G, i, j, A, B, n, (inf, n), reach, room)
+    count = manifold(G, i, j, A, B, n, (inf, n), reach, room)
+    if far <= 0.0 and count > 0:
+        return count
+    least = inf
+    for k in range(count):
+        least = min(least, room[k, 6])
+    if least <= far + prefer:
+        return count
+    gap, n, p = closest(G, i, j, A, B, reach, room)
+    if not gap <= reach:
+        return 0
+    return manifold(G, i, j, A, B, n, (gap, p), reach, room)
