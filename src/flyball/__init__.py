@@ -7,6 +7,8 @@ Describe a mechanism
     Body, Frame   what moves, and named axes on it; ``Body(shape=...)`` computes masses from
                   Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Link, Mesh, Prism, Rod, Sphere,
                   Torus, Tube
+    contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane as a floor; Bodies are many
+                  equal ones in arrays; Material and MaterialPair say friction, restitution, moving surfaces
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
@@ -88,6 +90,11 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.body import Driver as Driver
     from .model.body import Frame as Frame
     from .model.body import Initial as Initial
+    from .model.bulk import Bodies as Bodies
+    from .model.contact import Contact as Contact
+    from .model.ground import Ground as Ground
+    from .model.material import Material as Material
+    from .model.material import MaterialPair as MaterialPair
     from .model.sensor import IMU as IMU
     from .model.sensor import Sensor as Sensor
     from .model.shapes import *
@@ -115,6 +122,11 @@ _HOME = {
     "Frame": "model.body",
     "Driver": "model.body",
     "Initial": "model.body",
+    "Bodies": "model.bulk",
+    "Contact": "model.contact",
+    "Ground": "model.ground",
+    "Material": "model.material",
+    "MaterialPair": "model.material",
     "Sensor": "model.sensor",
     "IMU": "model.sensor",
     "Table": "model.table",
@@ -181,4 +193,4 @@ def __dir__() -> list[str]:
         importlib.import_module(f".{room}", __name__)
     rooms = tuple(f"{__name__}.{room}." for room in _ROOMS)
     elements = [k for k, c in Element.registry.items() if c.__module__.startswith(rooms)]
-    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid"})
+    return sorted({*_HOME, *_MODULES, *elements, "__version__"} - {"Solid", "Surface"})

@@ -19,6 +19,7 @@ from .element import (
     Flag,
     Law,
     Mass,
+    Name,
     Number,
     Point,
     Unit,
@@ -55,6 +56,13 @@ Inertia = Annotated[
     Unit("kg*m^2"),
 ]
 Shapes = Annotated[Solid | tuple[Solid, ...] | None, BeforeValidator(_solids)]
+
+
+def listed(shape: Solid | tuple[Solid, ...] | None) -> tuple[Solid, ...]:
+    """Shapes as a tuple, however many were given."""
+    if shape is None:
+        return ()
+    return shape if isinstance(shape, tuple) else (shape,)
 
 
 @element
@@ -109,6 +117,8 @@ class Body(Element):
     as_drawn : bool
         Assembly must not change the pose, nor the velocities given here. It holds nothing during the motion: to weld a
         body to ground add a `Fixed` joint.
+    material : str
+        `Material` that its shapes touch others with, where they name none of their own.
     color : str
         Colour in pictures: a name of CSS such as ``"steelblue"``, or ``"#rgb"`` or ``"#rrggbb"``.
     """
@@ -126,6 +136,7 @@ class Body(Element):
     shape: Shapes = field(default=None)
     density: Density | None = None
     as_drawn: Flag = False
+    material: Name | None = None
     color: str | None = None
 
     category: ClassVar[str] = "bodies"
@@ -145,9 +156,7 @@ class Body(Element):
 
     def shapes(self) -> tuple[Solid, ...]:
         """Its shapes, as a tuple."""
-        if self.shape is None:
-            return ()
-        return self.shape if isinstance(self.shape, tuple) else (self.shape,)
+        return listed(self.shape)
 
     def solids(self) -> tuple[Solid, ...]:
         """Its shapes that are seen: all but holes."""

@@ -18,7 +18,22 @@ if TYPE_CHECKING:
     from .element import Element
     from .model import Model
 
-CATEGORIES = ("bodies", "frames", "joints", "couplings", "tables", "sensors", "forces", "drivers", "initial")
+CATEGORIES = (
+    "materials",
+    "material_pairs",
+    "ground",
+    "bodies",
+    "bulk",
+    "frames",
+    "joints",
+    "couplings",
+    "tables",
+    "sensors",
+    "forces",
+    "drivers",
+    "initial",
+    "contacts",
+)
 SETTINGS = ("name", "planar", "gravity_told")
 
 

@@ -66,7 +66,16 @@ def _flag(value: Any) -> Any:
     return value
 
 
+def _name(value: Any) -> Any:
+    """A text that is not empty."""
+    if not isinstance(value, str) or not value:
+        raise ValueError("give a name")
+    return value
+
+
 Flag = Annotated[bool, BeforeValidator(_flag)]
+Name = Annotated[str, BeforeValidator(_name)]
+"""The name of another part."""
 Number = Annotated[float | str, BeforeValidator(plain)]
 """A number, a unit string such as ``"30 deg"``, or an expression of named parameters."""
 Numbers = Annotated[tuple[float | str, ...], BeforeValidator(plain)]
@@ -76,6 +85,7 @@ Law = Annotated[float | str | Function, BeforeValidator(plain)]
 Laws = Annotated[tuple[float | str | Function, ...], BeforeValidator(plain)]
 
 Length = Annotated[Number, Unit("m")]
+Ratio = Annotated[Number, Unit("1")]
 Angle = Annotated[Number, Unit("rad")]
 Mass = Annotated[Number, Unit("kg")]
 Density = Annotated[Number, Unit("kg/m^3")]
@@ -262,6 +272,8 @@ def written(e: Element) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for f in dataclasses.fields(e):
         value = getattr(e, f.name)
+        if hasattr(value, "tolist"):
+            value = value.tolist()
         if value == f.default and repr(value) == repr(f.default):  # -0.0 equals 0.0, yet is not the same
             continue
         if value is not None:

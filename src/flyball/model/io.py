@@ -15,12 +15,16 @@ from typing import Any, NoReturn, TypeVar
 
 from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
+from .bulk import Bodies
+from .contact import Contact
 from .copies import CATEGORIES
 from .coupling import Coupling
 from .element import Element, written
 from .force import Force
 from .function import function_name
+from .ground import Ground
 from .joint import Joint
+from .material import Material, MaterialPair
 from .model import Model, suggest
 from .sensor import IMU, Sensor
 from .shapes.mesh import Mesh, paths_from
@@ -29,7 +33,19 @@ from .table import Table
 M = TypeVar("M", bound=Model)
 
 SETTINGS = ("name", "planar", "gravity", "parameters")
-ONE_KIND = {"bodies": Body, "frames": Frame, "tables": Table, "drivers": Driver, "initial": Initial}
+ONE_KIND = {
+    "materials": Material,
+    "material_pairs": MaterialPair,
+    "ground": Ground,
+    "bodies": Body,
+    "bulk": Bodies,
+    "frames": Frame,
+    "tables": Table,
+    "drivers": Driver,
+    "initial": Initial,
+    "contacts": Contact,
+}
+NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {"joints": (Joint, "joints"), "couplings": (Coupling, "joints"), "forces": (Force, "forces")}
 SENSORS = {"Sensor": Sensor, "IMU": IMU}
 WIDTH = 100  # a list of shapes longer than this is written one shape a line
@@ -78,7 +94,7 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
 def _written(e: Element, folder: str | os.PathLike | None) -> dict[str, Any]:
     """The element's fields as plain data, paths of meshes as seen from the folder."""
     data = written(e)
-    if folder is not None and isinstance(e, Body) and "shape" in data:
+    if folder is not None and isinstance(e, (Body, Bodies, Ground)) and "shape" in data:
         tables = data["shape"] if isinstance(data["shape"], list) else [data["shape"]]
         for shape, table in zip(e.shapes(), tables, strict=True):
             if isinstance(shape, Mesh) and shape.path is not None:
@@ -252,7 +268,7 @@ def _header_lines(text: str) -> dict[str, list[int]]:
 def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
     fields = dict(table)
     cls = ONE_KIND[category] if category in ONE_KIND else _kind(category, fields, where)
-    if "name" not in fields:
+    if "name" not in fields and category not in NAMELESS:
         raise ModelError(f'{where}: it has no name; add name = "..."')
     try:
         model.add(cls(**fields))

@@ -11,22 +11,26 @@ import numpy as np
 
 from ..errors import ExpressionError, ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
+from .bulk import Bodies
+from .contact import Contact
 from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
 from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
 from .examine import but_is, carriers, check_units, measured
 from .expressions import folded, law_expression, number, resolve_parameters
-from .force import Force, TwoFrameForce
+from .force import Force
 from .function import function_name
 from .geometry import vector
+from .ground import Ground
 from .joint import Joint
 from .kept import Kept
+from .material import Material, MaterialPair
 from .references import check_references
 from .sensor import IMU, Sensor
 from .summary import summary
 from .table import Table
 from .units import same_kind
-from .validity import check_body, check_by_frames, check_frame, check_joint, check_vectors, refuse_twins, told_gravity
+from .validity import check_kind, check_vectors, refuse_twins, told_gravity
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -84,6 +88,11 @@ class Model:
         self.forces: list[Force] = []
         self.drivers: list[Driver] = []
         self.initial: list[Initial] = []
+        self.materials: list[Material] = []
+        self.material_pairs: list[MaterialPair] = []
+        self.ground: list[Ground] = []
+        self.bulk: list[Bodies] = []
+        self.contacts: list[Contact] = []
         self.by_name: dict[str, Element] = {}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
@@ -186,8 +195,8 @@ class Model:
         for e in elements:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
                 raise ModelError(
-                    f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table or initial "
-                    f"condition"
+                    f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table, initial "
+                    f"condition, part of ground, material or contact"
                 )
             self._check_name(e)
             check_references(self, e)
@@ -311,17 +320,8 @@ class Model:
         check_vectors(e, n, self.planar)
         self._check_laws(e)
         check_units(self, e, env)
-        if isinstance(e, Body):
-            check_body(self, e, n, env)
-        elif isinstance(e, Frame):
-            check_frame(self, e, n)
-        elif isinstance(e, Joint):
-            check_joint(self, e, n)
-        elif isinstance(e, Force):
-            e.placed(n, self.planar)
-            if isinstance(e, TwoFrameForce) and n.at is None:
-                check_by_frames(self, e)
-        elif isinstance(e, Initial):
+        check_kind(self, e, n, env)
+        if isinstance(e, Initial):
             unit = self.unit(e.name, e)
             for name, value, wanted in (("value", e.value, unit), ("rate", e.rate, f"{unit}/s")):
                 if value is not None:

@@ -6,12 +6,17 @@ import itertools
 from typing import TYPE_CHECKING
 
 from ..errors import ModelError
-from .body import GROUND, Driver, Frame, Initial
+from .body import GROUND, Body, Driver, Frame, Initial
+from .bulk import Bodies
+from .contact import Contact
 from .coupling import Coupling
 from .element import Element
 from .force import BodyForce, CoordinateForce, TwoFrameForce, TwoPointForce
+from .ground import Ground
 from .joint import Joint
+from .material import MaterialPair
 from .sensor import IMU, Sensor
+from .touching import check_touching
 
 if TYPE_CHECKING:
     from .model import Model
@@ -19,6 +24,8 @@ if TYPE_CHECKING:
 
 def check_references(model: Model, e: Element) -> None:
     """Refuse what names parts that are not there, or both times the same one."""
+    if isinstance(e, (Body, Bodies, Ground, Contact, MaterialPair)):
+        check_touching(model, e)
     if isinstance(e, (Joint, TwoPointForce, TwoFrameForce)):
         carriers = [model.carrier(name, e) for name in (e.body_i, e.body_j)]
         if carriers[0] == carriers[1]:

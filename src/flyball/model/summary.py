@@ -18,8 +18,10 @@ def lines(model: Model) -> list[tuple[str, str]]:
     gravity = ", ".join(str(x) for x in model.gravity)
     head = ("planar" if model.planar else "spatial") + (f", gravity ({gravity})" if model.gravity_told else "")
     out = [("mechanism", f"{model.name!r}, {head}")]
-    for category in ("bodies", "frames"):
-        out += _line(category, (e.name for e in getattr(model, category)))
+    out += _line("ground", (e.name for e in model.ground))
+    out += _line("bodies", (e.name for e in model.bodies))
+    out += _line("bulk", (f"{e.count} {e.name}" for e in model.bulk))
+    out += _line("frames", (e.name for e in model.frames))
     for category in ("joints", "couplings", "forces"):
         kinds: dict[str, list[str]] = {}
         for e in getattr(model, category):
@@ -28,7 +30,7 @@ def lines(model: Model) -> list[tuple[str, str]]:
             category, (f"{kind} {shortened(names)}" for kind, names in kinds.items()), len(getattr(model, category))
         )
     out += _line("drivers", (f"{d.name} ({d.coordinate} = {d.law})" for d in model.drivers))
-    for category in ("sensors", "tables", "initial"):
+    for category in ("sensors", "tables", "initial", "materials", "contacts"):
         out += _line(category, (e.name for e in getattr(model, category)))
     return out + _line("parameters", (f"{k} = {v}" for k, v in model.parameters.items()))
 

@@ -6,12 +6,15 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
-from .body import GROUND, Body
+from .body import GROUND, Body, Frame
+from .bulk import Bodies
 from .element import Element, Vector, fields_with, plain
-from .force import TwoFrameForce
+from .force import Force, TwoFrameForce
 from .geometry import vector
+from .ground import Ground
 from .inertia import mass_properties
 from .joint import Joint
+from .weighing import checked
 
 if TYPE_CHECKING:
     from .model import Model
@@ -25,6 +28,22 @@ def check_vectors(e: Element, n: Any, planar: bool) -> None:
             if v is not None and len(v) != 3 and not (planar and len(v) == 2):
                 wanted = 2 if planar else 3
                 raise ModelError(f"{name} of {e.title}: expected {wanted} components, got {len(v)}: {v}")
+
+
+def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
+    """What parts of its kind must fulfil."""
+    if isinstance(e, Body):
+        check_body(model, e, n, env)
+    elif isinstance(e, (Bodies, Ground)):
+        check_still(model, e, n, env)
+    elif isinstance(e, Frame):
+        check_frame(model, e, n)
+    elif isinstance(e, Joint):
+        check_joint(model, e, n)
+    elif isinstance(e, Force):
+        e.placed(n, model.planar)
+        if isinstance(e, TwoFrameForce) and n.at is None:
+            check_by_frames(model, e)
 
 
 def check_frame(model: Model, e: Any, n: Any) -> None:
@@ -47,6 +66,18 @@ def check_body(model: Model, e: Body, n: Any, env: dict[str, float]) -> None:
         wanted = "one number" if model.planar else "three components"
         raise ModelError(f"{e.title}: angular_velocity must be {wanted}, got {given}")
     check_frame(model, e, n)
+
+
+def check_still(model: Model, e: Bodies | Ground, n: Any, env: dict[str, float]) -> None:
+    """Many bodies, or what stands on ground: shapes, poses and velocities."""
+    if isinstance(e, Bodies):
+        e.weight(n, env, model.planar)
+        e.start(model.planar)
+        e.sizes()
+    else:
+        checked(e, env, model.planar)
+        vector(n.position, model.planar, f"position of {e.title}")
+        check_frame(model, e, n)
 
 
 def check_joint(model: Model, e: Joint, n: Any) -> None:

@@ -16,6 +16,7 @@ from .shapes import Solid
 
 if TYPE_CHECKING:
     from .body import Body
+    from .ground import Ground
 
 
 @dataclass(frozen=True)
@@ -33,8 +34,8 @@ def shifted(mass: Any, d: np.ndarray) -> np.ndarray:
     return mass * ((d @ d) * np.eye(3) - np.outer(d, d))
 
 
-def checked(body: Body, env: Any, planar: bool) -> list[tuple[Solid, SimpleNamespace, str]]:
-    """The body's shapes with their numbers and what to call them in messages, every one checked."""
+def checked(body: Body | Ground, env: Any, planar: bool) -> list[tuple[Solid, SimpleNamespace, str]]:
+    """The body's (or ground's) shapes with their numbers and what to call them in messages, every one checked."""
     out = []
     shapes = body.shapes()
     for k, s in enumerate(shapes, 1):

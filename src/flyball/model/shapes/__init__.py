@@ -4,16 +4,18 @@ import importlib
 import pkgutil
 from typing import TYPE_CHECKING
 
-from .solid import Solid
+from .solid import Solid, Surface
 
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
-SHAPES = [c for c in Solid.registry.values() if issubclass(c, Solid) and c.__module__.startswith(f"{__name__}.")]
-SHAPES.remove(Solid)
-"""Every shape that a file of this folder defines; all are public."""
+_ALL = [c for c in Solid.registry.values() if issubclass(c, Solid) and c.__module__.startswith(f"{__name__}.")]
+SHAPES = [c for c in _ALL if c is not Solid and not issubclass(c, Surface)]
+"""Every solid that a file of this folder defines; all are public."""
+SURFACES = [c for c in _ALL if c is not Surface and issubclass(c, Surface)]
+"""Every shape without an inside; all are public."""
 
-globals().update({c.__name__: c for c in SHAPES})
+globals().update({c.__name__: c for c in (*SHAPES, *SURFACES)})
 
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .box import Box as Box
@@ -24,6 +26,7 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .hemisphere import Hemisphere as Hemisphere
     from .link import Link as Link
     from .mesh import Mesh as Mesh
+    from .plane import Plane as Plane
     from .prism import Prism as Prism
     from .rod import Rod as Rod
     from .sphere import Sphere as Sphere

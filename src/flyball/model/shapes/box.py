@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Point, element
+from .form import Form
+from .outline import polygon
 from .rules import three_lengths
 from .solid import FINE, Solid
 from .surface import extrude
@@ -33,6 +35,15 @@ class Box(Solid):
         """(y^2 + z^2) / 12 and so on."""
         x, y, z = n.edges
         return (y * y + z * z) / 12, (x * x + z * z) / 12, (x * x + y * y) / 12
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        half = np.array(n.edges) / 2
+        return (Form("BOX", tuple(half.tolist()), np.sqrt(half @ half)),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """The outline of its corners: a rectangle, if it is not tilted out of the plane."""
+        return (polygon(self.mesh(n)[0]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The edges."""

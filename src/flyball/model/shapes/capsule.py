@@ -10,6 +10,8 @@ import numpy as np
 
 from ..element import element
 from .cylinder import Cylinder
+from .form import Form
+from .outline import polygon
 from .solid import FINE
 from .surface import arc, lathe, on_axis
 
@@ -28,6 +30,15 @@ class Capsule(Cylinder):
         rod, balls = length / (length + 4 / 3 * r), 4 / 3 * r / (length + 4 / 3 * r)
         across = rod * (3 * r**2 + length**2) / 12 + balls * (0.4 * r**2 + length**2 / 4 + 3 / 8 * length * r)
         return across, across, rod * r**2 / 2 + balls * 0.4 * r**2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        return (Form("CAPSULE", (n.radius, n.length / 2), n.radius + n.length / 2),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """A segment and all within the radius of it."""
+        p, R = self.pose(n)
+        return (polygon(np.array([p - R[:, 2] * n.length / 2, p + R[:, 2] * n.length / 2]), n.radius),)
 
     def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
         """Two domes and the side between them."""

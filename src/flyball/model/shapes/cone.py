@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
+from .form import Form
+from .outline import around_axis
 from .solid import FINE, Solid
 from .surface import lathe
 
@@ -37,6 +39,14 @@ class Cone(Solid):
     def centre(self, n: SimpleNamespace) -> Any:
         """A quarter of the height above the base."""
         return 0.0, 0.0, n.height / 4
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        return (Form("CONE", (n.radius, n.height), np.maximum(n.radius, n.height)),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """A circle, or a triangle from the side."""
+        return (around_axis(self, *self.pose(n), n.radius, [(n.radius, 0.0), (0.0, n.height)]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Radius and height."""

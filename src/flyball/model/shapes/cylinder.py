@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
+from .form import Form
+from .outline import around_axis
 from .solid import FINE, Solid
 from .surface import lathe
 
@@ -33,6 +35,16 @@ class Cylinder(Solid):
         """(3 r^2 + l^2) / 12 across, r^2 / 2 along."""
         k = (3 * n.radius**2 + n.length**2) / 12
         return k, k, n.radius**2 / 2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        r, h = self.size(n)[0], self.size(n)[-1] / 2
+        return (Form("CYLINDER", (r, h), np.hypot(r, h)),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """A circle, or a rectangle from the side."""
+        r, h = self.size(n)[0], self.size(n)[-1] / 2
+        return (around_axis(self, *self.pose(n), r, [(r, -h), (r, h)]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Radius and length."""

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..element import Point, element
+from .form import Form
 from .rules import three_lengths
 from .solid import FINE, Solid
 from .surface import arc, lathe, on_axis
@@ -34,6 +35,10 @@ class Ellipsoid(Solid):
         """(b^2 + c^2) / 5 and so on."""
         a, b, c = n.semi_axes
         return (b * b + c * c) / 5, (a * a + c * c) / 5, (a * a + b * b) / 5
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        return (Form("ELLIPSOID", tuple(n.semi_axes), np.max(n.semi_axes)),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The semi-axes."""

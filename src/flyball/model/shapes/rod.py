@@ -66,6 +66,9 @@ class Rod(Solid):
         """That of a cylinder."""
         return ROUND.gyration(self._bar(n))
 
+    forms = Cylinder.forms
+    outlines = Cylinder.outlines
+
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Radius and length."""
         return n.radius, ends(self, n)[2]

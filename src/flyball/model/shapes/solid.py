@@ -9,11 +9,15 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
-from ..element import Density, Element, Flag, Mass, Point, positive
+from ..element import Density, Element, Flag, Mass, Name, Point, positive
 from ..geometry import orientation_matrix, vector
 from ..orientation import Orientation
+from .form import Form
 
 FINE = 32  # corners of a circle in a picture
+OTHERWISE = (
+    "give it contact=False, and the body shapes that can stand for it, such as Cylinder(..., looks=True, contact=True)"
+)
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,11 @@ class Solid(Element):
     hole : bool
         It is missing from the others: its mass is taken away, and it is not drawn. It must lie inside them, which is
         not checked beyond what comes out: a positive mass and a possible inertia.
+    material : str
+        Name of the `Material` that it touches others with; that of its body if not given.
+    contact : bool
+        Whether it touches others, where a `Contact` lets its body. If not given: unless it is for looks only. A hole
+        is not cut out of what touches.
     """
 
     name: str = ""
@@ -49,6 +58,8 @@ class Solid(Element):
     mass: Mass | None = None
     looks: Flag = False
     hole: Flag = False
+    material: Name | None = None
+    contact: Flag | None = None
 
     category: ClassVar[str] = "shapes"
     points: ClassVar[tuple[str, ...]] = ("position",)  # fields that are points of the body
@@ -78,7 +89,36 @@ class Solid(Element):
             for field in ("density", "mass", "hole"):
                 if getattr(n, field):
                     raise ModelError(f"{self.title}: it is for looks only, so leave out looks or {field}")
+        if self.hole and self.contact is not None:
+            raise ModelError(f"{self.title}: a hole touches nothing; leave out contact")
         self.pose(n)
+
+    @property
+    def touches(self) -> bool:
+        """Whether it may touch others."""
+        return not (self.hole or self.looks) if self.contact is None else self.contact
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """What it is where it touches others in space: convex parts, in its own frame.
+
+        Raises
+        ------
+        ModelError
+            If there is nothing like that.
+        """
+        raise ModelError(f"{self.title}: {type(self).__name__} has no form that contact knows; {OTHERWISE}")
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """What it is where it touches others in a planar mechanism: convex parts of its outline, seen along z.
+
+        They are in the body's reference frame, at z = 0.
+
+        Raises
+        ------
+        ModelError
+            If there is nothing like that.
+        """
+        raise ModelError(f"{self.title}: {type(self).__name__} has no outline that contact knows; {OTHERWISE}")
 
     def volume(self, n: SimpleNamespace) -> Any:
         """Volume [m^3]."""
@@ -123,6 +163,21 @@ class Solid(Element):
         p, R = self.pose(n)
         v, f = self.surface(n)
         return p + v @ R.T, f
+
+
+@dataclass(frozen=True)
+class Surface(Solid):
+    """A shape without an inside, for what cannot move or has its mass and inertia given."""
+
+    def volume(self, n: SimpleNamespace) -> Any:
+        """There is none.
+
+        Raises
+        ------
+        ModelError
+            Always.
+        """
+        raise ModelError(f"{self.title}: it has no volume and so no mass; give mass= and inertia= of the body")
 
 
 def point(values: Any, what: str) -> np.ndarray:

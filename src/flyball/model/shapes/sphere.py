@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..element import Length, element, positive
+from .form import Form
+from .outline import circle
 from .solid import FINE, Solid
 from .surface import arc, lathe, on_axis
 
@@ -32,6 +34,14 @@ class Sphere(Solid):
         """2/5 r^2."""
         k = 0.4 * n.radius**2
         return k, k, k
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        return (Form("SPHERE", (n.radius,), n.radius),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """A circle."""
+        return (circle(n.radius, self.pose(n)[0]),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The radius."""

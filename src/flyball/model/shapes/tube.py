@@ -11,7 +11,7 @@ import numpy as np
 from ..element import Length, element, positive
 from .cylinder import Cylinder
 from .rules import smaller
-from .solid import FINE
+from .solid import FINE, Solid
 from .surface import lathe
 
 
@@ -36,6 +36,9 @@ class Tube(Cylinder):
         s = n.radius**2 + n.inner_radius**2
         k = (3 * s + n.length**2) / 12
         return k, k, s / 2
+
+    forms = Solid.forms
+    outlines = Solid.outlines
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Outer radius, inner radius and length."""

@@ -1,0 +1,100 @@
+"""What touches what in a model: names that contacts and materials refer to, and which contact holds for a pair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from ..errors import ModelError
+from .body import GROUND, Body
+from .bulk import Bodies
+from .contact import Contact
+from .element import Element
+from .ground import Ground
+from .material import Material, MaterialPair
+from .words import listing, suggest
+
+if TYPE_CHECKING:
+    from .model import Model
+
+Owner = Body | Bodies | Ground
+
+
+def has_contact(model: Model) -> bool:
+    """Whether something in the model may touch, or is there for contact only."""
+    return bool(model.contacts or model.bulk)
+
+
+def owners(model: Model) -> list[Owner]:
+    """All that may have shapes: parts of ground, bodies, many bodies."""
+    return [*model.ground, *model.bodies, *model.bulk]
+
+
+def check_touching(model: Model, e: Element) -> None:
+    """Refuse names of materials and bodies that are not there, and contacts that hold for the same.
+
+    Raises
+    ------
+    ModelError
+        If a name is unknown or means something else.
+    """
+    if isinstance(e, MaterialPair):
+        for name in (e.first, e.second):
+            _material(model, name, e)
+        _refuse_same_pair(model, e)
+    elif isinstance(e, Contact):
+        for name in named(e):
+            _touching(model, name, e)
+        _refuse_second(model, e)
+    elif isinstance(e, (Body, Bodies, Ground)):
+        for material in (e.material, *(s.material for s in e.shapes())):
+            if material is not None:
+                _material(model, material, e)
+
+
+def named(e: Contact) -> Iterator[str]:
+    """Every name that a contact gives."""
+    yield from e.between or ()
+    yield from e.others or ()
+    for pair in e.exclude:
+        yield from pair
+
+
+def _material(model: Model, name: str, e: Element) -> None:
+    found = model.find(name)
+    if not isinstance(found, Material):
+        known = [x.name for x in model.materials]
+        what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
+        raise ModelError(
+            f"{e.title}: there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}"
+        )
+
+
+def _touching(model: Model, name: str, e: Contact) -> None:
+    found = model.find(name)
+    if name == GROUND:
+        if not model.ground:
+            raise ModelError(f"{e.title}: ground has no shapes; add some by Ground('floor', shape=Plane())")
+        return
+    if not isinstance(found, (Body, Bodies, Ground)):
+        known = [GROUND, *(x.name for x in owners(model))]
+        what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
+        raise ModelError(f"{e.title}: there is no body named {name!r}{what}{suggest(name, known)}; {listing(known)}")
+    if not any(s.touches for s in found.shapes()):
+        raise ModelError(f"{e.title}: {found.title} has no shape that touches; give it one, or leave it out")
+
+
+def _refuse_second(model: Model, e: Contact) -> None:
+    """One contact for everything is enough."""
+    other = next((c for c in model.contacts if c.name != e.name and c.between is None), None)
+    if other is not None and e.between is None:
+        raise ModelError(
+            f"{e.title}: {other.title} holds for everything already; say between= what this one holds, or give them "
+            f"materials"
+        )
+
+
+def _refuse_same_pair(model: Model, e: MaterialPair) -> None:
+    for other in model.material_pairs:
+        if other.name != e.name and {other.first, other.second} == {e.first, e.second}:
+            raise ModelError(f"{e.title}: {other.title} is about the same two materials; leave one out")
