@@ -70,8 +70,8 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
 
 
 def _decided(model: Model, choices: Choices) -> Structure:
-    if not model.bodies:
-        pass  # raise ModelError(f"{model.name!r} has no bodies; add at least one")
+    if not model.bodies and not model.bulk:
+        raise ModelError(f"{model.name!r} has no bodies; add at least one")
     c = choices
     s = Structure(model, c.far, c.tree, c.positions or c.far, c.coupled)
     s.const = [0.0] * len(model.parameters)

@@ -12,6 +12,8 @@ import numpy as np
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
 from ....model.model import Model
+from ....numerics.cone.gauss_seidel import gauss_seidel
+from ....numerics.cone.problem import COULOMB
 from ....results.health import Health
 from ....results.result import Result
 from ....results.sides import Sides
@@ -28,6 +30,7 @@ from ....stepping.tables import (
     LIFTS,
     NO_RESTITUTION,
     REALS,
+    SEQUENTIAL,
     SLOWEST,
     SWEEPS,
     TAKEN,
@@ -43,6 +46,7 @@ from .collect import Collected, coordinates, sets
 from .parts import parts
 from .settings import RESTITUTION, Impulse
 
+MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
 FLATTEST = 1e-9  # overlap that is none, in parts of the smallest shape
 SLOW = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
 SWEEPS_USUAL, LIFTS_USUAL = 50, 30
@@ -105,8 +109,13 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse) -> Stepper:
     count[LAW] = law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
     turn = quaternion(M.pose[:, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass, scene.carriers.inertia, turn, planar)
+    count[SEQUENTIAL] = o.impacts == "sequential"
     pace = Pace(real, count, np.zeros(8, np.int64))
-    return Stepper(scene.geometry, free, M.pose[:, :3], M.twist, scene.surfaces, pace)
+    stepper = Stepper(scene.geometry, free, M.pose[:, :3], M.twist, scene.surfaces, pace, MARGIN * smallest)
+    r = stepper.rooms
+    r.O.count[COULOMB] = o.coulomb
+    pace.door[1:4] = gauss_seidel.address(r.P, r.X, r.W, r.O, r.F)
+    return stepper
 
 
 def march(stepper: Stepper, t_end: float, times: np.ndarray, longest: float, kept: Collected, tell: Tell) -> None:
@@ -132,7 +141,7 @@ def result_of(
     t = np.array(kept.t)
     vdot = np.zeros_like(v)
     vdot[1:] = np.diff(v, axis=0) / np.diff(t)[:, None] if len(t) > 1 else 0.0
-    count, real = stepper.pace.count, stepper.pace.real
+    count = stepper.pace.count
     health = Health(
         success=True,
         message="reached the end",

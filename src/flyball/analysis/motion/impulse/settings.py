@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 from ....errors import ModelError
-from ....numerics.cone.choose import SOLVERS
 from ...options import count, positive, seconds
 
+SOLVERS = ("auto", "gauss-seidel")
 RESTITUTION = ("poisson", "newton", "moreau")
 IMPACTS = ("simultaneous", "sequential")
 
