@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....contact.tables import FOUND, GAP, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ....model.model import Model
 from ....results.bulk import Bulk
 from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
@@ -107,7 +108,7 @@ def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.nd
     return q, v
 
 
-def sets(scene: Touching, kept: Collected) -> dict[str, Bulk]:
+def sets(model: Model, scene: Touching, kept: Collected) -> dict[str, Bulk]:
     """Sets of bodies by name."""
     out = {}
     for name in scene.carriers.names:
@@ -119,6 +120,7 @@ def sets(scene: Touching, kept: Collected) -> dict[str, Bulk]:
             name=name,
             mass=scene.carriers.mass[at],
             inertia=J,
+            com=model[name].sizes()[:, None] * scene.carriers.com[name],
             position=np.array([p[at] for p in kept.pose]),
             quaternion=np.array([p[at] for p in kept.turn]),
             velocity=np.array([p[at, :3] for p in kept.twist]),

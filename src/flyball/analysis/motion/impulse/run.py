@@ -159,5 +159,5 @@ def result_of(
     lam = np.zeros((len(t), len(values.system.row_i)))
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.contacts = kept.as_contacts(sides, model.planar)
-    result.bulk = sets(scene, kept)
+    result.bulk = sets(model, scene, kept)
     return result
