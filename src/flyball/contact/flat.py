@@ -27,7 +27,7 @@ from .desk import (
     USUAL,
 )
 from .envelopes import rotated
-from .tables import AHEAD, AXES, PLACE, SKIN
+from .tables import AHEAD, AXES, MARGIN, PLACE, SKIN
 
 
 @formula
@@ -103,7 +103,7 @@ def reaches(B, w, form, s):
             n = x[w, UP] * B.turn[s, c] + x[w, UP + 1] * B.turn[s, 3 + c] + x[w, UP + 2] * B.turn[s, 6 + c]
             deep += B.hold[i, BOX_HALF + c] * abs(n)
         deep = min(deep, size)
-    reach = B.fat[s, ROUND] - size + deep + x[w, SLACK]
+    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - size + deep + x[w, SLACK]
     if turns > 0.0:
         reach += B.real[AHEAD] * sqrt(turns * far)
     return gap - abs(lead) <= reach
