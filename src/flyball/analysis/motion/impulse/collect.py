@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ....contact.tables import FOUND, GAP, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
@@ -68,18 +70,13 @@ class Collected:
 
     def as_contacts(self, sides: Sides, planar: bool) -> Contacts:
         """All contacts of all output times."""
-        empty = {"pair": np.zeros((0, 2), np.int64), "state": np.zeros(0, np.int64)}
+        empty: dict[str, Any] = {"pair": np.zeros((0, 2), np.int64), "state": np.zeros(0, np.int64)}
         empty |= {k: np.zeros((0, 3)) for k in ("point", "normal", "force")}
         empty |= {k: np.zeros(0) for k in ("gap", "friction")}
         rows = [c or empty for c in self.contacts]
         begin = np.cumsum([0, *(len(c["gap"]) for c in rows)])
-        return Contacts(
-            t=np.array(self.t),
-            sides=sides,
-            begin=begin,
-            planar=planar,
-            **{k: np.concatenate([c[k] for c in rows]) for k in empty},
-        )
+        table: dict[str, Any] = {k: np.concatenate([c[k] for c in rows]) for k in empty}
+        return Contacts(t=np.array(self.t), sides=sides, begin=begin, planar=planar, **table)
 
 
 def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.ndarray, np.ndarray]:

@@ -11,13 +11,13 @@ import numpy as np
 
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
+from ....model.geometry import matrix_to_quaternion
 from ....model.model import Model
 from ....numerics.cone.gauss_seidel import gauss_seidel
 from ....numerics.cone.problem import COULOMB
 from ....results.health import Health
 from ....results.result import Result
 from ....results.sides import Sides
-from ....rotations.quaternions import quaternion
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
     COUNTS,
@@ -76,7 +76,7 @@ def impulse_motion(
     counts = [-1 if n in scene.carriers.single or n == "ground" else _size(scene, n) for n in names]
     sides = Sides(names, counts)
     kept = Collected(stepper, np.arange(len(scene.carriers.mass) + 1))
-    march(stepper, t_end, times, o.step, kept, tell)
+    march(stepper, t_end, times, o.longest, kept, tell)
     return result_of(base, scene, stepper, kept, sides, o, since)
 
 
@@ -107,7 +107,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse) -> Stepper:
     count[SWEEPS], count[LIFTS] = o.iterations or SWEEPS_USUAL, o.position_iterations or LIFTS_USUAL
     law = RESTITUTION.index(o.restitution) + 1
     count[LAW] = law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
-    turn = quaternion(M.pose[:, 3:].reshape(-1, 3, 3))
+    turn = matrix_to_quaternion(M.pose[:, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass, scene.carriers.inertia, turn, planar)
     count[SEQUENTIAL] = o.impacts == "sequential"
     pace = Pace(real, count, np.zeros(8, np.int64))

@@ -67,6 +67,11 @@ class Impulse:
             if getattr(self, name) not in known:
                 raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
 
+    @property
+    def longest(self) -> float:
+        """The longest step [s]."""
+        return float(self.step)
+
     def bounded(self, longest: float) -> Impulse:
         """With steps of at most ``longest`` seconds."""
-        return dataclasses.replace(self, step=min(self.step, longest))
+        return dataclasses.replace(self, step=min(self.longest, longest))
