@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
 import numpy as np
 
@@ -61,6 +62,7 @@ class Some:
             return np.linalg.norm(a[:3] * d)
         return np.max(self.hull.vertices @ d)
 
+    @cached_property
     def coal(self):
         """The same for coal, whose cone has its origin at half its height."""
         import coal
@@ -89,6 +91,13 @@ def some(kind, rng):
     if kind == HULL:
         return Some(kind, np.zeros(3), hull(rng.normal(size=(rng.integers(8, 21), 3)) * rng.uniform(0.1, 0.5, 3)))
     return Some(kind, rng.uniform(0.15, 0.6, 3))
+
+
+@lru_cache
+def pool(kind, seed=0, count=60):
+    """Shapes to draw pairs from."""
+    rng = np.random.default_rng((kind, seed))
+    return [some(kind, rng) for _ in range(count)]
 
 
 def rotation(rng):
@@ -152,7 +161,7 @@ class Sample:
 def sample(a, b, count, mode, seed=0):
     """Random pairs of shapes of kinds a and b, and what flyball says of them."""
     rng = np.random.default_rng((a, b, MODES.index(mode), seed))
-    shapes = [some(k, rng) for _ in range(count) for k in (a, b)]
+    shapes = [pool(k)[rng.integers(60)] for _ in range(count) for k in (a, b)]
     G, pose = tables(shapes), poses(count, mode, rng)
     r = np.array([s.rounding for s in shapes]).reshape(-1, 2).sum(axis=1)
     found = separations(G, pose)
@@ -188,7 +197,7 @@ def asked(sample):
             R = row[3:].reshape(3, 3)
             at[side].setRotation(R)
             at[side].setTranslation(row[:3] + (R[:, 2] * s.par[1] / 2 if s.kind == CONE else 0))
-            pair.append(s.coal())
+            pair.append(s.coal)
         result.clear()
         out[k, 0] = coal.distance(pair[0], at[0], pair[1], at[1], request, result)
         out[k, 1:] = result.normal

@@ -16,7 +16,7 @@ from .epa import deepest
 from .gjk import APART, BEYOND, MEET, nearest, point, reach
 
 OFF = 0.03  # of the size: the gap that is made
-LOOKS = 24  # looks from outside at most
+LOOKS = 48  # at most
 NEAR = 1e-6  # of the size: the least
 SAME = 1e-13  # of the size: what one more look brings when it was the last
 SHALLOW = 1e-8  # of the size: depth below which nobody asks whether another direction is less deep
