@@ -27,7 +27,9 @@ def test_free_fall_is_exact():
 def test_a_free_body_keeps_energy_and_angular_momentum_at_any_step():
     m = fb.Mechanism(gravity=(0, 0, 0))
     J = np.array([1.0, 2.0, 2.5])
-    m.add(fb.Body("book", mass=2, inertia=tuple(J), shape=fb.Box(edges=(0.3, 0.2, 0.1)), angular_velocity=(0.1, 6, 0.2)))
+    m.add(
+        fb.Body("book", mass=2, inertia=tuple(J), shape=fb.Box(edges=(0.3, 0.2, 0.1)), angular_velocity=(0.1, 6, 0.2))
+    )
     m.add(fb.Contact(friction=0))
     r = m.simulate(20, outputs=101, method=fb.Impulse(step=0.05))
     R, w = r["book"].rotation, r["book"].angular_velocity
