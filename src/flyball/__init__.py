@@ -9,6 +9,7 @@ Describe a mechanism
                   Torus, Tube
     contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane as a floor; Bodies are many
                   equal ones in arrays; Material and MaterialPair say friction, restitution, moving surfaces
+    Limit         hard stops of a coordinate
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
@@ -93,6 +94,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
     from .model.ground import Ground as Ground
+    from .model.limit import Limit as Limit
     from .model.material import Material as Material
     from .model.material import MaterialPair as MaterialPair
     from .model.sensor import IMU as IMU
@@ -125,6 +127,7 @@ _HOME = {
     "Bodies": "model.bulk",
     "Contact": "model.contact",
     "Ground": "model.ground",
+    "Limit": "model.limit",
     "Material": "model.material",
     "MaterialPair": "model.material",
     "Sensor": "model.sensor",
