@@ -20,11 +20,12 @@ SHAPE_1, SHAPE_2, FEATURE, BEFORE = range(4)
 # columns of Contacts.x
 POINT, NORMAL, GAP = 0, 3, 6
 # entries of Contacts.count
-FOUND, STATUS, REBUILT, PAIRS = range(4)
+FOUND, STATUS, REBUILT, PAIRS, NUMBER = range(5)
 # what a search may return: FULL_* says what to enlarge before it is called again at the same state
 DONE, FULL_CONTACTS, FULL_PAIRS, FULL_CELLS, NOT_FINITE = range(5)
-# entries of Search.real: largest gap that is a contact; by how much pairs are looked for further than that; time that
-# movers move on for before the next search (what may meet within it is a contact too)
+# entries of Search.real: largest gap that is a contact; how far shapes may go, in radii, before their
+# pairs are looked for again; time that movers move on for before the next search (what may meet within it is a contact
+# too)
 MARGIN, SKIN, AHEAD = range(3)
 
 
@@ -50,7 +51,8 @@ class Movers(NamedTuple):
 class Contacts(NamedTuple):
     """Contacts at one time; two of these are used in turn, so that a contact can be found again in the one before."""
 
-    count: np.ndarray  # type: ignore[assignment]  # (8,): how many, status, how often pairs were looked for afresh, how many pairs there are
+    count: np.ndarray  # type: ignore[assignment]  # (8,): how many, status, how often pairs were looked for afresh, how
+    # many pairs there are, number of the search
     at: np.ndarray  # (capacity, 4): shape 1, shape 2, feature (tells the contacts of a pair apart, and lasts from step
     # to step), place of the same contact in the contacts before or -1. Those of a pair stand together.
     x: np.ndarray  # (capacity, 8): point [m] midway between the surfaces, unit normal from 1 to 2, gap [m] (< 0:

@@ -1,0 +1,109 @@
+"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.scalar import sqrt
+from .desk import (
+    BALL,
+    BOX_HALF,
+    DRIFT,
+    DRIFTS,
+    FLAT,
+    FORM,
+    FRAME,
+    HALF_LINE,
+    MIDDLE,
+    ORIGIN,
+    ORIGIN_0,
+    ROUND,
+    SHAPE,
+    SIZE,
+    SLACK,
+    SPEED,
+    TURNS,
+    UP,
+    UP_0,
+    USUAL,
+)
+from .envelopes import rotated
+from .tables import AHEAD, AXES, MARGIN, PLACE, SKIN
+
+
+@formula
+def place_wide(G, M, B, w, i, m):
+    """Where wide shape ``w`` is and how it goes; its pairs' origin stays."""
+    x = G.shape_x
+    p, n = (x[i, PLACE], x[i, PLACE + 1], x[i, PLACE + 2]), (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
+    v = (0.0, 0.0, 0.0)
+    u = v
+    if m >= 0:
+        a, n = rotated(M, m, p[0], p[1], p[2]), rotated(M, m, n[0], n[1], n[2])
+        u = (M.twist[m, 3], M.twist[m, 4], M.twist[m, 5])
+        p = (M.pose[m, 0] + a[0], M.pose[m, 1] + a[1], M.pose[m, 2] + a[2])
+        v = (
+            M.twist[m, 0] + u[1] * a[2] - u[2] * a[1],
+            M.twist[m, 1] + u[2] * a[0] - u[0] * a[2],
+            M.twist[m, 2] + u[0] * a[1] - u[1] * a[0],
+        )
+    for c in range(3):
+        B.wide[w, ORIGIN + c], B.wide[w, UP + c], B.wide[w, SPEED + c], B.wide[w, TURNS + c] = p[c], n[c], v[c], u[c]
+
+
+@formula
+def comes(B, w):
+    """How far a plane comes along its normal in `AHEAD` seconds, in the frame."""
+    x = B.wide
+    a = x[w, UP] * (x[w, SPEED] - B.real[DRIFT])
+    a += x[w, UP + 1] * (x[w, SPEED + 1] - B.real[DRIFT + 1])
+    a += x[w, UP + 2] * (x[w, SPEED + 2] - B.real[DRIFT + 2])
+    return B.real[AHEAD] * max(0.0, a)
+
+
+@formula
+def gone(B, w):
+    """Whether a wide shape may have got pairs by moving."""
+    x, along, turned = B.wide, 0.0, 0.0
+    for c in range(3):
+        along += x[w, UP + c] * (x[w, ORIGIN + c] - B.real[FRAME + c] - x[w, ORIGIN_0 + c])
+        turned += abs(x[w, UP + c] - x[w, UP_0 + c]) + abs(x[w, TURNS + c])
+    return turned > 0.0 or abs(along) + comes(B, w) > x[w, SLACK]
+
+
+@formula
+def settle(B, w, still):
+    """Remember where a wide shape is while its pairs are looked for."""
+    for c in range(3):
+        B.wide[w, ORIGIN_0 + c] = B.wide[w, ORIGIN + c] - B.real[FRAME + c]
+        B.wide[w, UP_0 + c] = B.wide[w, UP + c]
+    B.wide[w, SLACK] = 0.0
+    if not still or B.count[DRIFTS] != 0:
+        B.wide[w, SLACK] = B.real[SKIN] * B.real[USUAL] + comes(B, w)
+
+
+@formula
+def reaches(B, w, form, s):
+    """Whether a wide shape and the envelope of slot s meet."""
+    if form != FLAT:
+        return True
+    x, gap, lead = B.wide, 0.0, 0.0
+    far, turns = 0.0, 0.0
+    for c in range(3):
+        a = B.fat[s, MIDDLE + c] + B.real[FRAME + c] - x[w, ORIGIN + c]
+        gap += x[w, UP + c] * a
+        lead += x[w, UP + c] * B.fat[s, HALF_LINE + c]
+        far += a * a
+        turns += x[w, TURNS + c] ** 2
+    size = B.now[s, SIZE]
+    deep = size
+    if B.slot[s, FORM] != BALL:
+        deep = 0.0
+        i = B.slot[s, SHAPE]
+        for c in range(3):
+            n = x[w, UP] * B.turn[s, c] + x[w, UP + 1] * B.turn[s, 3 + c] + x[w, UP + 2] * B.turn[s, 6 + c]
+            deep += B.hold[i, BOX_HALF + c] * abs(n)
+        deep = min(deep, size)
+    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - size + deep + x[w, SLACK]
+    if turns > 0.0:
+        reach += B.real[AHEAD] * sqrt(turns * far)
+    return gap - abs(lead) <= reach

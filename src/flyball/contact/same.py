@@ -1,0 +1,84 @@
+"""Which contact was which: a table of pairs and their first contacts, and the contacts of a pair matched by feature."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from .desk import KEPT
+from .tables import FEATURE, FOUND, POINT, SHAPE_1, SHAPE_2
+
+EMPTY = -1
+NEAR = 0.3  # a contact without a feature's namesake is the nearest one, if it is nearer than this, in radii
+
+
+@formula
+def spot(names, name):
+    """Where a pair stands in the table, or the empty place where it would stand."""
+    mask = names.shape[0] - 1
+    k = name * 0x1E3779B97F4A7C15
+    k = (k ^ (k >> 31)) & mask
+    while names[k] != EMPTY and names[k] != name:
+        k = (k + 1) & mask
+    return k
+
+
+@formula
+def keep(B, name, first):
+    """Put a pair and its first contact into the table, whose first contact stays the one put in first."""
+    k = spot(B.names, name)
+    if B.names[k] == EMPTY:
+        B.names[k], B.firsts[k] = name, first
+        B.taken[B.count[KEPT]] = k
+        B.count[KEPT] += 1
+
+
+@formula
+def kept(B, name):
+    """The first contact of a pair, or -1."""
+    if B.count[KEPT] == 0:
+        return -1
+    k = spot(B.names, name)
+    return B.firsts[k] if B.names[k] == name else -1
+
+
+@formula
+def forget(B):
+    """Empty the table."""
+    for k in range(B.count[KEPT]):
+        B.names[B.taken[k]] = EMPTY
+    B.count[KEPT] = 0
+
+
+@formula
+def keep_all(G, O, B):
+    """Put all pairs that have contacts in O into the table."""
+    i, j, ns = -1, -1, G.shape_i.shape[0]
+    for c in range(O.count[FOUND]):
+        if O.at[c, SHAPE_1] != i or O.at[c, SHAPE_2] != j:
+            i, j = O.at[c, SHAPE_1], O.at[c, SHAPE_2]
+            keep(B, i * ns + j, c)
+
+
+@formula
+def before(O, pair, first, feature, point, size, used):
+    """The contact before of a pair of shapes that is the one at ``point`` now; bits of ``used`` say which are taken.
+
+    Returns its place and its bit, or -1 and 0.
+    """
+    end, best, bit = O.count[FOUND], -1, 0
+    c = first
+    while 0 <= c < end and c - first < 62 and O.at[c, SHAPE_1] == pair[0] and O.at[c, SHAPE_2] == pair[1]:
+        b = 1 << (c - first)
+        if O.at[c, FEATURE] == feature and used & b == 0:
+            return c, b
+        c += 1
+    least = (NEAR * size) ** 2
+    for k in range(max(0, c - first)):
+        b = 1 << k
+        if used & b == 0:
+            x = O.x[first + k, POINT] - point[0]
+            y = O.x[first + k, POINT + 1] - point[1]
+            z = O.x[first + k, POINT + 2] - point[2]
+            d = x * x + y * y + z * z
+            if d < least:
+                least, best, bit = d, first + k, b
+    return best, bit

@@ -1,0 +1,229 @@
+"""Newton's method on velocities, with impulses held on to: second order, for few bodies and any ratio of masses.
+
+The contact problem is the limit of ones with a compliance R, min 1/2 |e|^2 + sum of envelopes (`smooth.py`), a convex
+function once differentiable, piecewise smooth: Newton's method with the exact Hessian of the piece at hand, factored in
+6 x 6 blocks, and an exact line search along the step ends in few steps (Todorov 2014; Castro et al. 2022 in velocities
+with finite compliance). Impulses are then held on to (p0 = p, the method of multipliers: Rockafellar 1976), so that
+contact is hard however large R is, and a warm start that is right costs no factor at all. R falls as the multipliers
+get closer. Coulomb's law: De Saxce's addition mu |u_t| to the normal velocity is renewed with the multipliers
+(Cadoux 2009).
+"""
+
+from __future__ import annotations
+
+from ...compiler.door import door
+from ...compiler.held import held
+from ...compiler.jit import formula
+from .blocks import factor, solve
+from .fill import dilation, fill_rows, gap_of_impulses, hand_back, lack, push_of, span_of
+from .gather import BLOCKS, ROWS
+from .layout import prepare, rows_of
+from .problem import (
+    BROKEN,
+    CONVERGED,
+    COULOMB,
+    CUT,
+    ENDED,
+    ENOUGH,
+    FORCE_RESIDUAL,
+    MOST,
+    RESIDUAL,
+    STALLED,
+    USED,
+)
+from .prox import DY, HELD, METRIC, OWN, ROOT_N, ROOT_T, SLIP, WIDE, Q, U, Y, set_metric
+from .smooth import along_step, from_held, hessian, product, set_impulses, set_y, slope_along
+
+FIRST_RHO, LEAST_RHO, FALL = 1e-3, 1e-9, 0.03  # of the mobility: compliance to begin with, the least, between
+SLOW = 0.05  # change of impulses over the one before, from which on the compliance falls
+EXACT = 0.1  # what is left of the slope along a step when its length is right
+SEARCHES = 30
+
+
+@formula
+def direction(R):
+    """Step from the gradient; its e . step, |step|^2 and gradient . step. False if the matrix could not be factored."""
+    n = R.size[BLOCKS]
+    b, g, s = R.blocks, 6 * n, 12 * n
+    hessian(R)
+    Lp = R.graph[6 * (n + 1) : 7 * (n + 1)]
+    if not factor(n, Lp, R.Li, R.D, R.L):
+        return False, 0.0, 0.0, 0.0
+    for k in range(g):
+        b[s + k] = -b[g + k]
+    solve(n, Lp, R.Li, R.D, R.L, b[s : s + g])
+    first, second, down = 0.0, 0.0, 0.0
+    for k in range(g):
+        first += b[k] * b[s + k]
+        second += b[s + k] * b[s + k]
+        down += b[g + k] * b[s + k]
+    return True, first, second, down
+
+
+@formula
+def length(R, first, second, down):
+    """How much of a step makes the objective least along it: the slope is continuous, rising and piecewise smooth."""
+    low, high, a = 0.0, 1e300, 1.0
+    at_low, at_high = down, 0.0
+    for _ in range(SEARCHES):
+        here = slope_along(R, a, first, second)
+        if abs(here) <= -EXACT * down:
+            return a
+        if here < 0.0:
+            low, at_low = a, here
+            if high > 1e299:
+                a *= 2.0
+                continue
+        else:
+            high, at_high = a, here
+        a = low - at_low * (high - low) / (at_high - at_low)
+        a = min(max(a, low + 0.1 * (high - low)), high - 0.1 * (high - low))
+    return a
+
+
+@formula
+def advance(R, a):
+    """e and the scaled y move by the part a of the step.
+
+    y is not found anew from e: velocities are differences of large numbers where a heavy body stands on light ones, and
+    their rounding over R would be seen in every impulse; in this way it is only once, and solved for.
+    """
+    x, n = R.row, 6 * R.size[BLOCKS]
+    for k in range(n):
+        R.blocks[k] += a * R.blocks[2 * n + k]
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        for k in range(3):
+            x[o + Y + k] += a * x[o + DY + k]
+
+
+@formula
+def gaps(R, coulomb):
+    """Of the impulses at y: residual, velocity that is still to come of the gradient, compliance times change [m/s].
+
+    The velocities that these impulses make are left in column OWN of the rows.
+    """
+    x, g = R.row, 6 * R.size[BLOCKS]
+    worst, inner, outer = 0.0, 0.0, 0.0
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        a, b, c = product(R, row, g)
+        r, p, q = x[o + METRIC], x[o + ROOT_N], x[o + ROOT_T]
+        n, s, t = x[o + Q] / p, x[o + Q + 1] / q, x[o + Q + 2] / q
+        u = r * x[o + HELD] - p * x[o + Y] - x[o + SLIP] - a
+        v, w = r * x[o + HELD + 1] - q * x[o + Y + 1] - b, r * x[o + HELD + 2] - q * x[o + Y + 2] - c
+        x[o + OWN], x[o + OWN + 1], x[o + OWN + 2] = u, v, w
+        d = lack(x, o, n, s, t, u + dilation(x, o, coulomb, v, w), v, w)
+        worst = d if d > worst or d != d else worst
+        inner = max(inner, a * a + b * b + c * c)
+        d, f, h = n - x[o + HELD], s - x[o + HELD + 1], t - x[o + HELD + 2]
+        outer = max(outer, r * r * (d * d + f * f + h * h))
+    return worst, inner**0.5, outer**0.5
+
+
+@formula
+def hold(R, coulomb):
+    """Hold on to the impulses at y."""
+    x, n = R.row, 6 * R.size[BLOCKS]
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        x[o + HELD] = x[o + Q] / x[o + ROOT_N]
+        x[o + HELD + 1], x[o + HELD + 2] = x[o + Q + 1] / x[o + ROOT_T], x[o + Q + 2] / x[o + ROOT_T]
+        x[o + SLIP] = dilation(x, o, coulomb, x[o + OWN + 1], x[o + OWN + 2])
+    for k in range(n):
+        R.blocks[k] -= R.blocks[n + k]
+
+
+@formula
+def slide(R, coulomb):
+    """De Saxce's additions at e."""
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        _, v, w = product(R, row, 0)
+        R.row[o + SLIP] = dilation(R.row, o, coulomb, v + R.row[o + U + 1], w + R.row[o + U + 2])
+
+
+@formula
+def search(R, O, coulomb):
+    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual."""
+    rho, steps, before = FIRST_RHO, 0, 1e300
+    enough = O.real[ENOUGH]
+    slide(R, coulomb)
+    for _ in range(4 * O.count[MOST] + 20):
+        set_metric(R, rho)
+        set_y(R)
+        while True:
+            set_impulses(R)
+            worst, inner, outer = gaps(R, coulomb)
+            O.count[USED] = steps
+            if worst != worst:
+                return BROKEN, worst
+            if worst <= enough or inner <= max(0.1 * outer, 0.1 * enough):
+                break
+            if steps >= O.count[MOST]:
+                hold(R, coulomb)
+                return CUT, worst
+            good, first, second, down = direction(R)
+            if not good:
+                return BROKEN, worst
+            steps += 1
+            along_step(R)
+            advance(R, length(R, first, second, down))
+        hold(R, coulomb)
+        if worst <= enough:
+            return CONVERGED, worst
+        if outer > SLOW * before:
+            rho = max(FALL * rho, LEAST_RHO)
+        before = outer
+    return STALLED, worst
+
+
+@formula
+def make_safe(R):
+    """Scale impulses so that they take energy: least 1/2 p' N p + b' p along them."""
+    from_held(R)
+    square, linear = push_of(R), 0.0
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        for k in range(3):
+            linear += R.row[o + U + k] * R.row[o + HELD + k]
+    a = -linear / square if square > 0.0 else 1.0
+    a = min(max(a, 0.0), 1.0)
+    for row in range(R.size[ROWS]):
+        for k in range(3):
+            R.row[WIDE * row + HELD + k] *= a
+
+
+@formula
+def newton_solve(P, X, O, F):
+    """See `newton`."""
+    span = span_of(P, O)
+    if P.turn.shape[0] > 0:
+        O.count[ENDED] = BROKEN
+        return 0
+    if not prepare(P, span, F, O):
+        return 0
+    R = held(rows_of(P, F, F.places[:16]))
+    fill_rows(P, X, R, span)
+    from_held(R)
+    coulomb = 1.0 * O.count[COULOMB]
+    worst, largest = gap_of_impulses(R, HELD, coulomb)
+    O.count[USED] = 0
+    ended = CONVERGED
+    if not worst <= O.real[ENOUGH]:
+        ended, worst = search(R, O, coulomb)
+        if ended == CUT:
+            make_safe(R)
+    O.count[ENDED], O.real[RESIDUAL] = ended, worst
+    O.real[FORCE_RESIDUAL] = 0.0
+    hand_back(P, X, R, span)
+    return O.count[USED]
+
+
+@door
+def newton(P, X, W, O, F, task):
+    """Newton's method; returns factorisations.
+
+    In `Choices.count[ENDED]`: BROKEN with rolling friction, which it does not know; SMALL: enlarge `Factor`, call anew.
+    """
+    return newton_solve(P, X, O, F)

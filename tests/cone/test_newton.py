@@ -1,0 +1,80 @@
+"""Newton's method: optimality by definition on dense matrices, Coulomb's law, heavy on light, cut solves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flyball.numerics.cone.newton import newton
+from flyball.numerics.cone.problem import CONVERGED, COULOMB, ENDED, ENOUGH, MOST, RESIDUAL, SMALL
+from flyball.numerics.cone.solve import solve
+from tests.cone.enlarge import solved
+from tests.cone.problems import KINDS, dense, impulses, random_problem
+from tests.cone.test_gauss_seidel import cone_lack
+
+ROLLING = {k for k in KINDS if "rolling" in k}
+
+
+@pytest.mark.parametrize("kind", [k for k in KINDS if k not in ROLLING])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_convex_form_is_solved(kind, seed):
+    P, X, W, O, F = random_problem(seed, **KINDS[kind])
+    _, DK, N, b = dense(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    O.count[MOST], O.real[ENOUGH] = 200, 1e-12
+    solved(newton, P, X, W, O, F)
+    p = impulses(P, X)
+    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-12
+    assert cone_lack(P, p, N @ p + b) < 1e-10 * (1 + abs(p).max())
+    after = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
+
+
+@pytest.mark.parametrize("kind", ["smooth", "smooth balls"])
+@pytest.mark.parametrize("seed", range(6))
+def test_coulombs_law(kind, seed):
+    """|p_t| <= mu p_n, u_n >= 0, u_n p_n = 0, and friction against the velocity."""
+    P, X, W, O, F = random_problem(seed, **KINDS[kind])
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 1000, 1e-12, 1
+    solved(newton, P, X, W, O, F)
+    p = impulses(P, X)
+    assert O.count[ENDED] == CONVERGED
+    assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-10 * (1 + abs(p).max())
+
+
+@pytest.mark.parametrize("kind", [k for k in KINDS if k not in ROLLING])
+@pytest.mark.parametrize("coulomb", [0, 1])
+@pytest.mark.parametrize("most", [0, 1, 2, 5])
+def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
+    """p' N p / 2 + b' p, by which the kinetic energy changes, is at most 0, from a foolish warm start as well."""
+    P, X, W, O, F = random_problem(5, **KINDS[kind])
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.count[COULOMB] = most, coulomb
+    X.p[:, 0] = 50.0
+    solved(newton, P, X, W, O, F)
+    p = impulses(P, X)
+    assert 0.5 * p @ N @ p + b @ p < 1e-10
+
+
+def test_least_impulses_are_held():
+    P, X, W, O, F = random_problem(2, balls=True)
+    P = P._replace(least=np.full(12, 0.7))
+    _, _, N, b = dense(P, X)
+    O.real[ENOUGH] = 1e-12
+    solved(newton, P, X, W, O, F)
+    p, u = X.p, (N @ X.p.ravel() + b).reshape(-1, 3)
+    assert p[:, 0].min() == 0.7
+    for c in range(12):  # the nearest point of the cut cone to p - u is p
+        n, s, t = p[c] - u[c]
+        r, mu = np.hypot(s, t), P.mu[c]
+        near = max(n if r <= mu * n else (n + mu * r) / (1 + mu * mu), 0.7)
+        a = min(1, mu * near / r)
+        np.testing.assert_allclose(p[c], (near, a * s, a * t), atol=1e-10)
+
+
+def test_rooms_too_small_are_said():
+    P, X, W, O, F = random_problem(0)
+    p = X.p.copy()
+    assert solve(newton, P, X, W, O, F) == 0 and O.count[ENDED] == SMALL
+    np.testing.assert_array_equal(X.p, p)
