@@ -5,10 +5,11 @@ A guided map, by task; ``help(fb.Revolute)`` and the like say the rest. All resu
 Describe a mechanism
     Mechanism     name, planar or spatial, gravity, parameters; ``m.add(...)`` takes the parts
     Body, Frame   what moves, and named axes on it; ``Body(shape=...)`` computes masses from
-                  Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Link, Mesh, Prism, Rod, Sphere,
+                  Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Hull, Link, Mesh, Prism, Rod, Sphere,
                   Torus, Tube
-    contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane as a floor; Bodies are many
-                  equal ones in arrays; Material and MaterialPair say friction, restitution, moving surfaces
+    contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane or HeightField as a
+                  floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
+                  moving surfaces
     Limit         hard stops of a coordinate
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,

@@ -56,7 +56,7 @@ class Triangulation:
         return integrals(self.v, self.f)
 
 
-def _rows(kind: type) -> Any:
+def rows_of(kind: type) -> Any:
     """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
 
     def convert(value: Any) -> Any:
@@ -99,8 +99,8 @@ class Mesh(Solid):
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
-    vertices: Annotated[Any, _rows(float)] = field(default=None, repr=False)
-    faces: Annotated[Any, _rows(int)] = field(default=None, repr=False)
+    vertices: Annotated[Any, rows_of(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, rows_of(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
