@@ -18,6 +18,8 @@ export {
   FrontSide,
   Group,
   HemisphereLight,
+  InstancedBufferAttribute,
+  InstancedMesh,
   LatheGeometry,
   MOUSE,
   Matrix4,

@@ -6,6 +6,7 @@ views of a result, its curves, data sets, sensors and outputs of analyses all re
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 ENERGY = "energy"  # the name under which a result has the energies of all
+MEMBER = re.compile(r"(.*)\[(\d+)\]")  # of a set of bodies: "balls[17]"
 
 
 class Quantity(NamedTuple):
@@ -54,11 +56,20 @@ Table = dict[str, Quantity]
 
 def quantities(model: Model, name: str) -> Table:
     """Everything that a result says of a part (or of ``"energy"``), by name."""
+    axes = "xy" if model.planar else "xyz"
+    touching = bool(getattr(model, "contacts", ()))
     if name == ENERGY:
-        return _of_energy()
-    e, axes = model[name], "xy" if model.planar else "xyz"
+        return _of_energy(touching)
+    member = MEMBER.fullmatch(name)
+    if member and member[1] in model.by_name and model[member[1]].category == "bulk":
+        return _of_member(axes)
+    e = model[name]
+    if isinstance(e, Body) and touching:
+        return _of_point(axes) | _of_contact(axes)
     if isinstance(e, (Body, Frame)):
         return _of_point(axes)
+    if e.category == "bulk":
+        return of_set(axes)
     if isinstance(e, Joint):
         return _of_joint(e, axes)
     if isinstance(e, Force):
@@ -121,8 +132,9 @@ def _unit_of(model: Model, text: str) -> str:
     return quantities(model, owner)[what].unit
 
 
-def _of_energy() -> Table:
-    listed = ("kinetic", "potential", "total", "balance")
+def _of_energy(touching: bool) -> Table:
+    listed = ["kinetic", "potential", "total", "balance"]
+    listed += ["friction_loss", "impact_loss", "surface_work"] if touching else []
     return {k: Quantity("J", curve=k in listed, array=True) for k in (*listed, "gravity", "elastic")}
 
 
@@ -148,6 +160,24 @@ def _of_point(axes: str) -> Table:
     for name, unit in (turning, turned):
         out[name] = Quantity(unit, array=True, width=0 if planar else n)
     return out | {"quaternion": Quantity("1", array=not planar, width=4), "rotation": Quantity("1", width=9)}
+
+
+def _of_contact(axes: str) -> Table:
+    """Of a body that may touch others: the sum of its contact forces."""
+    out = _split((f"contact_f{a}" for a in axes), "N", "contact_force")
+    return out | {"contact_force": Quantity("N", array=True, width=len(axes))}
+
+
+def _of_member(axes: str) -> Table:
+    """Of one of a set of bodies: as of any other, but for accelerations."""
+    own = {k: x for k, x in _of_point(axes).items() if not x.unit.endswith("/s^2")}
+    return own | _of_contact(axes)
+
+
+def of_set(axes: str) -> Table:
+    """Of a whole set of bodies: arrays over time and bodies."""
+    wholes = ("position", "angle", "velocity", "angular_velocity", "quaternion", "contact_force")
+    return {k: x._replace(curve=False) for k, x in _of_member(axes).items() if k in wholes}
 
 
 def _of_joint(e: Joint, axes: str) -> Table:

@@ -16,6 +16,10 @@ if TYPE_CHECKING:
     from .result import Result
 
 
+EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0}
+"""Energies that contacts exchange, and by which sign the bodies have them."""
+
+
 class Energy(Named):
     """Energies of a motion [J]: kinetic, potential (gravity and springs), and the work done from outside."""
 
@@ -43,7 +47,7 @@ class Energy(Named):
             _, R, w, v, _, _ = r.body(b)
             w_B = mtv(R, w)
             total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
-        return total
+        return sum((b.kinetic for b in self._result.bulk.values()), total)
 
     @cached_property
     def gravity(self) -> np.ndarray:
@@ -52,7 +56,7 @@ class Energy(Named):
         total = r.zeros()
         for b in range(len(S.body_i)):
             total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
-        return total
+        return sum((b.potential(S.glob[:3]) for b in self._result.bulk.values()), total)
 
     @cached_property
     def elastic(self) -> np.ndarray:
@@ -84,12 +88,33 @@ class Energy(Named):
                 out[element.element.name] = element.work + stored - stored[0]
         return out
 
+    def exchanged(self, name: str) -> np.ndarray:
+        """Energy since the start that contacts lost or gave, by its name in `EXCHANGED`; zeros without contact."""
+        found = self._result.exchanged.get(name)
+        return self._result.records.zeros() if found is None else found
+
+    @property
+    def friction_loss(self) -> np.ndarray:
+        """Energy lost in friction of contacts since the start."""
+        return self.exchanged("friction_loss")
+
+    @property
+    def impact_loss(self) -> np.ndarray:
+        """Energy lost in impacts since the start."""
+        return self.exchanged("impact_loss")
+
+    @property
+    def surface_work(self) -> np.ndarray:
+        """Energy that moving surfaces of contacts have given since the start."""
+        return self.exchanged("surface_work")
+
     @cached_property
     def balance(self) -> np.ndarray:
         """Total energy less all work put in less the total at the start: zero for an exact motion."""
         if not len(self._result.t):
             return np.zeros(0)
         put_in = sum(self.work.values(), self._result.records.zeros())
+        put_in = sum((sign * self.exchanged(k) for k, sign in EXCHANGED.items()), put_in)
         residue = self.total - put_in
         return residue - residue[0]
 

@@ -11,8 +11,10 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model
-from ..model.quantities import ENERGY, one, quantities
+from ..model.quantities import ENERGY, MEMBER, one, quantities
 from ..tables.values import Values
+from .bulk import Bulk
+from .contacts import Contacts
 from .energy import Energy
 from .health import Health
 from .measured import Measured
@@ -22,8 +24,10 @@ from .records import Records
 from .turn import Turn
 from .views import view
 from .views.base import Curves
+from .views.bulk import MemberView, SetView
 
 TOLD = 12  # curves in a text
+UNSAID = ("initial", "tables", "ground", "materials", "material_pairs", "contacts")  # parts of the description only
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
@@ -49,6 +53,13 @@ class Result:
     wound : dict
         Planar body -> whole turns [rad] that coordinates count and its angle does not (`records.wound`): those that a
         joint was told to begin with.
+    contacts : Contacts
+        Where bodies touched and with which forces; None where the mechanism has no contact.
+    bulk : dict
+        Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
+    exchanged : dict
+        Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
+        surfaces that move.
     """
 
     def __init__(
@@ -72,6 +83,9 @@ class Result:
         self._states = states
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
+        self.contacts: Contacts | None = None
+        self.bulk: dict[str, Bulk] = {}
+        self.exchanged: dict[str, np.ndarray] = {}
         self.energy = Energy(self)
 
     @property
@@ -165,17 +179,45 @@ class Result:
     def __contains__(self, name: object) -> bool:
         """Whether there is a part, or a quantity, of that name."""
         owner, dot, what = name.partition(".") if isinstance(name, str) else ("", "", "")
-        return owner in self.parts() and (not dot or what in quantities(self.model, owner))
+        if owner not in self.parts() and self._set_of(owner) is None:
+            return False
+        return not dot or what in self._view(owner).names
 
     def _view(self, name: str) -> Any:
         views = self.__dict__.setdefault("_views", {})
         if name not in views:
-            views[name] = self.energy if name == ENERGY else view(self, self.model[name])
+            views[name] = self._viewed(name)
         return views[name]
+
+    def _viewed(self, name: str) -> Any:
+        if name == ENERGY:
+            return self.energy
+        if (found := self._set_of(name)) is None:
+            return view(self, self.model[name])
+        own, k = found
+        return SetView(self, own) if k is None else MemberView(self, own, k)
+
+    def _set_of(self, name: str) -> tuple[Bulk, int | None] | None:
+        """The set of bodies of a name; of a member such as ``"balls[17]"`` its set and its number.
+
+        Raises
+        ------
+        ModelError
+            If the set has no such member.
+        """
+        if name in self.bulk:
+            return self.bulk[name], None
+        member = MEMBER.fullmatch(name) if self.bulk else None
+        if member is None or member[1] not in self.bulk:
+            return None
+        own, k = self.bulk[member[1]], int(member[2])
+        if k >= len(own):
+            raise ModelError(f"there is no {name!r}: {own.name!r} has the members 0 to {len(own) - 1}")
+        return own, k
 
     def parts(self) -> list[str]:
         """Names of all that the result says something of."""
-        parts = [e.name for e in self.model.elements() if e.category not in ("initial", "tables")]
+        parts = [e.name for e in self.model.elements() if e.category not in UNSAID]
         return [*parts, ENERGY]
 
     def names(self) -> list[str]:

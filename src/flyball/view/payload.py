@@ -15,7 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from .recording import Channel, Recording, Shape
+from .packing import orientations, positions, rooted
+from .recording import Channel, RecordedContacts, RecordedSet, Recording, Shape, extent
 from .recording_check import check
 
 ALIGNMENT = 8
@@ -71,6 +72,8 @@ def payload(recording: Recording) -> bytes:
             | {"p": block.add(b.p), "q": block.add(_continuous(b.q))}
             for b in recording.bodies
         ],
+        "sets": [_many(many, block) for many in recording.sets],
+        "contacts": None if recording.contacts is None else _contacts(recording.contacts, block),
         "lines": [
             {"name": line.name, "kind": line.kind, "radius": _number(line.radius)}
             | {"points": [block.add(p) for p in line.points]}
@@ -129,6 +132,35 @@ def _shape(shape: Shape, block: _Block) -> dict[str, object]:
         kind = "u2" if len(shape.vertices) <= 65_535 else "u4"
         return out | {"vertices": block.add(shape.vertices), "triangles": block.add(shape.triangles, kind)}
     return out
+
+
+def _many(many: RecordedSet, block: _Block) -> dict[str, object]:
+    """A set of bodies: its poses as `packing` has them."""
+    size = min((extent(shape) for shape in many.shapes), default=1.0)
+    size *= 1.0 if many.scale is None else float(np.min(many.scale, initial=np.inf))
+    p, about = positions(np.asarray(many.p, float), size)
+    kind = str(about.pop("type"))
+    out: dict[str, object] = {"name": many.name, "colors": list(many.colors), "count": int(np.shape(many.p)[1])}
+    out |= {"shapes": [_shape(s, block) for s in many.shapes], "p": block.add(p, kind)} | about
+    out["q"] = block.add(orientations(np.asarray(many.q, float)), "u2")
+    return out | {"scale": None if many.scale is None else block.add(many.scale)}
+
+
+def _contacts(contacts: RecordedContacts, block: _Block) -> dict[str, object]:
+    """Contact forces, each component by itself."""
+    point = np.asarray(contacts.point, float)
+    low = point.min(axis=0, initial=np.inf) if len(point) else np.zeros(3)
+    step = float((point - low).max(initial=0.0)) / 65_535 or 1.0
+    force, largest = rooted(np.asarray(contacts.force, float))
+    return {
+        "begin": block.add(contacts.begin, "u4"),
+        "point": block.add(np.rint((point - low) / step).astype(np.int64), "u2"),
+        "low": _numbers(low),
+        "step": step,
+        "force": block.add(force, "u2"),
+        "largest": largest,
+        "state": block.add(contacts.state, "u1"),
+    }
 
 
 def _continuous(q: np.ndarray) -> np.ndarray:

@@ -38,6 +38,19 @@ class Shape:
     hole: bool = False
 
 
+def extent(shape: Shape) -> float:
+    """About half the largest length of a shape [m]."""
+    if shape.kind == "mesh":
+        return 0.5 * float(np.ptp(np.asarray(shape.vertices), axis=0).max(initial=0.0))
+    if shape.kind == "plate":
+        return 0.5 * float(np.ptp(np.array(shape.outline), axis=0).max())
+    round_ones = {"sphere": 1.0, "ellipsoid": 1.0, "box": 0.5}
+    if shape.kind in round_ones:
+        return round_ones[shape.kind] * max(shape.size)
+    radius, length = shape.size
+    return max(radius, 0.5 * length + (radius if shape.kind == "capsule" else 0.0))
+
+
 @dataclass(frozen=True)
 class RecordedBody:
     """A body: its shapes and its pose over time, ``p`` (n, 3) [m] and ``q`` (n, 4) scalar first, world from body."""
@@ -47,6 +60,36 @@ class RecordedBody:
     p: np.ndarray
     q: np.ndarray
     color: str | None = None
+
+
+@dataclass(frozen=True)
+class RecordedSet:
+    """Many bodies of one shape, named ``name[0]``, ``name[1]``, ...; drawn all at once.
+
+    ``p`` (n, m, 3) [m] and ``q`` (n, m, 4) scalar first, world from body, of m bodies; ``scale`` (m,) of each, if they
+    are of several sizes; ``colors`` of each, to choose in turn, if there are several. A body whose pose is nan is not
+    drawn.
+    """
+
+    name: str
+    shapes: tuple[Shape, ...]
+    p: np.ndarray
+    q: np.ndarray
+    colors: tuple[str, ...] = ()
+    scale: np.ndarray | None = None
+
+
+@dataclass(frozen=True)
+class RecordedContacts:
+    """Contact forces as arrows: those of time i are the rows ``begin[i]`` to ``begin[i + 1]``.
+
+    ``point`` (k, 3) [m], ``force`` (k, 3) [N] on the second of two bodies, ``state`` (k,): 0 sticks, 1 slips.
+    """
+
+    begin: np.ndarray
+    point: np.ndarray
+    force: np.ndarray
+    state: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -231,12 +274,15 @@ class Recording:
     figures: tuple[Figure, ...] = ()  # of a report
     down: Three = (0.0, 0.0, 0.0)  # direction of gravity, or zero
     modes: tuple[RecordedMode, ...] = ()  # to choose from, in place of one motion
+    sets: tuple[RecordedSet, ...] = ()
+    contacts: RecordedContacts | None = None
 
 
 SHOW = {
     "reactions": "reaction forces of joints",
     "elements": "forces of springs, motors and drivers",
     "loads": "given forces",
+    "contacts": "contact forces",
     "moments": "moments beside forces, wherever those are shown",
     "world": "axes of the world",
     "bodies": "axes of bodies",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .recording import SHOW, Channel, RecordedLine, Recording, Shape
+from .recording import SHOW, Channel, RecordedContacts, RecordedLine, RecordedSet, Recording, Shape
 
 SIZES = {"box": 3, "sphere": 1, "cylinder": 2, "capsule": 2, "cone": 2, "ellipsoid": 3, "plate": 1, "mesh": 0}
 LINES = ("spring", "damper", "link", "rope", "arrow")
@@ -31,6 +31,10 @@ def check(recording: Recording) -> None:
         _check_shape(f"body {body.name!r}: q", body.q, (t.size, 4))
         for shape in body.shapes:
             _check_solid(body.name, shape)
+    for many in recording.sets:
+        _check_set(many, t.size)
+    if recording.contacts is not None:
+        _check_contacts(recording.contacts, t.size)
     for line in recording.lines:
         _check_line(line, t.size)
     for arrow in recording.arrows:
@@ -73,6 +77,26 @@ def _check_line(line: RecordedLine, n: int) -> None:
         _check_shape(f"line {line.name!r}: rest", line.rest, (n,))
 
 
+def _check_set(many: RecordedSet, n: int) -> None:
+    m = np.shape(many.p)[1] if np.ndim(many.p) == 3 else 0
+    for what, width in (("p", 3), ("q", 4)):
+        _check_shape(f"set {many.name!r}: {what}", getattr(many, what), (n, m, width))
+    if many.scale is not None and (np.shape(many.scale) != (m,) or not (np.asarray(many.scale) > 0).all()):
+        raise ValueError(f"set {many.name!r}: scale must be {m} positive numbers")
+    if not many.shapes:
+        raise ValueError(f"set {many.name!r}: it has no shape to draw")
+    for shape in many.shapes:
+        _check_solid(many.name, shape)
+
+
+def _check_contacts(contacts: RecordedContacts, n: int) -> None:
+    begin, k = np.asarray(contacts.begin), len(contacts.point)
+    if begin.shape != (n + 1,) or begin[0] != 0 or begin[-1] != k or (np.diff(begin) < 0).any():
+        raise ValueError(f"contacts: begin must ascend from 0 to {k} in {n + 1} steps")
+    for what, shape in (("point", (k, 3)), ("force", (k, 3)), ("state", (k,))):
+        _check_shape(f"contacts: {what}", getattr(contacts, what), shape)
+
+
 def _check_solid(body: str, shape: Shape) -> None:
     _check_kind(f"shape of body {body!r}", shape.kind, tuple(SIZES))
     if len(shape.size) != SIZES[shape.kind] or min(shape.size, default=0) < 0:
@@ -90,11 +114,11 @@ def _check_solid(body: str, shape: Shape) -> None:
 
 def _check_riders(recording: Recording) -> None:
     """Whatever rides on a body names one that is there."""
-    names = [body.name for body in recording.bodies]
+    names = [b.name for b in recording.bodies] + [s.name for s in recording.sets]
     twice = {name for name in names if names.count(name) > 1}
     if twice:
         raise ValueError(f"recording {recording.name!r}: two bodies are named {sorted(twice)[0]!r}")
-    known = {*names, "ground"}
+    known = {*(body.name for body in recording.bodies), "ground"}
     for what in ("joints", "curves", "arrows", "frames", "paths"):
         for rider in getattr(recording, what):
             if rider.body not in known:

@@ -16,16 +16,17 @@ from .problem import (
     RESIDUAL,
     WRITTEN,
 )
-from .residual import contacts_of, lines_of, residuals
+from .residual import contacts_of, lines_of
 
 
 @formula
-def finish(P, X, W, O, used, last):
+def finish(P, X, W, O, left, used, last):
     """Write down how far impulses are from a solution; if it is the last time, make them safe and hand back.
 
-    Impulses are those in X, velocities with them in W.own and X.wide, those without in X.v and W.wide[0].
+    Impulses are those in X, velocities with them in W.own and X.wide, those without in X.v and W.wide[0]; ``left`` is
+    what `residuals` says.
     """
-    velocity, force, linear, square = residuals(P, X, O, W.own, X.wide, X.v, W.wide[0])
+    velocity, force, linear, square = left
     row = O.count[WRITTEN]
     if not last and row < O.history.shape[0]:
         O.history[row, H_ITERATION], O.history[row, H_VELOCITY] = used, velocity

@@ -26,6 +26,7 @@ from .pack import (
     pack,
     take_nodes,
 )
+from .packed import remaining
 from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, ISLAND, MOST, USED, WRITTEN
 from .residual import contacts_of, lines_of
 from .sweeps import visit_ball, visit_rough, visit_smooth, visit_smooth_ball
@@ -74,7 +75,7 @@ def sweep_others(P, X, W, O, many, turned):
     for e in range(many[ROUGH]):
         s = placed(e, many[ROUGH], turned)
         i, j = W.sides[begin + s, 0], W.sides[begin + s, 1]
-        worst = max(worst, visit_rough(W.pack, W.own, i, j, at + 32 * s, O.count[COULOMB]))
+        worst = max(worst, visit_rough(W.pack, W.own, W.inner, i, j, at + 32 * s, O.count[COULOMB]))
     begin, at = begin + many[ROUGH], at + 32 * many[ROUGH]
     for e in range(many[4]):
         s = placed(e, many[4], turned)
@@ -153,11 +154,11 @@ def gauss_seidel(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
         used += 1
         if O.count[HISTORY]:
             unpack(P, X, W, many)
-            finish(P, X, W, O, used, False)
+            finish(P, X, W, O, remaining(P, X, W, O, many), used, False)
         if worst <= O.real[ENOUGH]:
             O.count[ENDED] = CONVERGED
             break
     O.count[USED] = used
     unpack(P, X, W, many)
-    finish(P, X, W, O, used, True)
+    finish(P, X, W, O, remaining(P, X, W, O, many), used, True)
     return used

@@ -20,7 +20,7 @@ WIDTH_BALL, WIDTH_SMOOTH = 16, 20  # numbers of a contact; the rest have 32
 STREAMS = 4
 PARALLEL = 1e-20  # square of the sine below which an arm is along the normal: poses far from the origin are rounded
 # columns of Scratch.own
-SLOW, SPUN, INNER = 6, 7, 8  # 1/m, mean of the block's diagonal, the block
+SLOW, SPUN = 6, 7  # 1/m, mean of the block's diagonal
 # where a ball's numbers stand
 R1, R2, B_BIAS, B_SOFT, B_IN, B_IT, B_MU, B_RATIO, B_P, B_T, B_LEAST = 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 15
 # of a smooth contact: normal, torques of a unit impulse on both sides, what they turn by
@@ -37,35 +37,43 @@ def take_nodes(P, X, W, nodes):
         i = P.member[e]
         for k in range(6):
             W.own[i, k] = X.v[i, k]
-            W.own[i, INNER + k] = P.node[i, 1 + k]
+            W.free[i, k] = X.v[i, k]
+            W.inner[i, k] = P.node[i, 1 + k]
         W.own[i, SLOW] = P.node[i, 0]
         W.own[i, SPUN] = (P.node[i, 1] + P.node[i, 2] + P.node[i, 3]) / 3.0
-    for k in range(16):
-        W.own[P.size[1], k] = 0.0
+    for k in range(8):
+        W.own[P.size[1], k], W.inner[P.size[1], k], W.free[P.size[1], k] = 0.0, 0.0, 0.0
 
 
 @formula
 def along_normal(P, c, side):
     """Whether the arm is along the normal, and its length in that direction."""
-    a = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
-    n = axis(P, c, 0)
-    r, x = dot(a, n), cross(a, n)
-    return dot(x, x) <= PARALLEL * r * r, r
+    a, b, d = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
+    x, y, z = P.frame[c, 0], P.frame[c, 1], P.frame[c, 2]
+    r = a * x + b * y + d * z
+    a, b, d = a - r * x, b - r * y, d - r * z
+    return a * a + b * b + d * d <= PARALLEL * r * r, r
 
 
 @formula
-def kind_of(P, c):
-    """What is to be done for a contact."""
+def kind_of(P, W, c):
+    """What is to be done for a contact; it and the arms of balls are left in W.rows[0]."""
     i, j = P.at[c, 0], P.at[c, 1]
     if i < NONE or j < NONE or P.turn.shape[0] > 0:
         return ANY
-    centred = (i < 0 or along_normal(P, c, 0)[0]) and (j < 0 or along_normal(P, c, 1)[0])
+    first, second = True, True
+    W.rows[0, c, 1], W.rows[0, c, 2] = 0.0, 0.0
+    if i >= 0:
+        first, W.rows[0, c, 1] = along_normal(P, c, 0)
+    if j >= 0:
+        second, W.rows[0, c, 2] = along_normal(P, c, 1)
     if P.mu[c] == 0.0:
-        return SMOOTH_BALL if centred else SMOOTH
+        return SMOOTH_BALL if first and second else SMOOTH
+    if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
+        return ROUGH
     alike = (i < 0 or P.node[i, ROUND] == 1.0) and (j < 0 or P.node[j, ROUND] == 1.0)
-    t = axis(P, c, 2)
-    square = abs(dot(t, t) - 1.0) < 1e-12 and P.bias[c, 1] == 0.0 and P.bias[c, 2] == 0.0
-    return BALL if centred and alike and square else ROUGH
+    x, y, z = P.frame[c, 6], P.frame[c, 7], P.frame[c, 8]
+    return BALL if alike and abs(x * x + y * y + z * z - 1.0) < 1e-12 else ROUGH
 
 
 @formula
@@ -86,24 +94,24 @@ def shuffled(e, m):
 
 
 @formula
-def pack_ball(P, W, c, place):
+def pack_ball(P, X, W, c, place):
     """A contact of balls."""
-    k, i, j = W.pack, P.at[c, 0], P.at[c, 1]
-    dn, dt = 0.0, 0.0
+    k, i, j, r1, r2 = W.pack, P.at[c, 0], P.at[c, 1], W.rows[0, c, 1], -W.rows[0, c, 2]
+    dn, dt, p, q = 0.0, 0.0, X.p[c, 1], X.p[c, 2]
     for s in range(3):
         k[place + s] = P.frame[c, s]
-    k[place + R1], k[place + R2] = 0.0, 0.0
+        k[place + B_T + s] = P.frame[c, 3 + s] * p + P.frame[c, 6 + s] * q
     if i >= 0:
-        r = along_normal(P, c, 0)[1]
-        k[place + R1], dn, dt = r, dn + P.node[i, 0], dt + r * r * P.node[i, 1]
+        dn, dt = dn + P.node[i, 0], dt + r1 * r1 * P.node[i, 1]
     if j >= 0:
-        r = along_normal(P, c, 1)[1]
-        k[place + R2], dn, dt = -r, dn + P.node[j, 0], dt + r * r * P.node[j, 1]
+        dn, dt = dn + P.node[j, 0], dt + r2 * r2 * P.node[j, 1]
     dt += dn
+    k[place + R1], k[place + R2] = r1, r2
     k[place + B_BIAS], k[place + B_SOFT] = P.bias[c, 0], P.soft[c]
     k[place + B_IN] = 1.0 / (dn + P.soft[c]) if dn > 0.0 else 0.0
     k[place + B_IT] = 1.0 / dt if dt > 0.0 else 0.0
     k[place + B_MU], k[place + B_RATIO] = P.mu[c], dt * k[place + B_IN]
+    k[place + B_P], k[place + B_LEAST] = X.p[c, 0], least_of(P, c)
 
 
 @formula
@@ -138,6 +146,7 @@ def pack_rough(P, O, W, c, place):
     for s in range(3):
         k[place + BIAS + s] = P.bias[c, s]
     k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
+    W.rows[1, c, 0] = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
     steps = local_steps(D, P.soft[c], O.count[COULOMB])
     for s in range(8):
         k[place + IN + s] = steps[s]
@@ -171,7 +180,7 @@ def count_kinds(P, W, first, last):
     """How many contacts there are of each kind; the kind of each is left in W.rows[0, c, 0]."""
     a, b, d, e, f = 0, 0, 0, 0, 0
     for c in range(first, last):
-        kind = kind_of(P, c)
+        kind = kind_of(P, W, c)
         W.rows[0, c, 0] = kind
         if kind == SMOOTH_BALL:
             a += 1
@@ -203,30 +212,54 @@ def pack(P, X, W, O, first, many):
 
 @formula
 def put(P, X, W, O, c, kind, visit, place):
-    """One contact."""
-    W.sides[visit, 0] = P.at[c, 0] if P.at[c, 0] >= 0 else P.size[1]
-    W.sides[visit, 1] = P.at[c, 1] if P.at[c, 1] >= 0 else P.size[1]
-    W.sides[visit, 2] = c
-    p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
-    least = least_of(P, c)
-    if kind == SMOOTH_BALL or kind == SMOOTH:
-        p = p[0], 0.0, 0.0
+    """One contact, with its impulse acting."""
+    i, j = P.at[c, 0], P.at[c, 1]
+    i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
+    W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
+    k = W.pack
     if kind == SMOOTH_BALL or kind == BALL:
-        pack_ball(P, W, c, place)
-        W.pack[place + B_LEAST] = least
-        W.pack[place + B_P] = p[0]
-        for s in range(3):
-            W.pack[place + B_T + s] = P.frame[c, 3 + s] * p[1] + P.frame[c, 6 + s] * p[2]
-    elif kind == SMOOTH:
+        pack_ball(P, X, W, c, place)
+        if kind == SMOOTH_BALL:
+            k[place + B_T], k[place + B_T + 1], k[place + B_T + 2] = 0.0, 0.0, 0.0
+        if k[place + B_P] != 0.0:
+            change_balls(
+                k, W.own, i, j, place, (k[place + B_P], k[place + B_T], k[place + B_T + 1], k[place + B_T + 2])
+            )
+        return
+    p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    if kind == SMOOTH:
         pack_smooth(P, W, c, place)
-        W.pack[place + S_LEAST] = least
-        W.pack[place + S_P] = p[0]
+        p = p[0], 0.0, 0.0
+        k[place + S_P], k[place + S_LEAST] = p[0], least_of(P, c)
     else:
         pack_rough(P, O, W, c, place)
-        W.pack[place + LEAST] = least
+        k[place + LEAST] = least_of(P, c)
         for s in range(3):
-            W.pack[place + IMPULSE + s] = p[s]
+            k[place + IMPULSE + s] = p[s]
     if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
         push(P, W.own, X.wide, c, p)
     if P.turn.shape[0] > 0:
         push_turning(P, W.own, X.wide, c, (X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]))
+
+
+@formula
+def change_balls(k, v, i, j, at, p):
+    """What an impulse of a contact of balls does: normal part, tangential vector in the world."""
+    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + R1], k[at + R2]
+    n, a, b, c = p
+    e, f, g = y * c - z * b, z * a - x * c, x * b - y * a  # n x tangential
+    a, b, c = a + n * x, b + n * y, c + n * z
+    m, r = v[j, SLOW], r2 * v[j, SPUN]
+    v[j, 0] += m * a
+    v[j, 1] += m * b
+    v[j, 2] += m * c
+    v[j, 3] -= r * e
+    v[j, 4] -= r * f
+    v[j, 5] -= r * g
+    m, r = v[i, SLOW], r1 * v[i, SPUN]
+    v[i, 0] -= m * a
+    v[i, 1] -= m * b
+    v[i, 2] -= m * c
+    v[i, 3] -= r * e
+    v[i, 4] -= r * f
+    v[i, 5] -= r * g

@@ -91,7 +91,9 @@ class Scratch(NamedTuple):
     nodes: np.ndarray  # (6, nn, 8)
     wide: np.ndarray  # (6, nw): of the groups' velocities
     lines: np.ndarray  # (6, nl)
-    own: np.ndarray  # (nn + 1, 16): of each node v, w, 1/m, mean of its block, the block; the last is what stands still
+    own: np.ndarray  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
+    inner: np.ndarray  # (nn + 1, 8): its block, two unused
+    free: np.ndarray  # (nn + 1, 8): v, w without impulses, two unused
     pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
     sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
 

@@ -16,6 +16,8 @@ from .operator import diagonal_of_line, seen, seen_line, seen_turning
 from .problem import BIAS, COULOMB, HIGH, ISLAND, LOW, SOFT
 from .projection import least_of, projected_above, projected_turning
 
+NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, impulse lacking, square of the largest impulse, b' p, p' N p
+
 
 @formula
 def contacts_of(P, O):
@@ -45,7 +47,8 @@ def larger(a, b):
 def of_contact(P, X, c, u, coulomb):
     """Squares of the impulse that contact c lacks and of its step, and of the impulse, without turning."""
     D = diagonal(P, c)
-    s = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
+    s = D[0] + D[3] + D[5]
+    s = 3.0 / (s + P.soft[c]) if s > 0.0 else 0.0
     n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     more = coulomb * P.mu[c] * sqrt(u[1] * u[1] + u[2] * u[2])  # De Saxce and Feng 1998
     x, y, z = projected_above(P.mu[c], least_of(P, c), n - s * (u[0] + more), a - s * u[1], b - s * u[2])
@@ -79,50 +82,70 @@ def with_bias(P, X, c, u):
 
 
 @formula
-def residuals(P, X, O, v, wide, free, free_wide):
-    """Residual [m/s], force residual [1], b . p and p' N p of impulses in X with velocities v, wide.
+def worse(sofar, more):
+    """Worst residual, impulse lacking and square of the largest impulse; sums of b' p and p' N p.
+
+    more: squares of the impulse that is lacking, step, square of the impulse, b' p, p' N p of one contact or line.
+    """
+    lack = sqrt(more[0])
+    rate = lack / more[1] if more[1] > 0.0 else lack
+    a, b, c = larger(sofar[0], rate), larger(sofar[1], lack), larger(sofar[2], more[2])
+    return a, b, c, sofar[3] + more[3], sofar[4] + more[4]
+
+
+@formula
+def summary(sofar):
+    """Residual [m/s], force residual [1], b . p and p' N p."""
+    worst, lacking, largest, linear, square = sofar
+    return worst, lacking / sqrt(largest) if largest > 0.0 else lacking, linear, square
+
+
+@formula
+def of_one(P, X, O, velocities, c):
+    """What `worse` wants to know of contact c."""
+    v, wide, free, free_wide = velocities
+    n, a, b, coulomb = X.p[c, 0], X.p[c, 1], X.p[c, 2], 1.0 * O.count[COULOMB]
+    d, e = seen(P, v, wide, c), seen(P, free, free_wide, c)
+    u = with_bias(P, X, c, d)
+    linear = n * (e[0] + P.bias[c, 0]) + a * (e[1] + P.bias[c, 1]) + b * (e[2] + P.bias[c, 2])
+    square = n * (d[0] - e[0] + P.soft[c] * n) + a * (d[1] - e[1]) + b * (d[2] - e[2])
+    if P.turn.shape[0] > 0:
+        w, o = seen_turning(P, v, wide, c), seen_turning(P, free, free_wide, c)
+        for k in range(3):
+            linear += X.torque[c, k] * o[k]
+            square += X.torque[c, k] * (w[k] - o[k])
+        lack, s, size = of_turning(P, X, c, u, w, coulomb)
+    else:
+        lack, s, size = of_contact(P, X, c, u, coulomb)
+    return lack, s, size, linear, square
+
+
+@formula
+def residuals(P, X, O, velocities):
+    """Residual [m/s], force residual [1], b . p and p' N p of the impulses in X.
 
     Parameters
     ----------
-    v, wide
-        Velocities with the impulses.
-    free, free_wide
-        Those without.
+    velocities : tuple
+        With the impulses: of nodes and of groups; without them: of nodes and of groups.
     """
-    worst, lacking, largest, linear, square = 0.0, 0.0, 0.0, 0.0, 0.0
-    coulomb = 1.0 * O.count[COULOMB]
+    sofar = NOTHING
     first, last = contacts_of(P, O)
     for c in range(first, last):
-        n, a, b = X.p[c, 0], X.p[c, 1], X.p[c, 2]
-        d, e = seen(P, v, wide, c), seen(P, free, free_wide, c)
-        u = with_bias(P, X, c, d)
-        linear += n * (e[0] + P.bias[c, 0]) + a * (e[1] + P.bias[c, 1]) + b * (e[2] + P.bias[c, 2])
-        square += n * (d[0] - e[0] + P.soft[c] * n) + a * (d[1] - e[1]) + b * (d[2] - e[2])
-        if P.turn.shape[0] > 0:
-            w, o = seen_turning(P, v, wide, c), seen_turning(P, free, free_wide, c)
-            for k in range(3):
-                linear += X.torque[c, k] * o[k]
-                square += X.torque[c, k] * (w[k] - o[k])
-            lack, s, size = of_turning(P, X, c, u, w, coulomb)
-        else:
-            lack, s, size = of_contact(P, X, c, u, coulomb)
-        lack = sqrt(lack)
-        worst, lacking, largest = larger(worst, lack / s), larger(lacking, lack), larger(largest, size)
-    worst, lacking, largest, more, again = of_lines(P, X, O, wide, free_wide, (worst, lacking, largest))
-    return worst, lacking / sqrt(largest) if largest > 0.0 else lacking, linear + more, square + again
+        sofar = worse(sofar, of_one(P, X, O, velocities, c))
+    return summary(of_lines(P, X, O, velocities[1], velocities[3], sofar))
 
 
 @formula
 def of_lines(P, X, O, wide, free_wide, sofar):
-    """As `residuals`, of lines; ``sofar``: residual, lacking impulse, square of the largest impulse."""
-    worst, lacking, largest = sofar
-    linear, square = 0.0, 0.0
+    """What is so far, and of the lines."""
     first, last = lines_of(P, O)
     for k in range(first, last):
         p, d, e = X.line[k], seen_line(P, wide, k), seen_line(P, free_wide, k)
-        linear += p * (e + P.line_x[k, BIAS])
-        square += p * (d - e + P.line_x[k, SOFT] * p)
-        s = 1.0 / diagonal_of_line(P, k)
-        q = min(max(p - s * (d + P.line_x[k, BIAS] + P.line_x[k, SOFT] * p), P.line_x[k, LOW]), P.line_x[k, HIGH])
-        worst, lacking, largest = larger(worst, abs(q - p) / s), larger(lacking, abs(q - p)), larger(largest, p * p)
-    return worst, lacking, largest, linear, square
+        s = diagonal_of_line(P, k)
+        s = 1.0 / s if s > 0.0 else 0.0
+        q = p - s * (d + P.line_x[k, BIAS] + P.line_x[k, SOFT] * p)
+        q = min(max(q, P.line_x[k, LOW]), P.line_x[k, HIGH]) - p
+        linear, square = p * (e + P.line_x[k, BIAS]), p * (d - e + P.line_x[k, SOFT] * p)
+        sofar = worse(sofar, (q * q, s, p * p, linear, square))
+    return sofar

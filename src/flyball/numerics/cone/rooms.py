@@ -54,6 +54,13 @@ def unfilled(contacts: int, nodes: int = 0, groups: int = 0, lines: int = 0, num
     )
 
 
+def aligned(rows: int, columns: int) -> np.ndarray:
+    """Zeros that begin where a line of the processor's cache does: a row of eight numbers is then in one line."""
+    whole = np.zeros(rows * columns + 8)
+    begin = -(whole.ctypes.data // 8) % 8
+    return whole[begin : begin + rows * columns].reshape(rows, columns)
+
+
 def rooms(P: Problem, history: int = 0) -> tuple[State, Scratch, Choices, Factor]:
     """State, scratch, choices and an empty factor for a problem.
 
@@ -75,8 +82,10 @@ def rooms(P: Problem, history: int = 0) -> tuple[State, Scratch, Choices, Factor
         nodes=np.zeros((6, nn, 8)),
         wide=np.zeros((6, nw)),
         lines=np.zeros((6, nl)),
-        own=np.zeros((nn + 1, 16)),
-        pack=np.zeros(PACKED * nc),
+        own=aligned(nn + 1, 8),
+        inner=aligned(nn + 1, 8),
+        free=aligned(nn + 1, 8),
+        pack=aligned(nc, PACKED).ravel(),
         sides=np.zeros((nc, 3), np.int64),
     )
     O = Choices(np.zeros(16, np.int64), np.zeros(16), np.zeros((history, 4)))

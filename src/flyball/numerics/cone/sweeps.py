@@ -28,7 +28,6 @@ from .pack import (
     G2,
     IMPULSE,
     IN,
-    INNER,
     ISS,
     IST,
     ITT,
@@ -47,7 +46,7 @@ from .pack import (
     SLIDE,
     SLOW,
     SOFT,
-    SPUN,
+    change_balls,
 )
 
 
@@ -85,12 +84,18 @@ def visit_smooth_ball(k, v, i, j, at):
 
 
 @formula
+def smooth_velocity(k, v, i, j, at):
+    """Normal velocity of any nodes."""
+    u = k[at] * (v[j, 0] - v[i, 0]) + k[at + 1] * (v[j, 1] - v[i, 1]) + k[at + 2] * (v[j, 2] - v[i, 2])
+    u += k[at + C2] * v[j, 3] + k[at + C2 + 1] * v[j, 4] + k[at + C2 + 2] * v[j, 5]
+    return u - (k[at + C1] * v[i, 3] + k[at + C1 + 1] * v[i, 4] + k[at + C1 + 2] * v[i, 5])
+
+
+@formula
 def visit_smooth(k, v, i, j, at):
     """Any nodes without friction."""
     x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + S_P]
-    u = x * (v[j, 0] - v[i, 0]) + y * (v[j, 1] - v[i, 1]) + z * (v[j, 2] - v[i, 2])
-    u += k[at + C2] * v[j, 3] + k[at + C2 + 1] * v[j, 4] + k[at + C2 + 2] * v[j, 5]
-    u -= k[at + C1] * v[i, 3] + k[at + C1 + 1] * v[i, 4] + k[at + C1 + 2] * v[i, 5]
+    u = smooth_velocity(k, v, i, j, at)
     q = p - (u + k[at + S_BIAS] + k[at + S_SOFT] * p) * k[at + S_IN]
     q = q if q > k[at + S_LEAST] else k[at + S_LEAST]
     d = q - p
@@ -114,42 +119,33 @@ def visit_smooth(k, v, i, j, at):
 
 
 @formula
+def sliding(k, v, i, j, at, d):
+    """Tangential velocity in the world of balls, d: that of their centres and its normal part."""
+    x, y, z, r1, r2 = k[at], k[at + 1], k[at + 2], k[at + R1], k[at + R2]
+    e, f, g = r2 * v[j, 3], r2 * v[j, 4], r2 * v[j, 5]
+    e, f, g = e + r1 * v[i, 3], f + r1 * v[i, 4], g + r1 * v[i, 5]
+    # u = v2 - v1 - (r2 w2 + r1 w1) x n, less its normal part
+    a, b, c, n = d
+    return a - n * x - (f * z - g * y), b - n * y - (g * x - e * z), c - n * z - (e * y - f * x)
+
+
+@formula
 def visit_ball(k, v, i, j, at, coulomb):
     """Balls: the tangential impulse is a vector in the world, and no block couples it with the normal one."""
-    x, y, z, p = k[at], k[at + 1], k[at + 2], k[at + B_P]
-    a, b, c = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2]
-    un = x * a + y * b + z * c
+    a, b, c, p = v[j, 0] - v[i, 0], v[j, 1] - v[i, 1], v[j, 2] - v[i, 2], k[at + B_P]
+    un = k[at] * a + k[at + 1] * b + k[at + 2] * c
     n = p - (un + k[at + B_BIAS] + k[at + B_SOFT] * p) * k[at + B_IN]
     if n <= 0.0 and p == 0.0 and coulomb and k[at + B_LEAST] == 0.0:
         return 0.0
-    r1, r2 = k[at + R1], k[at + R2]
-    e, f, g = r2 * v[j, 3] + r1 * v[i, 3], r2 * v[j, 4] + r1 * v[i, 4], r2 * v[j, 5] + r1 * v[i, 5]
-    # u = v2 - v1 - (r2 w2 + r1 w1) x n, less its normal part
+    a, b, c = sliding(k, v, i, j, at, (a, b, c, un))
     it, s, t, w = k[at + B_IT], k[at + B_T], k[at + B_T + 1], k[at + B_T + 2]
-    a = s - it * (a - un * x - (f * z - g * y))
-    b = t - it * (b - un * y - (g * x - e * z))
-    c = w - it * (c - un * z - (e * y - f * x))
+    a, b, c = s - it * a, t - it * b, w - it * c
     q, part = limited(n, sqrt(a * a + b * b + c * c), k[at + B_MU], k[at + B_RATIO], coulomb, k[at + B_LEAST])
     a, b, c = part * a, part * b, part * c
     k[at + B_P], k[at + B_T], k[at + B_T + 1], k[at + B_T + 2] = q, a, b, c
     n, a, b, c = q - p, a - s, b - t, c - w
-    e, f, g = y * c - z * b, z * a - x * c, x * b - y * a  # n x change
-    a, b, c = a + n * x, b + n * y, c + n * z
-    m, r = v[j, SLOW], r2 * v[j, SPUN]
-    v[j, 0] += m * a
-    v[j, 1] += m * b
-    v[j, 2] += m * c
-    v[j, 3] -= r * e
-    v[j, 4] -= r * f
-    v[j, 5] -= r * g
-    m, r = v[i, SLOW], r1 * v[i, SPUN]
-    v[i, 0] -= m * a
-    v[i, 1] -= m * b
-    v[i, 2] -= m * c
-    v[i, 3] -= r * e
-    v[i, 4] -= r * f
-    v[i, 5] -= r * g
-    return (abs(a) + abs(b) + abs(c)) / it
+    change_balls(k, v, i, j, at, (n, a, b, c))
+    return (abs(n) + abs(a) + abs(b) + abs(c)) / it
 
 
 @formula
@@ -161,16 +157,29 @@ def velocity_at(k, v, i, at):
 
 
 @formula
-def change(k, v, i, at, x, y, z):
+def rough_velocity(k, v, i, j, at):
+    """Velocity of a rough contact along its frame, without bias."""
+    a, b, c = velocity_at(k, v, j, at + ARM2)
+    e, f, g = velocity_at(k, v, i, at + ARM1)
+    a, b, c = a - e, b - f, c - g
+    return (
+        k[at] * a + k[at + 1] * b + k[at + 2] * c,
+        k[at + 3] * a + k[at + 4] * b + k[at + 5] * c,
+        k[at + 6] * a + k[at + 7] * b + k[at + 8] * c,
+    )
+
+
+@formula
+def change(k, v, B, i, at, x, y, z):
     """What an impulse at that point does to node i."""
     a, b, c, m = k[at], k[at + 1], k[at + 2], v[i, SLOW]
     e, f, g = b * z - c * y, c * x - a * z, a * y - b * x
     v[i, 0] += m * x
     v[i, 1] += m * y
     v[i, 2] += m * z
-    v[i, 3] += v[i, INNER] * e + v[i, INNER + 3] * f + v[i, INNER + 4] * g
-    v[i, 4] += v[i, INNER + 3] * e + v[i, INNER + 1] * f + v[i, INNER + 5] * g
-    v[i, 5] += v[i, INNER + 4] * e + v[i, INNER + 5] * f + v[i, INNER + 2] * g
+    v[i, 3] += B[i, 0] * e + B[i, 3] * f + B[i, 4] * g
+    v[i, 4] += B[i, 3] * e + B[i, 1] * f + B[i, 5] * g
+    v[i, 5] += B[i, 4] * e + B[i, 5] * f + B[i, 2] * g
 
 
 @formula
@@ -194,16 +203,9 @@ def stepped(k, at, u, coulomb):
 
 
 @formula
-def visit_rough(k, v, i, j, at, coulomb):
+def visit_rough(k, v, B, i, j, at, coulomb):
     """Any nodes."""
-    a, b, c = velocity_at(k, v, j, at + ARM2)
-    e, f, g = velocity_at(k, v, i, at + ARM1)
-    a, b, c = a - e, b - f, c - g
-    u = (
-        k[at] * a + k[at + 1] * b + k[at + 2] * c,
-        k[at + 3] * a + k[at + 4] * b + k[at + 5] * c,
-        k[at + 6] * a + k[at + 7] * b + k[at + 8] * c,
-    )
+    u = rough_velocity(k, v, i, j, at)
     n, s, t = stepped(k, at, u, coulomb)
     dn, ds, dt = n - k[at + IMPULSE], s - k[at + IMPULSE + 1], t - k[at + IMPULSE + 2]
     if dn == 0.0 and ds == 0.0 and dt == 0.0:
@@ -212,6 +214,6 @@ def visit_rough(k, v, i, j, at, coulomb):
     x = k[at] * dn + k[at + 3] * ds + k[at + 6] * dt
     y = k[at + 1] * dn + k[at + 4] * ds + k[at + 7] * dt
     z = k[at + 2] * dn + k[at + 5] * ds + k[at + 8] * dt
-    change(k, v, j, at + ARM2, x, y, z)
-    change(k, v, i, at + ARM1, -x, -y, -z)
+    change(k, v, B, j, at + ARM2, x, y, z)
+    change(k, v, B, i, at + ARM1, -x, -y, -z)
     return (abs(dn) + abs(ds) + abs(dt)) / k[at + IN]

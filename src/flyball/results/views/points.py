@@ -41,6 +41,14 @@ class PointView(View):
         return stacked(self._record[5], self._result.planar)
 
     @property
+    def contact_force(self) -> np.ndarray:
+        """Of a body: sum of the contact forces on it [N], world axes, (n, 2) or (n, 3)."""
+        found, n = self._result.contacts, 2 if self._result.planar else 3
+        if found is None or self.element.name not in found.sides.names:
+            return np.zeros((len(self._result.t), n))
+        return found.force_on(*found.sides.span(self.element.name))[:, 0, :n]
+
+    @property
     def rotation(self) -> np.ndarray:
         """Rotation matrices, world from frame, (n, 3, 3)."""
         return np.stack(self._record[1], axis=1).reshape(-1, 3, 3)

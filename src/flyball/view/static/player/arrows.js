@@ -4,6 +4,7 @@ import { pointAt, sampleNumbers } from "./data.js";
 import { ORDER } from "./flats.js";
 import { aim } from "./lines.js";
 import { Look } from "./look.js";
+import { Touches } from "./touches.js";
 
 const SLIM = 0.008; // radius of an arrow over typical length
 const LONGEST = 0.2; // length of the largest arrow, as part of the motion's extent
@@ -13,7 +14,13 @@ const LEAST = 0.03; // the lever, over typical length, on which the largest forc
 const SHORTEST = 0.012; // arrows shorter than this, over typical length, are left out
 const USUALLY = 0.99; // part of the times at which the largest arrow is not longer than that
 
-export const GROUPS = { reaction: "Joint reactions", element: "Springs, motors, drivers", load: "Given loads" };
+export const GROUPS = {
+  reaction: "Joint reactions",
+  element: "Springs, motors, drivers",
+  load: "Given loads",
+  stick: "Contacts that stick",
+  slip: "Contacts that slip",
+};
 
 /** The least of 1, 1.5, 2, 3, 5, 7 times a power of ten that is not below a number. */
 export function niceAbove(number) {
@@ -36,8 +43,10 @@ export class Arrows {
   constructor(recording, unit, extent, place) {
     Object.assign(this, { unit, extent, place, planar: recording.planar, factor: 1, frame: { i: 0, j: 0, f: 0 } });
     this.root = new THREE.Group();
-    this.shown = { reaction: false, element: false, load: false, moments: false };
+    this.shown = { reaction: false, element: false, load: false, contact: false, moments: false };
     this.items = recording.arrows.map((data, k) => this.#build(data, k));
+    this.touches = recording.contacts ? new Touches(recording.contacts, 0.75 * SLIM * unit, recording.planar) : null;
+    if (this.touches) this.root.add(this.touches.root);
     this.rescale();
   }
 
@@ -60,6 +69,7 @@ export class Arrows {
   /** Switch a group of arrows, or moments, on or off. */
   show(name, on) {
     this.shown[name] = on;
+    if (this.touches && name === "contact") this.touches.on = on;
     this.rescale();
   }
 
@@ -68,7 +78,8 @@ export class Arrows {
     this.factor = factor;
     const largest = (what) =>
       this.items.filter((item) => this.isOn(item) && item.data.what === what).reduce((m, a) => Math.max(m, a.usual), 0);
-    const [force, moment] = [largest("force"), largest("moment")];
+    const touching = this.touches?.on ? this.touches.usual : 0;
+    const [force, moment] = [Math.max(largest("force"), touching), largest("moment")];
     const worthwhile = Math.max(moment, LEAST * force * this.unit); // a small moment beside forces stays small
     const perMetre = (reference) => (reference > 0 ? niceAbove(reference / (LONGEST * this.extent * this.factor)) : 0);
     this.perMetre = { force: perMetre(force), moment: perMetre(moment && worthwhile) };
@@ -79,6 +90,7 @@ export class Arrows {
   seek(frame) {
     this.frame = frame;
     const v = new THREE.Vector3();
+    this.touches?.seek(frame, this.perMetre.force, SHORTEST * this.unit);
     for (const item of this.items) {
       const { data, group, bent } = item;
       const size = pointAt(data.vector, frame, v).length();
@@ -103,6 +115,7 @@ export class Arrows {
     const groups = Object.keys(GROUPS)
       .filter((group) => on.some(({ data }) => data.group === group))
       .map((group) => ({ group, force: peak(group, "force"), moment: peak(group, "moment") }));
+    for (const [group, force] of this.touches?.on ? this.touches.peaks() : []) groups.push({ group, force, moment: 0 });
     return { groups, perMetre: this.perMetre };
   }
 
@@ -120,5 +133,7 @@ export class Arrows {
 
   retheme(theme) {
     for (const { look } of this.items) look.retheme(theme);
+    this.touches?.retheme(theme);
+    this.seek(this.frame);
   }
 }

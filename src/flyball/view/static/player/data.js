@@ -13,7 +13,7 @@ function unshuffled(bytes, width) {
   return out.buffer;
 }
 
-const NUMBERS = { f8: Float64Array, f4: Float32Array, u2: Uint16Array, u4: Uint32Array };
+const NUMBERS = { f8: Float64Array, f4: Float32Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array };
 
 const isReference = (value) => Number.isInteger(value?.at) && Number.isInteger(value.count) && value.type in NUMBERS;
 

@@ -120,7 +120,7 @@ function flatMesh(shape, colour, paint, order) {
 }
 
 /** A shape that looks round in the plane: only a mark shows how it turns. */
-function looksRound({ kind, quaternion: [, x, y] }) {
+export function looksRound({ kind, quaternion: [, x, y] }) {
   return kind === "sphere" || (kind === "cylinder" && Math.abs(x) + Math.abs(y) < 1e-6);
 }
 

@@ -2,6 +2,7 @@
 import * as THREE from "three";
 import { pointAt, poseAt, sampleNumbers } from "./data.js";
 import { hull, silhouette } from "./flats.js";
+import { originsBox } from "./packed.js";
 import { cornersOf } from "./solids.js";
 
 const BUDGET = 60000; // points looked at, in all
@@ -38,6 +39,33 @@ function jointPoints(joint, unit, planar) {
   );
 }
 
+const PICTURES = 40; // of a set, looked at
+const SNUG = 0.6; // of the distance of a shape's corners: bodies are round, or lie flat
+
+/** Corners of a box made larger by a length all around. */
+function cornersAround([low, high], reach) {
+  const ends = [0, 1, 2].map((c) => [low[c] - reach, high[c] + reach]);
+  return ends[0].flatMap((x) => ends[1].flatMap((y) => ends[2].map((z) => new THREE.Vector3(x, y, z))));
+}
+
+/** Corners of boxes that hold the sets of bodies. */
+function crowdPoints({ sets, t }) {
+  return sets.flatMap((data) => {
+    const low = new THREE.Vector3();
+    const high = new THREE.Vector3();
+    for (const shape of data.shapes)
+      for (const corner of cornersOf(shape)) {
+        low.min(corner);
+        high.max(corner);
+      }
+    const reach = Math.max(low.length(), high.length()) * Math.max(...(data.scale ?? [1])) * SNUG;
+    return sampleNumbers(t.length, PICTURES).flatMap((picture) => {
+      const box = originsBox(data, picture);
+      return box ? cornersAround(box, reach) : [];
+    });
+  });
+}
+
 /** Points that enclose the motion over all times. */
 export function motionPoints(recording, unit) {
   const { bodies, lines, joints, curves, planar, t } = recording;
@@ -52,6 +80,7 @@ export function motionPoints(recording, unit) {
     const n = columns.length / 3;
     for (const i of sampleNumbers(n, 24)) target.push(pointAt(columns, { i, j: i, f: 0 }, new THREE.Vector3()));
   }
+  points.push(...crowdPoints(recording));
   const ends = lines.flatMap((line) => line.points);
   const each = [...own.values()].reduce((sum, list) => sum + list.length, 1) + ends.length;
   const pose = new THREE.Group();

@@ -9,7 +9,7 @@ import { Keys } from "./keys.js";
 import { Mechanism } from "./mechanism.js";
 import { Names } from "./names.js";
 import { axesMark, partTip, scaleMark } from "./overlay.js";
-import { bodyLegend, channelPicker, summary } from "./panels.js";
+import { bodyCount, bodyLegend, channelPicker, summary } from "./panels.js";
 import { Plots } from "./plots.js";
 import { Card } from "./select.js";
 import { Shown } from "./shown.js";
@@ -88,7 +88,7 @@ function begin(clock, { time, play }) {
 
 function describe(recording) {
   const span = recording.t.at(-1) - recording.t[0];
-  const bodies = recording.bodies.length === 1 ? "1 body" : `${recording.bodies.length} bodies`;
+  const bodies = bodyCount(recording);
   const { modes } = recording;
   if (modes.length)
     find(".subtitle").textContent = `${bodies}, ${modes.length === 1 ? "1 mode" : `${modes.length} modes`}`;
@@ -247,12 +247,15 @@ function choosing(picture, recording, plots, now) {
   const legend = bodyLegend(find(".legend ul"), find(".legend > button"), mechanism, {
     onShow: (index, on) => redraw(mechanism.show(index, on)),
     onTrail: (index, on) => redraw(mechanism.trace(index, on)),
+    onSet: (index, on) => redraw(mechanism.crowds[index].show(on)),
     onPath: (trail, on) => redraw(trail && (trail.root.visible = on)),
     onPoint: (index, on) => chosen.glow(mechanism.bodies[index].name, on),
     onSelect: (index) => chosen.select(mechanism.bodies[index]),
   });
   const chosen = selection(picture, card, legend, find(".follow"), now);
-  legend.open(innerWidth >= ROOMY && mechanism.bodies.length + mechanism.trails.length <= FEW);
+  legend.open(
+    innerWidth >= ROOMY && mechanism.bodies.length + mechanism.crowds.length + mechanism.trails.length <= FEW,
+  );
   stage.resize();
   partTip(find(".stage"), find(".tip"), stage, (part, on) => chosen.glow(part.name, on));
   clicks(stage, chosen.select);
@@ -332,9 +335,25 @@ function hooks(clock, { mechanism, stage }, recording, shown, chosen, modes) {
     },
     play: (on = true) => clock.play(on),
     pose: () => mechanism.pose(),
+    poses: (set) => mechanism.crowds.find(({ name }) => name === set)?.poses() ?? [],
+    contacts: () => mechanism.arrows.touches?.list(mechanism.arrows.frame) ?? [],
+    drawn: () => stage.drawn,
+    /** Milliseconds of script for one frame, the picture's commands included, over `n` frames through the motion. */
+    effort(n = 60) {
+      const [from, to] = [recording.t[0], recording.t.at(-1)];
+      const start = performance.now();
+      for (let k = 0; k < n; k++) mechanism.seek(from + ((to - from) * k) / n);
+      const moved = performance.now();
+      for (let k = 0; k < n; k++) {
+        stage.dirty = true;
+        stage.draw(performance.now());
+      }
+      return { moving: (moved - start) / n, drawing: (performance.now() - moved) / n };
+    },
     time: () => clock.time,
     playing: () => clock.playing,
     bodies: () => recording.bodies.map((body) => body.name),
+    pick: (x, y) => stage.pick(x, y)?.name ?? null,
     look: (view) => stage.look(view),
     webgl: () => Boolean(stage.renderer),
     show: (name, on = true) => shown.set(name, on),

@@ -1,6 +1,7 @@
 // The drawn mechanism: every body, line and joint of a recording as three.js objects, set to any time.
 import * as THREE from "three";
 import { Arrows } from "./arrows.js";
+import { Crowd } from "./crowd.js";
 import { frameAt, pointAt, poseAt } from "./data.js";
 import { ORDER, flatBody, stroke } from "./flats.js";
 import { flatJoint } from "./joints2d.js";
@@ -21,6 +22,8 @@ export class Mechanism {
     this.overlay = new THREE.Group(); // drawn on top of everything else
     const colours = bodyColours(recording.bodies);
     this.bodies = recording.bodies.map((body, k) => this.#body(body, colours[k], k));
+    const palette = bodyColours([...recording.bodies, ...recording.sets.map(({ name }) => ({ name }))]);
+    this.crowds = recording.sets.map((data, k) => this.#crowd(data, palette[recording.bodies.length + k], k));
     this.byName = new Map(this.bodies.map((body) => [body.name, body]));
     this.lines = recording.lines.map((line, k) => this.#line(line, k));
     this.joints = recording.joints.map((joint, k) => this.#joint(joint, k));
@@ -39,6 +42,13 @@ export class Mechanism {
     const part = { ...drawn, name: body.name, category: "body", colour, data: body, shown: true, trail: null };
     drawn.group.traverse((object) => (object.userData.part = part));
     return part;
+  }
+
+  #crowd(data, colour, index) {
+    const { planar, bodies } = this.recording;
+    const crowd = new Crowd(data, colour, { planar, unit: this.unit, order: bodies.length + index });
+    this.root.add(crowd.root);
+    return crowd;
   }
 
   #line(line, index) {
@@ -91,9 +101,18 @@ export class Mechanism {
 
   /** Where something is now that rides on a body. */
   place({ body, position }, out) {
-    const group = this.byName.get(body)?.group;
+    const group = (this.byName.get(body) ?? this.member(body))?.group;
     out.set(...position);
     return group ? out.applyQuaternion(group.quaternion).add(group.position) : out;
+  }
+
+  /** The member of a set by a name such as "balls[17]", or null. */
+  member(name) {
+    for (const crowd of this.crowds) {
+      const part = crowd.named(name);
+      if (part) return part;
+    }
+    return null;
   }
 
   /** Put everything where it is at a time. */
@@ -108,6 +127,7 @@ export class Mechanism {
       shade.quaternion.copy(group.quaternion);
       shade.visible = group.visible;
     }
+    for (const crowd of this.crowds) crowd.seek(frame);
     for (const line of this.lines) line.update(frame);
     for (const { trail } of [...this.bodies, ...this.trails]) trail?.seek();
     this.arrows.seek(frame);
@@ -121,7 +141,15 @@ export class Mechanism {
   }
 
   retheme(theme) {
-    const parts = [...this.bodies, ...this.lines, ...this.joints, ...this.curves, this.arrows, this.triads];
+    const parts = [
+      ...this.bodies,
+      ...this.crowds,
+      ...this.lines,
+      ...this.joints,
+      ...this.curves,
+      this.arrows,
+      this.triads,
+    ];
     for (const part of parts) part.retheme(theme);
   }
 
@@ -142,6 +170,8 @@ export class Mechanism {
 
   /** Every part of a name that can be lit up: a joint may be drawn with two symbols. */
   parts(name) {
+    const member = this.member(name);
+    if (member) return [member];
     return [...this.bodies, ...this.lines, ...this.joints].filter((part) => part.name === name);
   }
 
@@ -150,12 +180,15 @@ export class Mechanism {
     const meshes = [];
     const visit = (object) => {
       if (!object.visible) return;
-      if (object.isMesh && !object.isLineSegments2 && object.userData.part) meshes.push(object);
+      if (object.isMesh && !object.isLineSegments2 && (object.userData.part || object.userData.crowd))
+        meshes.push(object);
       object.children.forEach(visit);
     };
     visit(this.root);
     const hits = raycaster.intersectObjects(meshes, false);
     if (this.recording.planar) hits.sort((a, b) => b.object.renderOrder - a.object.renderOrder);
-    return hits[0]?.object.userData.part ?? null;
+    if (!hits.length) return null;
+    const [{ object, instanceId }] = hits;
+    return object.userData.crowd?.member(instanceId) ?? object.userData.part;
   }
 }

@@ -107,8 +107,19 @@ function switchButton(className, title, on, onClick, ...children) {
   return button;
 }
 
+/** How many bodies there are, in words. */
+export function bodyCount({ bodies, sets }) {
+  const count = sets.reduce((sum, set) => sum + set.count, bodies.length);
+  return count === 1 ? "1 body" : `${count} bodies`;
+}
+
 /** The legend: a row for each body, to select it, to hide it, or to show its path; then the paths asked for. */
-export function bodyLegend(box, toggle, { bodies, trails }, { onShow, onTrail, onPoint, onSelect, onPath }) {
+export function bodyLegend(
+  box,
+  toggle,
+  { bodies, trails, crowds },
+  { onShow, onTrail, onPoint, onSelect, onPath, onSet },
+) {
   const swatch = (colour, className = "swatch") => {
     const mark = element("span", { className });
     mark.style.background = colour;
@@ -150,8 +161,18 @@ export function bodyLegend(box, toggle, { bodies, trails }, { onShow, onTrail, o
       switchButton("eye", `Show the path ${name}`, true, (on) => onPath(trail, on), eye()),
     );
   });
-  box.append(...rows, ...paths);
-  toggle.querySelector("span").textContent = bodies.length === 1 ? "1 body" : `${bodies.length} bodies`;
+  const sets = crowds.map(({ name, colour, count }, index) => {
+    const text = element("span", { className: "name", textContent: `${name} (${count})` });
+    const label = element("span", { className: "body" }, swatch(colour), text);
+    return element(
+      "li",
+      {},
+      label,
+      switchButton("eye", `Show ${name}`, true, (on) => onSet(index, on), eye()),
+    );
+  });
+  box.append(...rows, ...sets, ...paths);
+  toggle.querySelector("span").textContent = bodyCount({ bodies, sets: crowds });
   const open = (on) => {
     box.hidden = !on;
     toggle.setAttribute("aria-expanded", String(on));

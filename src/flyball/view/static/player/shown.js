@@ -2,11 +2,12 @@
 import { GROUPS } from "./arrows.js";
 import { element, lengthText, shortNumber } from "./format.js";
 
-const ARROWS = { reactions: "reaction", elements: "element", loads: "load", moments: "moments" };
+const ARROWS = { reactions: "reaction", elements: "element", loads: "load", contacts: "contact", moments: "moments" };
 export const LABELS = {
   reactions: "Joint reactions",
   elements: "Springs, motors, drivers",
   loads: "Given loads",
+  contacts: "Contact forces",
   moments: "with moments",
   world: "World axes",
   bodies: "Body axes",
@@ -20,6 +21,7 @@ export class Shown {
   constructor(menu, legend, targets, onChange) {
     Object.assign(this, { menu, legend, targets, onChange, state: {} });
     const present = new Set(targets.mechanism.recording.arrows.map(({ group }) => `${group}s`));
+    if (targets.mechanism.arrows.touches) present.add("contacts");
     const moments = targets.mechanism.recording.arrows.some(({ what }) => what === "moment");
     const useful = (name) => (ARROWS[name] ? (name === "moments" ? moments : present.has(name)) : true);
     this.names = Object.keys(LABELS).filter(useful);
@@ -41,6 +43,7 @@ export class Shown {
     if (!this.names.includes(name)) return;
     this.state[name] = on;
     this.boxes[name].checked = on;
+    if (name === "contacts") for (const crowd of mechanism.crowds) crowd.fade(on);
     if (ARROWS[name]) mechanism.arrows.show(ARROWS[name], on);
     else if (name === "grid") stage.grid.visible = on;
     else if (name === "names") names.show(on);

@@ -236,6 +236,7 @@ export class Stage {
     if (!this.renderer) return true;
     this.renderer.autoClear = true;
     this.renderer.render(this.scene, this.camera);
+    this.drawn = { ...this.renderer.info.render };
     this.renderer.autoClear = false;
     this.renderer.clearDepth();
     this.renderer.render(this.top, this.camera);

@@ -1,0 +1,237 @@
+"""Contacts of a motion: where bodies touched at each output time, and with which forces."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from .convergence import Convergence
+from .pair_force import PairForce, summed
+from .sides import STATES, Sides
+
+if TYPE_CHECKING:
+    import pandas
+
+ARRAYS = {  # columns of the table: type, numbers a row
+    "pair": ("i8", 2),
+    "point": ("f8", 3),
+    "normal": ("f8", 3),
+    "gap": ("f8", 0),
+    "force": ("f8", 3),
+    "state": ("i8", 0),
+    "friction": ("f8", 0),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Contacts:
+    """Contacts at the output times, row by row; the rows of time ``i`` are ``begin[i]`` to ``begin[i + 1]``.
+
+    ``run.contacts.at(0.5)``, ``run.contacts.between("ball", "ground")``, ``run.contacts.on("ball")``.
+
+    Attributes
+    ----------
+    t : ndarray (n,) [s]
+    sides : Sides
+        Who touches.
+    begin : ndarray (n + 1,) of int
+    pair : ndarray (k, 2) of int
+        The two sides, as `Sides` counts them.
+    point : ndarray (k, 3) [m]
+        Midway between the surfaces, world axes.
+    normal : ndarray (k, 3)
+        From the first side to the second.
+    gap : ndarray (k,) [m]
+        Below zero where they overlap.
+    force : ndarray (k, 3) [N]
+        On the second side, the mean over the step that ends at the time, world axes.
+    state : ndarray (k,) of int
+        `STICK`, `SLIP` or `OPEN`, of which `STATES` has the names.
+    friction : ndarray (k,)
+        The coefficient that was used.
+    history : Convergence or None
+        How far each solve of the run went, if that was asked for.
+    planar : bool
+    """
+
+    t: np.ndarray
+    sides: Sides
+    begin: np.ndarray
+    pair: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    gap: np.ndarray
+    force: np.ndarray
+    state: np.ndarray
+    friction: np.ndarray
+    history: Convergence | None = None
+    planar: bool = False
+    _known: dict[Any, Any] = field(default_factory=dict, init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Refuse tables that do not fit together."""
+        k, n = len(self.pair), len(self.t)
+        for name, (_, width) in ARRAYS.items():
+            want = (k, width) if width else (k,)
+            if np.shape(getattr(self, name)) != want:
+                raise ValueError(f"contacts: {name} must have shape {want}, got {np.shape(getattr(self, name))}")
+        b = np.asarray(self.begin)
+        if b.shape != (n + 1,) or b[0] != 0 or b[-1] != k or (np.diff(b) < 0).any():
+            raise ValueError(f"contacts: begin must ascend from 0 to {k} in {n + 1} steps")
+        if k and not (np.min(self.pair) >= 0 and np.max(self.pair) < len(self.sides)):
+            raise ValueError(f"contacts: pair names sides beyond the {len(self.sides)} that there are")
+
+    def __len__(self) -> int:
+        return len(self.pair)
+
+    @cached_property
+    def when(self) -> np.ndarray:
+        """Index of the output time of each row."""
+        return np.repeat(np.arange(len(self.t)), np.diff(self.begin))
+
+    @cached_property
+    def normal_force(self) -> np.ndarray:
+        """Along the normal, pressing positive [N], (k,)."""
+        return np.einsum("ij,ij->i", self.force, self.normal)
+
+    @cached_property
+    def tangential_force(self) -> np.ndarray:
+        """In the tangent plane, on the second side [N], (k, 3)."""
+        return self.force - self.normal_force[:, None] * self.normal
+
+    @property
+    def worst_overlap(self) -> float:
+        """Deepest overlap at an output time [m]; 0 if nothing overlapped."""
+        return float(-np.min(self.gap, initial=0.0))
+
+    @property
+    def count(self) -> np.ndarray:
+        """Contacts at each output time, (n,)."""
+        return np.diff(self.begin)
+
+    def at(self, t: float) -> Contacts:
+        """The contacts at the output time nearest to ``t`` [s], as a table of one time.
+
+        Raises
+        ------
+        ModelError
+            If ``t`` is no number or outside of the motion.
+        """
+        if not len(self.t):
+            raise ModelError("the motion has no output times, so there are no contacts to read")
+        low, high = float(self.t[0]), float(self.t[-1])
+        slack = 1e-9 * max(high - low, abs(high))
+        if not isinstance(t, (int, float, np.number)) or not low - slack <= float(t) <= high + slack:
+            raise ModelError(f"contacts: t is {t!r}; it must be a time [s] from {low:g} to {high:g}")
+        i = int(np.abs(self.t - float(t)).argmin())
+        return self._rows(slice(int(self.begin[i]), int(self.begin[i + 1])), np.array([i]))
+
+    def _rows(self, rows: Any, times: np.ndarray) -> Contacts:
+        """Some rows of some output times."""
+        own = {name: getattr(self, name)[rows] for name in ARRAYS}
+        count = np.bincount(self.when[rows], minlength=len(self.t))[times]
+        return replace(self, t=self.t[times], begin=np.r_[0, np.cumsum(count)], history=None, **own)
+
+    def taken(self, times: np.ndarray) -> Contacts:
+        """The same at some of the output times, by their ascending indices."""
+        return self._rows(np.isin(self.when, times), np.asarray(times))
+
+    def between(self, a: str, b: str) -> PairForce:
+        """What ``a`` does to ``b`` over time: the sum over all their contacts.
+
+        Parameters
+        ----------
+        a, b : str
+            Names of bodies, of ``"ground"``, of sets (all their members), or of members: ``"balls[17]"``.
+
+        Raises
+        ------
+        ModelError
+            If there is none of these names.
+        """
+        return self._summed(b, a)
+
+    def on(self, name: str) -> PairForce:
+        """What all others do to a body, a member of a set, or a whole set, over time."""
+        return self._summed(name, None)
+
+    def _summed(self, on: str, by: str | None) -> PairForce:
+        if (on, by) not in self._known:
+            self._known[on, by] = summed(self, on, by)
+        return self._known[on, by]
+
+    def force_on(self, low: int, high: int) -> np.ndarray:
+        """Contact forces on the sides ``low`` to ``high`` (excluded), summed, (n, high - low, 3) [N], world axes."""
+        n, m = len(self.t), high - low
+        out = np.zeros((n * m, 3))
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            k = self.pair[:, side]
+            own = (k >= low) & (k < high)
+            at = self.when[own] * m + k[own] - low
+            for c in range(3):
+                out[:, c] += sign * np.bincount(at, self.force[own, c], n * m)
+        return out.reshape(n, m, 3)
+
+    def names(self) -> list[tuple[str, str]]:
+        """Names of the two sides, row by row."""
+        return [(self.sides.name(a), self.sides.name(b)) for a, b in self.pair.tolist()]
+
+    def table(self) -> dict[str, np.ndarray]:
+        """Every row as columns: time, names of the sides, x, y, z, normal, gap, force, state, friction."""
+        names = self.names()
+        out = {"t": self.t[self.when], "side_1": _texts([a for a, _ in names]), "side_2": _texts([b for _, b in names])}
+        axes = "xy" if self.planar else "xyz"
+        for label, what in (("", self.point), ("n", self.normal), ("f", self.force)):
+            out |= {f"{label}{a}": what[:, k] for k, a in enumerate(axes)}
+        states = np.array(STATES)[self.state]
+        return out | {"gap": self.gap, "normal_force": self.normal_force, "state": states, "friction": self.friction}
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """The table as a data frame, units in ``attrs["units"]``."""
+        import pandas as pd
+
+        frame = pd.DataFrame(self.table())
+        lengths, forces = ("x", "y", "z", "gap"), ("fx", "fy", "fz", "normal_force")
+        units = {"t": "s"} | dict.fromkeys(lengths, "m") | dict.fromkeys(forces, "N")
+        frame.attrs["units"] = {k: units.get(k, "1") for k in frame.columns}
+        return frame
+
+    def pairs(self) -> list[tuple[str, str]]:
+        """The pairs that touched, each once, in the order of `Sides`."""
+        return [(self.sides.name(a), self.sides.name(b)) for a, b in np.unique(self.pair, axis=0).tolist()]
+
+    def plot(self, *pairs: Sequence[str], path: str | os.PathLike | None = None) -> Any:
+        """Plot normal and tangential forces of pairs over time; see `flyball.view.contacts.plot_contacts`."""
+        from ..view.contacts import plot_contacts
+
+        return plot_contacts(self, pairs, path)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        if not len(self):
+            return [("contacts", "none at any output time")]
+        parts = [f"{n} {STATES[k]}" for k, n in enumerate(np.bincount(self.state, minlength=3).tolist()) if n]
+        most = int(self.count.max())
+        worst = f"{self.worst_overlap:.2g} m"
+        return [
+            ("contacts", f"{len(self)} at {len(self.t)} times, {most} at most at once: {', '.join(parts)}"),
+            ("worst overlap", worst),
+            ("largest force", f"{float(np.sqrt((self.force**2).sum(axis=1)).max()):.4g} N"),
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Every row as plain lists."""
+        return {k: v.tolist() for k, v in self.table().items()}
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{k:<14} {v}" for k, v in self.lines())
+
+
+def _texts(names: list[str]) -> np.ndarray:
+    return np.array(names, object)

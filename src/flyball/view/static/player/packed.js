@@ -1,0 +1,50 @@
+// Poses of a set of bodies as they arrive: differences from picture to picture, see packing.py.
+const TURN = (2 * Math.PI) / 65535; // a step of a rotation vector
+
+/** Differences summed up; `width` numbers a picture. What overflows is meant to. */
+function summed(changes, width) {
+  const out = changes.slice(); // equal arrays are stored once, so this may not be ours
+  for (let k = width; k < out.length; k++) out[k] += out[k - width];
+  return out;
+}
+
+/** The set with its `grid` of positions and its rotation vectors `turned`, both x of all, then y, then z. */
+export function unpacked(data) {
+  data.grid ??= summed(data.p, 3 * data.count);
+  data.turned ??= new Int16Array(summed(data.q, 3 * data.count).buffer);
+  return data;
+}
+
+/** Orientations at a picture into `out`: x, y, z, w of each member. */
+export function turnsAt({ turned, count }, picture, out) {
+  for (let k = 0, at = 3 * count * picture; k < count; k++, at++) {
+    const x = TURN * turned[at];
+    const y = TURN * turned[at + count];
+    const z = TURN * turned[at + 2 * count];
+    const angle = Math.sqrt(x * x + y * y + z * z);
+    const per = angle > 1e-9 ? Math.sin(angle / 2) / angle : 0.5;
+    out[4 * k] = per * x;
+    out[4 * k + 1] = per * y;
+    out[4 * k + 2] = per * z;
+    out[4 * k + 3] = Math.cos(angle / 2);
+  }
+  return out;
+}
+
+/** Least and largest coordinates of the members' origins at a picture, or null. */
+export function originsBox(data, picture) {
+  const { count, grid, low, step } = unpacked(data);
+  const box = [
+    [Infinity, Infinity, Infinity],
+    [-Infinity, -Infinity, -Infinity],
+  ];
+  for (let k = 0, at = 3 * count * picture; k < count; k++, at++) {
+    if (!grid[at]) continue; // not drawn
+    for (let c = 0; c < 3; c++) {
+      const x = low[c] + step * grid[at + c * count];
+      if (x < box[0][c]) box[0][c] = x;
+      if (x > box[1][c]) box[1][c] = x;
+    }
+  }
+  return box[0][0] > box[1][0] ? null : box;
+}

@@ -1,0 +1,151 @@
+"""Contact tables: sums over pairs, names of members, and what a static block and a pile weigh."""
+
+from __future__ import annotations
+
+import matplotlib.figure
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.results.contacts import Contacts
+from flyball.results.convergence import Convergence
+from flyball.results.sides import OPEN, SLIP, STICK, Sides
+
+SIDES = Sides(("box", "balls", "ground"), (-1, 3, -1))  # 0; 1, 2, 3; 4
+G = 9.81
+
+
+def block_on_four_points(mass: float = 2.0, n: int = 5) -> Contacts:
+    """A box at rest on four corners, pulled with a force that friction holds; balls[1] on it, balls[2] beside it."""
+    corners = np.array([[-1.0, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    rows = {k: [] for k in ("pair", "point", "normal", "gap", "force", "state", "friction")}
+    begin = [0]
+    for i in range(n):
+        for p in corners:  # the box is the first side: the force in the table is that on ground
+            for name, x in (("pair", (0, 4)), ("point", p), ("normal", (0, 0, -1)), ("gap", -1e-6 * i)):
+                rows[name].append(x)
+            rows["force"].append((0.25 * i, 0.0, -0.25 * mass * G))
+            rows["state"].append(STICK)
+        if i:
+            rows["pair"].append((0, 2))
+            rows["point"].append((0.0, 0, 1))
+            rows["normal"].append((0.0, 0, 1))
+            rows["gap"].append(1e-7)
+            rows["force"].append((0.0, 0.3, 1.0))
+            rows["state"].append(SLIP)
+        begin.append(len(rows["gap"]))
+    rows["friction"] = [0.3] * len(rows["gap"])
+    arrays = {k: np.array(v, int if k in ("pair", "state") else float) for k, v in rows.items()}
+    return Contacts(t=np.arange(float(n)), sides=SIDES, begin=np.array(begin), **arrays)
+
+
+def test_forces_between_two_are_summed_and_opposite():
+    c = block_on_four_points()
+    held = c.between("ground", "box")
+    np.testing.assert_allclose(held.force[:, 2], 2.0 * G, rtol=1e-14)  # ground carries the weight
+    np.testing.assert_allclose(held.force[:, 0], -np.arange(5.0))  # and holds against the pull
+    np.testing.assert_allclose(c.between("box", "ground").force, -held.force)
+    np.testing.assert_allclose(held.normal_force, 2.0 * G)
+    np.testing.assert_allclose(held.tangential_force, np.arange(5.0), atol=1e-14)
+    np.testing.assert_allclose(held.center, 0.0, atol=1e-15)
+    assert held.states == ["stick"] * 5
+    assert held.count.tolist() == [4] * 5
+    np.testing.assert_allclose(held.gap, -1e-6 * np.arange(5))
+    assert c.between("ground", "box") is held
+    assert "ground on box" in repr(held)
+
+
+def test_what_never_touches_has_no_force_and_no_gap():
+    apart = block_on_four_points().between("box", "balls[2]")
+    assert not apart.force.any()
+    assert np.isnan(apart.gap).all()
+    assert np.isnan(apart.center).all()
+    assert (apart.state == OPEN).all()
+
+
+def test_members_sets_and_all_others():
+    c = block_on_four_points()
+    one, whole, every = c.on("balls[1]"), c.on("balls"), c.between("box", "balls")
+    np.testing.assert_array_equal(one.force, whole.force)
+    np.testing.assert_array_equal(one.force, every.force)
+    np.testing.assert_allclose(one.force[1:], [(0.0, 0.3, 1.0)] * 4)
+    assert one.states == ["open", *["slip"] * 4]
+    np.testing.assert_allclose(one.tangential_force[1:], 0.3)
+    np.testing.assert_allclose(one.impulse(), (0.0, 1.2, 4.0))
+    np.testing.assert_allclose(c.on("box").force[2], (-2.0, -0.3, 2 * G - 1.0))
+    np.testing.assert_allclose(c.force_on(*SIDES.span("balls"))[2], [(0, 0, 0), (0, 0.3, 1), (0, 0, 0)])
+    total = c.force_on(0, len(SIDES)).sum(axis=1)
+    np.testing.assert_allclose(total, 0.0, atol=1e-14)  # what acts on one acts back on the other
+
+
+def test_contacts_between_members_of_a_set_are_forces_on_members():
+    row = {"point": [(0.0, 0, 0)], "normal": [(1.0, 0, 0)], "force": [(5.0, 1.0, 0)]}
+    arrays = {k: np.array(v) for k, v in row.items()}
+    c = Contacts(np.zeros(1), SIDES, np.array([0, 1]), np.array([(1, 3)]), gap=np.zeros(1), state=np.zeros(1, int),
+                 friction=np.ones(1), **arrays)  # fmt: skip
+    np.testing.assert_array_equal(c.between("balls[0]", "balls[2]").force, [(5.0, 1.0, 0)])
+    np.testing.assert_array_equal(c.between("balls[2]", "balls[0]").force, [(-5.0, -1.0, 0)])
+    assert not c.on("balls").force.any()
+    with pytest.raises(fb.ModelError, match="cancel in their sum"):
+        c.between("balls", "balls")
+
+
+def test_at_a_time_and_as_a_table():
+    c = block_on_four_points()
+    now = c.at(2.3)
+    assert (len(now), now.t.tolist(), now.begin.tolist()) == (5, [2.0], [0, 5])
+    assert now.names()[-1] == ("box", "balls[1]")
+    assert now.worst_overlap == pytest.approx(2e-6)
+    assert c.worst_overlap == pytest.approx(4e-6)
+    assert c.count.tolist() == [4, 5, 5, 5, 5]
+    assert c.pairs() == [("box", "balls[1]"), ("box", "ground")]
+    frame = c.to_dataframe()
+    assert len(frame) == 24
+    assert frame.attrs["units"]["fz"] == "N"
+    assert frame[(frame.side_2 == "ground") & (frame.t == 0.0)].fz.sum() == pytest.approx(-2 * G)
+    assert set(frame.state) == {"stick", "slip"}
+    few = c.taken(np.array([0, 3]))
+    assert few.t.tolist() == [0.0, 3.0]
+    np.testing.assert_array_equal(few.on("balls").force[1], c.on("balls").force[3])
+    assert dict(c.lines())["contacts"] == "24 at 5 times, 5 at most at once: 20 stick, 4 slip"
+
+
+@pytest.mark.parametrize(
+    ("ask", "said"),
+    [
+        (lambda c: c.between("box", "bals"), "did you mean 'balls'"),
+        (lambda c: c.on("balls[3]"), "has the members 0 to 2"),
+        (lambda c: c.on("box[0]"), "is a single body"),
+        (lambda c: c.between("balls", "balls[0]"), "share a body"),
+        (lambda c: c.at(17.0), "from 0 to 4"),
+        (lambda c: c.at("now"), "must be a time"),
+        (lambda c: c.plot("box"), "pairs of two names"),
+    ],
+)
+def test_wrong_questions_are_answered_in_words(ask, said):
+    with pytest.raises(fb.ModelError, match=said):
+        ask(block_on_four_points())
+
+
+def test_tables_that_do_not_fit_are_refused():
+    c = block_on_four_points()
+    own = {k: getattr(c, k) for k in ("pair", "point", "normal", "gap", "force", "state", "friction")}
+    for wrong in ({"gap": c.gap[:-1]}, {"pair": c.pair + 4}):
+        with pytest.raises(ValueError, match="contacts"):
+            Contacts(t=c.t, sides=SIDES, begin=c.begin, **(own | wrong))
+    with pytest.raises(ValueError, match="begin"):
+        Contacts(t=c.t, sides=SIDES, begin=c.begin[1:], **own)
+
+
+def test_pictures_of_forces_and_residuals(tmp_path):
+    c = block_on_four_points()
+    drawing = c.plot(("box", "ground"))
+    assert isinstance(drawing, matplotlib.figure.Figure)
+    np.testing.assert_allclose(drawing.axes[0].lines[0].get_ydata(), 2.0 * G)
+    c.plot(path=tmp_path / "all.png")
+    assert (tmp_path / "all.png").stat().st_size > 1000
+    k = np.arange(1, 20)
+    h = Convergence(k, 1.0 / k**2, 1.0 / k**3, k, over="iteration", solver="APGD")
+    np.testing.assert_allclose(h.plot().axes[0].lines[0].get_ydata(), 1.0 / k**2)
+    with pytest.raises(ValueError, match="convergence"):
+        Convergence(k, k[1:], k, k)
