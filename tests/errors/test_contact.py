@@ -108,6 +108,8 @@ def test_two_contacts_that_name_the_same_pair():
         ({"position": np.zeros((2, 2))}, r"position has the shape \(2, 2\); it must be \(2, 3\)"),
         ({"position": np.zeros((0, 3))}, r"a row for each body"),
         ({"position": [(0, 0, 0), (0, 0)]}, r"as long in every row"),
+        ({"position": "nowhere.npy"}, r"cannot read '.*nowhere.npy': No such file"),
+        ({"position": "nowhere.txt"}, r"'\*.npy' or '\*.csv'"),
         ({"position": [("1 mm", 0, 0)]}, r"give an array of numbers"),
         ({"velocity": np.zeros((3, 3))}, r"velocity has the shape \(3, 3\); it must be \(2, 3\)"),
         ({"orientation": np.zeros((2, 4))}, r"orientation of Bodies 'balls'"),

@@ -38,6 +38,11 @@ def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
         _FOLDER.reset(token)
 
 
+def folder() -> Path:
+    """The folder that relative paths are counted from."""
+    return _FOLDER.get() or Path.cwd()
+
+
 @dataclass(frozen=True, eq=False)
 class Triangulation:
     """Vertices (k, 3) and triangles (m, 3) with what follows from them, in units of their own."""
@@ -105,7 +110,7 @@ class Mesh(Solid):
 
     def __post_init__(self) -> None:
         """Remember the folder that a relative path is counted from."""
-        object.__setattr__(self, "_folder", _FOLDER.get() or Path.cwd())
+        object.__setattr__(self, "_folder", folder())
 
     def _key(self) -> tuple:
         return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
