@@ -11,10 +11,8 @@ from ..math.scalar import sqrt
 from .room import CORNERS, CUT_1, CUT_2
 
 X, Y, Z, EDGE, DEPTH = range(5)  # columns: place, height, edge to the next corner, gap
-KEEP = (
-    1e-6  # a corner so little beyond an edge, as part of the edge's length, is not cut off: equal boxes on each other
-)
-STEEP = 0.1  # a face is not used where it leans so far that its normal has this cosine with the contact's
+KEEP = 1e-6  # part of an edge's length that corners may be beyond it and stay: equal boxes on each other
+STEEP = 0.1  # a face or line is not used where the cosine of its lean against the plane square to the normal is less
 POINT = 1e-9  # parts of a line that are as good as a point
 PARALLEL = 3e-3  # lines are as one where they differ by less [rad]
 
@@ -119,12 +117,14 @@ def along_line(room, at, other):
     """What two nearly parallel lines have side by side, and how the other's height grows there: corners, slopes."""
     x, y = room[at + 1, X] - room[at, X], room[at + 1, Y] - room[at, Y]
     u, v = room[other + 1, X] - room[other, X], room[other + 1, Y] - room[other, Y]
+    z, w = room[at + 1, Z] - room[at, Z], room[other + 1, Z] - room[other, Z]
     xx, uu = x * x + y * y, u * u + v * v
+    if xx <= STEEP * STEEP * z * z or uu <= STEEP * STEEP * w * w:
+        return 0, 0.0, 0.0
     across = x * v - y * u
     if across * across >= PARALLEL * PARALLEL * xx * uu:  # crossing, or one is a point
         return 0, 0.0, 0.0
     s0 = ((room[other, X] - room[at, X]) * x + (room[other, Y] - room[at, Y]) * y) / xx
     s1 = s0 + (x * u + y * v) / xx
     first, last = max(0.0, min(s0, s1)), min(1.0, max(s0, s1))
-    rise = (room[other + 1, Z] - room[other, Z]) / uu
-    return part(room, at, first, last), rise * u, rise * v
+    return part(room, at, first, last), w / uu * u, w / uu * v

@@ -6,7 +6,7 @@ from ..compiler.jit import formula
 from ..math.scalar import sqrt
 
 CORNERS_OF_DISC = 8
-UPRIGHT = 1e-6  # lean [rad] below which the corners stay where they are in the shape
+UPRIGHT = 1e-4  # lean [rad] below which the corners stay where they are in the shape
 HALF = sqrt(0.5)
 
 

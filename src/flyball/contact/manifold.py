@@ -17,7 +17,7 @@ from .room import CORNERS, CUT_1, FACE_1, FACE_2
 from .surface import face, radius
 from .tables import KIND, RADIUS
 
-SAME = 1e-5  # gaps that differ by less, as part of the smaller shape, are equally deep
+SAME = 1e-6  # gaps and places that differ by less, as part of the smaller shape, are the same
 NEAREST_NAME = -1.0  # feature of the point where the shapes are nearest, if the faces do not hold it
 FACES = 4096.0  # names of points of one pair of faces
 PAIRS_OF_FACES = 65536.0
@@ -74,9 +74,18 @@ def common(room, m1, m2):
 
 
 @formula
-def gaps(room, at, count, r1, r2, reach, plane, first_name):
+def near(room, a, b, same):
+    """Whether two corners are as good as one."""
+    x, y = room[a, X] - room[b, X], room[a, Y] - room[b, Y]
+    return x * x + y * y <= same * same
+
+
+@formula
+def gaps(room, at, count, rounding, limits, plane, first_name):
     """Gaps of the corners against a face; those within reach move up: how many, the smallest."""
     other, a, b, side = plane
+    r1, r2 = rounding
+    reach, same = limits
     x, y, z = room[other, X], room[other, Y], room[other, Z]
     kept, least = 0, inf
     edge = room[at + count - 1, EDGE]
@@ -85,7 +94,7 @@ def gaps(room, at, count, r1, r2, reach, plane, first_name):
         gap = side * (height - room[k, Z]) - r1 - r2
         name = first_name + edge * (2 * CORNERS) + room[k, EDGE]
         edge = room[k, EDGE]
-        if gap <= reach:
+        if gap <= reach and not (kept > 0 and (near(room, at + kept - 1, k, same) or near(room, at, k, same))):
             to = at + kept
             room[to, X], room[to, Y] = room[k, X], room[k, Y]
             room[to, Z] = 0.5 * (height + room[k, Z] + r1 - r2)
@@ -146,6 +155,15 @@ def tell(room, at, count, frame):
 
 
 @formula
+def smallest(room, count):
+    """The smallest gap of the contacts told."""
+    least = inf
+    for k in range(count):
+        least = min(least, room[k, 6])
+    return least
+
+
+@formula
 def manifold(G, i, j, A, B, n, nearest, reach, room):
     """Contacts of shapes i at A and j at B along the unit normal n from i to j: how many.
 
@@ -156,13 +174,13 @@ def manifold(G, i, j, A, B, n, nearest, reach, room):
     m1, number_1 = drawn(G, i, A, n, frame, room, FACE_1)
     m2, number_2 = drawn(G, j, B, neg(n), frame, room, FACE_2)
     r1, r2 = radius(G.shape_i[i, KIND], G, i), radius(G.shape_i[j, KIND], G, j)
+    same = SAME * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
     at, count, least = CUT_1, 0, inf
     if m1 > 1 and m2 > 1:
         at, count, other, a, b, side = common(room, m1, m2)
         if count:
             name = FACES * (number_1 + PAIRS_OF_FACES * number_2)
-            count, least = gaps(room, at, count, r1, r2, reach, (other, a, b, side), name)
-    same = SAME * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
+            count, least = gaps(room, at, count, (r1, r2), (reach, same), (other, a, b, side), name)
     gap, p = nearest
     if gap <= reach and gap < least - same:
         put3(room, at + count, 0, (dot(frame[0], p), dot(frame[1], p), dot(n, p)))

@@ -6,9 +6,11 @@ the nearest points are sought (``nearest``), then the faces that meet there are 
 
 from __future__ import annotations
 
+from math import inf
+
 from ..compiler.jit import formula
 from ..compiler.written import written
-from ..math.vec import add, load3, load9, mm, mv, sub
+from ..math.vec import add, dot, load3, load9, mm, mv, sub
 from .manifold import manifold
 from .nearest import closest
 from .pairs.registry import WAYS
@@ -73,7 +75,10 @@ def collide(G, M, i, j, reach, room):
         i, j, a, b = j, i, b, a
     p, R = place(G, M, i)
     q, Q = place(G, M, j)
-    count = by_kinds(a, b, G, i, j, ((0.0, 0.0, 0.0), R), (sub(q, p), Q), reach, room)
+    d = sub(q, p)
+    if not dot(d, d) < inf:  # what is no number touches nothing
+        return 0
+    count = by_kinds(a, b, G, i, j, ((0.0, 0.0, 0.0), R), (d, Q), reach, room)
     for k in range(count):
         for c in range(3):
             room[k, c] += p[c]

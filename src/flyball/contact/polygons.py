@@ -81,23 +81,21 @@ def nearest_corner(G, i, j, p, R):
 
 
 @formula
-def apart(G, i, j, A, B, prefer):
-    """Signed distance of the cores of two polygons at A and B, unit normal from i to j, a point midway between."""
-    p, q = mtv(A[1], sub(B[0], A[0])), mtv(B[1], sub(A[0], B[0]))
+def sides_apart(G, i, j, A, B, prefer):
+    """Largest separation of the cores of two polygons at A and B along a side's normal, and that, from i to j."""
     C = mm(transpose(A[1]), B[1])
-    D = transpose(C)
-    far, n = along_sides(G, i, j, p, C)
+    far, n = along_sides(G, i, j, mtv(A[1], sub(B[0], A[0])), C)
     n = mv(A[1], n)
-    s, m = along_sides(G, j, i, q, D)
-    if s > far + prefer:
-        far, n = s, neg(mv(B[1], m))
-    if -inf < far <= 0.0:
-        return far, n, A[0]
-    length, d, x, y = nearest_corner(G, i, j, p, C)
-    d, x = mv(A[1], d), add(A[0], mv(A[1], scale(0.5, add(x, y))))
-    s, m, u, v = nearest_corner(G, j, i, q, D)
-    if s < length - prefer:
-        length, d, x = s, neg(mv(B[1], m)), add(B[0], mv(B[1], scale(0.5, add(u, v))))
-    if length > far + prefer:  # corner to corner
-        far, n = length, d
-    return far, n, x
+    s, m = along_sides(G, j, i, mtv(B[1], sub(A[0], B[0])), transpose(C))
+    return (far, n) if s <= far + prefer else (s, neg(mv(B[1], m)))
+
+
+@formula
+def corners_apart(G, i, j, A, B, prefer):
+    """Distance of the cores of two polygons that do not overlap, unit normal from i to j, a point midway between."""
+    C = mm(transpose(A[1]), B[1])
+    far, d, x, y = nearest_corner(G, i, j, mtv(A[1], sub(B[0], A[0])), C)
+    s, m, u, v = nearest_corner(G, j, i, mtv(B[1], sub(A[0], B[0])), transpose(C))
+    if s < far - prefer:
+        return s, neg(mv(B[1], m)), add(B[0], mv(B[1], scale(0.5, add(u, v))))
+    return far, mv(A[1], d), add(A[0], mv(A[1], scale(0.5, add(x, y))))

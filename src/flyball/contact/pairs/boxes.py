@@ -13,7 +13,7 @@ from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from ...math.vec import cross, dot, load3, mm, mtv, mv, neg, scale, transpose
 from ..kinds import BOX
-from ..manifold import manifold
+from ..manifold import manifold, smallest
 from ..nearest import closest
 from ..tables import PAR
 
@@ -88,12 +88,7 @@ def collide(G, i, j, A, B, reach, room):
         return 0
     n = mv(A[1], along(axis, C, c))
     count = manifold(G, i, j, A, B, n, (inf, n), reach, room)
-    if far <= 0.0 and count > 0:
-        return count
-    least = inf
-    for k in range(count):
-        least = min(least, room[k, 6])
-    if least <= far + prefer:
+    if count > 0 and (far <= 0.0 or smallest(room, count) <= far + prefer):
         return count
     gap, n, p = closest(G, i, j, A, B, reach, room)
     if not gap <= reach:
