@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from .desk import AT, BALL, BOUNDED, DRIFT, DRIFTS, FORM, LAG, MOVED, MOVES, SHAPE, STRIDE, USUAL, WIDE
-from .envelopes import STEPS, locate, within
+from .envelopes import STEPS, axes_now, locate, within
 from .flat import gone, place_wide
 from .tables import AHEAD, SKIN
 
@@ -66,8 +66,10 @@ def look(G, M, B):
             locate(M, B, i, m, ball, now, s)
             way = (way[0] + now[s, AT] - x, way[1] + now[s, AT + 1] - y, way[2] + now[s, AT + 2] - z)
             n += 1.0
+            if not ball:
+                axes_now(G, M, B, s, i, m)
         B.mark[s] = 0
-        if not within(G, M, B, s, i, ball):
+        if not within(B, s, ball):
             B.mark[s] = 1
             B.moved[moved] = s
             moved += 1
