@@ -6,7 +6,6 @@ import itertools
 
 import numpy as np
 import pytest
-from flyball.contact.build.hull import CLIMB, hull
 
 from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
