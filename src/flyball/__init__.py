@@ -26,7 +26,8 @@ Look before you run
     m.assemble()  -> Assembly: positions that close; m.mass_properties() -> MassReport
 
 Ask how it moves
-    m.simulate(t_end)             -> Result: motion, reactions, energies, health
+    m.simulate(t_end)             -> Result: motion, reactions, energies, health; with contact by steps of impulses,
+                                  of which method=Impulse(step=...) makes choices
     m.kinematics(times)           -> Result, where drivers prescribe the motion
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
@@ -66,6 +67,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assembly.start import Assembly as Assembly
+    from .analysis.motion.impulse.settings import Impulse as Impulse
     from .analysis.prepared import Prepared as Prepared
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
@@ -124,6 +126,7 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
+    "Impulse": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
     "Material": "model.material",
     "MaterialPair": "model.material",
