@@ -66,9 +66,8 @@ def _material(model: Model, name: str, e: Element) -> None:
     if not isinstance(found, Material):
         known = [x.name for x in model.materials]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(
-            f"{e.title}: {field_with(e, name)}there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}"
-        )
+        hint = f"{what}{suggest(name, known)}; {listing(known)}"
+        raise ModelError(f"{e.title}: {field_with(e, name)}there is no material named {name!r}{hint}")
 
 
 def _touching(model: Model, name: str, e: Contact) -> None:
