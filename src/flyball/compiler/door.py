@@ -38,6 +38,17 @@ class Door:
                     self._make(tuples)
         return self._made.address
 
+    def expects(self, *tuples: Any) -> None:
+        """Say what it is for before it is made: loops that may never go through compile without it."""
+        with LOCK:
+            if not self._types:
+                start_numba()
+                from numba import typeof
+
+                from .held import held_type
+
+                self._types = tuple(held_type(typeof(x)) for x in tuples)
+
     def _make(self, tuples: tuple[Any, ...]) -> None:
         start_numba()
         from numba import typeof, types

@@ -3,7 +3,8 @@
 Numba passes a tuple of arrays as its parts, some two hundred numbers for a mechanism, which every callee puts together
 again: half of all the code a kernel is made of, before the optimiser throws it away. ``held(S)`` leaves the tuple where
 it is and passes its address; ``S.field`` then reads the field there. Nothing writes to the tuple itself, so that the
-optimiser may read each part once and keep it (`invariant.load`). In plain Python ``held(S)`` is ``S``.
+optimiser may read each part once and keep it (`invariant.load`). A tuple in a tuple is held as well. In plain Python
+``held(S)`` is ``S``.
 """
 
 from __future__ import annotations
@@ -62,6 +63,8 @@ def _register() -> None:
             if attr not in typ.whole.fields:
                 return None
             field = typ.whole[typ.whole.fields.index(attr)]
+            if isinstance(field, types.BaseNamedTuple):
+                return Held(field)
             return table_type(field) if is_table(field) else field
 
     @lower_getattr_generic(Held)
@@ -69,7 +72,9 @@ def _register() -> None:
         address = builder.bitcast(value, context.get_value_type(typ.whole).as_pointer())
         k = typ.whole.fields.index(name)
         field = cgutils.gep_inbounds(builder, address, 0, k)
-        return builder.bitcast(field, cgutils.voidptr_t) if is_table(typ.whole[k]) else parts(builder, field)
+        if is_table(typ.whole[k]) or isinstance(typ.whole[k], types.BaseNamedTuple):
+            return builder.bitcast(field, cgutils.voidptr_t)
+        return parts(builder, field)
 
     def is_table(typ: Any) -> bool:
         return isinstance(typ, types.Array) and typ.layout == "C"

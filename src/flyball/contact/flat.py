@@ -1,4 +1,7 @@
-"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved."""
+"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved.
+
+What is no plane lies below one: its top.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,6 @@ from .desk import (
     BOX_HALF,
     DRIFT,
     DRIFTS,
-    FLAT,
     FORM,
     FRAME,
     HALF_LINE,
@@ -32,9 +34,10 @@ from .tables import AHEAD, AXES, MARGIN, PLACE, SKIN
 
 @formula
 def place_wide(G, M, B, w, i, m):
-    """Where wide shape ``w`` is and how it goes; its pairs' origin stays."""
-    x = G.shape_x
-    p, n = (x[i, PLACE], x[i, PLACE + 1], x[i, PLACE + 2]), (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
+    """Where the plane of wide shape ``w`` is and how it goes."""
+    x, top = G.shape_x, B.hold[i, BOX_HALF]
+    n = (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
+    p = (x[i, PLACE] + top * n[0], x[i, PLACE + 1] + top * n[1], x[i, PLACE + 2] + top * n[2])
     v = (0.0, 0.0, 0.0)
     u = v
     if m >= 0:
@@ -82,10 +85,8 @@ def settle(B, w, still):
 
 
 @formula
-def reaches(B, w, form, s):
-    """Whether a wide shape and the envelope of slot s meet."""
-    if form != FLAT:
-        return True
+def reaches(B, w, s):
+    """Whether the envelope of slot s comes below the plane of a wide shape."""
     x, gap, lead = B.wide, 0.0, 0.0
     far, turns = 0.0, 0.0
     for c in range(3):

@@ -48,7 +48,7 @@ def anew(G, M, O, B):
     """Look for all pairs: whether there was room."""
     B.count[TRUE] = 0
     forget(B)
-    keep_all(G, O, B)
+    keep_all(O, B)
     sort_all(G, M, B)
     for w in range(B.count[WIDE]):
         s = B.count[BOUNDED] + w
@@ -72,7 +72,7 @@ def mend(G, M, B):
         s = B.moved[k]
         if s < B.count[BOUNDED] and not refit(G, M, B, s):
             return -1
-    drop(G, B)
+    drop(B)
     room = list_moved(G, B)
     forget(B)
     B.count[TRUE] = 1 if room else 0

@@ -22,7 +22,21 @@ from .follow import follow
 from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
 from .residual import residual
-from .tasks import ARRIVE, COMPLETE, FOLLOW, INSPECT, INTEGRATE, MOTION, POSITION, REPORT, RESIDUAL, SOLVE, TANGENT
+from .slopes import slopes
+from .tasks import (
+    ARRIVE,
+    COMPLETE,
+    FOLLOW,
+    INSPECT,
+    INTEGRATE,
+    MOTION,
+    POSITION,
+    REPORT,
+    RESIDUAL,
+    SLOPES,
+    SOLVE,
+    TANGENT,
+)
 from .within import ROWS, inspect
 
 
@@ -76,6 +90,9 @@ def perform(S, W, R, clock, out, task):
         at = inspect(t, clock.real[H], clock.real[SPAN], clock.count[NEXT], clock.seen, S, W)
         clock.count[NEXT], clock.real[H], clock.real[GROW] = at
         return 0
+    if task == SLOPES:
+        slopes(S, W, t, out)
+        return 0
     if task == INTEGRATE:
         return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
     return 0
@@ -120,8 +137,8 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
         ``out[1]`` and multipliers ``out[2]``, in ``out[0]``. SOLVE: at the state last evaluated, accelerations
         ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
         make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
-        see ``within.inspect``; in and out by the clock. INTEGRATE: go on with the integration; FOLLOW: go on with
-        what the drivers prescribe.
+        see ``within.inspect``; in and out by the clock. SLOPES: of every force, see
+        ``slopes.slopes``. INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
 
     Returns
     -------

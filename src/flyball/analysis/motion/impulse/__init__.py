@@ -1,0 +1,1 @@
+"""Motion by steps of impulses: what `Mechanism.simulate` does where things touch."""

@@ -1,0 +1,105 @@
+"""What joints hold together, made ready for steps by impulses: which bodies these are, their groups, their tables."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....equations.engine import Sheet
+from ....equations.projection import STEPS
+from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
+from ....model.force import CoordinateForce, TwoPointForce
+from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
+from ....numerics.integrators.tableaux import tableau
+from ....stepping.joined import FIRST, STEP, TIME, Joined
+from ....stepping.smooth import MIXED, MIXING
+from ....tables.system import FORCE_ALONG, FORCE_F, FORCE_M, LATER, NV, PARENT, STABILIZE, V0, System
+from ..start import Start
+
+
+def tables(start: Start, bodies: list[str], first: int, h: float) -> Joined:
+    """The mechanism's tables for steps of h seconds, at its start.
+
+    Parameters
+    ----------
+    start : Start
+        Of the mechanism alone.
+    bodies : list of str
+        Those that are movers, in the order of the movers from number ``first`` on.
+    first : int
+    h : float [s]
+    """
+    c = start.assembly.compiled
+    s, S = c.structure, c.values.system
+    of, group = groups(S, s.nv)
+    rows = [s.place[name] for name in bodies]
+    y = np.zeros((STATES, len(start.y)))
+    y[0] = start.y
+    width = max(len(start.y) + 1, s.nv, len(S.row_i), 1)
+    clock = Clock(
+        np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, np.int64)
+    )
+    slopes = np.zeros((len(s.forces), SLOPE_WIDTH))
+    slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
+    springs = int(slopes[:, DIRECTIONS].sum())
+    c.work.option[STABILIZE], c.work.option[LATER] = STEPS, 0.0
+    A = Joined(
+        S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
+        real=np.zeros(8), count=np.zeros(16, np.int64),
+        mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
+        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((2, len(S.row_i))),
+        spring_x=np.zeros((springs, 8)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
+        stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING, s.nv)), weight=np.zeros((MIXED + 1, MIXED + 1)),
+        job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
+    )  # fmt: skip
+    A.count[FIRST] = first
+    A.real[TIME], A.real[STEP] = start.assembly.t, h
+    return A
+
+
+def directions(force) -> int:
+    """How many directions a force changes along: see `equations.slopes`."""
+    return 1 if isinstance(force, (CoordinateForce, TwoPointForce)) else 6
+
+
+def groups(S: System, nv: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which group each row of the body table is in (-1: it cannot move), and where the velocities of each begin.
+
+    Groups are what rows, measured quantities and forces connect; all is one group where velocities of one are no
+    neighbours.
+    """
+    part = np.arange(nv)
+
+    def root(d: int) -> int:
+        while part[d] != d:
+            part[d] = d = part[part[d]]
+        return d
+
+    def join(several) -> None:
+        several = list(several)
+        for d in several[1:]:
+            a, b = sorted((root(several[0]), root(d)))
+            part[b] = a
+
+    movers = [_moving(S, b) for b in range(len(S.body_i))]
+    for own in movers:
+        join(own)
+    for r in range(len(S.row_p) - 1):
+        join(S.col_i[S.row_p[r] : S.row_p[r + 1]])
+    for f in S.force_i[S.force_i[:, FORCE_ALONG] == 0]:
+        ends = [S.frame_i[f[k]] for k in (FORCE_F, FORCE_M)]
+        join(d for b in ends if b >= 0 for d in movers[b])
+    of = np.array([root(d) for d in range(nv)], np.int64)
+    first = np.flatnonzero(np.r_[True, of[1:] != of[:-1]]) if nv else np.zeros(0, np.int64)
+    if len(first) != len(np.unique(of)):
+        of, first = np.zeros(nv, np.int64), np.zeros(1, np.int64)
+    number = np.searchsorted(first, np.arange(nv), side="right") - 1
+    return np.array([number[m[0]] if m else -1 for m in movers], np.int64), np.r_[first, nv].astype(np.int64)
+
+
+def _moving(S: System, b: int) -> list[int]:
+    """Velocities that move a body."""
+    out: list[int] = []
+    while b >= 0:
+        out += range(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV])
+        b = S.body_i[b, PARENT]
+    return out

@@ -1,0 +1,216 @@
+"""Which solver takes which island, and the door that does all of them: ``solver="auto"``.
+
+Solvers are called by addresses, so that only those in use are compiled. Contacts of several islands are copied into
+rooms of their own where each island's stand together, those that sweeps take at the end as one.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...compiler.door import door, enter
+from ...compiler.held import held
+from ...compiler.jit import formula
+from .islands import Islands, find_islands
+from .problem import (
+    BROKEN,
+    CONVERGED,
+    ENDED,
+    FORCE_RESIDUAL,
+    ISLAND,
+    RESIDUAL,
+    SMALL,
+    USED,
+    Factor,
+    Problem,
+    State,
+)
+
+# entries of Auto.doors: addresses of what takes small islands and of what takes the rest; 0: not in use
+SMALL_ISLANDS, THE_REST, DOORS = range(3)
+# entries of Auto.limit: most contacts and most nodes of an island that is small
+MOST_CONTACTS, MOST_NODES, LIMITS = range(3)
+# entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
+# hand on to the other, contacts by the one; the largest island's contacts
+CALLS, ISLANDS, BY_ONE, BY_OTHER, HANDED_ON, CONTACTS_BY_ONE, LARGEST, TOLD = range(8)
+
+
+class Auto(NamedTuple):
+    """In place of `Factor`: rooms for factors, a copy of the problem by islands, addresses, what was picked."""
+
+    numbers: np.ndarray
+    places: np.ndarray
+    P: Problem
+    X: State
+    islands: Islands
+    pick: np.ndarray  # (ni,): islands, the small ones first
+    doors: np.ndarray
+    limit: np.ndarray
+    told: np.ndarray
+
+
+@formula
+def copy_contact(P, X, Q, Y, c, k):
+    """Contact c of (P, X) becomes contact k of (Q, Y)."""
+    for s in range(2):
+        Q.at[k, s], Q.block[k, s] = P.at[c, s], P.block[c, s]
+    for s in range(9):
+        Q.frame[k, s] = P.frame[c, s]
+    for s in range(6):
+        Q.arm[k, s] = P.arm[c, s]
+    for s in range(3):
+        Q.bias[k, s], Y.p[k, s] = P.bias[c, s], X.p[c, s]
+    Q.mu[k], Q.soft[k] = P.mu[c], P.soft[c]
+    if P.least.shape[0] > 0:
+        Q.least[k] = P.least[c]
+    if P.turn.shape[0] > 0:
+        Q.turn[k, 0], Q.turn[k, 1] = P.turn[c, 0], P.turn[c, 1]
+        for s in range(3):
+            Y.torque[k, s] = X.torque[c, s]
+
+
+@formula
+def take_back(X, Y, c, k, turning):
+    """Impulses of contact k of Y become those of contact c of X."""
+    for s in range(3):
+        X.p[c, s] = Y.p[k, s]
+        if turning:
+            X.torque[c, s] = Y.torque[k, s]
+
+
+@formula
+def copy_line(P, X, Q, Y, line, k):
+    """Line ``line`` of (P, X) becomes line k of (Q, Y)."""
+    Q.line_at[k, 0], Q.line_at[k, 1], Y.line[k] = P.line_at[line, 0], P.line_at[line, 1], X.line[line]
+    for s in range(4):
+        Q.line_x[k, s] = P.line_x[line, s]
+
+
+@formula
+def small(P, F, I, k):
+    """Whether island k is for the solver of small islands."""
+    contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
+    return contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]
+
+
+@formula
+def pick(P, F, I, count):
+    """Islands in a new order, in ``F.pick``: the small ones first; returns how many these are."""
+    some = 0
+    for k in range(count):
+        F.told[LARGEST] = max(F.told[LARGEST], I.island[k + 1] - I.island[k])
+        if F.doors[SMALL_ISLANDS] != 0 and small(P, F, I, k):
+            F.pick[some] = k
+            some += 1
+            F.told[CONTACTS_BY_ONE] += I.island[k + 1] - I.island[k]
+    rest = some
+    for k in range(count):
+        if F.doors[SMALL_ISLANDS] == 0 or not small(P, F, I, k):
+            F.pick[rest] = k
+            rest += 1
+    F.told[CALLS] += 1
+    F.told[ISLANDS] += count
+    F.told[BY_ONE] += some
+    F.told[BY_OTHER] += count - some
+    return some
+
+
+@formula
+def lay_out(P, X, Q, Y, F, I, count, some):
+    """Copy by islands: the small ones, then the others as one."""
+    c, l, m = 0, 0, 0
+    Q.island[0] = Q.line_p[0] = Q.member_p[0] = 0
+    for i in range(count):
+        k = F.pick[i]
+        for e in range(I.island[k], I.island[k + 1]):
+            copy_contact(P, X, Q, Y, I.order[e], c)
+            c += 1
+        for e in range(I.line_p[k], I.line_p[k + 1]):
+            copy_line(P, X, Q, Y, I.line_order[e], l)
+            l += 1
+        for e in range(I.member_p[k], I.member_p[k + 1]):
+            Q.member[m] = I.member[e]
+            m += 1
+        end = min(i, some) + 1
+        Q.island[end], Q.line_p[end], Q.member_p[end] = c, l, m
+    Q.size[0], Q.size[1], Q.size[2], Q.size[3] = c, P.size[1], P.size[2], l
+
+
+@formula
+def take_all_back(P, X, Y, F, I, count):
+    """Impulses back to where they came from."""
+    c, l, turning = 0, 0, P.turn.shape[0] > 0
+    for i in range(count):
+        k = F.pick[i]
+        for e in range(I.island[k], I.island[k + 1]):
+            take_back(X, Y, I.order[e], c, turning)
+            c += 1
+        for e in range(I.line_p[k], I.line_p[k + 1]):
+            X.line[I.line_order[e]] = Y.line[l]
+            l += 1
+
+
+@formula
+def gather(O, sofar):
+    """The worst of what solvers said: (residual, force residual, used, status)."""
+    a, b, used, ended = sofar
+    return (
+        max(a, O.real[RESIDUAL]),
+        max(b, O.real[FORCE_RESIDUAL]),
+        max(used, O.count[USED]),
+        max(ended, O.count[ENDED]),
+    )
+
+
+@formula
+def by_one(P, X, W, O, F, f):
+    """An island by the solver of small ones, or by the other where that cannot."""
+    enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
+    if O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN:
+        F.told[HANDED_ON] += 1
+        enter(F.doors[THE_REST], P, X, W, O, f, 0)
+
+
+@formula
+def one_by_one(P, X, Y, W, O, F, f, count, some):
+    """Islands each by its solver, on the copy."""
+    Q, I = held(F.P), held(F.islands)
+    lay_out(P, X, Q, Y, F, I, count, some)
+    sofar = (0.0, 0.0, 0, 0)
+    for k in range(some):
+        O.count[ISLAND] = k
+        by_one(Q, Y, W, O, F, f)
+        sofar = gather(O, sofar)
+    if some < count:
+        O.count[ISLAND] = some
+        enter(F.doors[THE_REST], Q, Y, W, O, f, 0)
+        sofar = gather(O, sofar)
+    O.count[ISLAND] = -1
+    O.real[RESIDUAL], O.real[FORCE_RESIDUAL], O.count[USED], O.count[ENDED] = sofar
+    take_all_back(P, X, Y, F, I, count)
+
+
+@formula
+def solve_all(P, X, W, O, F):
+    """See `auto`."""
+    f, I = held(Factor(F.numbers[:], F.places[:])), held(F.islands)
+    O.count[USED], O.count[ENDED], O.count[ISLAND] = 0, CONVERGED, -1
+    O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = 0.0, 0.0
+    nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
+    count = find_islands(P.at, P.line_at, (nc, nn, ng, nl), I)
+    some = pick(P, F, I, count)
+    if some == 0:
+        enter(F.doors[THE_REST], P, X, W, O, f, 0)
+    elif count == 1:
+        by_one(P, X, W, O, F, f)
+    else:
+        one_by_one(P, X, held(State(F.X.p, F.X.torque, F.X.line, X.v[:], X.wide[:])), W, O, F, f, count, some)
+    return O.count[USED]
+
+
+@door
+def auto(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
+    """Every island by the solver picked for it; returns the most iterations that one took. F is `Auto`."""
+    return solve_all(P, X, W, O, F)

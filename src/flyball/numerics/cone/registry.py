@@ -1,0 +1,90 @@
+"""Solvers by name. A new one is a file with a door, and a line here."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...compiler.door import Door
+from .choose import DOORS, LIMITS, MOST_CONTACTS, MOST_NODES, SMALL_ISLANDS, THE_REST, TOLD, Auto, auto
+from .gauss_seidel import gauss_seidel
+from .islands import room_for_islands
+from .newton import newton
+from .problem import Choices, Factor, Problem, Scratch, State
+from .rooms import rooms, unfilled
+
+SOLVERS: dict[str, Door] = {"gauss-seidel": gauss_seidel, "newton": newton}
+FACTORED = {"newton"}  # those that want `Factor`: each island by itself, the rest to sweeps where it cannot
+
+# islands up to this size go to Newton: measured on stacks, walls and piles (benchmarks)
+CONTACTS_FOR_NEWTON, NODES_FOR_NEWTON = 400, 100
+PLACES, NUMBERS = 60, 250  # of `Factor`, for each contact and node of the largest island that is to fit
+
+
+class Ready(NamedTuple):
+    """A solver to be called by its address, with its rooms."""
+
+    address: int
+    F: Any  # what stands in place of `Factor`
+    told: np.ndarray  # see `choose`; empty for a solver that does all at once
+
+
+def names() -> tuple[str, ...]:
+    """What solvers may be called."""
+    return ("auto", *SOLVERS)
+
+
+def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
+    """A solver for problems of these capacities; compiles what it needs.
+
+    Parameters
+    ----------
+    name : str
+        One of `names`.
+    P, X, W, O : Problem, State, Scratch, Choices
+        As large as they will be.
+
+    Returns
+    -------
+    Ready
+        To be asked for anew when the rooms are enlarged.
+
+    Raises
+    ------
+    KeyError
+        For another name.
+    """
+    if name != "auto" and name not in FACTORED:
+        F = Factor(np.zeros(0), np.zeros(0, np.int64))
+        return Ready(SOLVERS[name].address(P, X, W, O, F), F, np.zeros(0, np.int64))
+    whole = name != "auto"
+    made = room_for_all(P, O, whole)
+    f = Factor(made.numbers, made.places)
+    first = SOLVERS["newton" if name == "auto" else name]
+    made.doors[SMALL_ISLANDS] = first.address(P, X, W, O, f)
+    made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
+    return Ready(auto.address(P, X, W, O, made), made, made.told)
+
+
+def room_for_all(P: Problem, O: Choices, whole: bool) -> Auto:
+    """Rooms of `auto`; ``whole``: for islands of any size."""
+    nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
+    limit = np.zeros(LIMITS, np.int64)
+    limit[:] = (nc, nn) if whole else (CONTACTS_FOR_NEWTON, NODES_FOR_NEWTON)
+    contacts, nodes = min(nc, int(limit[MOST_CONTACTS])), min(nn, int(limit[MOST_NODES]))
+    wide = int(P.group[-1]) + 6 * ng
+    islands = room_for_islands(nc, nn, ng, nl)
+    most = len(islands.island) + 1
+    Q = unfilled(nc, nn, ng, nl, 0, len(P.turn) > 0)._replace(
+        node=P.node, group=P.group, J=P.J, Y=P.Y, least=np.zeros(len(P.least)),
+        **{k: np.zeros(most, np.int64) for k in ("island", "member_p", "line_p")},
+    )  # fmt: skip
+    size = contacts + nodes + nl + wide
+    fill = min(nodes * nodes // 2, 40 * nodes)
+    return Auto(
+        np.zeros(NUMBERS * size + 36 * fill),
+        np.zeros(PLACES * size + 4 * fill + nn + 3 * ng, np.int64),
+        Q, rooms(Q)[0], islands, np.zeros(most, np.int64),
+        np.zeros(DOORS, np.int64), limit, np.zeros(TOLD, np.int64),
+    )  # fmt: skip

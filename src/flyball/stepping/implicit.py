@@ -1,0 +1,163 @@
+"""Springs and dampers taken implicitly: what they add to the masses, as an operator of low rank.
+
+A force s along J v, with stiffness k and damping c, is taken at
+
+    x + (1 - b) / 4 h (r+ - r-) + b h r+   and   (1 - b) / 2 r- + (1 + b) / 2 r+
+
+x being where it is at half the step, r- and r+ its rates before and after. With b = 0 that is the trapezoidal rule,
+which keeps the energy of a linear spring; with b = 1 whatever is stiff is at rest after two steps. Between them it is
+stable for any h, k, c: with z = h^2 k / m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z),
+where b' = (1 + 3 b) / 4. b goes with the square of z, so that the step stays of second order.
+
+M + J' A J, with A = h^2 k b' + h c (1 + b) / 2, is inverted by Sherman, Morrison and Woodbury's formula.
+"""
+
+from __future__ import annotations
+
+from ..compiler.door import enter
+from ..compiler.jit import formula
+from ..equations.records import load
+from ..equations.slopes import ALONG, DAMPING, DIRECTIONS, STIFFNESS, direction
+from ..equations.solve import inverse_mass
+from ..equations.tasks import SLOPES, SOLVE
+from ..equations.tree import project
+from ..math.scalar import sqrt
+from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_M, NV, PARENT, SCHUR, SOLVER, V0
+from .joined import ADDED, SHARE, SOLVED, SPRING_C, SPRING_FORCE, SPRING_K, SPRING_OF, SPRINGS
+
+SOFT = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the evaluation at half the step
+
+
+@formula
+def climb(S, W, b, out, at, sign, force, torque, point):
+    """Add the power of a wrench on body b along all velocities that move it; ``out[at]`` is that of velocity 0."""
+    while b >= 0:
+        if S.body_i[b, NV] > 0:
+            project(S, W, b, out, at + S.body_i[b, V0], sign, force, torque, point)
+        b = S.body_i[b, PARENT]
+
+
+@formula
+def gradient(S, W, k, n, i, row):
+    """What force k acts along, direction i of n, as a row over all velocities."""
+    for d in range(row.shape[0]):
+        row[d] = 0.0
+    if S.force_i[k, FORCE_ALONG] == 1:
+        r = S.row_i.shape[0] + S.force_i[k, FORCE_F]
+        for e in range(S.row_p[r], S.row_p[r + 1]):
+            row[S.col_i[e]] += W.G[e]
+        return
+    F, M = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M])
+    axis = direction(F, M[0], n, i)
+    zero = (0.0, 0.0, 0.0)
+    force, torque = (axis, zero) if i < 3 else (zero, axis)
+    climb(S, W, S.frame_i[S.force_i[k, FORCE_M]], row, 0, 1.0, force, torque, M[0])
+    climb(S, W, S.frame_i[S.force_i[k, FORCE_F]], row, 0, -1.0, force, torque, M[0])
+
+
+@formula
+def dot_rows(a, b):
+    """Scalar product of two rows."""
+    s = 0.0
+    for d in range(a.shape[0]):
+        s += a[d] * b[d]
+    return s
+
+
+@formula
+def respond(A, force, out):
+    """What generalised impulses change the velocities by, rows of joints closed; springs have no say."""
+    nv, nr = A.wide.shape[1], A.S.row_i.shape[0]
+    rows = A.sheet.rows
+    for d in range(nv):
+        rows[0, d] = force[d]
+    for r in range(nr):
+        rows[1, r] = 0.0
+    enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, SOLVE)
+    for d in range(nv):
+        out[d] = rows[2, d]
+
+
+@formula
+def take_springs(A, h):
+    """Find what is to be taken implicitly, at the state evaluated last, and factor what it adds."""
+    S, W = A.S, A.W
+    A.count[SPRINGS] = 0
+    if S.force_i.shape[0] == 0:
+        return
+    enter(A.door[0], S, W, A.R, A.clock, A.slopes, SLOPES)
+    found = A.slopes.rows
+    used = 0
+    for k in range(S.force_i.shape[0]):
+        n = max(1, int(found[k, DIRECTIONS]))
+        for i in range(n):
+            stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
+            if stiffness + damping > 0.0 and one_spring(A, h, used, (k, n, i), stiffness, damping):
+                A.spring_x[used, SPRING_OF] = k
+                A.spring_x[used, SPRING_FORCE] = found[k, ALONG + i]
+                used += 1
+    A.count[SPRINGS] = used
+    factor_springs(A)
+
+
+@formula
+def one_spring(A, h, n, which, stiffness, damping):
+    """Put a spring into row n of the tables; whether it is stiff enough to stay there."""
+    J, Y, x = A.spring_J[n], A.spring_Y[n], A.spring_x[n]
+    gradient(A.S, A.W, which[0], which[1], which[2], J)
+    z = h * (h * stiffness + damping)
+    if A.S.kinds[SOLVER] == SCHUR:  # joints make nothing lighter
+        for b in range(A.S.body_i.shape[0]):
+            inverse_mass(A.S, b, J, A.S.body_i[b, V0], Y, A.S.body_i[b, V0])
+        if z * dot_rows(J, Y) < SOFT:
+            return False
+    respond(A, J, Y)
+    z *= dot_rows(J, Y)
+    if z < SOFT:
+        return False
+    y = (0.25 * z) * (0.25 * z)
+    share = y / (1.0 + y)
+    x[SPRING_K], x[SPRING_C], x[SHARE] = stiffness, damping, share
+    x[ADDED] = h * h * stiffness * (0.25 + 0.75 * share) + h * damping * (0.5 + 0.5 * share)
+    return True
+
+
+@formula
+def factor_springs(A):
+    """Cholesky's factor of 1 / A + J M^-1 J'."""
+    C = A.stiff
+    for i in range(A.count[SPRINGS]):
+        for j in range(i + 1):
+            s = dot_rows(A.spring_J[i], A.spring_Y[j])
+            if i == j:
+                s += 1.0 / A.spring_x[i, ADDED]
+            for k in range(j):
+                s -= C[i, k] * C[j, k]
+            C[i, j] = sqrt(s) if i == j else s / C[j, j]
+
+
+@formula
+def stiffened(A, x):
+    """Turn a response without springs into one with them, in place."""
+    n, C, t = A.count[SPRINGS], A.stiff, A.spring_x
+    for i in range(n):
+        s = dot_rows(A.spring_J[i], x)
+        for k in range(i):
+            s -= C[i, k] * t[k, SOLVED]
+        t[i, SOLVED] = s / C[i, i]
+    for i in range(n - 1, -1, -1):
+        s = t[i, SOLVED]
+        for k in range(i + 1, n):
+            s -= C[k, i] * t[k, SOLVED]
+        t[i, SOLVED] = s / C[i, i]
+    for i in range(n):
+        for d in range(x.shape[0]):
+            x[d] -= t[i, SOLVED] * A.spring_Y[i, d]
+
+
+@formula
+def implied(A, h, i, before, change):
+    """Impulse against spring i beyond the force at half the step and half the change of velocities."""
+    x = A.spring_x[i]
+    r, dr = dot_rows(A.spring_J[i], before), dot_rows(A.spring_J[i], change)
+    return h * h * x[SPRING_K] * (x[SHARE] * r + (0.25 + 0.75 * x[SHARE]) * dr) + 0.5 * h * x[SPRING_C] * x[SHARE] * dr

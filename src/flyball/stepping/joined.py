@@ -1,0 +1,83 @@
+"""What joints hold together, in a step by impulses: the tables of the mechanism, and rooms to work in.
+
+The mechanism is a `System` of its own, of the bodies that have joints, drivers or forces, behind the engine's door.
+Each part of it that is connected (not by way of ground) is a group of the cone problem, whose velocities are
+neighbours; group g has those from ``group[g]`` to ``group[g + 1]``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..equations.engine import Sheet
+from ..numerics.integrators.clock import Clock
+from ..numerics.integrators.tableaux import Tableau
+from ..numerics.ldl import Pattern
+from ..tables.system import System, Work
+
+# what may be asked at the door (`joints.joined`), in the order of a step: the start of a motion; velocities without
+# impulses, from those before the step in State.wide (movers' twists follow); those put there; rows of contacts into the
+# problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there; the way
+# gone with these and others beside them in State.wide; velocities at its end put there
+START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES = range(8)
+# entries of Joined.real: time and step
+TIME, STEP = range(2)
+# entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
+# steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has begun
+FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
+# rows of Joined.wide: velocities at the start of the step; their change without impulses of contact, as far as known,
+# and what the evaluation at half the change makes of it, and of the drivers' efforts; generalised impulses of contacts
+# and the rest, and what they change; velocities at the end; the way, scratch
+V_BEFORE, CHANGE, SMOOTH, EFFORTS, IMPULSE, STRUCK, V_AFTER, WAY = range(8)
+# columns of Joined.spring_x: stiffness, damping, share of the end of the step, what it adds to the masses, scratch,
+# the force that it is of and what this is along it
+SPRING_K, SPRING_C, SHARE, ADDED, SOLVED, SPRING_OF, SPRING_FORCE = range(7)
+# columns of Joined.job: what is answered, where its J and Y begin, how many rows, the next one of the group
+JOB_AT, JOB_ROWS, JOB_NEXT = range(3)
+NO_ROOM = 100  # what ROWS may return; the others return the engine's status
+
+
+class Joined(NamedTuple):
+    """The mechanism: tables, the engine's rooms, and those of the step."""
+
+    S: System
+    W: Work
+    R: Tableau
+    clock: Clock
+    sheet: Sheet  # (4, width)
+    slopes: Sheet  # (forces, SLOPE_WIDTH)
+    door: np.ndarray  # (1,): the engine's address
+    real: np.ndarray  # (8,)
+    count: np.ndarray  # type: ignore[assignment]  # (8,)
+    mover: np.ndarray  # (movers, 2): row of the body table, group
+    group: np.ndarray  # (ng + 1,)
+    wide: np.ndarray  # (8, nv)
+    lam: np.ndarray  # (2, nr): multipliers without contact; impulses of contacts and the rest over the step
+    spring_x: np.ndarray  # (springs, 8)
+    spring_J: np.ndarray  # (springs, nv)
+    spring_Y: np.ndarray  # (springs, nv)
+    stiff: np.ndarray  # (springs, springs): Cholesky factor
+    mixing: np.ndarray  # (MIXING, nv)
+    weight: np.ndarray  # (MIXED + 1, MIXED + 1)
+    job: np.ndarray  # (2 contacts + lines, 3)
+    queue: np.ndarray  # (ng,): the next job of each group
+
+
+def _none(of: type, dimensions: str, **parts: Any) -> Any:
+    """A named tuple of empty arrays: of floats with so many dimensions, of integers where that is a letter."""
+    names = [n for n in of._fields if n not in parts]  # type: ignore[attr-defined]
+    for name, d in zip(names, dimensions, strict=True):
+        whole = d in "abc"
+        parts[name] = np.zeros((0,) * ("abc".index(d) + 1 if whole else int(d)), np.int64 if whole else float)
+    return of(**parts)
+
+
+def no_mechanism() -> Joined:
+    """Tables of no mechanism, of the types of all others: what the loop of steps is compiled for."""
+    S = _none(System, "b2a2b2bbaabb2bbaa11bbb", ldl=_none(Pattern, "aaaaaaaa"))
+    W = _none(Work, "2222221112222112221a")
+    clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
+    sheet = Sheet(np.zeros((0, 0)))
+    return _none(Joined, "a1aba22222222ba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)

@@ -1,0 +1,272 @@
+"""The mechanism in a step by impulses, behind a door: what the loop of steps asks of it, one task after the other."""
+
+from __future__ import annotations
+
+from ..compiler.door import door, enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..equations.tasks import ARRIVE, MOTION, POSITION
+from ..equations.tree import retract
+from ..math.vec import load3, load9, put3, put9
+from ..numerics.integrators.clock import T
+from ..tables.system import (
+    BODY_LAW,
+    BODY_WORK,
+    COORDINATES,
+    EFFORT,
+    FORCE_WORK,
+    NU,
+    PLACED,
+    ROW_WORK,
+    SCHUR,
+    SOLVER,
+    V0,
+)
+from .contact_rows import contact_rows
+from .implicit import dot_rows, implied, respond
+from .joined import (
+    ADDED,
+    BEGIN,
+    BEGUN,
+    CHANGE,
+    EFFORTS,
+    FINISH,
+    FIRST,
+    FREE,
+    IMPULSE,
+    KEEP,
+    MEAN,
+    ROWS,
+    SMOOTH,
+    SPRING_C,
+    SPRING_FORCE,
+    SPRING_OF,
+    SPRINGS,
+    START,
+    STEP,
+    STRUCK,
+    TIME,
+    V_AFTER,
+    V_BEFORE,
+    VELOCITIES,
+    WAY,
+)
+from .smooth import free_velocities, put_aside
+
+
+@formula
+def ask(A, M, C, P, X, task):
+    """One task of `joined`."""
+    if task == START:
+        return start(A, M, X)
+    if task == FREE:
+        return free(A, M, X)
+    if task == BEGIN:
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = A.wide[V_BEFORE, d] + A.wide[CHANGE, d]
+        return 0
+    if task == ROWS:
+        return contact_rows(A, M, C, P)
+    if task == KEEP:
+        keep(A, P, X)
+        return 0
+    if task == MEAN:
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+        return 0
+    if task == FINISH:
+        return finish(A, M, X)
+    if task == VELOCITIES:
+        for d in range(A.wide.shape[1]):
+            X.wide[d] = A.clock.y[0, A.S.kinds[COORDINATES] + d]
+    return 0
+
+
+@formula
+def start(A, M, X):
+    """Evaluate where the motion begins, which must be on the constraints: accelerations, multipliers, efforts."""
+    A.count[BEGUN] = 0
+    A.clock.real[T] = A.real[TIME]
+    status = enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
+    put_aside(A, A.real[STEP])
+    nq = A.S.kinds[COORDINATES]
+    for d in range(A.wide.shape[1]):
+        X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
+        A.wide[STRUCK, d] = 0.0
+    for r in range(A.lam.shape[1]):
+        A.lam[1, r] = 0.0
+    show(A, M, True)
+    return status
+
+
+@formula
+def free(A, M, X):
+    """Velocities without contact, from those in State.wide; asked once more it begins at the same place again."""
+    y, nq = A.clock.y, A.S.kinds[COORDINATES]
+    if A.count[BEGUN] == 0:
+        for i in range(y.shape[1]):
+            y[1, i] = y[0, i]
+        A.count[BEGUN] = 1
+    for i in range(y.shape[1]):
+        y[0, i] = y[1, i]
+    for d in range(A.wide.shape[1]):
+        y[0, nq + d] = X.wide[d]
+    status = free_velocities(A)
+    show(A, M, False)
+    return status
+
+
+@formula
+def show(A, M, poses):
+    """Velocities of the bodies for what looks for contacts, and poses if these are asked for, as last evaluated."""
+    for k in range(A.mover.shape[0]):
+        b, to = A.mover[k, 0], A.count[FIRST] + k
+        if poses:
+            put3(M.pose, to, 0, load3(A.W.BK, b, 0))
+            put9(M.pose, to, 3, load9(A.W.BK, b, 3))
+        put3(M.twist, to, 0, load3(A.W.BK, b, 15))
+        put3(M.twist, to, 3, load3(A.W.BK, b, 12))
+
+
+@formula
+def keep(A, P, X):
+    """Velocities after the step, from the impulses that were found; what these do to joints and drivers.
+
+    They follow from one solve for all impulses: joints are exact to rounding, whatever the cone solver left.
+    """
+    nv, h = A.wide.shape[1], A.real[STEP]
+    before, total = A.wide[V_BEFORE], A.wide[IMPULSE]
+    for d in range(nv):
+        total[d] = 0.0
+        A.wide[WAY, d] = X.wide[d] - before[d] - A.wide[CHANGE, d]
+    contact_impulses(A, P, X, total)
+    for i in range(A.count[SPRINGS]):
+        s = implied(A, h, i, before, A.wide[CHANGE])
+        s += A.spring_x[i, ADDED] * dot_rows(A.spring_J[i], A.wide[WAY])
+        for d in range(nv):
+            total[d] -= s * A.spring_J[i, d]
+    respond(A, total, A.wide[STRUCK])
+    for r in range(A.lam.shape[1]):
+        A.lam[1, r] = A.sheet.rows[3, r]
+    for d in range(nv):
+        A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
+    account(A, h)
+    turn_on(A, h)
+    for d in range(nv):
+        X.wide[d] = A.wide[V_AFTER, d]
+
+
+@formula
+def turn_on(A, h):
+    """Velocity-dependent forces of the second half of the step at velocities after impacts, in joint coordinates.
+
+    Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
+    give energy. In absolute coordinates the projection that ends the step does that.
+    """
+    S, y, nq = A.S, A.clock.y, A.S.kinds[COORDINATES]
+    size = 0.0
+    for d in range(A.wide.shape[1]):
+        size += A.wide[STRUCK, d] * A.wide[STRUCK, d]
+        y[0, nq + d] = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d] + A.wide[STRUCK, d]
+    if S.kinds[SOLVER] == SCHUR or size == 0.0:
+        return
+    z = nq + A.wide.shape[1]
+    for i in range(z, y.shape[1]):
+        y[2, i] = A.clock.K[0, i]
+    if enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, MOTION) == 0:
+        for d in range(A.wide.shape[1]):
+            A.wide[V_AFTER, d] += 0.5 * (h * A.clock.K[0, nq + d] - A.wide[SMOOTH, d])
+    for i in range(z, y.shape[1]):
+        A.clock.K[0, i] = y[2, i]
+
+
+@formula
+def contact_impulses(A, P, X, total):
+    """Add the generalised impulses of all contacts and lines."""
+    for c in range(P.size[0]):
+        for side in range(2):
+            at = P.block[c, side]
+            if P.at[c, side] <= -2 and at >= 0:
+                g = -2 - P.at[c, side]
+                a = A.group[g]
+                n = A.group[g + 1] - a
+                sign = 1.0 if side == 1 else -1.0
+                for i in range(6 if P.turn.shape[0] > 0 else 3):
+                    s = sign * (X.p[c, i] if i < 3 else X.torque[c, i - 3])
+                    for d in range(n):
+                        total[a + d] += s * P.J[at + i * n + d]
+    for k in range(P.size[3]):
+        g, at = P.line_at[k, 0], P.line_at[k, 1]
+        for d in range(A.group[g + 1] - A.group[g]):
+            total[A.group[g] + d] += X.line[k] * P.J[at + d]
+
+
+@formula
+def account(A, h):
+    """Add what impulses changed to the works, whose rates at half the step stand in the clock."""
+    S, W = A.S, A.W
+    work = A.clock.K[0, S.kinds[COORDINATES] + A.wide.shape[1] :]
+    for r in range(S.row_i.shape[0]):
+        if S.row_i[r, ROW_WORK] >= 0:
+            work[S.row_i[r, ROW_WORK]] += A.lam[1, r] * W.row[NU, r] / h
+    for b in range(S.body_i.shape[0]):
+        if S.body_i[b, BODY_LAW] >= 0:
+            d = S.body_i[b, V0]
+            mean = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+            work[S.body_i[b, BODY_WORK]] += W.vel[EFFORT, d] * mean / h
+            A.wide[EFFORTS, d] += W.vel[EFFORT, d] / h
+    for d in range(A.wide.shape[1]):
+        A.wide[WAY, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
+    for i in range(A.count[SPRINGS]):
+        k = int(A.spring_x[i, SPRING_OF])
+        if S.force_i[k, FORCE_WORK] >= 0:
+            work[S.force_i[k, FORCE_WORK]] += spring_power(A, h, i)
+
+
+@formula
+def spring_power(A, h, i):
+    """What the power of an implicit force is beyond that at half the step and at the rate without impulses."""
+    J, damping = A.spring_J[i], A.spring_x[i, SPRING_C]
+    r = dot_rows(J, A.wide[V_BEFORE])
+    half = r + 0.5 * dot_rows(J, A.wide[CHANGE])
+    rate = 0.5 * (r + dot_rows(J, A.wide[V_AFTER]))
+    s = A.spring_x[i, SPRING_FORCE] - damping * (half - r)  # as evaluated last
+    less = implied(A, h, i, A.wide[V_BEFORE], A.wide[WAY]) / h + damping * (rate - half)
+    return s * (rate - half) - less * rate
+
+
+@formula
+def finish(A, M, X):
+    """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status."""
+    S, nq, nv, h = A.S, A.S.kinds[COORDINATES], A.wide.shape[1], A.real[STEP]
+    y, way = A.clock.y, A.wide[WAY]
+    for d in range(nv):
+        way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]
+        y[0, nq + d] = A.wide[V_AFTER, d]
+    retract(S, y[0, :nq], way)
+    for i in range(nq + nv, y.shape[1]):
+        y[0, i] = y[1, i] + h * A.clock.K[0, i]
+    A.real[TIME] += h
+    A.clock.real[T] = A.real[TIME]
+    A.W.option[PLACED] = 1.0
+    status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
+    A.W.option[PLACED] = 0.0
+    enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
+    show(A, M, True)
+    A.count[BEGUN] = 0
+    return status
+
+
+@door
+def joined(A, M, C, P, X, task):
+    """The mechanism: ``A`` as `Joined`, then movers, contacts, problem and state of the step; see ``joined.py``.
+
+    Returns 0, NO_ROOM, or the engine's status.
+    """
+    return ask(A, M, C, P, X, task)
+
+
+@kernel
+def joined_kernel(address, A, M, C, P, X, task):
+    """From Python through the door."""
+    return enter(address, held(A), held(M), held(C), held(P), held(X), task)

@@ -1,0 +1,84 @@
+"""Every island by its solver: the same answers as all at once, and what was picked is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flyball.numerics.cone.choose import (
+    BY_ONE,
+    BY_OTHER,
+    CALLS,
+    CONTACTS_BY_ONE,
+    HANDED_ON,
+    ISLANDS,
+    LARGEST,
+    MOST_CONTACTS,
+)
+from flyball.numerics.cone.islands import islands_of
+from flyball.numerics.cone.problem import CONVERGED, ENDED, ENOUGH, MOST, RESIDUAL, Factor
+from flyball.numerics.cone.registry import names, ready
+from flyball.numerics.cone.solve import solve_kernel
+from tests.cone.problems import KINDS, dense, impulses, random_problem
+from tests.cone.test_gauss_seidel import cone_lack
+
+
+def apart(seed, kind):
+    """A random problem of several islands: many nodes, few contacts."""
+    return random_problem(seed, **{**KINDS[kind], "nc": 14, "nn": 24})
+
+
+@pytest.mark.parametrize("limit", [0, 3, 100])
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("seed", range(3))
+def test_islands_one_by_one(limit, kind, seed):
+    P, X, W, O, _ = apart(seed, kind)
+    _, DK, N, b = dense(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    O.count[MOST], O.real[ENOUGH] = 200_000, 1e-12
+    made = ready("auto", P, X, W, O)
+    made.F.limit[MOST_CONTACTS] = limit
+    solve_kernel(made.address, P, X, W, O, made.F)
+    p = impulses(P, X)
+    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9
+    assert cone_lack(P, p, N @ p + b) < 1e-9 * (1 + abs(p).max())
+    after = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
+    told, (count, I) = made.told, islands_of(P.at, P.line_at, P.size[1], P.size[2])
+    contacts = np.diff(I.island[: count + 1])
+    expected = 1, count, (contacts <= limit).sum(), (contacts > limit).sum()
+    assert tuple(told[[CALLS, ISLANDS, BY_ONE, BY_OTHER]]) == expected
+    assert told[LARGEST] == contacts.max() and told[CONTACTS_BY_ONE] == contacts[contacts <= limit].sum()
+
+
+@pytest.mark.parametrize("name", names())
+def test_every_name_solves(name):
+    P, X, W, O, _ = random_problem(4)
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
+    made = ready(name, P, X, W, O)
+    solve_kernel(made.address, P, X, W, O, made.F)
+    p = impulses(P, X)
+    assert O.count[ENDED] == CONVERGED
+    assert cone_lack(P, p, N @ p + b) < 1e-8
+
+
+def test_what_does_not_fit_is_handed_on():
+    P, X, W, O, _ = random_problem(4)
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
+    made = ready("newton", P, X, W, O)
+    tight = made.F._replace(numbers=np.zeros(8), places=np.zeros(40, np.int64))
+    solve_kernel(made.address, P, X, W, O, tight)
+    p = impulses(P, X)
+    assert made.told[HANDED_ON] == 1 and O.count[ENDED] == CONVERGED
+    assert cone_lack(P, p, N @ p + b) < 1e-8
+
+
+def test_nothing_to_do():
+    P, X, W, O, F = random_problem(4, nc=0, nn=2)
+    made = ready("auto", P, X, W, O)
+    before = X.v.copy()
+    solve_kernel(made.address, P, X, W, O, made.F)
+    assert O.count[ENDED] == CONVERGED and isinstance(F, Factor)
+    np.testing.assert_array_equal(X.v, before)

@@ -1,0 +1,125 @@
+"""A mechanism stepped from Python: the door of its part of the step, and a plain solver of contact problems."""
+
+import numpy as np
+
+from flyball.analysis.motion.impulse.mechanism import tables
+from flyball.analysis.motion.start import begin
+from flyball.contact.tables import GAP, NORMAL, POINT, Contacts, Movers
+from flyball.equations.engine import engine
+from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.stepping.joined import BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, STEP, VELOCITIES
+from flyball.stepping.joints import joined, joined_kernel
+
+
+class Stepped:
+    """A mechanism and what it touches; ``touching(M)`` says what: (mover 1, mover 2, point, normal, gap, friction)."""
+
+    def __init__(self, model, h, coordinates="absolute", contacts=0, touching=None):
+        start = begin(model.snapshot(), 0.0, None, None, coordinates)
+        self.names = [b.name for b in model.bodies]
+        self.touching = touching
+        self.compiled = start.assembly.compiled
+        self.structure = self.compiled.structure
+        A = tables(start, self.names, 0, h)
+        self.A = A._replace(job=np.zeros((2 * contacts, 3), np.int64))
+        n, nv = len(self.names), A.wide.shape[1]
+        self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
+        self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
+        self.P = unfilled(contacts, 0, len(A.group) - 1, 0, 6 * contacts * nv)
+        self.P.group[:] = A.group
+        self.X, self.Y = rooms(self.P)[0], rooms(self.P)[0]
+        A.door[0] = engine.address(A.S, A.W, A.R, A.clock, A.sheet)
+        self.address = joined.address(self.A, self.M, self.C, self.P, self.X)
+        self.ask(START)
+
+    def ask(self, task, X=None):
+        status = joined_kernel(self.address, self.A, self.M, self.C, self.P, self.X if X is None else X, task)
+        assert status == 0, status
+
+    @property
+    def q(self):
+        return self.A.clock.y[0, : self.structure.nq]
+
+    @property
+    def v(self):
+        return self.A.clock.y[0, self.structure.nq : self.structure.nq + self.structure.nv]
+
+    @property
+    def z(self):
+        return self.A.clock.y[0, self.structure.nq + self.structure.nv :]
+
+    def pose(self, name):
+        """Mass centre, axes."""
+        x = self.M.pose[self.names.index(name)]
+        return x[:3], x[3:].reshape(3, 3)
+
+    def twist(self, name):
+        """Velocity of the mass centre, angular velocity."""
+        x = self.M.twist[self.names.index(name)]
+        return x[:3], x[3:]
+
+    def step(self, times=1):
+        for _ in range(times):
+            P, X, Y, h = self.P, self.X, self.Y, self.A.real[STEP]
+            found = self.touching(self.M) if self.touching else []
+            P.size[0] = n = len(found)
+            for c, (a, b, point, normal, gap, mu) in enumerate(found):
+                P.at[c], P.frame[c], P.mu[c], P.bias[c] = (a, b), frame(normal), mu, (max(gap, 0.0) / h, 0.0, 0.0)
+                self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
+            X.p[:] = Y.p[:] = 0.0
+            self.ask(FREE)
+            self.ask(ROWS)
+            self.ask(BEGIN)
+            self.solve(X, P.bias[:n], P.mu[:n])
+            self.ask(KEEP)
+            self.ask(MEAN, Y)
+            bias = np.array([(found[c][4] / h + self.seen(Y, c)[0], 0.0, 0.0) for c in range(n)]).reshape(n, 3)
+            Y.wide[:] = 0.0
+            self.solve(Y, bias, np.zeros(n))
+            self.ask(FINISH, Y)
+            self.ask(VELOCITIES)
+
+    def sides(self, c):
+        """(sign, slice of velocities, J, Y) of each side of contact c that is in a group."""
+        P, group = self.P, self.A.group
+        out = []
+        for side, sign in ((0, -1.0), (1, 1.0)):
+            if P.at[c, side] <= -2:
+                g, at = -2 - P.at[c, side], P.block[c, side]
+                n = group[g + 1] - group[g]
+                J, Y = (x[at : at + 3 * n].reshape(3, n) for x in (P.J, P.Y))
+                out.append((sign, slice(group[g], group[g + 1]), J, Y))
+        return out
+
+    def seen(self, X, c):
+        """Velocity at contact c."""
+        return sum((sign * J @ X.wide[part] for sign, part, J, _ in self.sides(c)), np.zeros(3))
+
+    def solve(self, X, bias, mu):
+        """Gauss and Seidel, Coulomb's law, to the last digit."""
+        n = len(mu)
+        sides = [self.sides(c) for c in range(n)]
+        N = [sum(J @ Y.T for _, _, J, Y in s) for s in sides]
+        for _ in range(3000):
+            worst = 0.0
+            for c in range(n):
+                old = X.p[c].copy()
+                u = bias[c] + self.seen(X, c)
+                X.p[c, 0] = max(0.0, old[0] - u[0] / N[c][0, 0])
+                if mu[c] > 0.0:
+                    t = X.p[c, 1:] - (u + N[c][:, 0] * (X.p[c, 0] - old[0]))[1:] / N[c].trace()
+                    X.p[c, 1:] = t * min(1.0, mu[c] * X.p[c, 0] / max(np.hypot(*t), 1e-300))
+                change = X.p[c] - old
+                for sign, part, _, Y in sides[c]:
+                    X.wide[part] += sign * change @ Y
+                worst = max(worst, np.abs(N[c] @ change).max())
+            if worst < 1e-13:
+                return
+
+
+def frame(normal):
+    """Rows n, t1, t2."""
+    n = np.asarray(normal, float)
+    t = np.cross(n, np.eye(3)[np.argmin(np.abs(n))])
+    t /= np.linalg.norm(t)
+    return np.r_[n, t, np.cross(n, t)]
