@@ -94,7 +94,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
     moving = bounded & (G.shape_i[:, MOVER] >= 0)
     usual = hold[moving if moving.any() else bounded, 3]
-    real[USUAL] = np.median(usual) if len(usual) else 1.0
+    real[USUAL] = (np.median(usual) if len(usual) else 0.0) or 1.0
     count[[BOUNDED, WIDE, TOLD]] = bounded.sum(), ns - bounded.sum(), exact
     slot = np.zeros((ns, 5), np.int64)
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
