@@ -25,3 +25,5 @@ from __future__ import annotations
 
 SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID = range(10)
 """Numbers of the kinds; a further kind takes the next one."""
+PLANAR = frozenset((SPHERE, PLANE, POLYGON))
+"""Kinds of planar mechanisms."""
