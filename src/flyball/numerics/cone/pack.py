@@ -57,10 +57,14 @@ def along_normal(P, c, side):
 
 @formula
 def kind_of(P, W, c, rubbing):
-    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: none is taken as smooth."""
+    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: 1 if none is taken
+    as smooth, 2 if none as one of balls either.
+    """
     i, j = P.at[c, 0], P.at[c, 1]
     if i < NONE or j < NONE or P.turn.shape[0] > 0:
         return ANY
+    if rubbing > 1:
+        return ROUGH
     first, second = True, True
     W.rows[0, c, 1], W.rows[0, c, 2] = 0.0, 0.0
     if i >= 0:
