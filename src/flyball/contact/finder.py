@@ -100,6 +100,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
         form = FLAT if G.shape_i[i, KIND] == PLANE else OTHER
         slot[s, [SHAPE, MOVES, FORM, CLASS]] = i, G.shape_i[i, MOVER], form, kin[i]
+    turning = ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0
     now = np.zeros((ns, 8))
     now[bounded.sum() :, SIZE] = np.inf
     return Search(
@@ -111,7 +112,8 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
         slot=slot,
         now=now,
         fat=np.zeros((ns, 8)),
-        turn=np.zeros((ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0, 9)),
+        axes=np.zeros((turning, 9)),
+        turn=np.zeros((turning, 9)),
         wide=np.zeros((ns - int(bounded.sum()), 20)),
         raw=np.zeros((ns, 18)),
         key=np.zeros(ns, np.int64),
