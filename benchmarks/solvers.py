@@ -21,7 +21,7 @@ import matplotlib as mpl
 import numpy as np
 from cone_problems import chain, pile, stack
 
-from flyball.numerics.cone.problem import ENOUGH, MOST, Factor
+from flyball.numerics.cone.problem import ENDED, ENOUGH, MOST, NEEDED_NUMBERS, NEEDED_PLACES, SMALL, Factor
 from flyball.numerics.cone.pyramid import sliding_share
 from flyball.numerics.cone.registry import FACTORED, SOLVERS, room_for_all
 from flyball.numerics.cone.residual import residuals
@@ -52,6 +52,9 @@ def points(name: str, P, v: np.ndarray, wide: np.ndarray) -> list[tuple[float, f
     room = room_for_all(P, O, True) if name in FACTORED else F
     F = Factor(room.numbers, room.places)
     address = SOLVERS[name].address(P, X, W, O, F)
+    solve_kernel(address, P, X, W, O, F)
+    if O.count[ENDED] == SMALL:
+        F = Factor(np.zeros(O.count[NEEDED_NUMBERS]), np.zeros(O.count[NEEDED_PLACES], np.int64))
     for cut in CUTS:
         spent, used = np.inf, 0
         for _ in range(3):
