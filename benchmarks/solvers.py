@@ -110,7 +110,7 @@ def draw_pyramid() -> None:
         axes[1].plot(np.degrees(angle), share[:, 1], f"C{k}:")
     axes[0].plot(np.cos(angle), np.sin(angle), "k", lw=0.8, label="cone")
     axes[0].set(aspect="equal", title="what holds, over mu p_n", xticks=[-1, 0, 1], yticks=[-1, 0, 1])
-    axes[1].set(title="sliding: against the velocity, and across it (dotted)", xlabel="direction [deg]", xlim=(0, 180))
+    axes[1].set(title="sliding: along, and across (dotted)", xlabel="direction [deg]", xlim=(0, 180))
     axes[1].axhline(1, color="k", lw=0.8)
     axes[0].legend(fontsize=7, loc="center")
     figure.savefig(IMAGES / "friction_pyramid.png", dpi=80)
