@@ -116,12 +116,12 @@ def lack(x, o, n, s, t, u, v, w):
     m, r = x[o + MOBILITY], x[o + ROOT_N]
     u += x[o + GIVE] * n
     m += x[o + GIVE]
-    if x[o + KIND] == CONTACT:
-        p = on_cone(x[o + FRICTION], x[o + LEAST] / r, n - u / m, s - v / m, t - w / m)
-    elif x[o + KIND] == LINE:
+    if x[o + KIND] == IDLE:
+        return 0.0
+    if x[o + KIND] == LINE:
         p = min(max(n - u / m, x[o + LEAST] / r), x[o + HIGHEST] / r), 0.0, 0.0
     else:
-        return 0.0
+        p = on_cone(x[o + FRICTION], x[o + LEAST] / r, n - u / m, s - v / m, t - w / m)
     a, b, c = p[0] - n, p[1] - s, p[2] - t
     return m * sqrt(a * a + b * b + c * c)
 

@@ -41,7 +41,7 @@ class Rows(NamedTuple):
     row: np.ndarray  # (m, 32): see the columns in `state.py`
     blocks: np.ndarray  # (4, nb, 6) flat: e, gradient, step, e of p
     D: np.ndarray  # (nb, 36)
-    L: np.ndarray  # (nnz, 36)
+    L: np.ndarray  # (2, nnz, 36) flat: below the diagonal, above it
 
 
 @formula

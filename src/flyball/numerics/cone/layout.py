@@ -60,7 +60,7 @@ def rows_of(P, F, size):
         x[s:t],
         x[t:u],
         x[u:v],
-        x[v : v + 36 * fill],
+        x[v : v + 72 * fill],
     )
 
 
@@ -75,7 +75,7 @@ def places_of(P, size):
 @formula
 def numbers_of(size):
     """How long `Factor.numbers` must be."""
-    return 18 * size[ENTRIES] + WIDE * size[ROWS] + 60 * size[BLOCKS] + 36 * size[FILL]
+    return 18 * size[ENTRIES] + WIDE * size[ROWS] + 60 * size[BLOCKS] + 72 * size[FILL]
 
 
 @formula

@@ -31,23 +31,41 @@ from .problem import (
     STALLED,
     USED,
 )
-from .prox import DY, HELD, METRIC, OWN, ROOT_N, ROOT_T, SLIP, WIDE, Q, U, Y, set_metric
-from .smooth import along_step, from_held, hessian, product, set_impulses, set_y, slope_along
+from .prox import (
+    CONTACT,
+    COULOMB_CONTACT,
+    DY,
+    HELD,
+    METRIC,
+    OWN,
+    ROOT_N,
+    ROOT_T,
+    SLIP,
+    WIDE,
+    Q,
+    U,
+    Y,
+    nearest,
+    set_kind,
+    set_metric,
+    slipped,
+)
+from .smooth import add_impulse, along_step, from_held, hessian, product, set_impulses, set_y, slope_along
 
 FIRST_RHO, LEAST_RHO, FALL = 1e-3, 1e-9, 0.03  # of the mobility: compliance to begin with, the least, between
 SLOW = 0.05  # change of impulses over the one before, from which on the compliance falls
 EXACT = 0.1  # what is left of the slope along a step when its length is right
-SEARCHES = 30
+SEARCHES, HALVINGS = 30, 4
 
 
 @formula
-def direction(R):
+def direction(R, symmetric):
     """Step from the gradient; its e . step, |step|^2 and gradient . step. False if the matrix could not be factored."""
     n = R.size[BLOCKS]
     b, g, s = R.blocks, 6 * n, 12 * n
-    hessian(R)
+    hessian(R, symmetric)
     Lp = R.graph[6 * (n + 1) : 7 * (n + 1)]
-    if not factor(n, Lp, R.Li, R.D, R.L):
+    if not factor(n, Lp, R.Li, R.D, R.L, symmetric):
         return False, 0.0, 0.0, 0.0
     for k in range(g):
         b[s + k] = -b[g + k]
@@ -82,6 +100,37 @@ def length(R, first, second, down):
 
 
 @formula
+def left(R, a):
+    """|e - sum G' p|^2 at the part a of the step."""
+    x, n = R.row, 6 * R.size[BLOCKS]
+    for k in range(n):
+        R.blocks[3 * n + k] = R.blocks[k] + a * R.blocks[2 * n + k]
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        p = nearest(x, o, x[o + Y] + a * x[o + DY], x[o + Y + 1] + a * x[o + DY + 1], x[o + Y + 2] + a * x[o + DY + 2])
+        if p[0] != 0.0:
+            add_impulse(R, row, 3 * n, -p[0] / x[o + ROOT_N], -p[1] / x[o + ROOT_T], -p[2] / x[o + ROOT_T])
+    s = 0.0
+    for k in range(n):
+        s += R.blocks[3 * n + k] * R.blocks[3 * n + k]
+    return s
+
+
+@formula
+def part(R):
+    """How much of a step leaves less of what is to vanish, where that is no gradient; 0 if nothing does."""
+    n = 6 * R.size[BLOCKS]
+    now, a = 0.0, 1.0
+    for k in range(n):
+        now += R.blocks[n + k] * R.blocks[n + k]
+    for _ in range(HALVINGS):
+        if left(R, a) < (1.0 - 0.5 * a) * now:
+            return a
+        a *= 0.5
+    return 0.0
+
+
+@formula
 def advance(R, a):
     """e and the scaled y move by the part a of the step.
 
@@ -110,7 +159,7 @@ def gaps(R, coulomb):
         a, b, c = product(R, row, g)
         r, p, q = x[o + METRIC], x[o + ROOT_N], x[o + ROOT_T]
         n, s, t = x[o + Q] / p, x[o + Q + 1] / q, x[o + Q + 2] / q
-        u = r * x[o + HELD] - p * x[o + Y] - x[o + SLIP] - a
+        u = r * x[o + HELD] - p * x[o + Y] - slipped(x, o) - a
         v, w = r * x[o + HELD + 1] - q * x[o + Y + 1] - b, r * x[o + HELD + 2] - q * x[o + Y + 2] - c
         x[o + OWN], x[o + OWN + 1], x[o + OWN + 2] = u, v, w
         d = lack(x, o, n, s, t, u + dilation(x, o, coulomb, v, w), v, w)
@@ -144,37 +193,60 @@ def slide(R, coulomb):
 
 
 @formula
-def search(R, O, coulomb):
-    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual."""
-    rho, steps, before = FIRST_RHO, 0, 1e300
+def inner(R, O, coulomb, law, steps):
+    """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
     enough = O.real[ENOUGH]
+    while True:
+        set_impulses(R)
+        worst, near, change = gaps(R, coulomb)
+        if worst != worst:
+            return BROKEN, worst, change, steps
+        if worst <= enough or near <= max(0.1 * change, 0.1 * enough):
+            return CONVERGED, worst, change, steps
+        if steps >= O.count[MOST]:
+            return CUT, worst, change, steps
+        steps += 1
+        good, first, second, down = direction(R, not law)
+        if not good:
+            return STALLED if law else BROKEN, worst, change, steps
+        along_step(R)
+        a = part(R) if law else length(R, first, second, down)
+        if law and a == 0.0:
+            return STALLED, worst, change, steps
+        advance(R, a)
+
+
+@formula
+def search(R, O, coulomb):
+    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual.
+
+    Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
+    """
+    rho, steps, before, law, best = FIRST_RHO, 0, 1e300, False, 1e300
     slide(R, coulomb)
     for _ in range(4 * O.count[MOST] + 20):
         set_metric(R, rho)
+        if law:
+            set_kind(R, CONTACT, COULOMB_CONTACT)
         set_y(R)
-        while True:
-            set_impulses(R)
-            worst, inner, outer = gaps(R, coulomb)
-            O.count[USED] = steps
-            if worst != worst:
-                return BROKEN, worst
-            if worst <= enough or inner <= max(0.1 * outer, 0.1 * enough):
-                break
-            if steps >= O.count[MOST]:
-                hold(R, coulomb)
-                return CUT, worst
-            good, first, second, down = direction(R)
-            if not good:
-                return BROKEN, worst
-            steps += 1
-            along_step(R)
-            advance(R, length(R, first, second, down))
+        ended, worst, change, steps = inner(R, O, coulomb, law, steps)
+        O.count[USED] = steps
+        if law:
+            set_kind(R, COULOMB_CONTACT, CONTACT)
+            if ended != CONVERGED or not worst < best:  # it has not come closer: on as before it
+                if ended == CUT:
+                    return CUT, best
+                from_held(R)
+                law, before = False, 1e300
+                continue
         hold(R, coulomb)
-        if worst <= enough:
-            return CONVERGED, worst
-        if outer > SLOW * before:
+        if ended != CONVERGED or worst <= O.real[ENOUGH]:
+            return ended, worst
+        best = worst
+        law = coulomb > 0.0
+        if change > SLOW * before:
             rho = max(FALL * rho, LEAST_RHO)
-        before = outer
+        before = change
     return STALLED, worst
 
 
