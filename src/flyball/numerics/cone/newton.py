@@ -14,9 +14,10 @@ from __future__ import annotations
 from ...compiler.door import door
 from ...compiler.held import held
 from ...compiler.jit import formula
+from ...math.scalar import sqrt
 from .blocks import factor, solve
-from .fill import dilation, fill_rows, gap_of_impulses, hand_back, lack, push_of, span_of
-from .gather import BLOCKS, ROWS
+from .fill import dilation, fill_rows, hand_back, push_of, residual, set_bounds, set_own, span_of
+from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS
 from .layout import prepare, rows_of
 from .problem import (
     BROKEN,
@@ -153,21 +154,18 @@ def gaps(R, coulomb):
     The velocities that these impulses make are left in column OWN of the rows.
     """
     x, g = R.row, 6 * R.size[BLOCKS]
-    worst, inner, outer = 0.0, 0.0, 0.0
+    near, change = 0.0, 0.0
     for row in range(R.size[ROWS]):
         o = WIDE * row
         a, b, c = product(R, row, g)
         r, p, q = x[o + METRIC], x[o + ROOT_N], x[o + ROOT_T]
-        n, s, t = x[o + Q] / p, x[o + Q + 1] / q, x[o + Q + 2] / q
-        u = r * x[o + HELD] - p * x[o + Y] - slipped(x, o) - a
-        v, w = r * x[o + HELD + 1] - q * x[o + Y + 1] - b, r * x[o + HELD + 2] - q * x[o + Y + 2] - c
-        x[o + OWN], x[o + OWN + 1], x[o + OWN + 2] = u, v, w
-        d = lack(x, o, n, s, t, u + dilation(x, o, coulomb, v, w), v, w)
-        worst = d if d > worst or d != d else worst
-        inner = max(inner, a * a + b * b + c * c)
-        d, f, h = n - x[o + HELD], s - x[o + HELD + 1], t - x[o + HELD + 2]
-        outer = max(outer, r * r * (d * d + f * f + h * h))
-    return worst, inner**0.5, outer**0.5
+        x[o + OWN] = r * x[o + HELD] - p * x[o + Y] - slipped(x, o) - a
+        x[o + OWN + 1] = r * x[o + HELD + 1] - q * x[o + Y + 1] - b
+        x[o + OWN + 2] = r * x[o + HELD + 2] - q * x[o + Y + 2] - c
+        near = max(near, a * a + b * b + c * c)
+        a, b, c = x[o + Q] / p - x[o + HELD], x[o + Q + 1] / q - x[o + HELD + 1], x[o + Q + 2] / q - x[o + HELD + 2]
+        change = max(change, r * r * (a * a + b * b + c * c))
+    return residual(R, coulomb), sqrt(near), sqrt(change)
 
 
 @formula
@@ -178,18 +176,18 @@ def hold(R, coulomb):
         o = WIDE * row
         x[o + HELD] = x[o + Q] / x[o + ROOT_N]
         x[o + HELD + 1], x[o + HELD + 2] = x[o + Q + 1] / x[o + ROOT_T], x[o + Q + 2] / x[o + ROOT_T]
-        x[o + SLIP] = dilation(x, o, coulomb, x[o + OWN + 1], x[o + OWN + 2])
+    set_slips(R, coulomb)
     for k in range(n):
         R.blocks[k] -= R.blocks[n + k]
 
 
 @formula
-def slide(R, coulomb):
-    """De Saxce's additions at e."""
-    for row in range(R.size[ROWS]):
-        o = WIDE * row
-        _, v, w = product(R, row, 0)
-        R.row[o + SLIP] = dilation(R.row, o, coulomb, v + R.row[o + U + 1], w + R.row[o + U + 2])
+def set_slips(R, coulomb):
+    """What is added to normal velocities, and bounds of rolling and spinning, of what is held on to."""
+    for row in range(R.size[CONTACTS]):
+        R.row[WIDE * row + SLIP] = dilation(R, row, coulomb)
+    for row in range(R.size[BEFORE_TURNING], R.size[ROWS]):
+        set_bounds(R, row, HELD)
 
 
 @formula
@@ -223,7 +221,7 @@ def search(R, O, coulomb):
     Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
     """
     rho, steps, before, law, best = FIRST_RHO, 0, 1e300, False, 1e300
-    slide(R, coulomb)
+    set_slips(R, coulomb)
     for _ in range(4 * O.count[MOST] + 20):
         set_metric(R, rho)
         if law:
@@ -270,7 +268,7 @@ def make_safe(R):
 def newton_solve(P, X, O, F):
     """See `newton`."""
     span = span_of(P, O)
-    if P.turn.shape[0] > 0:
+    if P.turn.shape[0] > 0 and O.count[COULOMB] == 0:
         O.count[ENDED] = BROKEN
         return 0
     if not prepare(P, span, F, O):
@@ -279,7 +277,8 @@ def newton_solve(P, X, O, F):
     fill_rows(P, X, R, span)
     from_held(R)
     coulomb = 1.0 * O.count[COULOMB]
-    worst, largest = gap_of_impulses(R, HELD, coulomb)
+    set_own(R)
+    worst = residual(R, coulomb)
     O.count[USED] = 0
     ended = CONVERGED
     if not worst <= O.real[ENOUGH]:
@@ -296,6 +295,7 @@ def newton_solve(P, X, O, F):
 def newton(P, X, W, O, F, task):
     """Newton's method; returns factorisations.
 
-    In `Choices.count[ENDED]`: BROKEN with rolling friction, which it does not know; SMALL: enlarge `Factor`, call anew.
+    In `Choices.count[ENDED]` SMALL: enlarge `Factor`, call again; BROKEN: not finite, or the convex form with rolling
+    friction, which it does not take. Then nothing was changed.
     """
     return newton_solve(P, X, O, F)

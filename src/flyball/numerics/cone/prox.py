@@ -17,7 +17,9 @@ U, Y, DY, Q, HELD, OWN = 0, 3, 6, 9, 12, 15
 # mean mobility; roots of R_n, R_t; scaled mu, least (or lowest), highest; R; compliance; De Saxce's addition; kind; mu
 MOBILITY, ROOT_N, ROOT_T, CONE, LEAST, HIGHEST, METRIC, GIVE, SLIP, KIND, FRICTION = range(21, 32)
 WIDE = 32
-CONTACT, LINE, IDLE, COULOMB_CONTACT = 0.0, 1.0, 2.0, 3.0  # kinds; idle: nothing that it acts on moves
+# kinds; idle: nothing that it acts on moves; turning: within LEAST about the tangents, HIGHEST about the normal, which
+# are FRICTION and SLIP times the normal impulse of the contact
+CONTACT, LINE, IDLE, COULOMB_CONTACT, TURNING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @formula
@@ -88,6 +90,9 @@ def nearest(x, o, n, s, t):
         return by_coulomb(x[o + CONE], x[o + LEAST], n, s, t)
     if x[o + KIND] == LINE:
         return min(max(n, x[o + LEAST]), x[o + HIGHEST]), 0.0, 0.0
+    if x[o + KIND] == TURNING:
+        a = by_coulomb(1.0, x[o + LEAST], -1.0, s, t)
+        return min(max(n, -x[o + HIGHEST]), x[o + HIGHEST]), a[1], a[2]
     return 0.0, 0.0, 0.0
 
 
@@ -98,6 +103,9 @@ def slope(x, o, n, s, t):
         return derivative_on_cone(x[o + CONE], x[o + LEAST], n, s, t)
     if x[o + KIND] == COULOMB_CONTACT:
         return derivative_by_coulomb(x[o + CONE], x[o + LEAST], n, s, t)
+    if x[o + KIND] == TURNING:
+        a = within(0.0, x[o + LEAST], s, t, sqrt(s * s + t * t))
+        return 1.0 if abs(n) < x[o + HIGHEST] else 0.0, 0.0, 0.0, a[3], a[4], a[5], 0.0, 0.0
     free = x[o + KIND] == LINE and x[o + LEAST] < n < x[o + HIGHEST]
     return 1.0 if free else 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
