@@ -36,8 +36,10 @@ from .prox import (
     CONTACT,
     COULOMB_CONTACT,
     DY,
+    FRICTION,
     HELD,
     METRIC,
+    MOBILITY,
     OWN,
     ROOT_N,
     ROOT_T,
@@ -53,7 +55,11 @@ from .prox import (
 )
 from .smooth import add_impulse, along_step, from_held, hessian, product, set_impulses, set_y, slope_along
 
-FIRST_RHO, LEAST_RHO, FALL = 1e-3, 1e-9, 0.03  # of the mobility: compliance to begin with, the least, between
+# compliance, in parts of the mobility: far from the solution, near it, the least
+MOST_RHO, SMALL_RHO, LEAST_RHO, FLAT_RHO = 0.1, 1e-3, 1e-9, 1e-6  # FLAT: without friction
+FALL, FALL_NEAR, NEAR = 0.1, 0.01, 1e-3  # where impulses come closer slowly; residual over velocities that is near
+RAISE = 3.0  # of the compliance where Newton's method on the law itself does not come closer
+ROOM, MANY = 1.0, 12  # see `next_rho`; steps at one compliance, after which it was too small
 SLOW = 0.05  # change of impulses over the one before, from which on the compliance falls
 EXACT = 0.1  # what is left of the slope along a step when its length is right
 SEARCHES, HALVINGS = 30, 4
@@ -193,7 +199,7 @@ def set_slips(R, coulomb):
 @formula
 def inner(R, O, coulomb, law, steps):
     """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
-    enough = O.real[ENOUGH]
+    enough, last = O.real[ENOUGH], steps + MANY
     while True:
         set_impulses(R)
         worst, near, change = gaps(R, coulomb)
@@ -203,6 +209,8 @@ def inner(R, O, coulomb, law, steps):
             return CONVERGED, worst, change, steps
         if steps >= O.count[MOST]:
             return CUT, worst, change, steps
+        if steps >= last:
+            return STALLED, worst, change, steps
         steps += 1
         good, first, second, down = direction(R, not law)
         if not good:
@@ -215,12 +223,41 @@ def inner(R, O, coulomb, law, steps):
 
 
 @formula
-def search(R, O, coulomb):
+def fastest(R):
+    """The largest velocity without impulses, or of an impulse that is held on to, by itself [m/s]."""
+    s = 0.0
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        for k in range(3):
+            s = max(s, abs(R.row[o + U + k]), R.row[o + MOBILITY] * abs(R.row[o + HELD + k]))
+    return s
+
+
+@formula
+def rough(R):
+    """Whether there is friction anywhere; without it all pieces are flat, and a small compliance is as easy as any."""
+    f = 0.0
+    for row in range(R.size[CONTACTS]):
+        f = max(f, R.row[WIDE * row + FRICTION])
+    return f > 0.0
+
+
+@formula
+def next_rho(rho, slow, near):
+    """Compliance of the next problem; ``near``: residual over the largest velocity."""
+    if slow:  # but not so small that a velocity as large as the residual moves impulses by as much as they are
+        rho = max((FALL if near > NEAR else FALL_NEAR) * rho, min(rho, ROOM * near), LEAST_RHO)
+    return min(rho, max(near, SMALL_RHO))
+
+
+@formula
+def search(R, O, coulomb, worst):
     """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual.
 
     Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
     """
-    rho, steps, before, law, best = FIRST_RHO, 0, 1e300, False, 1e300
+    steps, before, law, best = 0, 1e300, False, 1e300
+    rho = min(max(worst / fastest(R), SMALL_RHO), MOST_RHO) if rough(R) else FLAT_RHO
     set_slips(R, coulomb)
     for _ in range(4 * O.count[MOST] + 20):
         set_metric(R, rho)
@@ -235,16 +272,16 @@ def search(R, O, coulomb):
                 if ended == CUT:
                     return CUT, best
                 from_held(R)
-                law, before = False, 1e300
+                law, before, rho = False, 1e300, min(RAISE * rho, MOST_RHO)
                 continue
         hold(R, coulomb)
-        if ended != CONVERGED or worst <= O.real[ENOUGH]:
+        if ended == CUT or ended == BROKEN or worst <= O.real[ENOUGH]:
             return ended, worst
-        best = worst
-        law = coulomb > 0.0
-        if change > SLOW * before:
-            rho = max(FALL * rho, LEAST_RHO)
-        before = change
+        best, law = worst, coulomb > 0.0
+        if ended == STALLED:
+            rho, before = min(10.0 * rho, MOST_RHO), 1e300
+        else:
+            rho, before = next_rho(rho, change > SLOW * before, worst / fastest(R)), change
     return STALLED, worst
 
 
@@ -282,7 +319,7 @@ def newton_solve(P, X, O, F):
     O.count[USED] = 0
     ended = CONVERGED
     if not worst <= O.real[ENOUGH]:
-        ended, worst = search(R, O, coulomb)
+        ended, worst = search(R, O, coulomb, worst)
         if ended == CUT:
             make_safe(R)
     O.count[ENDED], O.real[RESIDUAL] = ended, worst
