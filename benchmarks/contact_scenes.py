@@ -54,7 +54,7 @@ def pile(what: str, count: int) -> Pile:
     kind = {
         "spheres": np.full(count, "sphere"),
         "boxes": np.full(count, "box"),
-        "mixed": np.array(KINDS)[np.arange(count) % 4],
+        "mixed": np.array(KINDS)[rng.permutation(count) % 4],
     }[what]
     e = rng.normal(size=(count, 4))
     e /= np.linalg.norm(e, axis=1)[:, None]
