@@ -1,7 +1,7 @@
 """The narrow phase: where two shapes touch, or nearly.
 
 The list of pairs that have a way of their own is written from ``pairs``, so no kind is named here. For any other pair
-the nearest points are sought (``nearest``), then the faces that meet there are cut (``manifold``).
+the nearest points are sought (``nearest``), then the faces that meet there are cut (``manifold``): ``convex``.
 """
 
 from __future__ import annotations
@@ -11,19 +11,9 @@ from math import inf
 from ..compiler.jit import formula
 from ..compiler.written import written
 from ..math.vec import add, dot, load3, load9, mm, mv, sub
-from .manifold import manifold
-from .nearest import closest
+from .convex import any_pair
 from .pairs.registry import WAYS
 from .tables import AXES, KIND, MOVER, PLACE
-
-
-@formula
-def any_pair(G, i, j, A, B, reach, room):
-    """Contacts of two convex shapes of any kind: see ``pairs.registry``."""
-    gap, n, p = closest(G, i, j, A, B, reach, room)
-    if not gap <= reach:
-        return 0
-    return manifold(G, i, j, A, B, n, (gap, p), reach, room)
 
 
 def _by_kinds():
