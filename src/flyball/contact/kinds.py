@@ -26,3 +26,5 @@ from __future__ import annotations
 
 SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID, HEMISPHERE = range(11)
 """Numbers of the kinds; a further kind takes the next one."""
+PLANAR = frozenset((SPHERE, PLANE, POLYGON))
+"""Kinds of planar mechanisms."""
