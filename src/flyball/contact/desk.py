@@ -62,7 +62,8 @@ class Search(NamedTuple):
     slot: np.ndarray  # (ns, 5)
     now: np.ndarray  # (ns, 8): by slot
     fat: np.ndarray  # (ns, 8): by slot
-    turn: np.ndarray  # (ns, 9): the box's axes when the envelope was made, by slot
+    axes: np.ndarray  # (ns, 9): axes in the world of what is no sphere, by slot
+    turn: np.ndarray  # (ns, 9): these when the envelope was made
     wide: np.ndarray  # (wide, 20)
     raw: np.ndarray  # (ns, 18): now, fat, and how large it may become, by shape
     key: np.ndarray  # (ns,): cells, by slot

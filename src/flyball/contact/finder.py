@@ -100,6 +100,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
         form = FLAT if G.shape_i[i, KIND] == PLANE else OTHER
         slot[s, [SHAPE, MOVES, FORM, CLASS]] = i, G.shape_i[i, MOVER], form, kin[i]
+    turning = ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0
     now = np.zeros((ns, 8))
     now[bounded.sum() :, SIZE] = np.inf
     return Search(
@@ -111,7 +112,8 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
         slot=slot,
         now=now,
         fat=np.zeros((ns, 8)),
-        turn=np.zeros((ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0, 9)),
+        axes=np.zeros((turning, 9)),
+        turn=np.zeros((turning, 9)),
         wide=np.zeros((ns - int(bounded.sum()), 20)),
         raw=np.zeros((ns, 18)),
         key=np.zeros(ns, np.int64),
@@ -165,14 +167,15 @@ class Finder:
 
     def _door(self) -> int:
         """Address of the search; the narrow phase is compiled only where a pair may ask for it."""
-        from .between import between, nothing
+        from .between import door_for, nothing
 
         G, B = self.geometry, self.search
         tuples = (G, no_movers(0), B, B, B)
         nothing.address(*tuples)
         bounded = np.isfinite(B.hold[:, 3])
         simple = (G.shape_i[:, KIND] == SPHERE) | (~bounded & (G.shape_i[:, KIND] == PLANE))
-        B.count[NARROW] = (nothing if simple.all() else between).address(*tuples)
+        narrow = nothing if simple.all() else door_for(set(G.shape_i[:, KIND].tolist()))
+        B.count[NARROW] = narrow.address(*tuples)
         return search.address(G, no_movers(0), self.now, self.before, B)
 
     def find(self, movers: Movers, afresh: bool = False) -> Contacts:

@@ -8,18 +8,15 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
 from .desk import (
-    BALL,
     BOX_HALF,
     DRIFT,
     DRIFTS,
-    FORM,
     FRAME,
     HALF_LINE,
     MIDDLE,
     ORIGIN,
     ORIGIN_0,
     ROUND,
-    SHAPE,
     SIZE,
     SLACK,
     SPEED,
@@ -28,7 +25,7 @@ from .desk import (
     UP_0,
     USUAL,
 )
-from .envelopes import rotated
+from .envelopes import depth, rotated
 from .tables import AHEAD, AXES, MARGIN, PLACE, SKIN
 
 
@@ -95,16 +92,8 @@ def reaches(B, w, s):
         lead += x[w, UP + c] * B.fat[s, HALF_LINE + c]
         far += a * a
         turns += x[w, TURNS + c] ** 2
-    size = B.now[s, SIZE]
-    deep = size
-    if B.slot[s, FORM] != BALL:
-        deep = 0.0
-        i = B.slot[s, SHAPE]
-        for c in range(3):
-            n = x[w, UP] * B.turn[s, c] + x[w, UP + 1] * B.turn[s, 3 + c] + x[w, UP + 2] * B.turn[s, 6 + c]
-            deep += B.hold[i, BOX_HALF + c] * abs(n)
-        deep = min(deep, size)
-    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - size + deep + x[w, SLACK]
+    deep = depth(B, B.turn, s, (x[w, UP], x[w, UP + 1], x[w, UP + 2]))
+    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - B.now[s, SIZE] + deep + x[w, SLACK]
     if turns > 0.0:
         reach += B.real[AHEAD] * sqrt(turns * far)
     return gap - abs(lead) <= reach

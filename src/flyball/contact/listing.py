@@ -31,7 +31,7 @@ from .desk import (
     WHOLE,
     WIDE,
 )
-from .envelopes import axes_now, fatten
+from .envelopes import fatten, keep_axes
 from .flat import reaches, settle
 from .meeting import allowed, envelopes_meet
 from .same import keep, kept
@@ -159,7 +159,7 @@ def drop(B):
 
 
 @formula
-def refit(G, M, B, s):
+def refit(B, s):
     """Another envelope for slot s, in its cell: whether a level takes it."""
     i = B.slot[s, SHAPE]
     for c in range(8):
@@ -172,7 +172,7 @@ def refit(G, M, B, s):
     for c in range(8):
         B.fat[s, c] = B.raw[i, FAT_RAW + c]
     if B.slot[s, FORM] == OTHER:
-        axes_now(G, M, i, B.turn, s)
+        keep_axes(B, s)
     link(B, s, l)
     B.count[REMADE] += 1
     return True

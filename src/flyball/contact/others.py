@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.scalar import sqrt
-from ..math.vec import add, dot, load3, scale, sub
+from ..math.vec import add, dot, load3, norm, scale, sub
 from .desk import AT, BOUNDED, FLAT, FORM, GOES, MOVES, ORIGIN, SHAPE, SIZE, SPIN, TURNS, UP
+from .envelopes import bodies_meet, depth
 from .rows import sign, write
 from .same import before
 from .swept import ask, first_touch, recall, remember
@@ -33,16 +33,11 @@ def farthest(B, s, t):
     """The largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; below 0 if it cannot."""
     now = B.now
     reach = B.real[MARGIN]
-    if s >= B.count[BOUNDED] or t >= B.count[BOUNDED]:
-        return reach
-    u2, d2 = 0.0, 0.0
-    for c in range(3):
-        u = now[t, GOES + c] - now[s, GOES + c]
-        d = now[t, AT + c] - now[s, AT + c]
-        u2, d2 = u2 + u * u, d2 + d * d
-    reach += B.real[AHEAD] * (sqrt(u2) + now[s, SPIN] + now[t, SPIN])
+    u = norm(sub(load3(now, t, GOES), load3(now, s, GOES)))
+    d = sub(load3(now, t, AT), load3(now, s, AT))
+    reach += B.real[AHEAD] * (u + now[s, SPIN] + now[t, SPIN])
     whole = reach + now[s, SIZE] + now[t, SIZE]
-    return reach if d2 < whole * whole else -1.0
+    return reach if dot(d, d) < whole * whole and bodies_meet(B, B.axes, s, t, d, reach) else -1.0
 
 
 @formula
@@ -50,14 +45,10 @@ def above(M, B, w, s):
     """As `farthest`, for wide slot w and slot s."""
     k = w - B.count[BOUNDED]
     q = B.wide
-    p = (B.now[s, AT], B.now[s, AT + 1], B.now[s, AT + 2])
-    v = velocity(M, B.slot[w, MOVES], p)
-    gap, u2, t2 = -B.now[s, SIZE], 0.0, 0.0
-    for c in range(3):
-        gap += q[k, UP + c] * (p[c] - q[k, ORIGIN + c])
-        u2 += (v[c] - B.now[s, GOES + c]) ** 2
-        t2 += q[k, TURNS + c] ** 2
-    reach = B.real[MARGIN] + B.real[AHEAD] * (sqrt(u2) + B.now[s, SPIN] + sqrt(t2) * B.now[s, SIZE])
+    p, n = load3(B.now, s, AT), load3(q, k, UP)
+    u = norm(sub(velocity(M, B.slot[w, MOVES], p), load3(B.now, s, GOES)))
+    gap = dot(n, sub(p, load3(q, k, ORIGIN))) - depth(B, B.axes, s, n)
+    reach = B.real[MARGIN] + B.real[AHEAD] * (u + B.now[s, SPIN] + norm(load3(q, k, TURNS)) * B.now[s, SIZE])
     return -1.0 if gap > reach else reach
 
 
