@@ -16,9 +16,10 @@ from .epa import deepest
 from .gjk import APART, BEYOND, MEET, nearest, point, reach
 
 OFF = 0.03  # of the size: the gap that is made
-LOOKS = 24  # looks from outside at most
+LOOKS = 48  # at most
+NEAR = 1e-6  # of the size: the least
 SAME = 1e-13  # of the size: what one more look brings when it was the last
-SHALLOW = 1e-5  # of the size: depth below which nobody asks whether another direction is less deep
+SHALLOW = 1e-8  # of the size: depth below which nobody asks whether another direction is less deep
 ONWARD = 10  # doublings
 EARLY = 4  # of these, before the polytope is asked
 ROWS = 8 + POLYTOPE  # of scratch
@@ -75,5 +76,5 @@ def separation(G, i, j, p, R, start, far, room, at):
                 if not better and s <= best + SAME * size:
                     return best, n, a
                 best, n, asked = s, d, True
-        away = OFF * size - best
+        away = min(OFF * size, max(NEAR * size, -best)) - best
     return best, n, a

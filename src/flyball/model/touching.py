@@ -9,7 +9,7 @@ from ..errors import ModelError
 from .body import GROUND, Body
 from .bulk import Bodies
 from .contact import Contact
-from .element import Element
+from .element import Element, field_with
 from .ground import Ground
 from .material import Material, MaterialPair
 from .words import listing, suggest
@@ -21,8 +21,8 @@ Owner = Body | Bodies | Ground
 
 
 def has_contact(model: Model) -> bool:
-    """Whether something in the model may touch, or is there for contact only."""
-    return bool(model.contacts or model.bulk)
+    """Whether there is something that only a motion by impulses knows: contacts, stops, many bodies."""
+    return bool(model.contacts or model.limits or model.bulk)
 
 
 def owners(model: Model) -> list[Owner]:
@@ -46,6 +46,7 @@ def check_touching(model: Model, e: Element) -> None:
         for name in named(e):
             _touching(model, name, e)
         _refuse_second(model, e)
+        _refuse_overlap(model, e)
     elif isinstance(e, (Body, Bodies, Ground)):
         for material in (e.material, *(s.material for s in e.shapes())):
             if material is not None:
@@ -65,9 +66,8 @@ def _material(model: Model, name: str, e: Element) -> None:
     if not isinstance(found, Material):
         known = [x.name for x in model.materials]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(
-            f"{e.title}: there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}"
-        )
+        hint = f"{what}{suggest(name, known)}; {listing(known)}"
+        raise ModelError(f"{e.title}: {field_with(e, name)}there is no material named {name!r}{hint}")
 
 
 def _touching(model: Model, name: str, e: Contact) -> None:
@@ -79,9 +79,15 @@ def _touching(model: Model, name: str, e: Contact) -> None:
     if not isinstance(found, (Body, Bodies, Ground)):
         known = [GROUND, *(x.name for x in owners(model))]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(f"{e.title}: there is no body named {name!r}{what}{suggest(name, known)}; {listing(known)}")
+        hint = f"{what}{suggest(name, known)}; {listing(known)}"
+        raise ModelError(f"{e.title}: {_where(e, name)}there is no body named {name!r}{hint}")
     if not any(s.touches for s in found.shapes()):
         raise ModelError(f"{e.title}: {found.title} has no shape that touches; give it one, or leave it out")
+
+
+def _where(e: Contact, name: str) -> str:
+    """The field that names it."""
+    return field_with(e, name) or "exclude: "
 
 
 def _refuse_second(model: Model, e: Contact) -> None:
@@ -91,6 +97,38 @@ def _refuse_second(model: Model, e: Contact) -> None:
         raise ModelError(
             f"{e.title}: {other.title} holds for everything already; say between= what this one holds, or give them "
             f"materials"
+        )
+
+
+def _refuse_overlap(model: Model, e: Contact) -> None:
+    """Two contacts that name bodies are about different ones."""
+    for other in model.contacts:
+        if other.name == e.name or other.between is None or e.between is None:
+            continue
+        mine, its = _sides(model, e), _sides(model, other)
+        for a in sorted(mine[0] & its[0]):
+            for b in sorted(mine[1] & its[1]):
+                _refuse_common(model, e, other, a, b)
+        for a in sorted(mine[0] & its[1]):
+            for b in sorted(mine[1] & its[0]):
+                _refuse_common(model, e, other, a, b)
+
+
+def _sides(model: Model, e: Contact) -> tuple[set[str], set[str]]:
+    """Names on either side of a contact, with the parts of ground in place of ground."""
+    ground = {g.name for g in model.ground}
+    first, second = (
+        set(x) - {GROUND} | (ground if GROUND in x else set()) for x in (e.between or (), e.others or e.between or ())
+    )
+    return first, second
+
+
+def _refuse_common(model: Model, e: Contact, other: Contact, a: str, b: str) -> None:
+    if a != b or isinstance(model.find(a), Bodies):
+        a, b = sorted((a, b))
+        raise ModelError(
+            f"{e.title}: {other.title} holds for {a!r} and {b!r} already; two contacts that name bodies must be about "
+            f"different pairs"
         )
 
 

@@ -18,6 +18,7 @@ from pydantic import BeforeValidator
 
 from ...errors import ModelError
 from ..element import Length, element, positive
+from .form import Form, surface_form
 from .polyhedron import Integrals, flaws, integrals, welded
 from .solid import FINE, Solid
 
@@ -38,6 +39,11 @@ def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
         _FOLDER.reset(token)
 
 
+def folder() -> Path:
+    """The folder that relative paths are counted from."""
+    return _FOLDER.get() or Path.cwd()
+
+
 @dataclass(frozen=True, eq=False)
 class Triangulation:
     """Vertices (k, 3) and triangles (m, 3) with what follows from them, in units of their own."""
@@ -56,7 +62,7 @@ class Triangulation:
         return integrals(self.v, self.f)
 
 
-def _rows(kind: type) -> Any:
+def rows_of(kind: type) -> Any:
     """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
 
     def convert(value: Any) -> Any:
@@ -99,13 +105,13 @@ class Mesh(Solid):
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
-    vertices: Annotated[Any, _rows(float)] = field(default=None, repr=False)
-    faces: Annotated[Any, _rows(int)] = field(default=None, repr=False)
+    vertices: Annotated[Any, rows_of(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, rows_of(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
         """Remember the folder that a relative path is counted from."""
-        object.__setattr__(self, "_folder", _FOLDER.get() or Path.cwd())
+        object.__setattr__(self, "_folder", folder())
 
     def _key(self) -> tuple:
         return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))
@@ -217,6 +223,28 @@ class Mesh(Solid):
     def gyration(self, n: SimpleNamespace) -> Any:
         """By Gauss's theorem; its axes need not be principal ones."""
         return self._integrals().gyration * n.scale**2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Its surface, from which convex parts are made.
+
+        Raises
+        ------
+        ModelError
+            If it is not closed.
+        """
+        return (surface_form(self._closed(self.surface(n))),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """The outlines of its convex parts."""
+        return (surface_form(self._closed(self.mesh(n))),)
+
+    def _closed(self, surface: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        if flaw := self.triangulation.flaws:
+            raise ModelError(
+                f"{self.title}: it cannot touch anything, since {flaw}. Close it, or give it contact=False and a "
+                f"simpler shape beside it"
+            )
+        return surface
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Edges of the box around it."""

@@ -12,7 +12,7 @@ from ...math.scalar import sqrt
 from ...math.vec import cross, dot
 from .diagonal import axis, diagonal, turned
 from .operator import push, push_turning
-from .problem import COULOMB, NONE, ROUND
+from .problem import NONE, ROUND
 from .projection import least_of
 
 SMOOTH_BALL, BALL, SMOOTH, ROUGH, ANY, KINDS = range(6)
@@ -56,8 +56,8 @@ def along_normal(P, c, side):
 
 
 @formula
-def kind_of(P, W, c):
-    """What is to be done for a contact; it and the arms of balls are left in W.rows[0]."""
+def kind_of(P, W, c, rubbing):
+    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: none is taken as smooth."""
     i, j = P.at[c, 0], P.at[c, 1]
     if i < NONE or j < NONE or P.turn.shape[0] > 0:
         return ANY
@@ -67,7 +67,7 @@ def kind_of(P, W, c):
         first, W.rows[0, c, 1] = along_normal(P, c, 0)
     if j >= 0:
         second, W.rows[0, c, 2] = along_normal(P, c, 1)
-    if P.mu[c] == 0.0:
+    if P.mu[c] == 0.0 and not rubbing:
         return SMOOTH_BALL if first and second else SMOOTH
     if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
         return ROUGH
@@ -136,7 +136,7 @@ def pack_smooth(P, W, c, place):
 
 
 @formula
-def pack_rough(P, O, W, c, place):
+def pack_rough(P, coulomb, W, c, place):
     """A contact with friction of any kind."""
     k, D = W.pack, diagonal(P, c)
     for s in range(9):
@@ -147,7 +147,7 @@ def pack_rough(P, O, W, c, place):
         k[place + BIAS + s] = P.bias[c, s]
     k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
     W.rows[1, c, 0] = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
-    steps = local_steps(D, P.soft[c], O.count[COULOMB])
+    steps = local_steps(D, P.soft[c], coulomb)
     for s in range(8):
         k[place + IN + s] = steps[s]
 
@@ -176,11 +176,11 @@ def local_steps(D, soft, coulomb):
 
 
 @formula
-def count_kinds(P, W, first, last):
+def count_kinds(P, W, first, last, rubbing):
     """How many contacts there are of each kind; the kind of each is left in W.rows[0, c, 0]."""
     a, b, d, e, f = 0, 0, 0, 0, 0
     for c in range(first, last):
-        kind = kind_of(P, W, c)
+        kind = kind_of(P, W, c, rubbing)
         W.rows[0, c, 0] = kind
         if kind == SMOOTH_BALL:
             a += 1
@@ -196,7 +196,7 @@ def count_kinds(P, W, first, last):
 
 
 @formula
-def pack(P, X, W, O, first, many):
+def pack(P, X, W, coulomb, first, many):
     """Put contacts in their order, and their impulses on the velocities in W.own and X.wide."""
     begin, at = 0, 0  # first visit and first number of a kind
     last = first + many[0] + many[1] + many[2] + many[3] + many[4]
@@ -206,12 +206,12 @@ def pack(P, X, W, O, first, many):
             if W.rows[0, c, 0] == kind:
                 visit = shuffled(e, m)
                 e += 1
-                put(P, X, W, O, c, kind, begin + visit, at + wide * visit)
+                put(P, X, W, coulomb, c, kind, begin + visit, at + wide * visit)
         begin, at = begin + m, at + wide * m
 
 
 @formula
-def put(P, X, W, O, c, kind, visit, place):
+def put(P, X, W, coulomb, c, kind, visit, place):
     """One contact, with its impulse acting."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
@@ -232,7 +232,7 @@ def put(P, X, W, O, c, kind, visit, place):
         p = p[0], 0.0, 0.0
         k[place + S_P], k[place + S_LEAST] = p[0], least_of(P, c)
     else:
-        pack_rough(P, O, W, c, place)
+        pack_rough(P, coulomb, W, c, place)
         k[place + LEAST] = least_of(P, c)
         for s in range(3):
             k[place + IMPULSE + s] = p[s]

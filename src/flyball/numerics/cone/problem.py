@@ -87,13 +87,14 @@ class Choices(NamedTuple):
 class Scratch(NamedTuple):
     """Rooms to work in, as large as the problem; compiled code allocates nothing."""
 
-    rows: np.ndarray  # (12, nc, 3)
+    rows: np.ndarray  # (17, nc, 3): vectors of impulses and velocities; of torques from the eighth on; the last: steps
     nodes: np.ndarray  # (6, nn, 8)
     wide: np.ndarray  # (6, nw): of the groups' velocities
-    lines: np.ndarray  # (6, nl)
+    lines: np.ndarray  # (9, nl): the same of lines
     own: np.ndarray  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
     inner: np.ndarray  # (nn + 1, 8): its block, two unused
     free: np.ndarray  # (nn + 1, 8): v, w without impulses, two unused
+    free_wide: np.ndarray  # velocities of the groups without impulses
     pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
     sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
 

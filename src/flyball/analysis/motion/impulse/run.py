@@ -1,0 +1,92 @@
+"""Motion with contact: the scene in arrays, the steps, and what comes of them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Mapping
+
+import numpy as np
+
+from ....model.model import Model
+from ....results.result import Result
+from ....results.sides import Sides
+from ....stepping.stepper import Stepper
+from ....stepping.tables import TIME
+from ....tables.contact import Touching, touching
+from ...assemble import assemble
+from ...progress import Tell
+from .collect import Collected
+from .ending import result_of
+from .parts import parts
+from .scene import begin, placed
+from .settings import Impulse
+
+EACH = 1000  # steps after which it is told how far it is
+
+
+def impulse_motion(
+    model: Model,
+    span: tuple[float, float],
+    times: np.ndarray,
+    o: Impulse,
+    parameters: Mapping[str, float] | None,
+    tell: Tell,
+) -> Result:
+    """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
+
+    Raises
+    ------
+    ModelError
+        If the scene makes no sense.
+    SimulationError
+        If the steps cannot go on.
+    """
+    since = time.perf_counter()
+    model = model.snapshot()
+    base = assemble(model, t=span[0], parameters=parameters)
+    values = base.compiled.values
+    found = parts(model, values)
+    scene = touching(model, values.given, (*found.free, *found.held))
+    movers = placed(scene, base)
+    stepper = begin(scene, movers, values, o)
+    names = [*scene.carriers.names, "ground"]
+    counts = [-1 if n in scene.carriers.single or n == "ground" else _size(scene, n) for n in names]
+    sides = Sides(names, counts)
+    kept = Collected(stepper, np.arange(len(scene.carriers.mass) + 1))
+    interrupted = march(stepper, span, times, o, kept, tell)
+    return result_of(base, scene, stepper, kept, sides, o, since, interrupted)
+
+
+def _size(scene: Touching, name: str) -> int:
+    at = scene.carriers.slices[name]
+    return at.stop - at.start
+
+
+def march(
+    stepper: Stepper, span: tuple[float, float], times: np.ndarray, o: Impulse, kept: Collected, tell: Tell
+) -> bool:
+    """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted."""
+    first, last = span
+    real = stepper.pace.real
+    real[TIME] = first
+    if times[0] == first:
+        kept.add(0.0)
+    try:
+        for t in (*times[times > first].tolist(), last):
+            way = t - float(real[TIME])
+            steps = math.ceil(way / o.longest * (1.0 - 1e-9) - 1e-12)
+            if steps > 0:
+                stepper.run(1, way / steps)
+                if not kept.acceleration:
+                    kept.begin(way / steps)
+                for part in range(1, steps, EACH):
+                    stepper.run(min(EACH, steps - part), way / steps)
+                    tell((float(real[TIME]) - first) / (last - first))
+            real[TIME] = t
+            if len(kept.t) < len(times):
+                kept.add(way / max(1, steps))
+            tell((t - first) / (last - first))
+    except KeyboardInterrupt:
+        return True
+    return False
