@@ -94,7 +94,7 @@ def room_for_all(P: Problem, O: Choices, whole: bool) -> Auto:
     size = contacts + nodes + nl + wide
     fill = min(nodes * nodes // 2, 40 * nodes)
     return Auto(
-        np.zeros(NUMBERS * size + 36 * fill),
+        np.zeros(NUMBERS * size + 72 * fill),
         np.zeros(PLACES * size + 4 * fill + nn + 3 * ng, np.int64),
         Q, rooms(Q)[0], islands, np.zeros(most, np.int64),
         np.zeros(DOORS, np.int64), limit, np.zeros(TOLD, np.int64),
