@@ -161,7 +161,7 @@ class Stepper:
             self._march()
             steps -= int(count[TAKEN] - before)
             took = max(time.perf_counter() - began, 1e-6)
-            self.quota = max(1, min(4 * self.quota, int(self.quota * SLICE / took)))
+            self.quota = int(max(1.0, min(4.0 * self.quota, self.quota * SLICE / took, 1e6)))
 
     def _march(self) -> None:
         """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
