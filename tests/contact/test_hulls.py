@@ -6,10 +6,10 @@ import itertools
 
 import numpy as np
 import pytest
+from flyball.contact.build.hull import CLIMB, hull
 
 from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
-from flyball.contact.build.hull import CLIMB, hull
 from flyball.contact.kinds import HULL
 from flyball.contact.room import CORNERS
 from flyball.contact.shapes.hull import face, support

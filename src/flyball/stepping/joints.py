@@ -23,6 +23,7 @@ from ..tables.system import (
     V0,
 )
 from .contact_rows import contact_rows
+from .gauges import put_right
 from .implicit import dot_rows, implied, respond
 from .joined import (
     ADDED,
@@ -51,6 +52,7 @@ from .joined import (
     VELOCITIES,
     WAY,
 )
+from .lines import lines_done, press, stops_only
 from .smooth import free_velocities, put_aside
 
 
@@ -73,6 +75,7 @@ def ask(A, M, C, P, X, task):
     if task == MEAN:
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+        stops_only(A, P, X)
         return 0
     if task == FINISH:
         return finish(A, M, X)
@@ -95,6 +98,7 @@ def start(A, M, X):
         A.wide[STRUCK, d] = 0.0
     for r in range(A.lam.shape[1]):
         A.lam[1, r] = 0.0
+    press(A)
     show(A, M, True)
     return status
 
@@ -151,6 +155,7 @@ def keep(A, P, X):
     for d in range(nv):
         A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
     account(A, h)
+    lines_done(A, P, X)
     turn_on(A, h)
     for d in range(nv):
         X.wide[d] = A.wide[V_AFTER, d]
@@ -248,6 +253,7 @@ def finish(A, M, X):
         y[0, i] = y[1, i] + h * A.clock.K[0, i]
     A.real[TIME] += h
     A.clock.real[T] = A.real[TIME]
+    put_right(A)
     A.W.option[PLACED] = 1.0
     status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
     A.W.option[PLACED] = 0.0
