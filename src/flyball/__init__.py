@@ -5,10 +5,12 @@ A guided map, by task; ``help(fb.Revolute)`` and the like say the rest. All resu
 Describe a mechanism
     Mechanism     name, planar or spatial, gravity, parameters; ``m.add(...)`` takes the parts
     Body, Frame   what moves, and named axes on it; ``Body(shape=...)`` computes masses from
-                  Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Link, Mesh, Prism, Rod, Sphere,
+                  Box, Capsule, Cone, Cylinder, Ellipsoid, Hemisphere, Hull, Link, Mesh, Prism, Rod, Sphere,
                   Torus, Tube
-    contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane as a floor; Bodies are many
-                  equal ones in arrays; Material and MaterialPair say friction, restitution, moving surfaces
+    contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane or HeightField as a
+                  floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
+                  moving surfaces
+    Limit         hard stops of a coordinate
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
@@ -26,7 +28,8 @@ Look before you run
     m.assemble()  -> Assembly: positions that close; m.mass_properties() -> MassReport
 
 Ask how it moves
-    m.simulate(t_end)             -> Result: motion, reactions, energies, health
+    m.simulate(t_end)             -> Result: motion, reactions, energies, health; with contact by steps of impulses,
+                                  of which method=Impulse(step=...) makes choices
     m.kinematics(times)           -> Result, where drivers prescribe the motion
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
@@ -66,6 +69,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assembly.start import Assembly as Assembly
+    from .analysis.motion.impulse.settings import Impulse as Impulse
     from .analysis.prepared import Prepared as Prepared
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
@@ -93,6 +97,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
     from .model.ground import Ground as Ground
+    from .model.limit import Limit as Limit
     from .model.material import Material as Material
     from .model.material import MaterialPair as MaterialPair
     from .model.sensor import IMU as IMU
@@ -124,7 +129,9 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
+    "Impulse": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
+    "Limit": "model.limit",
     "Material": "model.material",
     "MaterialPair": "model.material",
     "Sensor": "model.sensor",

@@ -236,6 +236,19 @@ def test_a_model_file_needs_two_lines() -> None:
     assert pairs(tables(m)) == {("floor", "balls[0]"), ("floor", "balls[1]"), ("balls[0]", "balls[1]")}
 
 
+def test_arrays_from_files(tmp_path) -> None:
+    rng = np.random.default_rng(2)
+    p, s = rng.normal(size=(20, 3)), rng.uniform(1, 2, 20)
+    np.save(tmp_path / "where.npy", p)
+    np.savetxt(tmp_path / "size.csv", s, delimiter=",")
+    lines = ["[[bulk]]", 'name = "balls"', 'shape = { type = "Sphere", radius = 0.1 }', "density = 1000"]
+    (tmp_path / "pile.toml").write_text("\n".join([*lines, 'position = "where.npy"', 'scale = "size.csv"']))
+    m = fb.load(tmp_path / "pile.toml")
+    assert m["balls"].position.tobytes() == p.tobytes()
+    assert m["balls"].scale == pytest.approx(s, rel=1e-15)
+    assert loads(dumps(m), fb.Mechanism) == m
+
+
 def test_a_hundred_thousand_spheres() -> None:
     m = fb.Mechanism("pile", gravity=(0, 0, -9.81))
     m.add(

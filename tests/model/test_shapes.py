@@ -41,6 +41,7 @@ SAMPLES = [
     fb.Link(start=(0, 0, 0), end=(0, 0, 2), width=0.4, thickness=0.1),
     fb.Prism(outline=ELL, thickness=0.4),
     fb.Prism(outline=(*ELL[::-1], ELL[-1]), thickness=0.4),
+    fb.Hull(vertices=[(0, 0, 0), (2, 0, 0), (0, 3, 0), (0, 0, 1), (1, 1, 1), (0.5, 0.5, 0.2)], scale="20 cm"),
     fb.Mesh(**TETRAHEDRON, scale="20 cm"),
 ]
 

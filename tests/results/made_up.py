@@ -1,4 +1,4 @@
-"""A slider crank's result from its closed-form motion: no simulation, so no compiler."""
+"""Results from closed-form motions: no simulation, so no compiler."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 
 import flyball as fb
+from flyball.results.bulk import Bulk
+from flyball.results.contact_health import ContactHealth
+from flyball.results.contacts import Contacts
+from flyball.results.convergence import Convergence
 from flyball.results.health import Health
 from flyball.results.result import Result
+from flyball.results.sides import Sides
 from flyball.tables.structure import structure
 from flyball.tables.values import values
 
@@ -59,3 +64,43 @@ def slider_crank(n: int = 41, speed: float = 2 * np.pi) -> Result:
     result = Result(m, x, t, np.stack(q, 1), np.stack(v, 1), states, vdot, lam, health)
     result.final = (1.0, np.r_[result.q[-1], result.v[-1], states[-1]])
     return result
+
+
+def thrown(n: int = 5, planar: bool = False) -> Result:
+    """A block at rest on a floor beside three balls of two sizes that fly and spin, with made-up contact forces.
+
+    The balls are in free flight: closed form, as far as they go.
+    """
+    g = np.array([0, -10.0, 0]) if planar else np.array([0, 0, -10.0])
+    up = -g / 10.0
+    start = np.array([[1.0, 2, 0], [2, 2, 0], [3, 2, 0]])
+    m = fb.Mechanism("thrown", planar=planar, gravity=tuple(g[:2]) if planar else tuple(g))
+    m.add(fb.Ground("floor", shape=[fb.Plane(normal=tuple(up)), fb.Plane(normal=(1, 0, 0), position=(-1, 0, 0))]))
+    m.add(fb.Body("block", shape=fb.Box(edges=(0.4, 0.4, 0.4)), density=1000))
+    m.add(fb.Bodies("balls", shape=fb.Sphere(radius=0.1), density=500, position=start[:, : 2 if planar else 3],
+                    scale=[1, 1, 0.5], color="teal"))  # fmt: skip
+    m.add(fb.Contact(friction=0.3))
+    x = values(structure(m))
+    t = np.linspace(0, 0.4, n)
+    still = np.zeros((n, x.structure.nv))
+    r = Result(m, x, t, np.tile(x.q, (n, 1)), still, np.zeros((n, 0)), still, np.zeros((n, 0)), healthy())
+    r.final = (0.4, np.r_[r.q[-1], r.v[-1]])
+    mass = np.array([2.0, 2.0, 0.25])
+    p = start + np.array([1.0, 0, 0]) * t[:, None, None] + 0.5 * g * t[:, None, None] ** 2
+    v = np.tile(np.array([1.0, 0, 0]), (n, 3, 1)) + g * t[:, None, None]
+    w = np.tile(np.array([0, 0, 4.0]), (n, 3, 1))
+    q = np.tile(np.stack([np.cos(2 * t), 0 * t, 0 * t, np.sin(2 * t)], 1)[:, None], (1, 3, 1))
+    J = (0.004 * mass * np.array([1, 1, 0.25]))[:, None, None] * np.eye(3)
+    r.bulk = {"balls": Bulk("balls", mass, J, np.zeros((3, 3)), p, q, v, w)}
+    k = 2 * n
+    force = np.tile(np.array([[320.0], [5.0]]) * up + [[1.0, 0, 0], [0, 0, 0]], (n, 1))
+    r.contacts = Contacts(
+        t, Sides(("block", "balls", "ground"), (-1, 3, -1)), 2 * np.arange(n + 1), np.tile([(4, 0), (4, 2)], (n, 1)),
+        np.tile(start[:2], (n, 1)), np.tile(up, (k, 1)), np.linspace(0, -1e-4, k), force, np.tile([0, 1], n),
+        np.full(k, 0.3), Convergence(t, 0.1 * t, 0.01 * t, np.arange(n), solver="Gauss-Seidel"), planar,
+    )  # fmt: skip
+    r.exchanged = {"friction_loss": t**2, "impact_loss": 0 * t}
+    r.health.contact = ContactHealth(
+        "Gauss-Seidel: free bodies only", "Poisson's", most=2, worst_overlap=1e-4, size=0.1
+    )
+    return r

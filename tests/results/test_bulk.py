@@ -59,5 +59,5 @@ def test_energies_of_a_result_count_sets_and_what_contacts_exchange():
     other = slider_crank(3)
     other.exchanged = {"friction_loss": np.array([0.0, 1, 3]), "surface_work": np.array([0.0, 0.5, 0.5])}
     np.testing.assert_allclose(other.energy.balance - alone.energy.balance, (0.0, 0.5, 2.5), atol=1e-9)
-    np.testing.assert_array_equal(other.energy.friction_loss, (0, 1, 3))
-    assert not alone.energy.impact_loss.any()
+    np.testing.assert_array_equal(other.energy.exchanged("friction_loss"), (0, 1, 3))
+    assert not alone.energy.exchanged("impact_loss").any()

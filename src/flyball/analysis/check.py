@@ -22,6 +22,7 @@ from .assembly.start import Assembly
 from .mass import report
 from .mobility import mobility
 from .motion.ahead import missed_at_start
+from .untouched import left_out
 
 FAR = 30.0  # a radius of gyration this many times the body's size, or this part of it, is worth a look
 BARELY = 1e-3  # slack of the triangle inequality, as part of the largest moment, below which a body is all but flat
@@ -79,9 +80,11 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobil
     for b in model.bodies:
         yield from _of_inertia(a.compiled.values, b.name, bodies[b.name])
     yield from (not_allowed(d) for d in changed_velocities(a.departures))
+    if text := left_out(model):
+        yield text
     held, pushed = _touched(model)
     for b in model.bodies:
-        if b.name not in held | pushed:
+        if b.name not in held | pushed and not (model.contacts and any(s.touches for s in b.shapes())):
             kept = "; as_drawn keeps assembly from moving it, it does not weld it to ground" if b.as_drawn else ""
             yield f"body {b.name!r} has neither a joint nor a force: it moves on its own{kept}"
     if not model.gravity_told and not model.gravity_vector().any():

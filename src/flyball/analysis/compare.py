@@ -27,6 +27,7 @@ from .motion.start import Start, begin, start_time
 from .options import Options, count
 from .progress import Tell, shown, unwatched
 from .simulate import clock_for, run_clock
+from .untouched import refuse_contact
 
 FINE = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
 LIMIT = 20  # times the steps of the reference: what takes more is given up
@@ -117,6 +118,7 @@ class _Task:
 
 def compare(model: Model, o: CompareOptions) -> Comparison:
     """Integrate the same motion by several formulations: see `Mechanism.compare`."""
+    refuse_contact(model, "compare")
     model = model.snapshot()
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)

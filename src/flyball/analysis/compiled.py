@@ -195,7 +195,8 @@ class Compiled:
             w, V = np.linalg.eigh(J)
             J = (V * np.sqrt(np.maximum(w, 0.0))[:, None, :]) @ V.transpose(0, 2, 1)
             translation = np.sqrt(translation)
-        i, j, x = [], [], []
+        none = np.zeros(0, np.int64)
+        i, j, x = [none], [none], [np.zeros(0)]
         plane = self.structure.model.planar
         used = slice(2, 3) if plane else slice(0, 3)
         for n in np.unique(S.body_i[:, NV]):

@@ -26,6 +26,7 @@ from .linear.search import LONGEST, NEWTON, arrived, descent, failure, newton, p
 from .linear.stability import stability
 from .options import Options
 from .progress import shown
+from .untouched import refuse_contact
 
 HALVINGS = 16  # of a step between two values, before its branch is taken to have ended
 CONTRACTING = 0.6  # how much shorter Newton's steps have to become, each than the one before; at limit points 1/2
@@ -48,6 +49,7 @@ class EquilibriaOptions(Options):
 
 def equilibria(model: Model, o: EquilibriaOptions) -> EquilibriumSeries:
     """Equilibria over values of a parameter, each following from the one before: see `Mechanism.equilibria`."""
+    refuse_contact(model, "equilibria")
     points = checked(model, o.parameter, o.values, o.t or None, o.parameters)
     way = _Way(model, o.parameter, o.t, dict(o.parameters or {}), o.stable)
     done = EquilibriumSeries(model.name, o.parameter, points[:0], [], way.jumps)

@@ -22,6 +22,7 @@ from .linear.turning import turning as turn
 from .linearize import without_inputs
 from .options import Options
 from .steps import tangent_step
+from .untouched import refuse_contact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -62,6 +63,7 @@ def resting(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    refuse_contact(model, "equilibrium")
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin = _begun(a, o.start)
     if o.turning:

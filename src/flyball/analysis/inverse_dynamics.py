@@ -22,6 +22,7 @@ from ..results.inverse import Drive, InverseDynamics
 from ..results.result import Result
 from .freedom.determinacy import determinacy
 from .kinematics import KinematicsOptions, kinematics, wanted_times
+from .untouched import refuse_contact
 
 FEWEST = 4  # samples that make a curve with two continuous derivatives
 
@@ -35,6 +36,7 @@ class InverseDynamicsOptions(KinematicsOptions):
 
 def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
     """Forces and torques of drives, and reactions, for a given motion: see `Mechanism.inverse_dynamics`."""
+    refuse_contact(model, "inverse_dynamics")
     model = model.copy() if o.motion else model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
     if o.motion:

@@ -31,6 +31,7 @@ from .motion.start import Start, begin_at
 from .options import Options
 from .progress import shown
 from .simulate import moved
+from .untouched import refuse_contact
 
 NARROW = 1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position
 PART = 1e-2  # elements with less than this part of the largest share in a dependency are not named
@@ -53,6 +54,7 @@ class KinematicsOptions(Options):
 
 def kinematics(model: Model, o: KinematicsOptions) -> Result:
     """Positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
+    refuse_contact(model, "kinematics")
     started = time.perf_counter()
     outputs, begin = wanted_times(o.times, o.t_start, o.t_end)
     model = model.snapshot()

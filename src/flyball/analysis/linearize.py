@@ -36,6 +36,7 @@ from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
+from .untouched import refuse_contact
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
@@ -77,6 +78,7 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    refuse_contact(model, "linearize")
     for name in o.outputs:
         one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     here = model

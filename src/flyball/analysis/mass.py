@@ -12,6 +12,7 @@ from ..model.inertia import principal, shifted
 from ..model.model import Model
 from ..results.mass import MassProperties, MassReport
 from ..results.records import Records
+from ..tables.contact.carriers import Carriers, carriers
 from ..tables.structure import structure
 from ..tables.values import Values, values
 from .assemble import assemble
@@ -49,12 +50,26 @@ def report(model: Model, x: Values, q: np.ndarray) -> MassReport:
         J = np.asarray(d.inertia).real
         bodies[b.name] = _properties(float(d.mass.real), d.com.real, c, J, d.volume, model.planar)
         placed.append((float(d.mass.real), c, R @ J @ R.T))
+    for e in model.bulk:
+        m, c, K = _together(carriers(model, x.given, [e.name]))
+        bodies[e.name] = _properties(m, c, c, K, None, model.planar)
+        placed.append((m, c, K))
     mass = sum(m for m, _, _ in placed)
     com: Any = sum(m * c for m, c, _ in placed) / mass if mass else np.mean([c for _, c, _ in placed], axis=0)
     inertia: Any = sum(K + shifted(m, c - com) for m, c, K in placed)
     volumes = [b.volume for b in bodies.values()]
     volume = None if None in volumes else sum(volumes)  # type: ignore[arg-type]
     return MassReport(model.name, model.planar, bodies, _properties(mass, com, com, inertia, volume, model.planar))
+
+
+def _together(at: Carriers) -> tuple[float, np.ndarray, np.ndarray]:
+    """Mass, centre and inertia about it of many bodies as drawn, in the world."""
+    p, R = at.movers.pose[:, :3], at.movers.pose[:, 3:].reshape(-1, 3, 3)
+    mass = float(at.mass.sum())
+    com = at.mass @ p / mass
+    d = p - com
+    steiner = np.einsum("n,nk,nk->", at.mass, d, d) * np.eye(3) - np.einsum("n,ni,nj->ij", at.mass, d, d)
+    return mass, com, np.einsum("nij,njk,nlk->il", R, at.inertia, R) + steiner
 
 
 def _properties(

@@ -24,6 +24,7 @@ from .freedom.inertia import check_inertia, massless
 from .freedom.jacobian import Found, few, scaled_jacobian
 from .freedom.redundancy import redundant_sets
 from .freedom.stresses import undetermined
+from .untouched import left_out
 
 
 class Sought(Found):
@@ -105,4 +106,5 @@ def mobility(
             names.append(name)
     lam = dependent / np.maximum(size, 1e-300)[:, None]
     there = Sought(a, lam, None if motions is None else motions * scale[:, None], gap)
-    return Mobility(nv, nr, rank, tuple(names), undetermined(a, lam, names) if len(names) else {}, there)
+    without = left_out(model)
+    return Mobility(nv, nr, rank, tuple(names), undetermined(a, lam, names) if len(names) else {}, without, there)

@@ -16,6 +16,7 @@ from .linear.large import DENSE, Large, is_large
 from .linear.spectrum import EQUAL, spectrum
 from .linearize import InstantOptions, without_inputs
 from .options import count as at_least
+from .untouched import refuse_contact
 
 FEW = 10
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
@@ -36,6 +37,7 @@ class ModesOptions(InstantOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    refuse_contact(model, "modes")
     count, frozen = o.count, o.frozen
     x = o.state(model, DENSE)
     if is_large(x):

@@ -16,6 +16,7 @@ from .options import count as at_least
 from .options import positive
 from .progress import Tell, shown
 from .sensitivity import DerivativeOptions, SensitivityOptions, sensitivity
+from .untouched import refuse_contact
 
 STEP = 1e-6  # of the quantities, for the slope of a function that the user gives
 REFUSED = 1e3  # times the first cost: what parameters cost with which the mechanism cannot be assembled
@@ -83,6 +84,7 @@ SEARCHED = {  # by the status of L-BFGS-B
 
 def optimize(model: Model, o: OptimizeOptions) -> Optimum:
     """Find parameters that serve best: see `Mechanism.optimize`."""
+    refuse_contact(model, "optimize")
     with shown(o.progress, "optimizing") as tell:
         search = Search(model, o, tell)
         return search.fit(o.target, o.weights) if o.minimize is None else search.minimum(o.minimize)

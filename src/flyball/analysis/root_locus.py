@@ -18,6 +18,7 @@ from .linear.passing import passing
 from .linear.sample import Sample, match, sample
 from .linearize import InstantOptions, without_inputs
 from .progress import Tell, shown
+from .untouched import refuse_contact
 
 SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
 ROUNDED = 1e-13  # of the largest value: what is none
@@ -73,6 +74,7 @@ class RootLocusOptions(InstantOptions):
 
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
+    refuse_contact(model, "root_locus")
     points = checked(model, o.parameter, o.values, o.t, o.parameters)
     along = equilibria(model, o.rest(points)) if o.equilibrium else None
 

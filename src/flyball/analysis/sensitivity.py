@@ -38,6 +38,7 @@ from .motion.options import output_times, projected
 from .motion.start import begin
 from .options import Options, positive
 from .simulate import SimulateOptions, clock_for, simulate
+from .untouched import refuse_contact
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
@@ -118,6 +119,7 @@ class Question:
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
+    refuse_contact(model, "sensitivity")
     env = model.environment(o.parameters)
     for name in o.to:
         if name not in env:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
+from ..model.touching import has_contact
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -24,6 +25,8 @@ from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
+from .motion.impulse.run import impulse_motion
+from .motion.impulse.settings import Impulse
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
@@ -31,6 +34,9 @@ from .motion.start import Start, begin, start_time
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
+AUTO, IMPULSE, USUAL = "auto", "impulse", "dop853"  # methods beside the integrators by name; what auto is
+IDLE = {"rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None}
+"""Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
@@ -38,12 +44,18 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 class SimulateOptions(Integration):
     """What `Mechanism.simulate` is asked."""
 
+    method: str | Impulse  # type: ignore[assignment]
     t_end: float
     t_start: float | None
     outputs: int | Sequence[float]
     parameters: Mapping[str, float] | None
     start: Result | None
     progress: bool | Callable[[float], None]
+
+    def check_method(self) -> None:
+        """An integrator, steps by impulses, or what suits the model."""
+        if not isinstance(self.method, Impulse) and self.method not in (AUTO, IMPULSE):
+            super().check_method()
 
 
 def simulate(model: Model, o: SimulateOptions) -> Result:
@@ -52,6 +64,10 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     model = model.snapshot()
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
+    o = chosen(model, o)
+    if isinstance(o.method, Impulse):
+        with shown(o.progress, "simulating") as tell:
+            return impulse_motion(model, o.t_end, times, o.method, o.parameters, tell)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
@@ -61,6 +77,31 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
+
+
+def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
+    """With the method that is meant.
+
+    Raises
+    ------
+    ModelError
+        If there is contact and the method does not know it, or options have no effect on steps by impulses.
+    """
+    if o.method == AUTO:
+        o = replace(o, method=Impulse() if has_contact(model) else USUAL)
+    elif o.method == IMPULSE:
+        o = replace(o, method=Impulse())
+    if not isinstance(o.method, Impulse):
+        if has_contact(model):
+            raise ModelError(
+                f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
+                f"give method='impulse'"
+            )
+        return o
+    for name, usual in IDLE.items():
+        if getattr(o, name) != usual:
+            raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
+    return replace(o, method=o.method.bounded(o.max_step))
 
 
 def moved(

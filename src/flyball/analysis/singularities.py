@@ -24,6 +24,7 @@ from .singular.closure import Place
 from .singular.freed import Freed, freed
 from .singular.locate import branch_point, limit
 from .singular.trace import SAME, STILL, Node, Tracer, Way
+from .untouched import refuse_contact
 
 NEAR = 1e-4  # a start this near to a singular position is drawn there [1]
 EDGE = 1e-9  # of the range: how far beyond its ends a singular position may lie
@@ -49,6 +50,7 @@ class SingularitiesOptions(Options):
 
 def singularities(model: Model, o: SingularitiesOptions) -> Singularities:
     """Follow a driven motion through its singular positions: see `Mechanism.singularities`."""
+    refuse_contact(model, "singularities")
     f = freed(model, o.driver, o.t, o.parameters)
     return _followed(f, Tracer(f.closure, o.step), _range(f, o.range, o.parameters), o.branch, o.steps)
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import field, fields
 from functools import cached_property
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar
 
@@ -16,12 +18,26 @@ from .body import Body, Inertia, Shapes, listed
 from .element import LARGEST, Density, Element, Mass, Name, element
 from .inertia import MassProperties, mass_properties
 from .shapes import Solid
+from .shapes.mesh import folder
+
+
+def _read(path: Path) -> np.ndarray:
+    """The array in a file of NumPy, or in a text with commas."""
+    kind = path.suffix.lower()
+    if kind not in (".npy", ".csv"):
+        raise ValueError("give an array of numbers, or the path of a file '*.npy' or '*.csv' that holds one")
+    try:
+        return np.load(path, allow_pickle=False) if kind == ".npy" else np.loadtxt(path, delimiter=",", ndmin=1)
+    except OSError as error:
+        raise ValueError(f"cannot read {os.fspath(path)!r}: {error.strerror or error}") from None
+    except ValueError as error:
+        raise ValueError(f"{os.fspath(path)!r} holds no array of numbers: {error}") from None
 
 
 def _numbers(value: Any) -> Any:
     """An array of numbers of its own, not to be changed."""
-    if isinstance(value, (str, bytes)):
-        raise ValueError("give an array of numbers")
+    if isinstance(value, (str, os.PathLike)):
+        value = _read(folder() / value)
     try:
         a = np.array(value)
     except ValueError:
@@ -41,8 +57,10 @@ ARRAYS = ("position", "angle", "orientation", "velocity", "angular_velocity", "s
 class Bodies(Element):
     """Many bodies of one shape, on nothing but gravity and contact: grains, balls, bricks.
 
-    Their numbers are arrays in SI units with a row for each body: 100,000 take no longer to describe than one. In
-    messages and results the eighteenth of ``"balls"`` is ``"balls[17]"``. Joints, drivers and forces act on a `Body`.
+    Their numbers are arrays in SI units with a row for each body: 100,000 take no longer to describe than one. In place
+    of an array the path of a file that holds it will do, ``"grains.npy"`` or ``"grains.csv"``, counted from the folder
+    of the model file; it is read at once, and what is saved holds the numbers. In messages and results the eighteenth
+    of ``"balls"`` is ``"balls[17]"``. Joints, drivers and forces act on a `Body`.
 
     Parameters
     ----------

@@ -33,6 +33,7 @@ CATEGORIES = (
     "drivers",
     "initial",
     "contacts",
+    "limits",
 )
 SETTINGS = ("name", "planar", "gravity_told")
 

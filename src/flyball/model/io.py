@@ -24,6 +24,7 @@ from .force import Force
 from .function import function_name
 from .ground import Ground
 from .joint import Joint
+from .limit import Limit
 from .material import Material, MaterialPair
 from .model import Model, suggest
 from .sensor import IMU, Sensor
@@ -44,6 +45,7 @@ ONE_KIND = {
     "drivers": Driver,
     "initial": Initial,
     "contacts": Contact,
+    "limits": Limit,
 }
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {"joints": (Joint, "joints"), "couplings": (Coupling, "joints"), "forces": (Force, "forces")}

@@ -15,7 +15,7 @@ from .bulk import Bodies
 from .contact import Contact
 from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
 from .coupling import Coupling
-from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve, si_numbers
+from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve
 from .examine import but_is, carriers, check_units, measured
 from .expressions import folded, law_expression, number, resolve_parameters
 from .force import Force
@@ -24,6 +24,7 @@ from .geometry import vector
 from .ground import Ground
 from .joint import Joint
 from .kept import Kept
+from .limit import Limit
 from .material import Material, MaterialPair
 from .references import check_references
 from .sensor import IMU, Sensor
@@ -93,6 +94,7 @@ class Model:
         self.ground: list[Ground] = []
         self.bulk: list[Bodies] = []
         self.contacts: list[Contact] = []
+        self.limits: list[Limit] = []
         self.by_name: dict[str, Element] = {}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
@@ -196,7 +198,7 @@ class Model:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
                 raise ModelError(
                     f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table, initial "
-                    f"condition, part of ground, material or contact"
+                    f"condition, part of ground, material, contact or limit"
                 )
             self._check_name(e)
             check_references(self, e)
@@ -321,11 +323,6 @@ class Model:
         self._check_laws(e)
         check_units(self, e, env)
         check_kind(self, e, n, env)
-        if isinstance(e, Initial):
-            unit = self.unit(e.name, e)
-            for name, value, wanted in (("value", e.value, unit), ("rate", e.rate, f"{unit}/s")):
-                if value is not None:
-                    si_numbers(value, env, wanted, f"{name} of {e.title}")
 
     def _check_laws(self, e: Element) -> None:
         for name, of in fields_with(e.__class__, LawOf).items():

@@ -14,6 +14,7 @@ from .element import Element
 from .force import BodyForce, CoordinateForce, TwoFrameForce, TwoPointForce
 from .ground import Ground
 from .joint import Joint
+from .limit import Limit
 from .material import MaterialPair
 from .sensor import IMU, Sensor
 from .touching import check_touching
@@ -48,8 +49,8 @@ def check_references(model: Model, e: Element) -> None:
     elif isinstance(e, IMU):
         if model.carrier(e.frame, e) == GROUND:
             raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
-    elif isinstance(e, (Driver, Initial)):
-        model.coordinate(e.coordinate if isinstance(e, Driver) else e.name, e)
+    elif isinstance(e, (Driver, Initial, Limit)):
+        model.coordinate(e.name if isinstance(e, Initial) else e.coordinate, e)
 
 
 def _check_path(model: Model, e: CoordinateForce) -> None:

@@ -30,7 +30,7 @@ def lines(model: Model) -> list[tuple[str, str]]:
             category, (f"{kind} {shortened(names)}" for kind, names in kinds.items()), len(getattr(model, category))
         )
     out += _line("drivers", (f"{d.name} ({d.coordinate} = {d.law})" for d in model.drivers))
-    for category in ("sensors", "tables", "initial", "materials", "contacts"):
+    for category in ("sensors", "tables", "initial", "materials", "contacts", "limits"):
         out += _line(category, (e.name for e in getattr(model, category)))
     return out + _line("parameters", (f"{k} = {v}" for k, v in model.parameters.items()))
 

@@ -21,8 +21,8 @@ Owner = Body | Bodies | Ground
 
 
 def has_contact(model: Model) -> bool:
-    """Whether something in the model may touch, or is there for contact only."""
-    return bool(model.contacts or model.bulk)
+    """Whether there is something that only a motion by impulses knows: contacts, stops, many bodies."""
+    return bool(model.contacts or model.limits or model.bulk)
 
 
 def owners(model: Model) -> list[Owner]:
@@ -46,6 +46,7 @@ def check_touching(model: Model, e: Element) -> None:
         for name in named(e):
             _touching(model, name, e)
         _refuse_second(model, e)
+        _refuse_overlap(model, e)
     elif isinstance(e, (Body, Bodies, Ground)):
         for material in (e.material, *(s.material for s in e.shapes())):
             if material is not None:
@@ -91,6 +92,38 @@ def _refuse_second(model: Model, e: Contact) -> None:
         raise ModelError(
             f"{e.title}: {other.title} holds for everything already; say between= what this one holds, or give them "
             f"materials"
+        )
+
+
+def _refuse_overlap(model: Model, e: Contact) -> None:
+    """Two contacts that name bodies are about different ones."""
+    for other in model.contacts:
+        if other.name == e.name or other.between is None or e.between is None:
+            continue
+        mine, its = _sides(model, e), _sides(model, other)
+        for a in sorted(mine[0] & its[0]):
+            for b in sorted(mine[1] & its[1]):
+                _refuse_common(model, e, other, a, b)
+        for a in sorted(mine[0] & its[1]):
+            for b in sorted(mine[1] & its[0]):
+                _refuse_common(model, e, other, a, b)
+
+
+def _sides(model: Model, e: Contact) -> tuple[set[str], set[str]]:
+    """Names on either side of a contact, with the parts of ground in place of ground."""
+    ground = {g.name for g in model.ground}
+    first, second = (
+        set(x) - {GROUND} | (ground if GROUND in x else set()) for x in (e.between or (), e.others or e.between or ())
+    )
+    return first, second
+
+
+def _refuse_common(model: Model, e: Contact, other: Contact, a: str, b: str) -> None:
+    if a != b or isinstance(model.find(a), Bodies):
+        a, b = sorted((a, b))
+        raise ModelError(
+            f"{e.title}: {other.title} holds for {a!r} and {b!r} already; two contacts that name bodies must be about "
+            f"different pairs"
         )
 
 

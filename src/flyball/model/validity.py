@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
-from .body import GROUND, Body, Frame
+from .body import GROUND, Body, Frame, Initial
 from .bulk import Bodies
-from .element import Element, Vector, fields_with, plain
+from .element import Element, Vector, fields_with, plain, si_numbers
 from .force import Force, TwoFrameForce
 from .geometry import vector
 from .ground import Ground
 from .inertia import mass_properties
 from .joint import Joint
+from .limit import Limit
 from .weighing import checked
 
 if TYPE_CHECKING:
@@ -44,6 +45,19 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
         e.placed(n, model.planar)
         if isinstance(e, TwoFrameForce) and n.at is None:
             check_by_frames(model, e)
+    elif isinstance(e, Initial):
+        unit = model.unit(e.name, e)
+        told(e, env, {"value": unit, "rate": f"{unit}/s"})
+    elif isinstance(e, Limit):
+        unit = model.unit(e.coordinate, e)
+        low, high = told(e, env, {"lower": unit, "upper": unit})
+        if low is not None and high is not None and not low.real < high.real:
+            raise ModelError(f"{e.title}: lower is {low:g} {unit}; it must be less than upper, {high:g} {unit}")
+
+
+def told(e: Element, env: Mapping[str, float], units: Mapping[str, str]) -> list[Any]:
+    """SI numbers of fields whose units depend on what the element is about."""
+    return [si_numbers(getattr(e, k), env, unit, f"{k} of {e.title}") for k, unit in units.items()]
 
 
 def check_frame(model: Model, e: Any, n: Any) -> None:

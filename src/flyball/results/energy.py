@@ -93,20 +93,8 @@ class Energy(Named):
         found = self._result.exchanged.get(name)
         return self._result.records.zeros() if found is None else found
 
-    @property
-    def friction_loss(self) -> np.ndarray:
-        """Energy lost in friction of contacts since the start."""
-        return self.exchanged("friction_loss")
-
-    @property
-    def impact_loss(self) -> np.ndarray:
-        """Energy lost in impacts since the start."""
-        return self.exchanged("impact_loss")
-
-    @property
-    def surface_work(self) -> np.ndarray:
-        """Energy that moving surfaces of contacts have given since the start."""
-        return self.exchanged("surface_work")
+    def _found(self, name: str) -> np.ndarray:
+        return self.exchanged(name)
 
     @cached_property
     def balance(self) -> np.ndarray:

@@ -21,6 +21,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
+from .stored_contacts import packed
 
 if TYPE_CHECKING:
     import pandas
@@ -198,6 +199,8 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "parameters": json.dumps(list(result.model.parameters)),
         "wound": json.dumps(result.wound),
     }
+    told, more = packed(result)
+    texts |= told
     for name, text in texts.items():
         group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
     for name, (_, *rest) in ARRAYS.items():
@@ -213,4 +216,8 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
     for name, values in numbers.items():
         group.dimensions[f"n_{name}"] = len(values)
         group.create_variable(name, (f"n_{name}",), data=np.array(values, float))
-    group.attrs["checksum"] = checksum(texts | {name: getattr(result, name) for name in ARRAYS} | numbers)
+    for name, values in more.items():
+        for k, n in enumerate(values.shape):
+            group.dimensions[f"n_{name}_{k}"] = n
+        group.create_variable(name, tuple(f"n_{name}_{k}" for k in range(values.ndim)), data=values)
+    group.attrs["checksum"] = checksum(texts | {name: getattr(result, name) for name in ARRAYS} | numbers | more)

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from typing import Any
 
+from .contact_health import ContactHealth
 from .departure import Departure, summary
 
 LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
@@ -34,6 +35,7 @@ class Health:
     coordinates: str = ""  # "absolute: why", or "joint: why"
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
+    contact: ContactHealth | None = None  # how contacts were solved, where there are any
 
     @property
     def _simulated(self) -> bool:
@@ -84,11 +86,14 @@ class Health:
     @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to look at the result twice: energy balance, violated constraints, undetermined loads, creep."""
-        return self._found("warnings") if "warnings" in self.late else self.remarks
+        found = self._found("warnings") if "warnings" in self.late else self.remarks
+        own = self.contact.warnings() if self.contact else ()
+        return tuple(dict.fromkeys((*found, *own)))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
         plain = {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late"}
+        plain["contact"] = self.contact.as_dict() if self.contact else None
         plain["departures"] = [d.as_dict() for d in self.departures]
         return plain | {k: getattr(self, k) for k in LATE}
 
@@ -117,6 +122,8 @@ class Health:
         if crept:
             text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())
             out.append(("creep of friction", text))
+        if self.contact:
+            out += self.contact.lines()
         return out + [(f"warning {k}", text) for k, text in enumerate(self.warnings, 1)]
 
     def __str__(self) -> str:

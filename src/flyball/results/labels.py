@@ -17,6 +17,9 @@ if TYPE_CHECKING:
 TIME, AXIS, QUATERNION = "time", "component", "quaternion_component"
 
 
+MEMBERS = 1_000_000  # members of a set times output times that are labelled
+
+
 class Labelled(NamedTuple):
     """One quantity over time."""
 
@@ -41,17 +44,26 @@ def labelled(result: Result, most: float = np.inf) -> Iterator[Labelled]:
     tables = {name: quantities(result.model, name) for name in result.parts()}
     count = sum(x.array for table in tables.values() for x in table.values())
     for name in tables if count <= most else (ENERGY,):
+        if name in result.bulk and len(result.t) * len(result.bulk[name]) > MEMBERS:
+            continue  # its arrays are in the file once, for flyball
         view = result[name]
         for what, x in tables[name].items():
             if x.array:
                 values = view.quantity(what)[1]
-                yield Labelled(f"{name}.{what}", _dims(what, values), x.unit, values, _note(view, what))
+                dims = _of_members(name, what, values) if name in result.bulk else _dims(what, values)
+                yield Labelled(f"{name}.{what}", dims, x.unit, values, _note(view, what))
 
 
 def _dims(what: str, values: np.ndarray) -> tuple[str, ...]:
     if values.ndim == 1:
         return (TIME,)
     return (TIME, QUATERNION if what == "quaternion" else AXIS)
+
+
+def _of_members(name: str, what: str, values: np.ndarray) -> tuple[str, ...]:
+    """Of a set of bodies: times, members, and components if there are some."""
+    own = (TIME, f"{name}_member")
+    return own if values.ndim == 2 else (*own, *_dims(what, values[:, 0])[1:])
 
 
 def _note(view: Any, what: str) -> str:

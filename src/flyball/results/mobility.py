@@ -61,6 +61,7 @@ class Mobility:
     rank: int
     redundant: tuple[str, ...] = ()
     undetermined: dict[str, tuple[str, ...]] = field(default_factory=dict)
+    without: str = ""  # what is there besides, and not counted
     found: Findings | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -110,6 +111,8 @@ class Mobility:
         out += [("freedoms", m.text) for m in self.motions[:LINES]]
         if self.freedoms > LINES:
             out.append(("freedoms", f"... and {self.freedoms - LINES} more"))
+        if self.without:
+            out.append(("not counted", self.without))
         if not there.gap:
             out.append(("geometry", self.geometry.text))
         for s in self.sets[:LINES]:

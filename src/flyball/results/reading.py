@@ -18,10 +18,12 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
+from .contact_health import ContactHealth
 from .departure import Departure
 from .files import ARRAYS, FORMAT, GROUP, checksum, sealed
 from .health import Health
 from .result import Result
+from .stored_contacts import unpack
 
 M = TypeVar("M", bound=Model)
 
@@ -146,6 +148,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
         raise _damaged(where, "its times do not ascend")
     result = Result(model, x, health=health, **arrays)
     result.final = (float(final[0]), final[1:])
+    unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
     return result
 
@@ -163,5 +166,7 @@ def _health(data: dict[str, Any]) -> Health:
     late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
     late["warnings"] = tuple(data.get("warnings", ()))
     data["remarks"] = tuple(data.get("remarks", ()))
+    if data.get("contact"):
+        data["contact"] = ContactHealth.from_dict(data["contact"])
     data["departures"] = tuple(map(Departure.from_dict, data.get("departures", ())))
     return Health(**{k: v for k, v in data.items() if k in known}, late=late)

@@ -142,7 +142,7 @@ def body_table(s: Structure) -> None:
             s.tree_joints[h.joint.name] = TreeJoint(h.joint, h.reversed, tuple(range(first, len(rows))), steps)
         place[h.body] = len(rows) - 1
     s.place = place
-    kinds = np.array([kind for _, kind in rows])
+    kinds = np.array([kind for _, kind in rows], np.int64)
     nq, nv = np.array(TREE_NQ)[kinds], np.array(TREE_NV)[kinds]
     if model.planar:
         nq[kinds == POINT] = nv[kinds == POINT] = 2

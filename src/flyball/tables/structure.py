@@ -70,7 +70,7 @@ def structure(model: Model, choices: Choices = PLAIN) -> Structure:
 
 
 def _decided(model: Model, choices: Choices) -> Structure:
-    if not model.bodies:
+    if not model.bodies and not model.bulk:
         raise ModelError(f"{model.name!r} has no bodies; add at least one")
     c = choices
     s = Structure(model, c.far, c.tree, c.positions or c.far, c.coupled)

@@ -143,6 +143,8 @@ def _check_points(s: Structure, frame_x: np.ndarray, length: Any, new: Afresh) -
 def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
     """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
     centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
+    if not len(centres):
+        return 1.0
     ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
     longest = ways[np.argmax((ways.real**2).sum(axis=1))]
     length = np.sqrt((longest**2).sum())

@@ -29,12 +29,14 @@ from .recording import (
     RecordedPath,
     Recording,
 )
+from .scene import crowds, grounds, touches
 from .symbols import Drawn, symbols
 
 if TYPE_CHECKING:
     from ..results.result import Result
 
 FRAMES = 2000  # times in a recording, about
+POSES = 1_500_000  # of members of sets in a recording, at most
 CURVES = 60
 USUAL = ("loads", "moments", "grid")
 
@@ -80,7 +82,8 @@ def record(
     """
     if not len(result.t):
         raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
-    every = kept(len(result.t))
+    members = sum(map(len, result.bulk.values()))
+    every = kept(len(result.t), members)
     places = Places(result)
     looks = Looks(result, places)
     drawn = list(_drawn(result, places, looks, every))
@@ -89,17 +92,24 @@ def record(
         RecordedBody(b.name, looks.shapes(b.name), *_poses(result, b.name, every), b.color) for b in result.model.bodies
     )
     joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
+    sets = crowds(result, every)
+    contacts, left_out = touches(result, every) if curves else (None, "")
+    notes = dict(result.health.lines()) if told else {}
+    if len(every) < len(result.t) and members:
+        notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
+    if left_out:
+        notes["contact arrows"] = left_out
     return Recording(
         name=result.model.name,
         planar=result.planar,
         t=result.t[every],
-        bodies=bodies,
+        bodies=(*bodies, *grounds(result, every, (*bodies, *sets))),
         lines=tuple(d for d in drawn if isinstance(d, RecordedLine)),
         joints=joints,
         channels=channels,
         shown=shown(result, [c.name for c in channels]),
         size=looks.size,
-        notes=dict(result.health.lines()) if told else {},
+        notes=notes,
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
         arrows=arrows(result, places, every) if curves else (),
         frames=tuple(_frames(result, places)),
@@ -107,12 +117,18 @@ def record(
         show=_chosen(show),
         facts=facts(result) if told else {},
         down=_down(result),
+        sets=sets,
+        contacts=contacts,
     )
 
 
-def kept(n: int) -> np.ndarray:
-    """Indices of the times that are shown: all, or about 2000 evenly chosen, first and last among them."""
-    return np.arange(n) if n <= FRAMES * 1.25 else np.unique(np.linspace(0, n - 1, FRAMES).round().astype(int))
+def kept(n: int, members: int = 0) -> np.ndarray:
+    """Indices of the times that are shown: all, or about 2000 evenly chosen, first and last among them.
+
+    Fewer of so many members of sets of bodies that the page would become too large.
+    """
+    most = max(2, min(FRAMES, POSES // max(members, 1)))
+    return np.arange(n) if n <= most * 1.25 else np.unique(np.linspace(0, n - 1, most).round().astype(int))
 
 
 def _chosen(show: Collection[str]) -> tuple[str, ...]:

@@ -160,19 +160,8 @@ class Looks:
         return min(1.0, TRIANGLES / total) if total else 1.0
 
     def _given(self, s: Any) -> Shape:
-        """A shape as the user gave it; a cone is counted from its middle in pictures."""
-        n = self._numbers[id(s)]
-        if _meshed(s):
-            v, t = s.mesh(n)
-            most = max(int(self._share * len(t)), min(FEWEST, len(t)))
-            v, t = simplified(v, np.asarray(t), most)
-            return Shape("mesh", (), vertices=v, triangles=t, hole=s.hole)
-        p, R = s.pose(n)
-        if isinstance(s, Cone):
-            p = p + R[:, 2] * n.height / 2
-        kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
-        turn = tuple(matrix_to_quaternion(R).tolist())
-        return Shape(kind, tuple(map(float, s.size(n))), three(p), turn, hole=s.hole)
+        """A shape as the user gave it."""
+        return given_shape(s, self._numbers[id(s)], self._share)
 
     def _cam(self, e: Any) -> list[Shape]:
         """The disc that a cam's outline bounds."""
@@ -266,6 +255,24 @@ class Looks:
         return Shape(
             "box", tuple(max(x, 0.2 * least) for x in edges), three(com), tuple(matrix_to_quaternion(V).tolist())
         )
+
+
+def given_shape(s: Any, n: Any, share: float = 1.0) -> Shape:
+    """A solid of the model, with its numbers, as it is drawn; meshes keep a share of their triangles.
+
+    A cone is counted from its middle in pictures.
+    """
+    if _meshed(s):
+        v, t = s.mesh(n)
+        most = max(int(share * len(t)), min(FEWEST, len(t)))
+        v, t = simplified(v, np.asarray(t), most)
+        return Shape("mesh", (), vertices=v, triangles=t, hole=s.hole)
+    p, R = s.pose(n)
+    if isinstance(s, Cone):
+        p = p + R[:, 2] * n.height / 2
+    kind = "cylinder" if isinstance(s, Rod) else type(s).__name__.lower()
+    turn = tuple(matrix_to_quaternion(R).tolist())
+    return Shape(kind, tuple(map(float, s.size(n))), three(p), turn, hole=s.hole)
 
 
 def _extents(kind: str, size: tuple[float, ...]) -> list[float]:

@@ -68,7 +68,12 @@ def payload(recording: Recording) -> bytes:
         "down": _numbers(recording.down),
         "t": block.add(recording.t, "f8"),
         "bodies": [
-            {"name": b.name, "color": b.color, "shapes": [_shape(s, block) for s in b.shapes]}
+            {
+                "name": b.name,
+                "color": b.color,
+                "opacity": float(b.opacity),
+                "shapes": [_shape(s, block) for s in b.shapes],
+            }
             | {"p": block.add(b.p), "q": block.add(_continuous(b.q))}
             for b in recording.bodies
         ],

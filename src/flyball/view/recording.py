@@ -60,6 +60,7 @@ class RecordedBody:
     p: np.ndarray
     q: np.ndarray
     color: str | None = None
+    opacity: float = 1.0
 
 
 @dataclass(frozen=True)

@@ -66,6 +66,10 @@ class Integration(Options):
             known = ", ".join(STABILIZATION)
             raise ModelError(f"unknown stabilization {self.stabilization!r}; choose one of {known}")
         self._rates()
+        self.check_method()
+
+    def check_method(self) -> None:
+        """Refuse integrators that there are not."""
         try:
             tableau(self.method)
         except ValueError as error:

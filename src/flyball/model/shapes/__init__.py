@@ -23,7 +23,9 @@ if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .cone import Cone as Cone
     from .cylinder import Cylinder as Cylinder
     from .ellipsoid import Ellipsoid as Ellipsoid
+    from .height_field import HeightField as HeightField
     from .hemisphere import Hemisphere as Hemisphere
+    from .hull import Hull as Hull
     from .link import Link as Link
     from .mesh import Mesh as Mesh
     from .plane import Plane as Plane

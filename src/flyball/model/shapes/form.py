@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+LENGTHS = {"HULL": (0,), "FIELD": (2, 3)}  # parameters that are lengths; of other kinds all are
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +27,13 @@ class Form:
     axes : (3, 3)
         Its axes (columns) in the shape's own.
     vertex : (k, 3)
-        Corners [m] in its own axes, of what has them.
+        Corners [m] in its own axes, of what has them, and whatever else its kind keeps there.
     face : (l,)
         Faces of what has them: count of corners, then the corners counter-clockwise seen from outside, and so on.
+    corners : int
+        How many of the rows of ``vertex`` are corners; all if not given. The others do not grow with the shape.
+    sides : int
+        How many faces there are.
     """
 
     kind: str
@@ -37,7 +43,18 @@ class Form:
     axes: np.ndarray = field(default_factory=lambda: np.eye(3))
     vertex: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     face: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    corners: int | None = None
+    sides: int = 0
 
     def carried(self, p: np.ndarray, R: np.ndarray) -> Form:
         """The same, in a frame in which the shape's own lies at p with the axes R."""
-        return Form(self.kind, self.par, self.reach, p + R @ self.place, R @ self.axes, self.vertex, self.face)
+        return replace(self, place=p + R @ self.place, axes=R @ self.axes)
+
+    def grown(self, sizes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Parameters (n, k) and, one below the other, ``vertex`` of the same in n sizes."""
+        par = np.tile(np.real(np.array(self.par, complex)), (len(sizes), 1))
+        lengths = list(LENGTHS.get(self.kind, range(len(self.par))))
+        par[:, lengths] *= sizes[:, None]
+        vertex = np.tile(np.asarray(self.vertex, float), (len(sizes), 1, 1))
+        vertex[:, : self.corners] *= sizes[:, None, None]
+        return par, vertex.reshape(-1, 3)

@@ -11,6 +11,8 @@ import numpy as np
 from ...errors import ModelError
 from ..element import Direction, Length, Point, element, positive
 from ..geometry import vector
+from .form import Form
+from .outline import ALONG, OBLIQUE, polygon
 from .rod import ends
 from .solid import FINE, Solid
 from .surface import arc, extrude
@@ -77,6 +79,22 @@ class Link(Solid):
         x2 = (w * length**3 / 12 + length**2 * pi * r**2 / 4 + 4 / 3 * length * r**3 + pi * r**4 / 4) / area
         z2 = n.thickness**2 / 12
         return y2 + z2, x2 + z2, x2 + y2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """The bar between the centres of its ends, and a disc about either."""
+        h, r, t = ends(self, n)[2] / 2, n.width / 2, n.thickness / 2
+        middle = Form("BOX", (h, r, t), np.sqrt(h * h + r * r + t * t))
+        return middle, *(Form("CYLINDER", (r, t), np.sqrt(r * r + t * t), np.array([x, 0.0, 0.0])) for x in (-h, h))
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """A segment with round ends; what there is to see from the side."""
+        p, R = self.pose(n)
+        flat = np.hypot(*R[:2, 2]) < ALONG
+        if not flat and np.sort(np.abs(R[2]))[1] < ALONG:  # from the side
+            return (polygon(self.mesh(n)[0]),)
+        if not flat:
+            raise ModelError(f"{self.title}: {OBLIQUE}")
+        return (polygon(np.array([p + s * R[:, 0] * ends(self, n)[2] / 2 for s in (-1.0, 1.0)]), n.width / 2),)
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Length between the ends' centres, width and thickness."""

@@ -38,6 +38,11 @@ def paths_from(folder: str | os.PathLike | None) -> Iterator[None]:
         _FOLDER.reset(token)
 
 
+def folder() -> Path:
+    """The folder that relative paths are counted from."""
+    return _FOLDER.get() or Path.cwd()
+
+
 @dataclass(frozen=True, eq=False)
 class Triangulation:
     """Vertices (k, 3) and triangles (m, 3) with what follows from them, in units of their own."""
@@ -56,7 +61,7 @@ class Triangulation:
         return integrals(self.v, self.f)
 
 
-def _rows(kind: type) -> Any:
+def rows_of(kind: type) -> Any:
     """Rows of plain numbers become tuples, quickly; what is none is left as it is, to be refused with all the rest."""
 
     def convert(value: Any) -> Any:
@@ -99,13 +104,13 @@ class Mesh(Solid):
     """
 
     path: Annotated[str | None, BeforeValidator(_text)] = None
-    vertices: Annotated[Any, _rows(float)] = field(default=None, repr=False)
-    faces: Annotated[Any, _rows(int)] = field(default=None, repr=False)
+    vertices: Annotated[Any, rows_of(float)] = field(default=None, repr=False)
+    faces: Annotated[Any, rows_of(int)] = field(default=None, repr=False)
     scale: Length = 1.0
 
     def __post_init__(self) -> None:
         """Remember the folder that a relative path is counted from."""
-        object.__setattr__(self, "_folder", _FOLDER.get() or Path.cwd())
+        object.__setattr__(self, "_folder", folder())
 
     def _key(self) -> tuple:
         return tuple(self.file if f.name == "path" else getattr(self, f.name) for f in fields(self))

@@ -11,6 +11,10 @@ from .form import Form
 from .surface import cross
 
 ALONG = 1e-9  # sine of the angle between directions that count as the same
+OBLIQUE = (
+    "it stands oblique to the plane of the mechanism, so it has no outline that contact knows; turn it, or give it "
+    "contact=False"
+)
 
 
 def polygon(points: np.ndarray, rounding: Any = 0.0) -> Form:
@@ -38,10 +42,7 @@ def around_axis(what: Any, p: np.ndarray, R: np.ndarray, radius: Any, profile: l
     if np.hypot(*R[:2, 2]) < ALONG:
         return circle(radius, p)
     if not abs(R[2, 2]) < ALONG:
-        raise ModelError(
-            f"{what.title}: its axis is neither in the plane of the mechanism nor normal to it, so it has no outline "
-            f"that contact knows; turn it, or give it contact=False"
-        )
+        raise ModelError(f"{what.title}: {OBLIQUE}")
     z = R[:2, 2]
     x = np.array([-z[1], z[0]])
     return polygon(np.array([p[:2] + r * x * side + h * z for r, h in profile for side in (-1.0, 1.0)]))

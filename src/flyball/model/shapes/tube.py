@@ -11,13 +11,16 @@ import numpy as np
 from ..element import Length, element, positive
 from .cylinder import Cylinder
 from .rules import smaller
-from .solid import FINE, Solid
+from .solid import FINE
 from .surface import lathe
 
 
 @element
 class Tube(Cylinder):
-    """A hollow cylinder along z, its middle at its origin: outer ``radius``, ``inner_radius`` and ``length`` [m]."""
+    """A hollow cylinder along z, its middle at its origin: outer ``radius``, ``inner_radius`` and ``length`` [m].
+
+    It touches others as a cylinder does: nothing gets into its bore.
+    """
 
     inner_radius: Length
 
@@ -36,9 +39,6 @@ class Tube(Cylinder):
         s = n.radius**2 + n.inner_radius**2
         k = (3 * s + n.length**2) / 12
         return k, k, s / 2
-
-    forms = Solid.forms
-    outlines = Solid.outlines
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Outer radius, inner radius and length."""

@@ -40,9 +40,8 @@ class PointView(View):
         """Acceleration of its origin, world axes [m/s^2]."""
         return stacked(self._record[5], self._result.planar)
 
-    @property
-    def contact_force(self) -> np.ndarray:
-        """Of a body: sum of the contact forces on it [N], world axes, (n, 2) or (n, 3)."""
+    def _found(self, name: str) -> np.ndarray:
+        """Of a body where there is contact: the sum of contact forces on it [N], world axes, (n, 2) or (n, 3)."""
         found, n = self._result.contacts, 2 if self._result.planar else 3
         if found is None or self.element.name not in found.sides.names:
             return np.zeros((len(self._result.t), n))

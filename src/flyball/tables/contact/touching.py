@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...contact import kinds
 from ...contact import tables as ct
 from ...contact.surfaces import Surfaces
+from ...errors import ModelError
 from ...model.body import GROUND, Body
 from ...model.bulk import Bodies
 from ...model.element import resolve
@@ -67,11 +68,12 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
     Raises
     ------
     ModelError
-        If a shape has no form that contact knows, or nothing says the friction of a pair.
+        If a shape has no form that contact knows, what touches has no mass, or nothing says the friction of a pair.
     """
     at = carriers(model, given, names)
     owners: list[Owner] = [*model.ground, *(e for name in names if isinstance(e := model.find(name), (Body, Bodies)))]
     owners = [e for e in owners if any(s.touches for s in e.shapes())]
+    _refuse_massless(owners, at)
     g = groups(model, owners)
     rows = _Rows(model, given, at, g)
     for k, e in enumerate(owners):
@@ -89,6 +91,16 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
         apart,
     )
     return Touching(geometry, surfaces, at, tuple(e.name for e in owners), _joined(rows.part, (0,), np.int64))
+
+
+def _refuse_massless(owners: list[Owner], at: Carriers) -> None:
+    """Refuse what impulses would give any velocity."""
+    for e in owners:
+        if not isinstance(e, Ground) and not at.mass[at.slices[e.name].start] > 0.0:
+            raise ModelError(
+                f"{e.title}: it touches and has no mass; give it one, or contact=False to its shapes and put such that "
+                f"touch on the bodies that it joins"
+            )
 
 
 def _joined(parts: list[np.ndarray], empty: tuple[int, ...], dtype: type = float) -> np.ndarray:
@@ -112,14 +124,14 @@ class _Rows:
     def add(self, k: int, e: Owner) -> None:
         """The shapes of one owner; of many bodies, those of the first, of the second, and so on."""
         where, movers, sizes, com = self._frame(e)
-        forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(s)]
+        forms = [(s, f) for s in e.shapes() if s.touches for f in self._forms(e, s)]
         count, n = len(movers), len(forms)
         ints, reals = np.zeros((count, n, 9), np.int64), np.zeros((count, n, 24))
         mine = np.zeros((n, 2, 3))
         for j, (s, form) in enumerate(forms):
             f = form if where is None else form.carried(*where)
+            reals[:, j] = _reals(f, com, sizes, self._places)
             ints[:, j] = self._ints(e, s, f, sizes)
-            reals[:, j] = _reals(f, com, sizes)
             mine[j] = self._own(e, s, where)
         ints[:, :, ct.MOVER] = movers[:, None]
         self.ints.append(ints.reshape(-1, 9))
@@ -135,27 +147,31 @@ class _Rows:
         sizes = e.sizes() if isinstance(e, Bodies) else np.ones(1)
         return None, np.arange(at.start, at.stop), sizes, self.at.com[e.name]
 
-    def _forms(self, s: Solid) -> list[Form]:
-        """Its parts, in the body's reference frame."""
+    def _forms(self, e: Owner, s: Solid) -> list[Form]:
+        """The parts of a shape, in the body's reference frame."""
         n = resolve(s, self.given.env)
-        if self.model.planar:
-            return list(s.outlines(n))
-        p, R = s.pose(n)
-        return [f.carried(p, R) for f in s.forms(n)]
+        try:
+            if self.model.planar:
+                return list(s.outlines(n))
+            p, R = s.pose(n)
+            return [f.carried(p, R) for f in s.forms(n)]
+        except ModelError as error:
+            raise type(error)(f"{e.title}: {error}") from None
 
     def _ints(self, e: Owner, s: Solid, f: Form, sizes: np.ndarray) -> np.ndarray:
         """Kind, places of corners and faces, groups and surface; corners of other sizes are corners of their own."""
         group, material = self.groups.of[e.name], s.material or e.material
         row = np.zeros((len(sizes), 9), np.int64)
         row[:, ct.KIND] = getattr(kinds, f.kind)
-        row[:, ct.COUNT], row[:, ct.FACE_COUNT] = len(f.vertex), len(f.face)
+        row[:, ct.COUNT] = len(f.vertex) if f.corners is None else f.corners
+        row[:, ct.FACE_COUNT] = f.sides
         row[:, ct.FIRST], row[:, ct.FACE_FIRST] = self._corners, self._places
-        copies = sizes if len(f.vertex) and (sizes != sizes[0]).any() else sizes[:1]
-        row[:, ct.FIRST] += len(f.vertex) * np.arange(len(sizes)) if len(copies) > 1 else 0
         if len(f.vertex):
-            self.vertex.append((copies[:, None, None] * f.vertex).reshape(-1, 3))
-            self.face.append(f.face)
-            self._corners += len(copies) * len(f.vertex)
+            other = (sizes != sizes[0]).any()
+            row[:, ct.FIRST] += len(f.vertex) * np.arange(len(sizes)) if other else 0
+            self.vertex.append(f.grown(sizes if other else sizes[:1])[1])
+            self.face.append(np.asarray(f.face, np.int64))
+            self._corners += len(self.vertex[-1])
             self._places += len(f.face)
         row[:, ct.MEMBER], row[:, ct.MASK] = 1 << group, self.groups.meets(group)
         surface = group, material
@@ -170,11 +186,13 @@ class _Rows:
         return out if where is None else out @ where[1].T
 
 
-def _reals(f: Form, com: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Origin from the mover's, axes, parameters (all of them lengths), radius around it."""
+def _reals(f: Form, com: np.ndarray, sizes: np.ndarray, places: int) -> np.ndarray:
+    """Origin from the mover's, axes, parameters, radius around it; the edges of a hull are counted from all faces."""
     row = np.zeros((len(sizes), 24))
     row[:, ct.PLACE : ct.PLACE + 3] = sizes[:, None] * (np.real(f.place) - com)
     row[:, ct.AXES : ct.AXES + 9] = np.real(f.axes).ravel()
-    row[:, ct.PAR : ct.PAR + len(f.par)] = sizes[:, None] * np.real(np.array(f.par, complex))
+    row[:, ct.PAR : ct.PAR + len(f.par)] = replace(f, vertex=np.zeros((0, 3))).grown(sizes)[0]
+    if f.kind == "HULL" and f.par[1] >= 0:
+        row[:, ct.PAR + 1] += places
     row[:, ct.RADIUS] = sizes * np.real(f.reach)
     return row

@@ -1,1 +1,1 @@
-"""Motion by impulses: a model made into tables of the step, and what comes of it."""
+"""Motion by steps of impulses: what `Mechanism.simulate` does where things touch."""

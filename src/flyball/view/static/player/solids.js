@@ -95,6 +95,8 @@ function spinMarks({ kind, size }, material) {
 export function solidBody(body, colour) {
   const group = new THREE.Group();
   const material = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.48, metalness: 0.08 });
+  const glass = body.opacity < 1;
+  if (glass) Object.assign(material, { transparent: true, opacity: body.opacity, depthWrite: false });
   const dark = new THREE.MeshStandardMaterial({ color: colour, roughness: 0.7 });
   dark.color.multiplyScalar(0.3);
   const opening = new THREE.MeshStandardMaterial({ color: colour, roughness: 1 });
@@ -107,7 +109,7 @@ export function solidBody(body, colour) {
     } else holder.add(new THREE.Mesh(solidGeometry(shape), material), ...spinMarks(shape, dark));
     group.add(holder);
   }
-  group.traverse((object) => Object.assign(object, { castShadow: true, receiveShadow: true }));
+  group.traverse((object) => Object.assign(object, { castShadow: !glass, receiveShadow: !glass }));
   return { group, retheme() {}, glow: (on) => material.emissive.set(colour).multiplyScalar(on ? 0.35 : 0) };
 }
 

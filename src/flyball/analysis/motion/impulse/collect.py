@@ -1,0 +1,126 @@
+"""What is kept of a motion with contact at the output times."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ....contact.tables import FOUND, GAP, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ....model.model import Model
+from ....results.bulk import Bulk
+from ....results.contacts import Contacts
+from ....results.sides import OPEN, SLIP, STICK, Sides
+from ....stepping.free import matrix, unrotated
+from ....stepping.stepper import Stepper
+from ....stepping.tables import GIVEN, IMPULSE, KICK, LOST_FRICTION, LOST_IMPACT, SLIDES, TIME
+from ....tables.contact import Touching
+from ....tables.system import NV, Q0, V0
+from ...assembly.start import Assembly
+
+SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN)
+
+
+class Collected:
+    """Rows of output, put together at the end.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    side_of : (movers + 1,) of int
+        Of each mover the side that it is in `Sides`; the last one is that of ground.
+    """
+
+    def __init__(self, stepper: Stepper, side_of: np.ndarray) -> None:
+        self.stepper, self.side_of = stepper, side_of
+        self.t: list[float] = []
+        self.pose: list[np.ndarray] = []
+        self.turn: list[np.ndarray] = []
+        self.twist: list[np.ndarray] = []
+        self.sums: list[np.ndarray] = []
+        self.contacts: list[dict[str, np.ndarray]] = []
+
+    def add(self, h: float) -> None:
+        """Keep where the stepper is now, and the contacts of the step of length h that led here (0: none did)."""
+        s = self.stepper
+        self.t.append(float(s.pace.real[TIME]))
+        self.pose.append(s.movers.pose[:, :3].copy())
+        self.turn.append(s.free.turn.copy())
+        self.twist.append(s.rooms.X.v[:, :6].copy())
+        self.sums.append(s.pace.real[list(SUMS)])
+        self.contacts.append(self._touching(h) if h > 0.0 else {})
+
+    def _touching(self, h: float) -> dict[str, np.ndarray]:
+        """Contacts with a force."""
+        s = self.stepper
+        C, kept = s.last()
+        n = int(C.count[FOUND])
+        impulse = kept[:n, IMPULSE : IMPULSE + 3] + kept[:n, KICK : KICK + 3]
+        k = np.flatnonzero((impulse != 0.0).any(axis=1))
+        mover = s.geometry.shape_i[C.at[k][:, [SHAPE_1, SHAPE_2]], MOVER]
+        return {
+            "pair": self.side_of[mover],
+            "point": C.x[k, POINT : POINT + 3],
+            "normal": C.x[k, NORMAL : NORMAL + 3],
+            "gap": C.x[k, GAP],
+            "force": impulse[k] / h,
+            "state": np.where(kept[k, SLIDES] > 0.5, SLIP, np.where(kept[k, SLIDES] < -0.5, OPEN, STICK)),
+            "friction": s.rooms.P.mu[k],
+        }
+
+    def as_contacts(self, sides: Sides, planar: bool) -> Contacts:
+        """All contacts of all output times."""
+        empty: dict[str, Any] = {"pair": np.zeros((0, 2), np.int64), "state": np.zeros(0, np.int64)}
+        empty |= {k: np.zeros((0, 3)) for k in ("point", "normal", "force")}
+        empty |= {k: np.zeros(0) for k in ("gap", "friction")}
+        rows = [c or empty for c in self.contacts]
+        begin = np.cumsum([0, *(len(c["gap"]) for c in rows)])
+        table: dict[str, Any] = {k: np.concatenate([c[k] for c in rows]) for k in empty}
+        return Contacts(t=np.array(self.t), sides=sides, begin=begin, planar=planar, **table)
+
+
+def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.ndarray, np.ndarray]:
+    """Absolute coordinates (n, nq) and velocities (n, nv) of single bodies over time."""
+    s = base.compiled.structure
+    body_i = s.tables["body_i"]
+    n = len(kept.t)
+    q, v = np.tile(base.q, (n, 1)), np.zeros((n, s.nv))
+    pose, turn, twist = np.array(kept.pose), np.array(kept.turn), np.array(kept.twist)
+    for name, b in s.place.items():
+        if b < 0 or name not in scene.carriers.slices:
+            continue
+        k = scene.carriers.slices[name].start
+        q0, v0, width = body_i[b, Q0], body_i[b, V0], body_i[b, NV]
+        if width == 3 and s.model.planar:
+            q[:, q0 : q0 + 2], v[:, v0 : v0 + 2] = pose[:, k, :2], twist[:, k, :2]
+            half = np.unwrap(np.arctan2(turn[:, k, 3], turn[:, k, 0]))  # of the angle: whole turns are told apart
+            q[:, q0 + 2] = base.q[q0 + 2] + 2.0 * (half - half[0])
+            v[:, v0 + 2] = twist[:, k, 5]
+            continue
+        q[:, q0 : q0 + 3], v[:, v0 : v0 + 3] = pose[:, k], twist[:, k, :3]
+        if width == 6:
+            e = turn[:, k] * (1.0 if turn[0, k] @ base.q[q0 + 3 : q0 + 7] >= 0.0 else -1.0)
+            q[:, q0 + 3 : q0 + 7] = e
+            v[:, v0 + 3 : v0 + 6] = np.stack(unrotated(matrix(e.T), twist[:, k, 3:].T), axis=1)
+    return q, v
+
+
+def sets(model: Model, scene: Touching, kept: Collected) -> dict[str, Bulk]:
+    """Sets of bodies by name."""
+    out = {}
+    for name in scene.carriers.names:
+        if name in scene.carriers.single:
+            continue
+        at = scene.carriers.slices[name]
+        J = scene.carriers.inertia[at]
+        out[name] = Bulk(
+            name=name,
+            mass=scene.carriers.mass[at],
+            inertia=J,
+            com=model[name].sizes()[:, None] * scene.carriers.com[name],
+            position=np.array([p[at] for p in kept.pose]),
+            quaternion=np.array([p[at] for p in kept.turn]),
+            velocity=np.array([p[at, :3] for p in kept.twist]),
+            angular_velocity=np.array([p[at, 3:] for p in kept.twist]),
+        )
+    return out

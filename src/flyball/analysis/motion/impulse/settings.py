@@ -1,0 +1,77 @@
+"""Choices of a motion by steps of impulses."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+from ....errors import ModelError
+from ...options import count, positive, seconds
+
+SOLVERS = ("auto", "gauss-seidel")
+RESTITUTION = ("poisson", "newton", "moreau")
+IMPACTS = ("simultaneous", "sequential")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Impulse:
+    """How a motion with contact is stepped: ``simulate(..., method=fb.Impulse(step="2 ms"))``.
+
+    Every step solves for the velocities at its end, with all contacts and joints at once, and then moves bodies out of
+    what overlap is left without giving them velocity.
+
+    Parameters
+    ----------
+    step : float or str [s]
+        Longest step; shorter where an output time asks for it.
+    solver : str
+        Of the cone problem: ``auto`` (chosen for each island of bodies that touch), or one by name: see
+        ``docs/contact_solvers.md``.
+    iterations : int, optional
+        Most iterations of the solve for velocities; a number that suits the solver if not given.
+    position_iterations : int, optional
+        Most iterations of the solve for positions; the same.
+    tolerance : float [m/s]
+        Residual of velocities that is enough.
+    coulomb : bool
+        Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
+        coefficient times sliding speed times step.
+    restitution : {"poisson", "newton", "moreau"}
+        Law of impacts.
+    impacts : {"simultaneous", "sequential"}
+        Whether what is hit at once is solved at once, or one contact after the other, the fastest first, as in Newton's
+        cradle.
+    """
+
+    step: float | str = 5e-3
+    solver: str = "auto"
+    iterations: int | None = None
+    position_iterations: int | None = None
+    tolerance: float = 1e-5
+    coulomb: bool = True
+    restitution: str = "poisson"
+    impacts: str = "simultaneous"
+
+    def __post_init__(self) -> None:
+        if isinstance(self.step, str):
+            object.__setattr__(self, "step", seconds(self.step, "step"))
+        for name in ("step", "tolerance"):
+            positive(getattr(self, name), name)
+            if not math.isfinite(getattr(self, name)):
+                raise ModelError(f"{name} of Impulse must be finite")
+        for name in ("iterations", "position_iterations"):
+            if getattr(self, name) is not None:
+                count(getattr(self, name), name)
+        for name, known in (("solver", SOLVERS), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
+            if getattr(self, name) not in known:
+                raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
+
+    @property
+    def longest(self) -> float:
+        """The longest step [s]."""
+        return float(self.step)
+
+    def bounded(self, longest: float) -> Impulse:
+        """With steps of at most ``longest`` seconds."""
+        return dataclasses.replace(self, step=min(self.longest, longest))

@@ -1,0 +1,95 @@
+"""How well contacts were solved."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import Any
+
+ENOUGH = 10.0  # a residual above so many times what was asked for is told
+
+
+@dataclass(frozen=True)
+class ContactHealth:
+    """Figures of contact over a whole run.
+
+    Attributes
+    ----------
+    solver : str
+        What solved the contacts, and why it was chosen.
+    impacts : str
+        Law of impacts, and whether they come together or one after the other.
+    most : int
+        Contacts in one step, at most.
+    worst_overlap : float [m]
+        Deepest overlap after any step.
+    overlap_at_start : float [m]
+        Deepest overlap as described.
+    residual : float [m/s]
+        Largest velocity left in any solve that should vanish.
+    force_residual : float
+        Largest part of an impulse that was left, over the largest impulse of its solve.
+    tolerance : float [m/s]
+        What the residual was asked to be.
+    solves, iterations, unconverged : int
+        How many solves there were, their iterations, and how many were cut off before they had converged.
+    worst_at : float or None [s]
+        Time of the largest residual.
+    size : float [m]
+        Of the smallest body that touches, which overlaps are compared with.
+    notes : tuple of str
+        What else has to be said: a law of impacts that was softened, a position without unique forces (Painleve).
+    """
+
+    solver: str = ""
+    impacts: str = ""
+    most: int = 0
+    worst_overlap: float = 0.0
+    overlap_at_start: float = 0.0
+    residual: float = 0.0
+    force_residual: float = 0.0
+    tolerance: float = 0.0
+    solves: int = 0
+    iterations: int = 0
+    unconverged: int = 0
+    worst_at: float | None = None
+    size: float = 0.0
+    notes: tuple[str, ...] = field(default_factory=tuple)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people."""
+        out = [("contact", f"{self.most} contacts at most")]
+        if self.solver:
+            out.append(("contact solver", self.solver))
+        if self.impacts:
+            out.append(("impacts", self.impacts))
+        out.append(("worst overlap", f"{self.worst_overlap:.2g} m"))
+        out.append(("contact residual", f"{self.residual:.2e} m/s, {self.force_residual:.2e} of the largest force"))
+        if self.solves:
+            left = f", {self.unconverged} not converged" if self.unconverged else ""
+            out.append(("contact solves", f"{self.solves}, {self.iterations / self.solves:.3g} iterations each{left}"))
+        return out
+
+    def warnings(self) -> tuple[str, ...]:
+        """Reasons to look at the motion twice."""
+        out = list(self.notes)
+        if self.unconverged:
+            when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""
+            share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"
+            out.append(f"{share}: forces are rough there; allow more iterations, or take another solver")
+        elif self.tolerance > 0.0 and self.residual > ENOUGH * self.tolerance:
+            out.append(f"a contact solve left {self.residual:.2g} m/s where {self.tolerance:.2g} m/s was asked for")
+        if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
+            part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"
+            out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")
+        if self.size > 0.0 and self.overlap_at_start > 1e-3 * self.size:
+            out.append(f"bodies overlap by {self.overlap_at_start:.2g} m as described; they are pushed apart at first")
+        return tuple(out)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any]) -> ContactHealth:
+        """What `as_dict` gave."""
+        return cls(**(data | {"notes": tuple(data.get("notes", ()))}))

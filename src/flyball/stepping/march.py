@@ -1,0 +1,126 @@
+"""The loop of steps by impulses: search, solve, displace; everything large is behind doors, called by address."""
+
+from __future__ import annotations
+
+from ..compiler.door import enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..contact.tables import AHEAD, DONE, FOUND, GAP
+from ..numerics.cone.operator import seen
+from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
+from .bounce import bounce
+from .motion import begin, displace, fall, halfway, rest
+from .record import book
+from .rows import fill_rows, static_where_stuck, warm
+from .tables import (
+    CUTS,
+    ENOUGH_V,
+    ENOUGH_X,
+    FLAT,
+    ITERATIONS,
+    LEFT,
+    LIFTS,
+    MOST_CONTACTS,
+    POSITIONS,
+    SEARCHING,
+    STEP,
+    SWEEPS,
+    TAKEN,
+    TIME,
+    VELOCITIES,
+    WORST_FORCE,
+    WORST_OVERLAP,
+    WORST_RESIDUAL,
+)
+
+STEP_ON = 0  # the task of a search: go on from the pairs that are known
+
+
+@formula
+def solved(address, P, X, W, O, F, pace, most, enough):
+    """Go through a solver's door; keeps what came of it."""
+    O.count[MOST] = most
+    O.real[ENOUGH] = enough
+    pace.count[ITERATIONS] += enter(address, P, X, W, O, F, 0)
+    return O.count[ENDED]
+
+
+@formula
+def velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before):
+    """Velocities at the end of the step: the cone problem, and its residual into the sums."""
+    warm(C, P, X, now, before)
+    static_where_stuck(G, C, P, L, X, pace, now)
+    begin(N, M, X)
+    ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    if ended != CONVERGED:
+        pace.count[CUTS] += 1
+    pace.real[WORST_RESIDUAL] = max(pace.real[WORST_RESIDUAL], O.real[RESIDUAL])
+    pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real[FORCE_RESIDUAL])
+
+
+@formula
+def positions(C, P, Q, X, Y, W, O, F, N, pace, now):
+    """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
+
+    min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
+    impulses are booked, since the mean velocities are at hand.
+    """
+    h = pace.real[STEP]
+    halfway(N, X, Y)
+    deepest = 0.0
+    for c in range(C.count[FOUND]):
+        pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
+        u = seen(P, Y.v, Y.wide, c)
+        gap = C.x[c, GAP] + h * u[0]
+        deepest = min(deepest, gap)
+        Q.bias[c, 0] = gap / h
+        book(P, X, c, u, pace, now)
+        for i in range(3):
+            Y.p[c, i] = 0.0
+    rest(Y)
+    if deepest < -pace.real[FLAT]:
+        Q.size[0] = C.count[FOUND]
+        solved(pace.door[POSITIONS], Q, Y, W, O, F, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+
+
+@formula
+def step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+    """One step of time; nothing is changed where it returns that a table is full."""
+    fall(N, M, P, X, pace)
+    B.real[AHEAD] = pace.real[STEP]
+    status = enter(pace.door[SEARCHING], G, M, C, D, B, STEP_ON)
+    if status != DONE:
+        return status
+    fill_rows(G, M, C, P, L, pace)
+    if bounce(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+        fall(N, M, P, X, pace)
+    velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before)
+    positions(C, P, Q, X, Y, W, O, F, N, pace, now)
+    displace(N, M, X, Y.v, pace)
+    pace.real[TIME] += pace.real[STEP]
+    pace.count[TAKEN] += 1
+    pace.count[LEFT] -= 1
+    pace.count[MOST_CONTACTS] = max(pace.count[MOST_CONTACTS], C.count[FOUND])
+    return DONE
+
+
+@formula
+def march(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+    """See `march_kernel`."""
+    while pace.count[LEFT] > 0:
+        if pace.count[TAKEN] % 2 == 0:
+            status = step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
+        else:
+            status = step(G, M, D, C, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
+        if status != DONE:
+            return status
+    return DONE
+
+
+@kernel
+def march_kernel(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+    """Take ``pace.count[LEFT]`` steps. Returns what the search said last."""
+    return march(
+        held(G), held(M), held(C), held(D), held(B), held(P), held(Q), held(R), held(X), held(Y), held(Z), held(E),
+        held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
+    )  # fmt: skip

@@ -1,0 +1,27 @@
+"""What is kept of a step: impulses for the next one, whether contacts slide, and where energy went."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..math.scalar import sqrt
+from ..numerics.cone.operator import across
+from .tables import GIVEN, IMPULSE, LOST_FRICTION, LOST_IMPACT, SLIDES
+
+ON = 1e-9  # part of the friction cone's radius within which an impulse is on it
+
+
+@formula
+def book(P, X, c, u, pace, now):
+    """Impulse of contact c for the next step, and its work at the mean velocities u of the step."""
+    n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
+    k = across(P, c, n, s, t)
+    for i in range(3):
+        now[c, IMPULSE + i] = k[i]
+    if n > 0.0:
+        belt = P.bias[c, 1] * s + P.bias[c, 2] * t
+        pace.real[LOST_IMPACT] -= n * u[0]
+        pace.real[LOST_FRICTION] -= s * u[1] + t * u[2] + belt
+        pace.real[GIVEN] -= belt
+        now[c, SLIDES] = 1.0 if sqrt(s * s + t * t) >= (1.0 - ON) * P.mu[c] * n else 0.0
+    else:
+        now[c, SLIDES] = -1.0

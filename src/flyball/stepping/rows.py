@@ -1,0 +1,130 @@
+"""Contacts made into rows of the cone problem: frames, arms, biases, friction, and the warm start."""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
+from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ..math.scalar import sqrt
+from ..numerics.cone.operator import seen
+from .tables import GRAVITY, IMPULSE, SLIDES, STEP
+
+
+@formula
+def tangent(n):
+    """A unit vector across the unit vector n (Duff and others, 2017)."""
+    s = 1.0 if n[2] >= 0.0 else -1.0
+    a = -1.0 / (s + n[2])
+    return (1.0 + s * n[0] * n[0] * a, s * n[0] * n[1] * a, -s * n[0])
+
+
+@formula
+def fill_rows(G, M, C, P, L, pace):
+    """Everything of the problem but impulses and masses; its sizes too."""
+    h = pace.real[STEP]
+    P.size[0] = C.count[FOUND]
+    P.island[0], P.island[1] = 0, C.count[FOUND]
+    belts, turns = L.belt.shape[0] > 0, P.turn.shape[0] > 0
+    for c in range(C.count[FOUND]):
+        i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+        a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
+        P.at[c, 0], P.at[c, 1] = a, b
+        n = (C.x[c, NORMAL], C.x[c, NORMAL + 1], C.x[c, NORMAL + 2])
+        for k in range(3):
+            P.frame[c, k] = n[k]
+            P.arm[c, k] = C.x[c, POINT + k] - M.pose[a, k] if a >= 0 else 0.0
+            P.arm[c, 3 + k] = C.x[c, POINT + k] - M.pose[b, k] if b >= 0 else 0.0
+        law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+        cross_frame(P.frame, c, direction(G, M, L, i, a, n), law[ACROSS])
+        gap = C.x[c, GAP]
+        P.bias[c, 0] = gap / h if gap > 0.0 else 0.0
+        P.bias[c, 1] = P.bias[c, 2] = 0.0
+        P.mu[c] = law[KINETIC]
+        P.soft[c] = 0.0
+        if turns:
+            P.turn[c, 0], P.turn[c, 1] = law[ROLLING], law[SPINNING]
+        if belts:
+            add_belt(M, L, P, c, i, a, -1.0)
+            add_belt(M, L, P, c, j, b, 1.0)
+
+
+@formula
+def direction(G, M, L, i, a, n):
+    """A tangent: along the grain of shape i where anisotropic friction has one, any other where it has none."""
+    t = tangent(n)
+    if L.grain.shape[0] > 0:
+        g = (L.grain[i, 0], L.grain[i, 1], L.grain[i, 2])
+        if a >= 0:
+            g = along_world(M, a, g)
+        d = g[0] * n[0] + g[1] * n[1] + g[2] * n[2]
+        g = (g[0] - d * n[0], g[1] - d * n[1], g[2] - d * n[2])
+        s = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
+        if s > 1e-12:
+            s = 1.0 / sqrt(s)
+            return (s * g[0], s * g[1], s * g[2])
+    return t
+
+
+@formula
+def along_world(M, a, g):
+    """A vector in the axes of mover a, along the world's."""
+    return (
+        M.pose[a, 3] * g[0] + M.pose[a, 4] * g[1] + M.pose[a, 5] * g[2],
+        M.pose[a, 6] * g[0] + M.pose[a, 7] * g[1] + M.pose[a, 8] * g[2],
+        M.pose[a, 9] * g[0] + M.pose[a, 10] * g[1] + M.pose[a, 11] * g[2],
+    )
+
+
+@formula
+def cross_frame(frame, c, t, ratio):
+    """Rows t1 = t and t2 = ratio n x t: in a circular cone, forces across are ``ratio`` times as large."""
+    n0, n1, n2 = frame[c, 0], frame[c, 1], frame[c, 2]
+    frame[c, 3], frame[c, 4], frame[c, 5] = t
+    frame[c, 6] = ratio * (n1 * t[2] - n2 * t[1])
+    frame[c, 7] = ratio * (n2 * t[0] - n0 * t[2])
+    frame[c, 8] = ratio * (n0 * t[1] - n1 * t[0])
+
+
+@formula
+def add_belt(M, L, P, c, shape, mover, sign):
+    """The velocity of a surface on its mover, such as a conveyor's."""
+    g = (L.belt[shape, 0], L.belt[shape, 1], L.belt[shape, 2])
+    if mover >= 0:
+        g = along_world(M, mover, g)
+    for k in range(2):
+        f = 3 + 3 * k
+        u = P.frame[c, f] * g[0] + P.frame[c, f + 1] * g[1] + P.frame[c, f + 2] * g[2]
+        P.bias[c, 1 + k] += sign * u
+
+
+@formula
+def warm(C, P, X, now, before):
+    """Impulses of the same contacts in the step before; what stuck there has the static friction coefficient."""
+    for c in range(C.count[FOUND]):
+        o = C.at[c, BEFORE]
+        now[c, SLIDES] = before[o, SLIDES] if o >= 0 else -1.0
+        for r in range(3):
+            X.p[c, r] = 0.0
+            if o >= 0:
+                f = 3 * r
+                s = 0.0
+                d = 0.0
+                for k in range(3):
+                    s += P.frame[c, f + k] * before[o, IMPULSE + k]
+                    d += P.frame[c, f + k] * P.frame[c, f + k]
+                X.p[c, r] = s / d
+
+
+@formula
+def static_where_stuck(G, C, P, L, X, pace, now):
+    """The static coefficient for contacts that stuck before, and for new ones that hardly slide."""
+    h = pace.real[STEP]
+    g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
+    slow = h * sqrt(g0 * g0 + g1 * g1 + g2 * g2)
+    for c in range(C.count[FOUND]):
+        law = L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
+        if law[STATIC] > law[KINETIC] and now[c, SLIDES] < 0.5:
+            u = seen(P, X.v, X.wide, c)
+            s, t = u[1] + P.bias[c, 1], u[2] + P.bias[c, 2]
+            if now[c, SLIDES] == 0.0 or s * s + t * t <= slow * slow:
+                P.mu[c] = law[STATIC]

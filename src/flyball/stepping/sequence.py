@@ -1,0 +1,101 @@
+"""Impacts one after the other: the contact that closes fastest is hit first, until none closes.
+
+What Newton's cradle needs, and billiards. Each impact is one of two bodies, by Poisson's law: compression until the
+contact's normal velocity is gone, expansion with e times its normal impulse, friction in each within its cone (Routh's
+impact in two parts, each inelastic along the tangents).
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..contact.tables import FOUND
+from ..math.scalar import sqrt
+from ..numerics.cone.diagonal import diagonal
+from ..numerics.cone.operator import push, seen
+from .tables import BEFORE_KICK, HIT
+
+MANY = 200  # impacts for each contact, after which what still closes is left to the step
+STILL = 1e-12  # closing speed that is none, in parts of the fastest
+
+
+@formula
+def one_after_the_other(R, Z, X, C, now):
+    """Impacts of the contacts that are hit; impulses in ``Z.p``, velocities in ``X``. Returns whether all are over.
+
+    Their restitutions stand in ``R.least``.
+    """
+    n = C.count[FOUND]
+    for c in range(n):
+        for i in range(3):
+            Z.p[c, i] = 0.0
+    fastest = 0.0
+    for c in range(n):
+        if now[c, HIT] > 0.0:
+            fastest = max(fastest, -now[c, BEFORE_KICK])
+    for _ in range(MANY * n):
+        first, most = -1, STILL * fastest
+        for c in range(n):
+            if now[c, HIT] > 0.0:
+                u = seen(R, X.v, X.wide, c)
+                if -u[0] > most:
+                    first, most = c, -u[0]
+        if first < 0:
+            return True
+        hit_alone(R, Z, X, first, R.least[first])
+    return False
+
+
+@formula
+def hit_alone(R, Z, X, c, e):
+    """One contact's impact."""
+    D = diagonal(R, c)
+    n = compress(R, Z, X, c, D)
+    u = seen(R, X.v, X.wide, c)
+    p = within(R, c, D, e * n, u)
+    add_impulse(R, Z, X, c, p)
+
+
+@formula
+def compress(R, Z, X, c, D):
+    """Impulses that end the approach; the normal one is returned.
+
+    Normal and tangential impulses act on each other's velocities: they are taken in turn until they agree.
+    """
+    total = 0.0
+    s, t = 0.0, 0.0
+    for _ in range(MANY):
+        u = seen(R, X.v, X.wide, c)
+        d = -u[0] / D[0]
+        if total + d < 0.0:
+            d = -total
+        add_impulse(R, Z, X, c, (d, 0.0, 0.0))
+        total += d
+        u = seen(R, X.v, X.wide, c)
+        ps, pt = s - (u[1] + R.bias[c, 1]) / D[3], t - (u[2] + R.bias[c, 2]) / D[5]
+        size = sqrt(ps * ps + pt * pt)
+        if size > R.mu[c] * total:
+            ps, pt = ps * R.mu[c] * total / size, pt * R.mu[c] * total / size
+        add_impulse(R, Z, X, c, (0.0, ps - s, pt - t))
+        change = abs(d) + abs(ps - s) + abs(pt - t)
+        s, t = ps, pt
+        if change <= 1e-14 * total:
+            break
+    return total
+
+
+@formula
+def within(R, c, D, n, u):
+    """Impulses of expansion: n along the normal, and along the tangents what ends sliding, within the cone."""
+    s, t = -(u[1] + R.bias[c, 1] + D[1] * n) / D[3], -(u[2] + R.bias[c, 2] + D[2] * n) / D[5]
+    size = sqrt(s * s + t * t)
+    if size > R.mu[c] * n:
+        s, t = s * R.mu[c] * n / size, t * R.mu[c] * n / size
+    return (n, s, t)
+
+
+@formula
+def add_impulse(R, Z, X, c, p):
+    """An impulse at contact c."""
+    push(R, X.v, X.wide, c, p)
+    for i in range(3):
+        Z.p[c, i] += p[i]

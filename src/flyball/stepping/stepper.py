@@ -1,0 +1,172 @@
+"""The loop of steps from Python: its tables, made, enlarged and kept from call to call."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..contact.finder import Finder
+from ..contact.surfaces import Surfaces
+from ..contact.tables import Contacts, Geometry, Movers
+from ..numerics.cone.problem import Choices, Factor, Problem, Scratch, State
+from ..numerics.cone.rooms import rooms, unfilled
+from .free import rotation_matrices
+from .march import march_kernel
+from .tables import (
+    FREE_INERTIA,
+    FREE_INVERSE,
+    FREE_MASS,
+    FREE_PER_MASS,
+    FREE_ROUND,
+    LEFT,
+    STEP,
+    TAKEN,
+    Free,
+    Pace,
+    Tracks,
+)
+
+ROOMIER = 1.5  # times as many contacts as were found, when there is room for no more
+
+
+@dataclass
+class Rooms:
+    """What is as large as the number of contacts."""
+
+    P: Problem
+    Q: Problem
+    R: Problem
+    X: State
+    Y: State
+    Z: State
+    E: State
+    W: Scratch
+    O: Choices
+    F: Factor
+    T: Tracks
+    U: Tracks
+
+
+def make_rooms(contacts: int, node: np.ndarray, turning: bool, old: Rooms | None = None) -> Rooms:
+    """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
+    P = unfilled(contacts, len(node), turning=turning)._replace(node=node)
+    Q = P._replace(bias=np.zeros((contacts, 3)), mu=np.zeros(contacts), turn=np.zeros((0, 2)))
+    R = P._replace(bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
+    X, W, O, F = rooms(P)
+    Y, E = rooms(Q)[0], rooms(P)[0]
+    if old is not None:
+        X.v[:] = old.X.v
+        O, F = old.O, old.F
+    Z = rooms(P)[0]._replace(v=X.v, wide=X.wide)
+    kept = [np.zeros((contacts, 12)) for _ in range(2)]
+    if old is not None:
+        for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
+            a[: len(b)] = b
+    return Rooms(P, Q, R, X, Y, Z, E, W, O, F, Tracks(kept[0]), Tracks(kept[1]))
+
+
+def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar: bool) -> Free:
+    """Tables of free bodies.
+
+    Parameters
+    ----------
+    mass : (n,) [kg]
+    inertia : (n, 3, 3) [kg m^2]
+        About the mass centre, in body axes; in the plane its last entry counts.
+    turn : (n, 4)
+        Unit quaternions, body axes to the world.
+    planar : bool
+    """
+    n = len(mass)
+    body = np.zeros((n, 16))
+    body[:, FREE_MASS], body[:, FREE_PER_MASS] = mass, 1.0 / mass
+    if planar:  # torques are about z only: as if it were round
+        inertia = inertia[:, 2, 2, None, None] * np.eye(3)
+    inverse = np.linalg.inv(inertia)
+    for first, J in ((FREE_INERTIA, inertia), (FREE_INVERSE, inverse)):
+        for k, (i, j) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
+            body[:, first + k] = J[:, i, j]
+    size = np.trace(inertia, axis1=1, axis2=2) / 3.0
+    odd = np.abs(inertia - size[:, None, None] * np.eye(3)).max(axis=(1, 2), initial=0.0)
+    body[:, FREE_ROUND] = odd <= 1e-12 * size
+    return Free(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)))
+
+
+def nodes(free: Free) -> np.ndarray:
+    """Nodes of the cone problem; those of bodies that are not round are filled in every step."""
+    out = np.zeros((len(free.body), 8))
+    out[:, 0] = free.body[:, FREE_PER_MASS]
+    out[:, 1:7] = free.body[:, FREE_INVERSE : FREE_INVERSE + 6]
+    out[:, 7] = free.body[:, FREE_ROUND]
+    return out
+
+
+class Stepper:
+    """Free bodies, shapes and laws on the way through time.
+
+    Parameters
+    ----------
+    geometry : Geometry
+    free : Free
+        Movers 0 to n - 1.
+    position : (n, 3) [m]
+        Of the mass centres.
+    velocity : (n, 6) [m/s, rad/s]
+        Of the mass centres, and angular velocities, along the world's axes.
+    laws : Surfaces
+    pace : Pace
+        With time, choices and the solvers' addresses; that of the search is put in here.
+    margin : float [m]
+        Gap up to which what does not approach is a contact.
+    """
+
+    def __init__(
+        self,
+        geometry: Geometry,
+        free: Free,
+        position: np.ndarray,
+        velocity: np.ndarray,
+        laws: Surfaces,
+        pace: Pace,
+        margin: float,
+    ) -> None:
+        n = len(free.body)
+        self.geometry, self.free, self.laws, self.pace = geometry, free, laws, pace
+        self.movers = Movers(np.zeros((n, 12)), velocity.copy())
+        self.movers.pose[:, :3] = position
+        self.movers.pose[:, 3:] = rotation_matrices(free.turn)
+        self.finder = Finder(geometry, margin=margin)
+        turning = bool((laws.pair[..., 3:5] > 0.0).any())
+        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning)
+        self.rooms.X.v[:, :6] = velocity
+        self.turning = turning
+
+    def run(self, steps: int, h: float) -> None:
+        """Take as many steps of h seconds.
+
+        Raises
+        ------
+        SimulationError
+            What the search cannot go on with.
+        """
+        self.pace.real[STEP], self.pace.count[LEFT] = h, steps
+        self.pace.door[0] = self.finder.address
+        while True:
+            r, f = self.rooms, self.finder
+            a, b = f.now, f.before
+            status = march_kernel(
+                self.geometry, self.movers, a, b, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E, r.W, r.O, r.F, self.free,
+                self.laws, self.pace, r.T, r.U,
+            )  # fmt: skip
+            if status == 0:
+                return
+            f.enlarge(status, (a if self.pace.count[TAKEN] % 2 == 0 else b).count)
+            if len(f.now.at) > len(r.P.mu):
+                self.rooms = make_rooms(len(f.now.at), r.P.node, self.turning, r)
+
+    def last(self) -> tuple[Contacts, np.ndarray]:
+        """Contacts of the last step, and what is remembered of them."""
+        if self.pace.count[TAKEN] % 2 == 1:
+            return self.finder.now, self.rooms.T.kept
+        return self.finder.before, self.rooms.U.kept

@@ -1,0 +1,55 @@
+"""What a step by impulses works on, beside shapes, contacts and the cone problem: free bodies, laws, the pace.
+
+Movers (``contact.tables``) are numbered: first the free bodies, each a node of the cone problem with the same number,
+then bodies of the mechanism. All vectors are along the world's axes where nothing else is said.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# columns of Free.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy zz xy
+# xz yz), 1 if the inertia is the same about every axis
+FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
+# columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
+# impact, impulse of that in the world, and its velocities before
+IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
+# entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
+# none; residual [m/s] that is enough for velocities and for positions
+TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
+# ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen
+LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE = 10, 11, 12, 13, 14, 15
+REALS = 24
+# entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
+# restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
+# whether they are one after the other
+LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL = range(11)
+COUNTS = 16
+# places in Pace.door: addresses of the search and of the solvers of velocities, positions, impacts
+SEARCHING, VELOCITIES, POSITIONS, BOUNCE = range(4)
+NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # Pace.count[LAW]
+
+
+class Free(NamedTuple):
+    """Bodies on nothing but gravity and contact."""
+
+    body: np.ndarray  # (n, 16)
+    turn: np.ndarray  # (n, 4): unit quaternion, body axes to the world
+    before: np.ndarray  # (n, 8): velocities at the start of the step
+    move: np.ndarray  # (n, 8): velocities that bodies are displaced with
+
+
+class Tracks(NamedTuple):
+    """What is remembered of each contact; one for each of the two tables of contacts."""
+
+    kept: np.ndarray  # (capacity, 12)
+
+
+class Pace(NamedTuple):
+    """Time, choices and sums of a run."""
+
+    real: np.ndarray  # (REALS,)
+    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
+    door: np.ndarray  # (8,)

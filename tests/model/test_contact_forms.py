@@ -1,0 +1,123 @@
+"""What shapes are where they touch: as far in every direction as the surface that is drawn, and weighed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.contact import kinds
+from flyball.contact import tables as ct
+from flyball.errors import ModelError
+from flyball.tables.contact import touching
+from flyball.tables.numbers import numbers
+from tests.model.test_shapes import SAMPLES
+
+SAMPLES = [s for s in SAMPLES if not isinstance(s, (fb.Hull, fb.Mesh, fb.Prism, fb.Hemisphere))]
+FORMLESS = {"Torus"}
+FLAT = {"Torus", "Ellipsoid"}  # without an outline
+SOME = {"position": (0.3, -0.2, 0.5), "orientation": (0.3, -0.7, 0.4)}
+rng = np.random.default_rng(5)
+
+
+def far(G: ct.Geometry, i: int, d: np.ndarray) -> float:
+    """How far shape i goes along d, from its mover's origin."""
+    x, first = G.shape_x[i], G.shape_i[i, ct.FIRST]
+    u, par = x[ct.AXES : ct.AXES + 9].reshape(3, 3).T @ d, x[ct.PAR : ct.PAR + 8]
+    kind, across = G.shape_i[i, ct.KIND], np.hypot(u[0], u[1])
+    vertex = G.vertex[first : first + G.shape_i[i, ct.COUNT]]
+    return (
+        x[ct.PLACE : ct.PLACE + 3] @ d
+        + {
+            kinds.SPHERE: lambda: par[0],
+            kinds.BOX: lambda: par[:3] @ np.abs(u),
+            kinds.CAPSULE: lambda: par[0] + par[1] * abs(u[2]),
+            kinds.CYLINDER: lambda: par[0] * across + par[1] * abs(u[2]),
+            kinds.CONE: lambda: max(par[0] * across, par[1] * u[2]),
+            kinds.ELLIPSOID: lambda: np.sqrt((par[:3] ** 2) @ u**2),
+            kinds.HULL: lambda: par[0] + (vertex @ u).max(),
+            kinds.POLYGON: lambda: par[0] + (vertex @ u).max(),
+        }[kind]()
+    )
+
+
+def put(shape: fb.Mechanism, planar: bool, **fields: object) -> tuple[fb.Mechanism, ct.Geometry]:
+    m = fb.Mechanism("one", planar=planar)
+    m.add(fb.Body("b", shape=shape, mass=1, inertia=1 if planar else (1, 1, 1), **fields), fb.Contact(friction=0.1))
+    return m, touching(m.snapshot(), numbers(m), ["b"]).geometry
+
+
+@pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
+def test_forms_reach_as_far_as_the_surface(shape) -> None:
+    if type(shape).__name__ in FORMLESS:
+        with pytest.raises(ModelError, match="has no form that contact knows"):
+            put(shape, False)
+        return
+    _, G = put(shape, False)
+    env = numbers(fb.Mechanism("none")).env
+    n = fb.model.element.resolve(shape, env)
+    p, R = shape.pose(n)
+    v = p + shape.surface(n, 256)[0] @ R.T
+    for d in rng.normal(size=(50, 3)):
+        d /= np.linalg.norm(d)
+        reach = [far(G, i, d) for i in range(len(G.shape_i))]
+        assert max(reach) == pytest.approx((v @ d).max(), abs=3e-4 * np.ptp(v))
+        for i, x in enumerate(G.shape_x):  # no form goes beyond the ball that is said to hold it
+            assert reach[i] <= x[ct.PLACE : ct.PLACE + 3] @ d + x[ct.RADIUS] * (1 + 1e-12)
+
+
+@pytest.mark.parametrize("shape", SAMPLES, ids=lambda s: type(s).__name__)
+def test_outlines_reach_as_far_as_the_surface(shape) -> None:
+    if type(shape).__name__ in FLAT:
+        with pytest.raises(ModelError, match="has no outline that contact knows"):
+            put(shape, True)
+        return
+    try:
+        _, G = put(shape, True)
+    except ModelError as error:
+        assert "it stands oblique" in str(error) and isinstance(shape, (fb.Rod, fb.Link))
+        return
+    n = fb.model.element.resolve(shape, {})
+    p, R = shape.pose(n)
+    v = p + shape.surface(n, 256)[0] @ R.T
+    for turn in rng.uniform(0, 2 * np.pi, 50):
+        d = np.array([np.cos(turn), np.sin(turn), 0.0])
+        reach = [far(G, i, d) for i in range(len(G.shape_i))]
+        assert max(reach) == pytest.approx((v @ d).max(), abs=3e-4 * np.ptp(v))
+    assert not G.vertex[:, 2].any()
+
+
+@pytest.mark.parametrize("kind", [fb.Capsule, fb.Cylinder])
+def test_round_bars_in_the_plane(kind) -> None:
+    """Standing they are circles, lying a segment with round ends and a rectangle."""
+    _, G = put(kind(radius=0.1, length=0.4), True)
+    assert (G.shape_i[0, ct.KIND] == kinds.SPHERE) == (kind is fb.Cylinder)
+    m, G = put(kind(radius=0.1, length=0.4, orientation=(0, np.pi / 2, 0), position=(1, 2)), True)
+    assert far(G, 0, np.array([1.0, 0, 0])) == pytest.approx(1 + (0.3 if kind is fb.Capsule else 0.2))
+    assert far(G, 0, np.array([0.0, 1, 0])) == pytest.approx(2.1)
+    corner = np.array([1.0, 1, 0]) / 2**0.5
+    edge = 0.2 / 2**0.5 + (0.1 if kind is fb.Capsule else 0.1 / 2**0.5)
+    assert far(G, 0, corner) == pytest.approx(3 / 2**0.5 + edge)
+
+
+def test_polygons_go_round_counter_clockwise() -> None:
+    _, G = put(fb.Box(edges=(2, 1, 1), orientation=(0, 0, 0.3)), True)
+    v = G.vertex[:, :2]
+    assert len(v) == 4
+    after = np.roll(v, -1, axis=0)
+    assert (v[:, 0] * after[:, 1] - v[:, 1] * after[:, 0]).sum() / 2 == pytest.approx(2.0)
+
+
+def test_a_landscape() -> None:
+    x, y = np.meshgrid(np.arange(4) * 0.5, np.arange(5) * 0.25, indexing="ij")
+    m = fb.Mechanism("hills")
+    m.add(fb.Ground("hills", shape=fb.HeightField(heights=x + y * y, dx=0.5, dy=0.25), position=(1, 0, 0)))
+    m.add(fb.Contact(friction=0.5))
+    G = touching(m.snapshot(), numbers(m), []).geometry
+    assert G.shape_i[0, ct.KIND] == kinds.FIELD
+    assert G.shape_x[0, ct.PAR : ct.PAR + 4].tolist() == [4, 5, 0.5, 0.25]
+    assert G.shape_x[0, :3].tolist() == [1, 0, 0]
+    assert G.vertex.ravel()[:20] == pytest.approx((x + y * y).ravel())
+    v, f = m["hills"].shape.surface(fb.model.element.resolve(m["hills"].shape, {}))
+    a, b, c = (v[f[:, k]] for k in range(3))
+    assert (np.cross(b - a, c - a)[:, 2] > 0).all()
