@@ -48,6 +48,7 @@ def test_sliding_becomes_rolling_at_five_sevenths(step):
     assert r["ball"].vx[-1] == pytest.approx(10 / 7, rel=1e-9)
     assert r.energy.kinetic[-1] == pytest.approx(8 * 5 / 7, rel=1e-9)
     slides = r.t < 2 * 2 / 7 / (0.3 * G) - step
+    assert np.abs(r.energy.balance).max() < 1e-9
     assert r["ball"].x[slides] == pytest.approx(2 * r.t[slides] - 0.15 * G * r.t[slides] ** 2, abs=1e-9)
 
 

@@ -67,7 +67,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     o = chosen(model, o)
     if isinstance(o.method, Impulse):
         with shown(o.progress, "simulating") as tell:
-            return impulse_motion(model, o.t_end, times, o.method, o.parameters, tell)
+            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":

@@ -16,6 +16,7 @@ from .tables import (
     CUTS,
     ENOUGH_V,
     ENOUGH_X,
+    FIRST_OVERLAP,
     FLAT,
     ITERATIONS,
     LEFT,
@@ -28,6 +29,7 @@ from .tables import (
     TAKEN,
     TIME,
     VELOCITIES,
+    WORST_AT,
     WORST_FORCE,
     WORST_OVERLAP,
     WORST_RESIDUAL,
@@ -54,7 +56,9 @@ def velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before):
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
-    pace.real[WORST_RESIDUAL] = max(pace.real[WORST_RESIDUAL], O.real[RESIDUAL])
+    if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
+        pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
+        pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
     pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real[FORCE_RESIDUAL])
 
 
@@ -77,6 +81,8 @@ def positions(C, P, Q, X, Y, W, O, F, N, pace, now):
         book(P, X, c, u, pace, now)
         for i in range(3):
             Y.p[c, i] = 0.0
+    if pace.count[TAKEN] == 0:
+        pace.real[FIRST_OVERLAP] = pace.real[WORST_OVERLAP]
     rest(Y)
     if deepest < -pace.real[FLAT]:
         Q.size[0] = C.count[FOUND]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from .free import inverse_in_world, matrix, middle, momentum_of, rotated, times, turned, unrotated
-from .tables import FREE_INVERSE, FREE_PER_MASS, FREE_ROUND, GRAVITY, STEP
+from .tables import FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
 
 EPS = 1e-300
 
@@ -72,11 +72,12 @@ def displace(N, M, X, lifts, pace):
 
     By the velocities at its end, and then by what displaces bodies beside these: x += h v + h d, d = ``N.move`` and
     the velocities of ``lifts``. Turns by v keep energy and angular momentum; d takes the velocities along, so that it
-    changes no energy.
+    changes no energy. What the lifts change the energy of gravity by is an impact's part.
     """
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):
         for i in range(3):
+            pace.real[LOST_IMPACT] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * lifts[k, i]
             M.pose[k, i] += h * (X.v[k, i] + N.move[k, i] + lifts[k, i])
         w = (X.v[k, 3], X.v[k, 4], X.v[k, 5])
         d = (

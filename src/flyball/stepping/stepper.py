@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..contact.finder import Finder
 from ..contact.surfaces import Surfaces
-from ..contact.tables import Contacts, Geometry, Movers
+from ..contact.tables import DONE, Contacts, Geometry, Movers
 from ..numerics.cone.problem import Choices, Factor, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
@@ -20,6 +21,7 @@ from .tables import (
     FREE_PER_MASS,
     FREE_ROUND,
     LEFT,
+    SEARCHING,
     STEP,
     TAKEN,
     Free,
@@ -27,7 +29,7 @@ from .tables import (
     Tracks,
 )
 
-ROOMIER = 1.5  # times as many contacts as were found, when there is room for no more
+SLICE = 0.05  # seconds that a call of the loop should take
 
 
 @dataclass
@@ -141,17 +143,29 @@ class Stepper:
         self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning)
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
+        self.quota = 1
 
     def run(self, steps: int, h: float) -> None:
-        """Take as many steps of h seconds.
+        """Take as many steps of h seconds, in calls that take so long that an interrupt comes through.
 
         Raises
         ------
-        SimulationError
+        ModelError
             What the search cannot go on with.
         """
-        self.pace.real[STEP], self.pace.count[LEFT] = h, steps
-        self.pace.door[0] = self.finder.address
+        count = self.pace.count
+        self.pace.real[STEP] = h
+        while steps > 0:
+            began, before = time.perf_counter(), count[TAKEN]
+            count[LEFT] = min(steps, self.quota)
+            self._march()
+            steps -= int(count[TAKEN] - before)
+            took = max(time.perf_counter() - began, 1e-6)
+            self.quota = max(1, min(4 * self.quota, int(self.quota * SLICE / took)))
+
+    def _march(self) -> None:
+        """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
+        self.pace.door[SEARCHING] = self.finder.address
         while True:
             r, f = self.rooms, self.finder
             a, b = f.now, f.before
@@ -159,7 +173,7 @@ class Stepper:
                 self.geometry, self.movers, a, b, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E, r.W, r.O, r.F, self.free,
                 self.laws, self.pace, r.T, r.U,
             )  # fmt: skip
-            if status == 0:
+            if status == DONE:
                 return
             f.enlarge(status, (a if self.pace.count[TAKEN] % 2 == 0 else b).count)
             if len(f.now.at) > len(r.P.mu):

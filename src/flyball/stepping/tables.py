@@ -19,8 +19,9 @@ IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
 # none; residual [m/s] that is enough for velocities and for positions
 TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
-# ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen
-LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE = 10, 11, 12, 13, 14, 15
+# ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen, time
+# of the worst residual, overlap at the start
+LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE, WORST_AT, FIRST_OVERLAP = range(10, 18)
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
 # restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;

@@ -37,6 +37,9 @@ class Collected:
         self.pose: list[np.ndarray] = []
         self.turn: list[np.ndarray] = []
         self.twist: list[np.ndarray] = []
+        self.acceleration: list[
+            np.ndarray
+        ] = []  # mean of the step that ends at the time; of the first step at the start
         self.sums: list[np.ndarray] = []
         self.contacts: list[dict[str, np.ndarray]] = []
 
@@ -48,7 +51,14 @@ class Collected:
         self.turn.append(s.free.turn.copy())
         self.twist.append(s.rooms.X.v[:, :6].copy())
         self.sums.append(s.pace.real[list(SUMS)])
+        if h > 0.0:
+            self.begin(h)
         self.contacts.append(self._touching(h) if h > 0.0 else {})
+
+    def begin(self, h: float) -> None:
+        """Keep the mean accelerations of the last step; of the first one, for the start."""
+        s = self.stepper
+        self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / h)
 
     def _touching(self, h: float) -> dict[str, np.ndarray]:
         """Contacts with a force."""
@@ -79,30 +89,37 @@ class Collected:
         return Contacts(t=np.array(self.t), sides=sides, begin=begin, planar=planar, **table)
 
 
-def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.ndarray, np.ndarray]:
-    """Absolute coordinates (n, nq) and velocities (n, nv) of single bodies over time."""
+def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Absolute coordinates (n, nq), velocities and accelerations (n, nv) of single bodies over time."""
     s = base.compiled.structure
     body_i = s.tables["body_i"]
     n = len(kept.t)
     q, v = np.tile(base.q, (n, 1)), np.zeros((n, s.nv))
+    a = np.zeros((n, s.nv))
     pose, turn, twist = np.array(kept.pose), np.array(kept.turn), np.array(kept.twist)
+    change = np.array(kept.acceleration[:n]) if kept.acceleration else np.zeros_like(twist)
     for name, b in s.place.items():
         if b < 0 or name not in scene.carriers.slices:
             continue
         k = scene.carriers.slices[name].start
         q0, v0, width = body_i[b, Q0], body_i[b, V0], body_i[b, NV]
-        if width == 3 and s.model.planar:
-            q[:, q0 : q0 + 2], v[:, v0 : v0 + 2] = pose[:, k, :2], twist[:, k, :2]
-            half = np.unwrap(np.arctan2(turn[:, k, 3], turn[:, k, 0]))  # of the angle: whole turns are told apart
-            q[:, q0 + 2] = base.q[q0 + 2] + 2.0 * (half - half[0])
-            v[:, v0 + 2] = twist[:, k, 5]
+        line = slice(v0, v0 + 2 if s.model.planar else v0 + 3)
+        v[:, line], a[:, line] = twist[:, k, : line.stop - v0], change[:, k, : line.stop - v0]
+        if s.model.planar:
+            q[:, q0 : q0 + 2] = pose[:, k, :2]
+            if width == 3:
+                half = np.unwrap(np.arctan2(turn[:, k, 3], turn[:, k, 0]))  # of the angle: tells whole turns apart
+                q[:, q0 + 2] = base.q[q0 + 2] + 2.0 * (half - half[0])
+                v[:, v0 + 2], a[:, v0 + 2] = twist[:, k, 5], change[:, k, 5]
             continue
-        q[:, q0 : q0 + 3], v[:, v0 : v0 + 3] = pose[:, k], twist[:, k, :3]
+        q[:, q0 : q0 + 3] = pose[:, k]
         if width == 6:
             e = turn[:, k] * (1.0 if turn[0, k] @ base.q[q0 + 3 : q0 + 7] >= 0.0 else -1.0)
             q[:, q0 + 3 : q0 + 7] = e
-            v[:, v0 + 3 : v0 + 6] = np.stack(unrotated(matrix(e.T), twist[:, k, 3:].T), axis=1)
-    return q, v
+            R = matrix(e.T)
+            v[:, v0 + 3 : v0 + 6] = np.stack(unrotated(R, twist[:, k, 3:].T), axis=1)
+            a[:, v0 + 3 : v0 + 6] = np.stack(unrotated(R, change[:, k, 3:].T), axis=1)
+    return q, v, a
 
 
 def sets(model: Model, scene: Touching, kept: Collected) -> dict[str, Bulk]:

@@ -1,0 +1,108 @@
+"""What comes of a motion with contact: the result, and how well it went."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from functools import partial
+
+import numpy as np
+
+from ....results.contact_health import ContactHealth
+from ....results.health import Health
+from ....results.result import Result
+from ....results.sides import Sides
+from ....stepping.stepper import Stepper
+from ....stepping.tables import (
+    CUTS,
+    FIRST_OVERLAP,
+    IMPACTS,
+    ITERATIONS,
+    MOST_CONTACTS,
+    REDUCED,
+    TAKEN,
+    TIME,
+    WORST_AT,
+    WORST_FORCE,
+    WORST_OVERLAP,
+    WORST_RESIDUAL,
+)
+from ....tables.contact import Touching
+from ...assembly.start import Assembly
+from ...mobility import mobility
+from .collect import Collected, coordinates, sets
+from .scene import smallest
+from .settings import Impulse
+
+
+def result_of(
+    base: Assembly,
+    scene: Touching,
+    stepper: Stepper,
+    kept: Collected,
+    sides: Sides,
+    o: Impulse,
+    since: float,
+    interrupted: bool,
+) -> Result:
+    """The motion by name."""
+    values, model = base.compiled.values, base.compiled.structure.model
+    q, v, vdot = coordinates(base, scene, kept)
+    t = np.array(kept.t)
+    count = stepper.pace.count
+    real = stepper.pace.real
+    health = Health(
+        success=not interrupted,
+        message=f"interrupted by the user at t = {real[TIME]:.6g} s; what was computed is kept"
+        if interrupted
+        else "reached the end",
+        violation=0.0,
+        velocity_violation=0.0,
+        steps=int(count[TAKEN]),
+        rejected=0,
+        evaluations=int(count[ITERATIONS]),
+        factorisations=0,
+        seconds=time.perf_counter() - since,
+        options={"method": dataclasses.asdict(o)},
+        coordinates="absolute: steps of impulses",
+        contact=_contact_health(scene, stepper, o, smallest(scene, values)),
+    )
+    health.late = {
+        "mobility": partial(mobility, model, base),
+        "energy_drift": lambda: result.energy.drift,
+    }
+    states = np.zeros((len(t), len(values.structure.states)))
+    lam = np.zeros((len(t), len(values.system.row_i)))
+    result = Result(model, values, t, q, v, states, vdot, lam, health)
+    result.final = (float(real[TIME]), np.concatenate([q[-1], v[-1], states[-1]]))
+    sums = np.array(kept.sums)
+    result.exchanged = dict(zip(("friction_loss", "impact_loss", "surface_work"), sums.T, strict=True))
+    result.contacts = kept.as_contacts(sides, model.planar)
+    result.bulk = sets(model, scene, kept)
+    return result
+
+
+def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) -> ContactHealth:
+    real, count = stepper.pace.real, stepper.pace.count
+    notes = []
+    if count[REDUCED]:
+        notes.append(
+            f"{count[REDUCED]} of {count[IMPACTS]} impacts gave back less than {o.restitution.title()}'s law says, "
+            f"which would have made energy there"
+        )
+    return ContactHealth(
+        solver=o.solver,
+        impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
+        most=int(count[MOST_CONTACTS]),
+        worst_overlap=float(-min(0.0, real[WORST_OVERLAP])),
+        overlap_at_start=float(-min(0.0, real[FIRST_OVERLAP])),
+        residual=float(real[WORST_RESIDUAL]),
+        force_residual=float(real[WORST_FORCE]),
+        tolerance=o.tolerance,
+        solves=int(count[TAKEN]),
+        iterations=int(count[ITERATIONS]),
+        unconverged=int(count[CUTS]),
+        worst_at=float(real[WORST_AT]),
+        size=size,
+        notes=tuple(notes),
+    )

@@ -1,0 +1,74 @@
+"""The scene at the start of a motion with contact: what moves, where it is, and the stepper that moves it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....contact import surfaces as su
+from ....contact.tables import RADIUS, Movers
+from ....model.geometry import matrix_to_quaternion
+from ....numerics.cone.gauss_seidel import gauss_seidel
+from ....numerics.cone.problem import COULOMB
+from ....stepping.stepper import Stepper, free_bodies
+from ....stepping.tables import (
+    COUNTS,
+    ENOUGH_V,
+    ENOUGH_X,
+    FLAT,
+    GRAVITY,
+    LAW,
+    LIFTS,
+    NO_RESTITUTION,
+    REALS,
+    SEQUENTIAL,
+    SLOWEST,
+    SWEEPS,
+    Pace,
+)
+from ....tables.contact import Touching
+from ....tables.values import Values
+from ...assembly.start import Assembly
+from .settings import RESTITUTION, Impulse
+
+MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
+FLATTEST = 1e-9  # overlap that is none, in parts of the smallest shape
+SLOW = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
+SWEEPS_USUAL, LIFTS_USUAL = 50, 30
+
+
+def smallest(scene: Touching, values: Values) -> float:
+    """Radius [m] of the smallest shape."""
+    sizes = scene.geometry.shape_x[:, RADIUS]
+    return float(np.min(sizes[np.isfinite(sizes)], initial=values.length))
+
+
+def placed(scene: Touching, base: Assembly) -> Movers:
+    """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
+    for name, b in base.compiled.moving(base.t, base.q, base.v).items():
+        k = scene.carriers.slices[name].start
+        M.pose[k] = np.r_[b.p, b.R.ravel()]
+        M.twist[k] = np.r_[b.v, b.w]
+    return M
+
+
+def begin(scene: Touching, M: Movers, values: Values, o: Impulse) -> Stepper:
+    """The stepper at the start."""
+    planar = values.structure.model.planar
+    real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
+    real[GRAVITY : GRAVITY + 3] = values.system.glob[:3]
+    size = smallest(scene, values)
+    real[SLOWEST], real[FLAT] = SLOW, FLATTEST * size
+    real[ENOUGH_V], real[ENOUGH_X] = o.tolerance, o.tolerance
+    count[SWEEPS], count[LIFTS] = o.iterations or SWEEPS_USUAL, o.position_iterations or LIFTS_USUAL
+    law = RESTITUTION.index(o.restitution) + 1
+    count[LAW] = law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
+    turn = matrix_to_quaternion(M.pose[:, 3:].reshape(-1, 3, 3))
+    free = free_bodies(scene.carriers.mass, scene.carriers.inertia, turn, planar)
+    count[SEQUENTIAL] = o.impacts == "sequential"
+    pace = Pace(real, count, np.zeros(8, np.int64))
+    stepper = Stepper(scene.geometry, free, M.pose[:, :3], M.twist, scene.surfaces, pace, MARGIN * size)
+    r = stepper.rooms
+    r.O.count[COULOMB] = o.coulomb
+    pace.door[1:4] = gauss_seidel.address(r.P, r.X, r.W, r.O, r.F)
+    return stepper
