@@ -18,7 +18,7 @@ from __future__ import annotations
 from ..compiler.door import enter
 from ..compiler.jit import formula
 from ..equations.records import load
-from ..equations.slopes import ALONG, DAMPING, DIRECTIONS, STIFFNESS, direction
+from ..equations.slopes import DAMPING, DIRECTIONS, STIFFNESS, direction
 from ..equations.solve import inverse_mass
 from ..equations.tasks import SLOPES, SOLVE
 from ..equations.tree import project
@@ -32,7 +32,6 @@ from .joined import (
     SHARE,
     SOLVED,
     SPRING_C,
-    SPRING_FORCE,
     SPRING_K,
     SPRING_OF,
     SPRINGS,
@@ -107,7 +106,6 @@ def take_springs(A, h):
             stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
             if stiffness + damping > 0.0 and one_spring(A, h, used, (k, n, i), stiffness, damping):
                 A.spring_x[used, SPRING_OF] = k
-                A.spring_x[used, SPRING_FORCE] = found[k, ALONG + i]
                 A.spring_x[used, OF_MANY], A.spring_x[used, OF_DIRECTION] = n, i
                 used += 1
     A.count[SPRINGS] = used

@@ -21,8 +21,8 @@ from ..tables.system import System, Work
 # impulses, from those before the step in State.wide (movers' twists follow); those put there; rows of contacts into the
 # problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there, lines
 # being made those of the second solve; the way gone with these and others beside them in State.wide; velocities at its
-# end put there
-START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES = range(8)
+# end put there. Besides, impacts over before the step whose impulses stand in a state
+START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED = range(9)
 # entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop would be overrun
 TIME, STEP, LOST_AT_STOPS, OVERRUN = range(4)
 # entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
@@ -33,9 +33,9 @@ FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
 # and the rest, and what they change; velocities at the end; the way, scratch
 V_BEFORE, CHANGE, SMOOTH, EFFORTS, IMPULSE, STRUCK, V_AFTER, WAY = range(8)
 # columns of Joined.spring_x: stiffness, damping, share of the end of the step, what it adds to the masses, scratch,
-# the force that it is of, what this is along it, its directions, which one it is, where it is along that;
+# the force that it is of, its directions, which one it is, where it is along that;
 # its bias acceleration
-SPRING_K, SPRING_C, SHARE, ADDED, SOLVED, SPRING_OF, SPRING_FORCE, OF_MANY, OF_DIRECTION, REACH, BEND = range(11)
+SPRING_K, SPRING_C, SHARE, ADDED, SOLVED, SPRING_OF, OF_MANY, OF_DIRECTION, REACH, BEND = range(10)
 # columns of Joined.job: what is answered, where its J and Y begin, how many rows, the next one of the group
 JOB_AT, JOB_ROWS, JOB_NEXT = range(3)
 # columns of Joined.line, single rows that are there to act: what it is (friction in a joint, stop, rope), the quantity,
@@ -47,7 +47,7 @@ FRICTION, STOP, ROPE = range(3)
 LEAST, MOST_AT, REBOUND, ROPE_K, ROPE_C, SHORTEST, PRESSED, PULLED = range(8)
 # columns of Joined.active: line of the step, + 1 and negative for an upper stop; its group; where its row begins
 LINE_OF, LINE_GROUP, LINE_AT = range(3)
-NO_ROOM = 100  # what ROWS may return; the others return the engine's status
+NO_ROOM, NO_WAY = 100, 101  # what ROWS may return; what the loop says where the engine has a status
 
 
 class Joined(NamedTuple):
@@ -65,8 +65,9 @@ class Joined(NamedTuple):
     mover: np.ndarray  # (movers, 2): row of the body table, group
     group: np.ndarray  # (ng + 1,)
     wide: np.ndarray  # (8, nv)
-    lam: np.ndarray  # (2, nr): multipliers without contact; impulses of contacts and the rest over the step
-    spring_x: np.ndarray  # (springs, 11)
+    lam: np.ndarray  # (3, nr): multipliers without contact; impulses of contacts and the rest over the step; those of
+    # impacts before it
+    spring_x: np.ndarray  # (springs, 10)
     spring_J: np.ndarray  # (springs, nv)
     spring_Y: np.ndarray  # (springs, nv)
     stiff: np.ndarray  # (springs, springs): Cholesky factor
@@ -94,4 +95,5 @@ def no_mechanism() -> Joined:
     W = _none(Work, "2222221112222112221a")
     clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
     sheet = Sheet(np.zeros((0, 0)))
-    return _none(Joined, "a1aba22222222b2bba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
+    tables = _none(Joined, "a1aba22222222b2bba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
+    return tables._replace(real=np.zeros(8), count=np.zeros(16, np.int64), group=np.zeros(1, np.int64))

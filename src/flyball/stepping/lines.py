@@ -179,7 +179,7 @@ def press(A):
     if A.S.load_i.shape[0] == 0:
         return
     for r in range(A.lam.shape[1]):
-        A.W.row[LAM, r] = A.lam[0, r] + A.lam[1, r] / A.real[STEP]
+        A.W.row[LAM, r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
         if A.line[k, WHAT] != STOP and A.line[k, WHAT] != ROPE:
