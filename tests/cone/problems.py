@@ -128,3 +128,22 @@ def dense(P, X):
 def impulses(P, X):
     """All impulses in the order of `dense`."""
     return np.concatenate([np.hstack([X.p, X.torque] if len(P.turn) else [X.p]).ravel(), X.line])
+
+
+def cone_lack(P, p, u, coulomb=False):
+    """How far each contact and line is from the conditions: p in its cone, u in the dual cone, u . p = 0."""
+    r, out = 6 if len(P.turn) else 3, []
+    for c in range(P.size[0]):
+        q, w = p[c * r : c * r + r], u[c * r : c * r + r]
+        bounds = [(P.mu[c], slice(1, 3))]
+        if r == 6:
+            bounds += [(P.turn[c, 0], slice(4, 6)), (P.turn[c, 1], slice(3, 4))]
+        slip = sum(m * np.linalg.norm(w[s]) for m, s in bounds)
+        out += [max(0, np.linalg.norm(q[s]) - m * q[0]) for m, s in bounds]
+        opening = w[0] + (slip if coulomb else 0)  # De Saxce's correction makes Coulomb's law this condition
+        out += [max(0, slip - opening), abs(q[0] * opening + q[1:] @ w[1:])]
+    for k in range(P.size[3]):
+        low, high = P.line_x[k, 2:]
+        s, w = p[P.size[0] * r + k], u[P.size[0] * r + k]
+        out.append(abs(min(max(s - w, low), high) - s))
+    return max(out)

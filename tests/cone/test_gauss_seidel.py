@@ -9,26 +9,7 @@ from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.problem import CONVERGED, COULOMB, ENDED, ENOUGH, FORCE_RESIDUAL, HISTORY, MOST, RESIDUAL
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
-from tests.cone.problems import KINDS, dense, impulses, random_problem
-
-
-def cone_lack(P, p, u, coulomb=False):
-    """How far each contact and line is from the conditions: p in its cone, u in the dual cone, u . p = 0."""
-    r, out = 6 if len(P.turn) else 3, []
-    for c in range(P.size[0]):
-        q, w = p[c * r : c * r + r], u[c * r : c * r + r]
-        bounds = [(P.mu[c], slice(1, 3))]
-        if r == 6:
-            bounds += [(P.turn[c, 0], slice(4, 6)), (P.turn[c, 1], slice(3, 4))]
-        slip = sum(m * np.linalg.norm(w[s]) for m, s in bounds)
-        out += [max(0, np.linalg.norm(q[s]) - m * q[0]) for m, s in bounds]
-        opening = w[0] + (slip if coulomb else 0)  # De Saxce's correction makes Coulomb's law this condition
-        out += [max(0, slip - opening), abs(q[0] * opening + q[1:] @ w[1:])]
-    for k in range(P.size[3]):
-        low, high = P.line_x[k, 2:]
-        s, w = p[P.size[0] * r + k], u[P.size[0] * r + k]
-        out.append(abs(min(max(s - w, low), high) - s))
-    return max(out)
+from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -69,6 +50,22 @@ def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
     solve(gauss_seidel, P, X, W, O, F)
     p = impulses(P, X)
     assert 0.5 * p @ N @ p + b @ p < 1e-10
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("coulomb", [0, 1])
+def test_a_start_outside_of_the_cone(kind, coulomb):
+    """What is handed back is what acts: friction without a normal impulse once stayed, unfelt, and grew."""
+    P, X, W, O, F = random_problem(6, **KINDS[kind])
+    _, DK, _, _ = dense(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    X.p[:] = np.random.default_rng(0).standard_normal(X.p.shape)
+    X.p[::2, 0] = 0.0
+    O.count[MOST], O.count[COULOMB] = 3, coulomb
+    solve(gauss_seidel, P, X, W, O, F)
+    p, after = impulses(P, X), np.concatenate([X.v[:, :6].ravel(), X.wide])
+    np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
+    assert (np.hypot(X.p[:, 1], X.p[:, 2]) <= P.mu * X.p[:, 0] * (1 + 1e-12)).all()
 
 
 def on_a_slope(angle, mu, h=1e-2, g=9.81):

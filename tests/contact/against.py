@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from flyball.contact.build.hull import Hull, hull
 
 from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, HULL, SPHERE
+from flyball.contact.solids.hull import Hull, hull
 from flyball.contact.tables import AXES, COUNT, FACE_COUNT, FACE_FIRST, FIRST, KIND, MOVER, PAR, RADIUS, Geometry
 from tests.contact.pairs import separations
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
 from flyball.contact.narrow import collide
 from flyball.contact.room import ROOM
@@ -11,7 +12,7 @@ from flyball.contact.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Ge
 
 
 def _collide(G, M, i, j, reach, room):
-    return collide(G, M, i, j, reach, room)
+    return collide(held(G), held(M), i, j, reach, room)
 
 
 meet = kernel(_collide)

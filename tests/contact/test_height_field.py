@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from flyball.contact.build.field import field
 
 from flyball.contact.kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, SPHERE
+from flyball.contact.solids.field import field
 from flyball.errors import ModelError
 from tests.contact.scenes import contacts, turned
 

@@ -46,6 +46,23 @@ def bodies() -> fb.Mechanism:
     return m
 
 
+def touching(planar: bool) -> fb.Mechanism:
+    """What is about contact, with all that it can have."""
+    m = fb.Mechanism("touching", planar=planar)
+    at, turn = ((0, 0), {"angle": 0.1}) if planar else ((0, 0, 0), {"orientation": (0, 0, 0.1)})
+    m.add(fb.Material("wood", friction=(0.1, 0.2), static_friction=0.3, restitution=0.1, rolling_friction=0.1,
+                      spinning_friction=0.2, grain=at[1:] + (1.0,), surface_velocity=at))  # fmt: skip
+    m.add(fb.Material("steel", friction=0.3))
+    m.add(fb.MaterialPair("wood", "steel", friction=0.1, static_friction=0.2, restitution=0.1, rolling_friction=0.1,
+                          spinning_friction=0.2))  # fmt: skip
+    m.add(fb.Ground("floor", shape=fb.Sphere(radius=1.0), position=at, material="wood", color="red", **turn))
+    m.add(fb.Body("b", shape=fb.Sphere(radius=0.1), density=1, material="steel"))
+    m.add(fb.Limit("stop", "b.x", lower=0, upper=1, restitution=0.5))
+    m.add(fb.Contact("c", between="b", others="floor", friction=0.1, static_friction=0.2, restitution=0.1,
+                     rolling_friction=0.1, spinning_friction=0.2, joined=True, exclude=[("b", "floor")]))  # fmt: skip
+    return m
+
+
 def one(where: str, name: str) -> Iterator[tuple[fb.Mechanism, Element]]:
     m = zoo.joined(where, name)
     yield m, m["J"]
@@ -68,6 +85,7 @@ def given(value: Any) -> list[Any]:
 
 CASES = {f"{where} {name}": (one, where, name) for where, name in zoo.CASES}
 CASES |= {f"forces in the {w}": (lambda w: all_of(with_forces(w), Force), w) for w in ("space", "plane")}
+CASES |= {f"touching in the {w}": (lambda p: all_of(touching(p)), w == "plane") for w in ("space", "plane")}
 CASES |= {"others": (lambda: all_of(others()),), "bodies": (lambda: all_of(bodies()),)}
 TEXTS = ("body", "body_i", "body_j", "bodies", "coordinate", "coordinates", "joint", "of", "frame")
 NO_NUMBERS = ("name", "color", "shape", "interpolation", "beyond", "axes", "x_unit", "y_unit")

@@ -8,7 +8,9 @@ import pytest
 import flyball as fb
 from tests.mechanisms import EXAMPLES
 
-FILES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
+EVERY = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
+CONTACT = {"conveyor.toml", "dominoes.py", "pile_in_a_box.py", "tippe_top.py"}  # see test_contact_examples
+FILES = [name for name in EVERY if name not in CONTACT]
 PROMISED = {
     "andrews.toml",
     "bricard.toml",
@@ -47,7 +49,7 @@ def mechanism(name):
 
 
 def test_all_that_was_promised_is_there():
-    assert set(FILES) >= PROMISED
+    assert set(EVERY) >= PROMISED | CONTACT
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -67,7 +69,7 @@ def test_example_is_sound(name):
     assert all(np.isfinite(v).all() for _, v in r.channels().values())
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", EVERY)
 def test_example_survives_its_file(name, tmp_path):
     """Saved and loaded it is equal, part by part, and starts bit for bit the same."""
     m = mechanism(name)

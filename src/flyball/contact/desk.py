@@ -31,7 +31,7 @@ COUNTS = 24
 # columns of Search.hold: centre (in the mover's axes), radius, half edges of a box about it (along the shape's axes)
 CENTRE, HELD, BOX_HALF = 0, 3, 4
 # columns of Search.slot
-SHAPE, MOVES, LEVEL, FORM, CLASS, OFFSET = range(6)
+SHAPE, MOVES, LEVEL, FORM, CLASS = range(5)
 BALL, FLAT, OTHER = range(3)  # Search.slot[FORM]: sphere, plane, what the narrow phase is asked about
 BALLS, FLAT_BALL, BALL_FLAT, ANY = range(4)  # Search.pair[:, 2]
 # columns of Search.now: centre, radius, its velocity, speed of the surface by turning
@@ -59,10 +59,11 @@ class Search(NamedTuple):
     hold: np.ndarray  # (ns, 8): by shape
     kin: np.ndarray  # (ns,): classes of shapes; those of one class meet the same classes
     meets: np.ndarray  # (classes, classes)
-    slot: np.ndarray  # (ns, 6)
+    slot: np.ndarray  # (ns, 5)
     now: np.ndarray  # (ns, 8): by slot
     fat: np.ndarray  # (ns, 8): by slot
-    turn: np.ndarray  # (ns, 9): the box's axes when the envelope was made, by slot
+    axes: np.ndarray  # (ns, 9): axes in the world of what is no sphere, by slot
+    turn: np.ndarray  # (ns, 9): these when the envelope was made
     wide: np.ndarray  # (wide, 20)
     raw: np.ndarray  # (ns, 18): now, fat, and how large it may become, by shape
     key: np.ndarray  # (ns,): cells, by slot
@@ -77,5 +78,6 @@ class Search(NamedTuple):
     moved: np.ndarray  # (ns,): slots that have
     names: np.ndarray  # (places,): a table of pairs, by hashing
     firsts: np.ndarray  # (places,): their first contacts
-    taken: np.ndarray  # (places,): places that are not empty
+    taken: np.ndarray  # (places / 2,): places that are not empty
     room: np.ndarray  # (ROOM, 8): of the narrow phase
+    kept: np.ndarray  # (2, 12): poses of a pair that is carried on

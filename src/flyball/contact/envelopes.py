@@ -6,22 +6,25 @@ from ..compiler.jit import formula
 from ..math.scalar import sqrt
 from .desk import (
     AT,
+    BALL,
     BOX_HALF,
     CENTRE,
     DRIFT,
     DRIFTS,
+    FORM,
     FRAME,
     GOES,
     HALF_LINE,
     HELD,
     MIDDLE,
     ROUND,
+    SHAPE,
     SIZE,
     SPIN,
     USUAL,
     WHOLE,
 )
-from .tables import AHEAD, AXES, MARGIN, MOVER, SKIN
+from .tables import AHEAD, AXES, MARGIN, SKIN
 
 LARGE = 3.0  # in usual radii: larger shapes have no thicker skins
 STEPS = 8.0  # an envelope reaches this many steps ahead
@@ -63,28 +66,28 @@ def locate(M, B, i, m, ball, row, s):
 
 
 @formula
-def axes_now(G, M, i, out, s):
-    """The shape's axes in the world, into row s: what is left of them when envelopes are looked at again."""
-    m = G.shape_i[i, MOVER]
+def axes_now(G, M, B, s, i, m):
+    """Axes of slot s, shape i of mover m, in the world."""
     for c in range(3):
         a = (G.shape_x[i, AXES + c], G.shape_x[i, AXES + 3 + c], G.shape_x[i, AXES + 6 + c])
         if m >= 0:
             a = rotated(M, m, a[0], a[1], a[2])
-        out[s, c], out[s, 3 + c], out[s, 6 + c] = a
+        B.axes[s, c], B.axes[s, 3 + c], B.axes[s, 6 + c] = a
 
 
 @formula
-def chord(G, M, B, s, i):
+def keep_axes(B, s):
+    """Remember the axes with which an envelope is made."""
+    for c in range(9):
+        B.turn[s, c] = B.axes[s, c]
+
+
+@formula
+def chord(B, s):
     """How far the surface has turned since the envelope was made, as a part of the radius: 2 sin(angle / 2)."""
-    m = G.shape_i[i, MOVER]
-    if m < 0:
-        return 0.0
     total = 0.0
-    for c in range(3):
-        a = rotated(M, m, G.shape_x[i, AXES + c], G.shape_x[i, AXES + 3 + c], G.shape_x[i, AXES + 6 + c])
-        for r in range(3):
-            e = a[r] - B.turn[s, 3 * r + c]
-            total += e * e
+    for c in range(9):
+        total += (B.axes[s, c] - B.turn[s, c]) ** 2
     return sqrt(0.5 * total)
 
 
@@ -132,12 +135,12 @@ def off(fat, s, x, y, z):
 
 
 @formula
-def within(G, M, B, s, i, ball):
+def within(B, s, ball):
     """Whether a shape, with what it covers in `AHEAD` seconds, is still within its envelope."""
     now, fat, real = B.now, B.fat, B.real
     allowed = fat[s, ROUND] - now[s, SIZE] - 0.5 * real[MARGIN]
     if not ball:
-        allowed -= now[s, SIZE] * chord(G, M, B, s, i)
+        allowed -= now[s, SIZE] * chord(B, s)
     x = now[s, AT] - real[FRAME] - fat[s, MIDDLE]
     y = now[s, AT + 1] - real[FRAME + 1] - fat[s, MIDDLE + 1]
     z = now[s, AT + 2] - real[FRAME + 2] - fat[s, MIDDLE + 2]
@@ -152,10 +155,54 @@ def within(G, M, B, s, i, ball):
 
 
 @formula
-def to_box(B, s, i, x, y, z):
-    """Squared distance of a point, from the middle of the envelope of slot s (shape i), to the shape's box."""
-    total = 0.0
+def to_box(B, axes, s, d):
+    """Squared distance to the box of slot s, with these axes, of a point at d from its middle."""
+    total, i = 0.0, B.slot[s, SHAPE]
     for c in range(3):
-        a = abs(B.turn[s, c] * x + B.turn[s, 3 + c] * y + B.turn[s, 6 + c] * z) - B.hold[i, BOX_HALF + c]
+        a = abs(axes[s, c] * d[0] + axes[s, 3 + c] * d[1] + axes[s, 6 + c] * d[2]) - B.hold[i, BOX_HALF + c]
         total += a * a if a > 0.0 else 0.0
     return total
+
+
+@formula
+def depth(B, axes, s, n):
+    """How far slot s reaches from its middle along a unit vector, and back."""
+    if B.slot[s, FORM] == BALL:
+        return B.now[s, SIZE]
+    total, i = 0.0, B.slot[s, SHAPE]
+    for c in range(3):
+        a = axes[s, c] * n[0] + axes[s, 3 + c] * n[1] + axes[s, 6 + c] * n[2]
+        total += B.hold[i, BOX_HALF + c] * abs(a)
+    return min(total, B.now[s, SIZE])
+
+
+@formula
+def boxes_meet(B, axes, s, t, d, reach):
+    """Whether boxes with these axes, the second's middle at d from the first's, come as near as this.
+
+    Along the six axes of their faces; two that cross edge to edge may be further apart than this says.
+    """
+    i, j = B.slot[s, SHAPE], B.slot[t, SHAPE]
+    for side in range(2):
+        u, v, k, m = (s, t, i, j) if side == 0 else (t, s, j, i)
+        for c in range(3):
+            a = (axes[u, c], axes[u, 3 + c], axes[u, 6 + c])
+            whole = B.hold[k, BOX_HALF + c] + reach
+            for e in range(3):
+                b = a[0] * axes[v, e] + a[1] * axes[v, 3 + e] + a[2] * axes[v, 6 + e]
+                whole += B.hold[m, BOX_HALF + e] * abs(b)
+            if abs(d[0] * a[0] + d[1] * a[1] + d[2] * a[2]) > whole:
+                return False
+    return True
+
+
+@formula
+def bodies_meet(B, axes, s, t, d, reach):
+    """Whether the boxes of two slots come as near as this; of a sphere the sphere itself."""
+    if B.slot[s, FORM] == BALL:
+        if B.slot[t, FORM] == BALL:
+            return True
+        return to_box(B, axes, t, d) <= (reach + B.now[s, SIZE]) ** 2
+    if B.slot[t, FORM] == BALL:
+        return to_box(B, axes, s, d) <= (reach + B.now[t, SIZE]) ** 2
+    return boxes_meet(B, axes, s, t, d, reach)

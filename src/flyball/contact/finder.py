@@ -22,6 +22,7 @@ from .desk import (
     OTHER,
     REALS,
     SHAPE,
+    SIZE,
     SIZES,
     TOLD,
     USUAL,
@@ -82,7 +83,7 @@ def _power(least: int) -> int:
 def _hashing(contacts: int) -> dict[str, np.ndarray]:
     """A table of pairs that as many contacts never fill by more than half."""
     n = _power(2 * contacts)
-    return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int64), "taken": np.zeros(n, np.int64)}
+    return {"names": np.full(n, -1, np.int64), "firsts": np.zeros(n, np.int64), "taken": np.zeros(n // 2, np.int64)}
 
 
 def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
@@ -95,10 +96,13 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     usual = hold[moving if moving.any() else bounded, 3]
     real[USUAL] = np.median(usual) if len(usual) else 1.0
     count[[BOUNDED, WIDE, TOLD]] = bounded.sum(), ns - bounded.sum(), exact
-    slot = np.zeros((ns, 6), np.int32)
+    slot = np.zeros((ns, 5), np.int64)
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
         form = FLAT if G.shape_i[i, KIND] == PLANE else OTHER
         slot[s, [SHAPE, MOVES, FORM, CLASS]] = i, G.shape_i[i, MOVER], form, kin[i]
+    turning = ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0
+    now = np.zeros((ns, 8))
+    now[bounded.sum() :, SIZE] = np.inf
     return Search(
         real=real,
         count=count,
@@ -106,22 +110,24 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
         kin=np.where(bounded, kin, -1),
         meets=meets,
         slot=slot,
-        now=np.zeros((ns, 8)),
+        now=now,
         fat=np.zeros((ns, 8)),
-        turn=np.zeros((ns if (G.shape_i[bounded, KIND] != SPHERE).any() else 0, 9)),
+        axes=np.zeros((turning, 9)),
+        turn=np.zeros((turning, 9)),
         wide=np.zeros((ns - int(bounded.sum()), 20)),
         raw=np.zeros((ns, 18)),
         key=np.zeros(ns, np.int64),
-        link=np.zeros(ns, np.int32),
-        head=np.zeros(4 * ns + 2 * len(meets) * SIZES + 2, np.int32),
+        link=np.zeros(ns, np.int64),
+        head=np.zeros(4 * ns + 2 * len(meets) * SIZES + 2, np.int64),
         level_i=np.zeros((len(meets) * SIZES, 6), np.int64),
         level_x=np.zeros((len(meets) * SIZES, 8)),
         sums=np.zeros((len(meets) * SIZES, 10)),
         pair=np.zeros((pairs, 3), np.int32),
         seen=np.full((2, pairs), -1, np.int32),
-        mark=np.zeros(ns, np.int32),
-        moved=np.zeros(ns, np.int32),
+        mark=np.zeros(ns, np.int64),
+        moved=np.zeros(ns, np.int64),
         room=np.zeros((ROOM, 8)),
+        kept=np.zeros((2, 12)),
         **_hashing(contacts),
     )
 
@@ -161,14 +167,15 @@ class Finder:
 
     def _door(self) -> int:
         """Address of the search; the narrow phase is compiled only where a pair may ask for it."""
-        from .between import between, nothing
+        from .between import door_for, nothing
 
         G, B = self.geometry, self.search
         tuples = (G, no_movers(0), B, B, B)
         nothing.address(*tuples)
         bounded = np.isfinite(B.hold[:, 3])
         simple = (G.shape_i[:, KIND] == SPHERE) | (~bounded & (G.shape_i[:, KIND] == PLANE))
-        B.count[NARROW] = (nothing if simple.all() else between).address(*tuples)
+        narrow = nothing if simple.all() else door_for(set(G.shape_i[:, KIND].tolist()))
+        B.count[NARROW] = narrow.address(*tuples)
         return search.address(G, no_movers(0), self.now, self.before, B)
 
     def find(self, movers: Movers, afresh: bool = False) -> Contacts:

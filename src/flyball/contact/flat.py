@@ -1,23 +1,22 @@
-"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved."""
+"""Planes and whatever else has no bounds: their pairs are looked for among all shapes, when they have moved.
+
+What is no plane lies below one: its top.
+"""
 
 from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
 from .desk import (
-    BALL,
     BOX_HALF,
     DRIFT,
     DRIFTS,
-    FLAT,
-    FORM,
     FRAME,
     HALF_LINE,
     MIDDLE,
     ORIGIN,
     ORIGIN_0,
     ROUND,
-    SHAPE,
     SIZE,
     SLACK,
     SPEED,
@@ -26,15 +25,16 @@ from .desk import (
     UP_0,
     USUAL,
 )
-from .envelopes import rotated
+from .envelopes import depth, rotated
 from .tables import AHEAD, AXES, MARGIN, PLACE, SKIN
 
 
 @formula
 def place_wide(G, M, B, w, i, m):
-    """Where wide shape ``w`` is and how it goes; its pairs' origin stays."""
-    x = G.shape_x
-    p, n = (x[i, PLACE], x[i, PLACE + 1], x[i, PLACE + 2]), (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
+    """Where the plane of wide shape ``w`` is and how it goes."""
+    x, top = G.shape_x, B.hold[i, BOX_HALF]
+    n = (x[i, AXES + 2], x[i, AXES + 5], x[i, AXES + 8])
+    p = (x[i, PLACE] + top * n[0], x[i, PLACE + 1] + top * n[1], x[i, PLACE + 2] + top * n[2])
     v = (0.0, 0.0, 0.0)
     u = v
     if m >= 0:
@@ -82,10 +82,8 @@ def settle(B, w, still):
 
 
 @formula
-def reaches(B, w, form, s):
-    """Whether a wide shape and the envelope of slot s meet."""
-    if form != FLAT:
-        return True
+def reaches(B, w, s):
+    """Whether the envelope of slot s comes below the plane of a wide shape."""
     x, gap, lead = B.wide, 0.0, 0.0
     far, turns = 0.0, 0.0
     for c in range(3):
@@ -94,16 +92,8 @@ def reaches(B, w, form, s):
         lead += x[w, UP + c] * B.fat[s, HALF_LINE + c]
         far += a * a
         turns += x[w, TURNS + c] ** 2
-    size = B.now[s, SIZE]
-    deep = size
-    if B.slot[s, FORM] != BALL:
-        deep = 0.0
-        i = B.slot[s, SHAPE]
-        for c in range(3):
-            n = x[w, UP] * B.turn[s, c] + x[w, UP + 1] * B.turn[s, 3 + c] + x[w, UP + 2] * B.turn[s, 6 + c]
-            deep += B.hold[i, BOX_HALF + c] * abs(n)
-        deep = min(deep, size)
-    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - size + deep + x[w, SLACK]
+    deep = depth(B, B.turn, s, (x[w, UP], x[w, UP + 1], x[w, UP + 2]))
+    reach = B.fat[s, ROUND] + 0.5 * B.real[MARGIN] - B.now[s, SIZE] + deep + x[w, SLACK]
     if turns > 0.0:
         reach += B.real[AHEAD] * sqrt(turns * far)
     return gap - abs(lead) <= reach

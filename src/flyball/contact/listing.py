@@ -31,7 +31,7 @@ from .desk import (
     WHOLE,
     WIDE,
 )
-from .envelopes import axes_now, fatten
+from .envelopes import fatten, keep_axes
 from .flat import reaches, settle
 from .meeting import allowed, envelopes_meet
 from .same import keep, kept
@@ -56,7 +56,7 @@ def offer(G, B, s, t):
     elif a == BALL and b == FLAT:
         way = BALL_FLAT
     B.pair[n, 0], B.pair[n, 1], B.pair[n, 2] = s, t, way
-    B.seen[B.count[HALF], n] = kept(B, i * G.shape_i.shape[0] + j)
+    B.seen[B.count[HALF], n] = kept(B, i, j)
     B.count[LISTED] = n + 1
     return True
 
@@ -119,7 +119,7 @@ def with_wide(G, B, w):
     of = B.slot[w, CLASS]
     settle(B, w - B.count[BOUNDED], B.slot[w, MOVES] < 0)
     for s in range(B.count[BOUNDED]):
-        near = B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], B.slot[w, FORM], s)
+        near = B.meets[of, B.slot[s, CLASS]] != 0 and reaches(B, w - B.count[BOUNDED], s)
         if near and allowed(G, B, s, w) and not offer(G, B, s, w):
             return False
     return True
@@ -144,23 +144,22 @@ def list_all(G, B):
 
 
 @formula
-def drop(G, B):
+def drop(B):
     """Take the pairs of marked slots off the list, and keep in the table which contacts they had."""
     n, half = 0, B.count[HALF]
     for k in range(B.count[LISTED]):
-        s, t = B.pair[k, 0], B.pair[k, 1]
-        first = B.seen[half, k]
+        s, t, first = B.pair[k, 0] + 0, B.pair[k, 1] + 0, B.seen[half, k] + 0  # all integers of one type
         if B.mark[s] == 0 and B.mark[t] == 0:
             if n < k:
                 B.pair[n, 0], B.pair[n, 1], B.pair[n, 2], B.seen[half, n] = s, t, B.pair[k, 2], first
             n += 1
         elif first >= 0:
-            keep(B, B.slot[s, SHAPE] * G.shape_i.shape[0] + B.slot[t, SHAPE], first)
+            keep(B, B.slot[s, SHAPE], B.slot[t, SHAPE], first)
     B.count[LISTED] = n
 
 
 @formula
-def refit(G, M, B, s):
+def refit(B, s):
     """Another envelope for slot s, in its cell: whether a level takes it."""
     i = B.slot[s, SHAPE]
     for c in range(8):
@@ -173,7 +172,7 @@ def refit(G, M, B, s):
     for c in range(8):
         B.fat[s, c] = B.raw[i, FAT_RAW + c]
     if B.slot[s, FORM] == OTHER:
-        axes_now(G, M, i, B.turn, s)
+        keep_axes(B, s)
     link(B, s, l)
     B.count[REMADE] += 1
     return True
@@ -194,6 +193,6 @@ def list_moved(G, B):
                 return False
         for w in range(wide, wide + B.count[WIDE]):
             may = B.mark[w] == 0 and B.meets[B.slot[w, CLASS], B.slot[s, CLASS]] != 0
-            if may and reaches(B, w - wide, B.slot[w, FORM], s) and allowed(G, B, s, w) and not offer(G, B, s, w):
+            if may and reaches(B, w - wide, s) and allowed(G, B, s, w) and not offer(G, B, s, w):
                 return False
     return True

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from .desk import BALL, BOX_HALF, FORM, MIDDLE, MOVES, ROUND, SHAPE, SIZE, TOLD, WHOLE
-from .envelopes import to_box
+from .desk import MIDDLE, MOVES, ROUND, SHAPE, SIZE, TOLD, WHOLE
+from .envelopes import bodies_meet
 from .tables import MASK, MEMBER
 
 FAST = 0.5  # an envelope longer than this, in radii, is looked at as a capsule
@@ -67,25 +67,6 @@ def between(fat, s, t, x, y, z):
 
 
 @formula
-def boxes_meet(B, s, t, x, y, z):
-    """Whether boxes about two shapes, as thick as their envelopes, meet along the six axes of their faces."""
-    i, j = B.slot[s, SHAPE], B.slot[t, SHAPE]
-    more = B.fat[s, WHOLE] - B.now[s, SIZE] + B.fat[t, WHOLE] - B.now[t, SIZE]
-    for side in range(2):
-        u, v, k, m = (s, t, i, j) if side == 0 else (t, s, j, i)
-        for c in range(3):
-            a = (B.turn[u, c], B.turn[u, 3 + c], B.turn[u, 6 + c])
-            reach = B.hold[k, BOX_HALF + c] + more
-            for e in range(3):
-                reach += B.hold[m, BOX_HALF + e] * abs(
-                    a[0] * B.turn[v, e] + a[1] * B.turn[v, 3 + e] + a[2] * B.turn[v, 6 + e]
-                )
-            if abs(x * a[0] + y * a[1] + z * a[2]) > reach:
-                return False
-    return True
-
-
-@formula
 def envelopes_meet(B, s, t):
     """Whether the envelopes of two bounded slots meet."""
     fat = B.fat
@@ -98,12 +79,4 @@ def envelopes_meet(B, s, t):
     close = fat[s, ROUND] + fat[t, ROUND]
     if whole > (1.0 + FAST) * close and between(fat, s, t, x, y, z) > close * close:
         return False
-    if B.slot[s, FORM] == BALL:
-        if B.slot[t, FORM] == BALL:
-            return True
-        more = fat[s, WHOLE] + fat[t, WHOLE] - B.now[t, SIZE]
-        return to_box(B, t, B.slot[t, SHAPE], x, y, z) <= more * more
-    if B.slot[t, FORM] == BALL:
-        more = fat[t, WHOLE] + fat[s, WHOLE] - B.now[s, SIZE]
-        return to_box(B, s, B.slot[s, SHAPE], x, y, z) <= more * more
-    return boxes_meet(B, s, t, x, y, z)
+    return bodies_meet(B, B.turn, s, t, (x, y, z), whole - B.now[s, SIZE] - B.now[t, SIZE])

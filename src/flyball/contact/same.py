@@ -11,20 +11,23 @@ NEAR = 0.3  # a contact without a feature's namesake is the nearest one, if it i
 
 
 @formula
-def spot(names, name):
-    """Where a pair stands in the table, or the empty place where it would stand."""
+def spot(names, i, j, name):
+    """Where a pair stands in the table, or the empty place where it would stand.
+
+    Pairs of shapes with near numbers stand near each other, for these are mostly asked for together.
+    """
     mask = names.shape[0] - 1
-    k = name * 0x1E3779B97F4A7C15
-    k = (k ^ (k >> 31)) & mask
+    k = (3 * i + 5 * j) & mask
     while names[k] != EMPTY and names[k] != name:
         k = (k + 1) & mask
     return k
 
 
 @formula
-def keep(B, name, first):
-    """Put a pair and its first contact into the table, whose first contact stays the one put in first."""
-    k = spot(B.names, name)
+def keep(B, i, j, first):
+    """Put a pair of shapes and its first contact into the table."""
+    name = i * B.kin.shape[0] + j
+    k = spot(B.names, i, j, name)
     if B.names[k] == EMPTY:
         B.names[k], B.firsts[k] = name, first
         B.taken[B.count[KEPT]] = k
@@ -32,11 +35,12 @@ def keep(B, name, first):
 
 
 @formula
-def kept(B, name):
+def kept(B, i, j):
     """The first contact of a pair, or -1."""
     if B.count[KEPT] == 0:
         return -1
-    k = spot(B.names, name)
+    name = i * B.kin.shape[0] + j
+    k = spot(B.names, i, j, name)
     return B.firsts[k] if B.names[k] == name else -1
 
 
@@ -49,13 +53,13 @@ def forget(B):
 
 
 @formula
-def keep_all(G, O, B):
+def keep_all(O, B):
     """Put all pairs that have contacts in O into the table."""
-    i, j, ns = -1, -1, G.shape_i.shape[0]
+    i, j = -1, -1
     for c in range(O.count[FOUND]):
         if O.at[c, SHAPE_1] != i or O.at[c, SHAPE_2] != j:
             i, j = O.at[c, SHAPE_1], O.at[c, SHAPE_2]
-            keep(B, i * ns + j, c)
+            keep(B, i, j, c)
 
 
 @formula

@@ -48,7 +48,7 @@ def anew(G, M, O, B):
     """Look for all pairs: whether there was room."""
     B.count[TRUE] = 0
     forget(B)
-    keep_all(G, O, B)
+    keep_all(O, B)
     sort_all(G, M, B)
     for w in range(B.count[WIDE]):
         s = B.count[BOUNDED] + w
@@ -63,16 +63,16 @@ def anew(G, M, O, B):
 
 
 @formula
-def mend(G, M, B):
+def mend(G, B):
     """Look again for pairs of what has left its envelope: 1 if that was done, 0 without room, -1 if all must."""
     if B.count[MOVED] > MANY * B.count[BOUNDED] + 8.0:
         return -1
     B.count[TRUE] = 0
     for k in range(B.count[MOVED]):
         s = B.moved[k]
-        if s < B.count[BOUNDED] and not refit(G, M, B, s):
+        if s < B.count[BOUNDED] and not refit(B, s):
             return -1
-    drop(G, B)
+    drop(B)
     room = list_moved(G, B)
     forget(B)
     B.count[TRUE] = 1 if room else 0
@@ -91,7 +91,7 @@ def pairs(G, M, O, B, task):
     if task == AFRESH or O.count[NUMBER] != B.count[SEARCHES] or B.count[LISTED] > 2 * B.count[LISTED_ALL] + 64:
         mended = -1
     elif B.count[MOVED] > 0:
-        mended = mend(G, M, B)
+        mended = mend(G, B)
     if mended < 0:
         return anew(G, M, O, B)
     follow(B, n, way)

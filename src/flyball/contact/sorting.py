@@ -24,7 +24,7 @@ from .desk import (
     STRIDE,
     WHOLE,
 )
-from .envelopes import axes_now, fatten, locate
+from .envelopes import axes_now, fatten, keep_axes, locate
 from .kinds import SPHERE
 from .tables import AHEAD, KIND, MOVER
 
@@ -97,7 +97,8 @@ def fill_slots(G, M, B):
             for c in range(8):
                 B.now[s, c], B.fat[s, c] = B.raw[i, c], B.raw[i, FAT_RAW + c]
             if B.slot[s, FORM] == OTHER:
-                axes_now(G, M, i, B.turn, s)
+                axes_now(G, M, B, s, i, B.slot[s, MOVES])
+                keep_axes(B, s)
     for s in range(B.count[BOUNDED]):
         B.key[s], _ = cell_of(B, s, B.slot[s, LEVEL])
         B.mark[s] = 0

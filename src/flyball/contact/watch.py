@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from .desk import AT, BALL, BOUNDED, DRIFT, DRIFTS, FORM, LAG, MOVED, MOVES, SHAPE, STRIDE, WIDE
-from .envelopes import locate, within
+from .desk import AT, BALL, BOUNDED, DRIFT, DRIFTS, FORM, LAG, MOVED, MOVES, SHAPE, STRIDE, USUAL, WIDE
+from .envelopes import STEPS, axes_now, locate, within
 from .flat import gone, place_wide
+from .tables import AHEAD, SKIN
 
 TOGETHER, APART = 0.6, 0.4  # squared common velocity over mean square: above, the frame goes along; below, it stops
+SLOW = 0.5  # but not where an envelope reaches less far ahead than this, in skins
 
 
 @formula
@@ -25,8 +27,10 @@ def census(M, B):
         a, b, c = M.twist[m, 0], M.twist[m, 1], M.twist[m, 2]
         v = (v[0] + a, v[1] + b, v[2] + c)
         v2 += a * a + b * b + c * c
-    mean2 = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / max(1.0, n)
+    mean2 = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / max(1.0, n)  # n times the square of the mean velocity
     goes = n > 1.0 and mean2 > (TOGETHER if B.count[DRIFTS] == 0 else APART) * v2
+    slow = SLOW * B.real[SKIN] * B.real[USUAL]
+    goes = goes and mean2 * (STEPS * B.real[AHEAD]) ** 2 > n * slow * slow
     for c in range(3):
         B.real[DRIFT + c] = v[c] / n if goes else 0.0
     B.count[DRIFTS] = 1 if goes else 0
@@ -62,8 +66,10 @@ def look(G, M, B):
             locate(M, B, i, m, ball, now, s)
             way = (way[0] + now[s, AT] - x, way[1] + now[s, AT + 1] - y, way[2] + now[s, AT + 2] - z)
             n += 1.0
+            if not ball:
+                axes_now(G, M, B, s, i, m)
         B.mark[s] = 0
-        if not within(G, M, B, s, i, ball):
+        if not within(B, s, ball):
             B.mark[s] = 1
             B.moved[moved] = s
             moved += 1

@@ -9,7 +9,7 @@ from ..errors import ModelError
 from .body import GROUND, Body
 from .bulk import Bodies
 from .contact import Contact
-from .element import Element
+from .element import Element, field_with
 from .ground import Ground
 from .material import Material, MaterialPair
 from .words import listing, suggest
@@ -66,9 +66,8 @@ def _material(model: Model, name: str, e: Element) -> None:
     if not isinstance(found, Material):
         known = [x.name for x in model.materials]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(
-            f"{e.title}: there is no material named {name!r}{what}{suggest(name, known)}; {listing(known)}"
-        )
+        hint = f"{what}{suggest(name, known)}; {listing(known)}"
+        raise ModelError(f"{e.title}: {field_with(e, name)}there is no material named {name!r}{hint}")
 
 
 def _touching(model: Model, name: str, e: Contact) -> None:
@@ -80,9 +79,15 @@ def _touching(model: Model, name: str, e: Contact) -> None:
     if not isinstance(found, (Body, Bodies, Ground)):
         known = [GROUND, *(x.name for x in owners(model))]
         what = "" if found is None else f" ({name!r} is a {type(found).__name__})"
-        raise ModelError(f"{e.title}: there is no body named {name!r}{what}{suggest(name, known)}; {listing(known)}")
+        hint = f"{what}{suggest(name, known)}; {listing(known)}"
+        raise ModelError(f"{e.title}: {_where(e, name)}there is no body named {name!r}{hint}")
     if not any(s.touches for s in found.shapes()):
         raise ModelError(f"{e.title}: {found.title} has no shape that touches; give it one, or leave it out")
+
+
+def _where(e: Contact, name: str) -> str:
+    """The field that names it."""
+    return field_with(e, name) or "exclude: "
 
 
 def _refuse_second(model: Model, e: Contact) -> None:

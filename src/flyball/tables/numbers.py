@@ -18,6 +18,7 @@ from ..model.geometry import vector
 from ..model.inertia import mass_properties
 from ..model.kept import Kept, bits
 from ..model.model import Model
+from ..model.touching import owners
 
 PLAIN = (float, int, str, np.float64)  # kinds of values that their text tells apart to the bit
 MOST = 4  # sets of values of the parameters that are kept
@@ -139,7 +140,7 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
 def _files(model: Model) -> tuple[str, ...]:
     """Files that shapes are read from."""
     return model.kept.get(
-        "files", None, 1, lambda: tuple(f for b in model.bodies for s in b.shapes() if (f := getattr(s, "file", None)))
+        "files", None, 1, lambda: tuple(f for b in owners(model) for s in b.shapes() if (f := getattr(s, "file", None)))
     )
 
 

@@ -1,4 +1,4 @@
-"""A convex polyhedron, as ``build/hull.py`` writes it into the tables.
+"""A convex polyhedron, as ``solids/hull.py`` writes it into the tables.
 
 Vertices stand from ``FIRST`` on in `Geometry.vertex`, after them the outward unit normals of its faces, one a row.
 Faces stand from ``FACE_FIRST`` on in `Geometry.face`; corners count from the hull's first vertex. Parameters: rounding

@@ -12,18 +12,17 @@ from .problem import (
     H_ITERATION,
     H_OBJECTIVE,
     H_VELOCITY,
-    ISLAND,
     RESIDUAL,
     WRITTEN,
 )
-from .residual import contacts_of, lines_of
+from .residual import contacts_of, lines_of, nodes_of
 
 
 @formula
 def finish(P, X, W, O, left, used, last):
     """Write down how far impulses are from a solution; if it is the last time, make them safe and hand back.
 
-    Impulses are those in X, velocities with them in W.own and X.wide, those without in X.v and W.wide[0]; ``left`` is
+    Impulses are those in X, velocities with them in W.own and X.wide, those without in X.v and W.free_wide; ``left`` is
     what `residuals` says.
     """
     velocity, force, linear, square = left
@@ -54,8 +53,7 @@ def between(part, a, b):
 @formula
 def hand_back(P, X, W, O, part):
     """Velocities with a part of the impulses."""
-    k = O.count[ISLAND]
-    begin, end = (0, P.size[1]) if k < 0 else (P.member_p[k], P.member_p[k + 1])
+    begin, end = nodes_of(P, O)
     for e in range(begin, end):
         i = P.member[e]
         for s in range(6):
@@ -63,7 +61,7 @@ def hand_back(P, X, W, O, part):
     if part == 1.0:
         return
     for s in range(X.wide.shape[0]):
-        X.wide[s] = between(part, W.wide[0, s], X.wide[s])
+        X.wide[s] = between(part, W.free_wide[s], X.wide[s])
     first, last = contacts_of(P, O)
     for c in range(first, last):
         for s in range(3):

@@ -27,19 +27,10 @@ from .pack import (
     take_nodes,
 )
 from .packed import remaining
-from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, ISLAND, MOST, USED, WRITTEN
-from .residual import contacts_of, lines_of
+from .problem import CONVERGED, COULOMB, CUT, ENDED, ENOUGH, HISTORY, MOST, USED, WRITTEN
+from .residual import contacts_of, lines_of, nodes_of
 from .sweeps import visit_ball, visit_rough, visit_smooth, visit_smooth_ball
 from .sweeps_any import visit_any, visit_line
-
-
-@formula
-def nodes_of(P, O):
-    """First node of what is meant and the one after its last, in ``member``."""
-    k = O.count[ISLAND]
-    if k < 0:
-        return 0, P.size[1]
-    return P.member_p[k], P.member_p[k + 1]
 
 
 @formula
@@ -135,9 +126,9 @@ def prepare(P, X, W, O):
     first, last = contacts_of(P, O)
     take_nodes(P, X, W, nodes_of(P, O))
     for k in range(X.wide.shape[0]):
-        W.wide[0, k] = X.wide[k]
-    many = count_kinds(P, W, first, last)
-    pack(P, X, W, O, first, many)
+        W.free_wide[k] = X.wide[k]
+    many = count_kinds(P, W, first, last, 0)
+    pack(P, X, W, O.count[COULOMB], first, many)
     begin, end = lines_of(P, O)
     for k in range(begin, end):
         push_line(P, X.wide, k, X.line[k])

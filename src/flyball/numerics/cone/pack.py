@@ -12,8 +12,8 @@ from ...math.scalar import sqrt
 from ...math.vec import cross, dot
 from .diagonal import axis, diagonal, turned
 from .operator import push, push_turning
-from .problem import COULOMB, NONE, ROUND
-from .projection import least_of
+from .problem import NONE, ROUND
+from .projection import least_of, share
 
 SMOOTH_BALL, BALL, SMOOTH, ROUGH, ANY, KINDS = range(6)
 WIDTH_BALL, WIDTH_SMOOTH = 16, 20  # numbers of a contact; the rest have 32
@@ -56,18 +56,22 @@ def along_normal(P, c, side):
 
 
 @formula
-def kind_of(P, W, c):
-    """What is to be done for a contact; it and the arms of balls are left in W.rows[0]."""
+def kind_of(P, W, c, rubbing):
+    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: 1 if none is taken
+    as smooth, 2 if none as one of balls either.
+    """
     i, j = P.at[c, 0], P.at[c, 1]
     if i < NONE or j < NONE or P.turn.shape[0] > 0:
         return ANY
+    if rubbing > 1:
+        return ROUGH
     first, second = True, True
     W.rows[0, c, 1], W.rows[0, c, 2] = 0.0, 0.0
     if i >= 0:
         first, W.rows[0, c, 1] = along_normal(P, c, 0)
     if j >= 0:
         second, W.rows[0, c, 2] = along_normal(P, c, 1)
-    if P.mu[c] == 0.0:
+    if P.mu[c] == 0.0 and not rubbing:
         return SMOOTH_BALL if first and second else SMOOTH
     if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
         return ROUGH
@@ -136,7 +140,7 @@ def pack_smooth(P, W, c, place):
 
 
 @formula
-def pack_rough(P, O, W, c, place):
+def pack_rough(P, coulomb, W, c, place):
     """A contact with friction of any kind."""
     k, D = W.pack, diagonal(P, c)
     for s in range(9):
@@ -147,7 +151,7 @@ def pack_rough(P, O, W, c, place):
         k[place + BIAS + s] = P.bias[c, s]
     k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
     W.rows[1, c, 0] = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
-    steps = local_steps(D, P.soft[c], O.count[COULOMB])
+    steps = local_steps(D, P.soft[c], coulomb)
     for s in range(8):
         k[place + IN + s] = steps[s]
 
@@ -176,11 +180,11 @@ def local_steps(D, soft, coulomb):
 
 
 @formula
-def count_kinds(P, W, first, last):
+def count_kinds(P, W, first, last, rubbing):
     """How many contacts there are of each kind; the kind of each is left in W.rows[0, c, 0]."""
     a, b, d, e, f = 0, 0, 0, 0, 0
     for c in range(first, last):
-        kind = kind_of(P, W, c)
+        kind = kind_of(P, W, c, rubbing)
         W.rows[0, c, 0] = kind
         if kind == SMOOTH_BALL:
             a += 1
@@ -196,7 +200,7 @@ def count_kinds(P, W, first, last):
 
 
 @formula
-def pack(P, X, W, O, first, many):
+def pack(P, X, W, coulomb, first, many):
     """Put contacts in their order, and their impulses on the velocities in W.own and X.wide."""
     begin, at = 0, 0  # first visit and first number of a kind
     last = first + many[0] + many[1] + many[2] + many[3] + many[4]
@@ -206,21 +210,36 @@ def pack(P, X, W, O, first, many):
             if W.rows[0, c, 0] == kind:
                 visit = shuffled(e, m)
                 e += 1
-                put(P, X, W, O, c, kind, begin + visit, at + wide * visit)
+                put(P, X, W, coulomb, c, kind, begin + visit, at + wide * visit)
         begin, at = begin + m, at + wide * m
 
 
 @formula
-def put(P, X, W, O, c, kind, visit, place):
+def admit(P, X, c):
+    """Make an impulse to start from one of the cone: where it presses less, or not, its friction is less."""
+    n = X.p[c, 0] if X.p[c, 0] > 0.0 else 0.0  # nan too
+    n = max(n, least_of(P, c))
+    a, b = X.p[c, 1], X.p[c, 2]
+    r = sqrt(a * a + b * b)
+    part = share(n, P.mu[c], r) if n > 0.0 and r == r else 0.0
+    X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, part * a if part > 0.0 else 0.0, part * b if part > 0.0 else 0.0
+    if P.turn.shape[0] > 0:
+        z, a, b = X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]
+        roll = share(n, P.turn[c, 0], sqrt(a * a + b * b)) if n > 0.0 else 0.0
+        spin = share(n, P.turn[c, 1], abs(z)) if n > 0.0 else 0.0
+        X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = spin * z, roll * a, roll * b
+
+
+@formula
+def put(P, X, W, coulomb, c, kind, visit, place):
     """One contact, with its impulse acting."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
     W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
+    admit(P, X, c)
     k = W.pack
     if kind == SMOOTH_BALL or kind == BALL:
         pack_ball(P, X, W, c, place)
-        if kind == SMOOTH_BALL:
-            k[place + B_T], k[place + B_T + 1], k[place + B_T + 2] = 0.0, 0.0, 0.0
         if k[place + B_P] != 0.0:
             change_balls(
                 k, W.own, i, j, place, (k[place + B_P], k[place + B_T], k[place + B_T + 1], k[place + B_T + 2])
@@ -229,10 +248,9 @@ def put(P, X, W, O, c, kind, visit, place):
     p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     if kind == SMOOTH:
         pack_smooth(P, W, c, place)
-        p = p[0], 0.0, 0.0
         k[place + S_P], k[place + S_LEAST] = p[0], least_of(P, c)
     else:
-        pack_rough(P, O, W, c, place)
+        pack_rough(P, coulomb, W, c, place)
         k[place + LEAST] = least_of(P, c)
         for s in range(3):
             k[place + IMPULSE + s] = p[s]

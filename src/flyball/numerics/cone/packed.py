@@ -118,7 +118,7 @@ def of_packed(P, X, W, O, kind, s, at):
         return of_smooth(W.pack, W.own, W.free, i, j, at)
     if kind == ROUGH:
         return of_rough(W.pack, W.own, W.free, i, j, at, W.rows[1, c, 0], O.count[COULOMB])
-    return of_one(P, X, O, (W.own, X.wide, X.v, W.wide[0]), c)
+    return of_one(P, X, O, (W.own, X.wide, X.v, W.free_wide), c)
 
 
 @formula
@@ -130,4 +130,4 @@ def remaining(P, X, W, O, many):
             sofar = worse(sofar, of_packed(P, X, W, O, kind, s, at))
             at += width(kind)
         begin += many[kind]
-    return summary(of_lines(P, X, O, X.wide, W.wide[0], sofar))
+    return summary(of_lines(P, X, O, X.wide, W.free_wide, sofar))

@@ -31,8 +31,9 @@ PER_MASS, BLOCK, ROUND = 0, 1, 7
 BIAS, SOFT, LOW, HIGH = range(4)
 # entries of Choices.count: most iterations (sweeps), island that is meant or -1 for all, keep a history or not;
 # and what comes back: iterations used, how the solver ended, rows of the history written
-# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be)
-MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES = range(9)
+# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be;
+# DIRECTIONS: of a friction pyramid)
+MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES, DIRECTIONS = range(10)
 CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # Choices.count[ENDED]; SMALL: enlarge what is needed, call again
 # entries of Choices.real: residual [m/s] that is enough; and what comes back: the residual reached as a velocity
 # [m/s], and as a force (what is left of an impulse over the largest impulse) [1]
@@ -87,13 +88,14 @@ class Choices(NamedTuple):
 class Scratch(NamedTuple):
     """Rooms to work in, as large as the problem; compiled code allocates nothing."""
 
-    rows: np.ndarray  # (12, nc, 3)
+    rows: np.ndarray  # (17, nc, 3): vectors of impulses and velocities; of torques from the eighth on; the last: steps
     nodes: np.ndarray  # (6, nn, 8)
     wide: np.ndarray  # (6, nw): of the groups' velocities
-    lines: np.ndarray  # (6, nl)
+    lines: np.ndarray  # (9, nl): the same of lines
     own: np.ndarray  # (nn + 1, 8): of each node v, w, 1/m, mean of its block; the last is what stands still
     inner: np.ndarray  # (nn + 1, 8): its block, two unused
     free: np.ndarray  # (nn + 1, 8): v, w without impulses, two unused
+    free_wide: np.ndarray  # velocities of the groups without impulses
     pack: np.ndarray  # (32 nc,): contacts in the order of sweeps, each all in one place
     sides: np.ndarray  # (nc, 3): in that order its nodes in ``own``, and which it is
 

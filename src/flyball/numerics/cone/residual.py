@@ -29,6 +29,15 @@ def contacts_of(P, O):
 
 
 @formula
+def nodes_of(P, O):
+    """First node of what is meant and the one after its last, in ``member``."""
+    k = O.count[ISLAND]
+    if k < 0:
+        return 0, P.size[1]
+    return P.member_p[k], P.member_p[k + 1]
+
+
+@formula
 def lines_of(P, O):
     """First line of what is meant, and the one after its last."""
     k = O.count[ISLAND]

@@ -78,13 +78,14 @@ def rooms(P: Problem, history: int = 0) -> tuple[State, Scratch, Choices, Factor
     nc, nn, nl, nw = len(P.mu), len(P.node), len(P.line_at), int(P.group[-1])
     X = State(np.zeros((nc, 3)), np.zeros((len(P.turn), 3)), np.zeros(nl), np.zeros((nn, 8)), np.zeros(nw))
     W = Scratch(
-        rows=np.zeros((12, nc, 3)),
+        rows=np.zeros((17, nc, 3)),
         nodes=np.zeros((6, nn, 8)),
         wide=np.zeros((6, nw)),
-        lines=np.zeros((6, nl)),
+        lines=np.zeros((9, nl)),
         own=aligned(nn + 1, 8),
         inner=aligned(nn + 1, 8),
         free=aligned(nn + 1, 8),
+        free_wide=np.zeros(nw),
         pack=aligned(nc, PACKED).ravel(),
         sides=np.zeros((nc, 3), np.int64),
     )

@@ -194,7 +194,7 @@ def stepped(k, at, u, coulomb):
         ut += k[at + NT] * (n - p)
         a = s - (k[at + ISS] * us + k[at + IST] * ut)
         b = t - (k[at + IST] * us + k[at + ITT] * ut)
-        if a * a + b * b <= (k[at + MU] * n) ** 2:
+        if a * a + b * b <= k[at + MU] * k[at + MU] * n * n:
             return n, a, b
     # it slides: only a step of one size in all directions ends with friction against the velocity
     a, b = s - k[at + SLIDE] * us, t - k[at + SLIDE] * ut

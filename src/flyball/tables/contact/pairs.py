@@ -41,8 +41,14 @@ def pairs(model: Model, given: Numbers, groups: Groups, known: Mapping[Surface, 
             sides = [given.of[name] if name else NOTHING for name in (first, second)]
             named = NOTHING if contact.between is None else given.of[contact.name]
             special = told.get(frozenset((first, second)), NOTHING)  # type: ignore[arg-type]
-            out[i, j] = out[j, i] = _row((contact, first, second), (named, special, plain), sides)
+            out[i, j] = out[j, i] = _row((contact, first, second, _two(on, by)), (named, special, plain), sides)
     return out
+
+
+def _two(on: set[str], by: set[str]) -> str:
+    """Two of what bears two surfaces, for messages."""
+    a, b = next((a, b) for a in sorted(on) for b in sorted(by) if a != b)
+    return f"{a!r} on {b!r}"
 
 
 def _row(who: tuple, told: Sequence[Any], sides: Sequence[Any]) -> np.ndarray:
@@ -65,19 +71,18 @@ def _friction(row: np.ndarray, who: tuple, told: Sequence[Any], sides: Sequence[
     found = _both("friction", told[2], sides)
     if found is None:
         raise ModelError(
-            f"{who[0].title}: nothing says the friction; give the contact or a material friction=... (0 is smooth)"
+            f"{who[0].title}: nothing says the friction of {who[3]}; give the contact friction=... (0 is smooth), or "
+            f"one of them a material that says it"
         )
-    grained = [x for x in found if isinstance(x.friction, tuple)]
-    if len(grained) == 2:
+    if all(isinstance(x.friction, tuple) for x in sides):
         raise ModelError(
             f"{who[0].title}: materials {who[1]!r} and {who[2]!r} both have a grain, and no law says what their "
             f"friction is; say it by MaterialPair({who[1]!r}, {who[2]!r}, friction=...)"
         )
-    along = [np.real(pair(x.friction)[0]) for x in found]
+    along, across = (np.sqrt(np.prod([np.real(pair(x.friction)[k]) for x in found])) for k in (0, 1))
     row[su.STATIC] = np.sqrt(np.prod([np.real(_at_rest(x)) for x in found]))
-    row[su.KINETIC] = np.sqrt(np.prod(along))
-    if grained:
-        row[su.ACROSS] = np.sqrt(np.real(grained[0].friction[1]) / np.real(grained[0].friction[0]))
+    row[su.KINETIC] = along
+    row[su.ACROSS] = across / along if along > 0.0 else 1.0
 
 
 def _at_rest(x: Any) -> Any:

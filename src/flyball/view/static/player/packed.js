@@ -31,20 +31,24 @@ export function turnsAt({ turned, count }, picture, out) {
   return out;
 }
 
-/** Least and largest coordinates of the members' origins at a picture, or null. */
+const LOOKED_AT = 1500; // members, of which a box is found
+const STRAYS = 0.02; // part of them that may have gone astray at either end ...
+const FAR = 2; // ... when they are so many times as far away as all others
+
+/** Least and largest coordinates of the members' origins at a picture, those gone astray left out; or null. */
 export function originsBox(data, picture) {
   const { count, grid, low, step } = unpacked(data);
-  const box = [
-    [Infinity, Infinity, Infinity],
-    [-Infinity, -Infinity, -Infinity],
-  ];
-  for (let k = 0, at = 3 * count * picture; k < count; k++, at++) {
-    if (!grid[at]) continue; // not drawn
-    for (let c = 0; c < 3; c++) {
-      const x = low[c] + step * grid[at + c * count];
-      if (x < box[0][c]) box[0][c] = x;
-      if (x > box[1][c]) box[1][c] = x;
-    }
-  }
-  return box[0][0] > box[1][0] ? null : box;
+  const every = Math.max(1, Math.floor(count / LOOKED_AT));
+  const from = 3 * count * picture;
+  const there = [];
+  for (let k = 0; k < count; k += every) if (grid[from + k]) there.push(from + k);
+  if (!there.length) return null;
+  const ends = [0, 1, 2].map((c) => {
+    const x = there.map((at) => low[c] + step * grid[at + c * count]).sort((a, b) => a - b);
+    const away = Math.floor(STRAYS * x.length);
+    const [first, last] = [x[away], x.at(-1 - away)];
+    const reach = FAR * (last - first);
+    return [x[0] < first - reach ? first : x[0], x.at(-1) > last + reach ? last : x.at(-1)];
+  });
+  return [ends.map(([first]) => first), ends.map(([, last]) => last)];
 }

@@ -1,0 +1,117 @@
+"""Time of a search for contacts, by number of spheres: `python benchmarks/search.py [N ...]`.
+
+Spheres (radius 0.1 m) are poured into a box of planes by pushing them apart, then move about at some mm/s, 5 ms a step.
+CPU time of one thread, the least of ten runs of ten steps; beside it that of a search for all pairs.
+"""
+
+import sys
+import time
+
+import numpy as np
+
+from flyball.compiler.door import enter
+from flyball.compiler.held import held
+from flyball.compiler.jit import formula, kernel
+from flyball.contact.desk import AFRESH_SO_FAR, REMADE
+from flyball.contact.finder import Finder, no_movers
+from flyball.contact.kinds import PLANE, SPHERE
+from flyball.contact.search import AFRESH, STEP
+from flyball.contact.tables import AXES, FOUND, GAP, KIND, MASK, MEMBER, MOVER, NORMAL, PAIRS, PAR, RADIUS, Geometry
+
+R, H, MARGIN = 0.1, 5e-3, 2e-3
+
+
+@formula
+def go(address, G, M, C, O, B, h, steps, task):
+    """Move on and search, again and again; an even number of steps leaves C and O as they were."""
+    for k in range(steps):
+        for m in range(M.pose.shape[0]):
+            for c in range(3):
+                M.pose[m, c] += h * M.twist[m, c]
+        status = enter(address, G, M, C, O, B, task) if k % 2 == 0 else enter(address, G, M, O, C, B, task)
+        if status != 0:
+            return status
+    return 0
+
+
+@kernel
+def go_kernel(address, G, M, C, O, B, h, steps, task):
+    return go(address, held(G), held(M), held(C), held(O), held(B), h, steps, task)
+
+
+def box_of_spheres(n):
+    """Spheres on a grid in a box as high as they need: shapes, movers."""
+    side = round(n ** (1 / 3))
+    pitch = 2.02 * R
+    half = 0.5 * pitch * side + 0.01
+    k = np.arange(n)
+    x = np.stack([k % side, k // side % side, k // side**2], 1) * pitch + [R + 0.01 - half, R + 0.01 - half, R + 0.01]
+    x += np.random.default_rng(0).uniform(-0.1, 0.1, (n, 3)) * R
+    planes = [((0, 0, 0), (0, 0, 1))]
+    planes += [((s * half * (1 - c), s * half * c, 0), (-s * (1 - c), -s * c, 0)) for s in (1, -1) for c in (0, 1)]
+    shape_i, shape_x = np.zeros((n + 5, 9), np.int64), np.zeros((n + 5, 24))
+    shape_i[:, MEMBER], shape_i[:, MASK], shape_i[:n, KIND], shape_i[:n, MOVER] = 1, -1, SPHERE, k
+    shape_i[n:, KIND], shape_i[n:, MOVER] = PLANE, -1
+    shape_x[:, [AXES, AXES + 4, AXES + 8]] = 1.0
+    shape_x[:n, [PAR, RADIUS]], shape_x[n:, RADIUS] = R, np.inf
+    for i, (p, z) in enumerate(planes, start=n):
+        x_axis = np.cross(z, [0.3, 0.5, 0.7])
+        x_axis /= np.linalg.norm(x_axis)
+        shape_x[i, :3], shape_x[i, AXES : AXES + 9] = p, np.stack([x_axis, np.cross(z, x_axis), z], 1).ravel()
+    M = no_movers(n)
+    M.pose[:, :3] = x
+    return Geometry(shape_i, shape_x, np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros((0, 2), np.int64)), M
+
+
+def pour(F, G, M, rounds):
+    """Let all sink a little and push apart what overlaps."""
+    mover = G.shape_i[:, MOVER]
+    for k in range(rounds):
+        M.pose[:, 2] -= 0.02 * R * (1.0 - k / rounds)
+        for _ in range(3):
+            C = F.find(M)
+            n = C.count[FOUND]
+            a, b = mover[C.at[:n, 0]], mover[C.at[:n, 1]]
+            push = 0.5 * np.minimum(C.x[:n, GAP], 0.0)[:, None] * C.x[:n, NORMAL : NORMAL + 3]
+            push *= np.where((a < 0) | (b < 0), 2.0, 1.0)[:, None]
+            for c in range(3):
+                M.pose[:, c] += np.bincount(a[a >= 0], push[a >= 0, c], len(M.pose))
+                M.pose[:, c] -= np.bincount(b[b >= 0], push[b >= 0, c], len(M.pose))
+
+
+def timed(F, M, task, runs=10, steps=10):
+    """Least CPU time of a step [ms]."""
+    least = np.inf
+    for _ in range(runs):
+        M.twist[:, :3] *= -1.0
+        while True:
+            start = time.process_time()
+            status = go_kernel(F.address, F.geometry, M, F.now, F.before, F.search, H, steps, task)
+            took = time.process_time() - start
+            if status == 0:
+                break
+            F.enlarge(status, F.now.count)
+        least = min(least, took / steps)
+    return 1e3 * least
+
+
+def main():
+    print("spheres  pairs  contacts  step ms  all pairs ms  made anew a step")
+    for n in map(int, sys.argv[1:] or ["1000", "4000", "16000"]):
+        G, M = box_of_spheres(n)
+        F = Finder(G, margin=MARGIN, ahead=H)
+        pour(F, G, M, 40)
+        M.twist[:, :3] = 5e-3 * np.random.default_rng(1).standard_normal((n, 3))
+        F.find(M)
+        everything = timed(F, M, AFRESH, runs=3, steps=4)
+        made, afresh = F.search.count[REMADE], F.search.count[AFRESH_SO_FAR]
+        step = timed(F, M, STEP)
+        made, afresh = F.search.count[REMADE] - made, F.search.count[AFRESH_SO_FAR] - afresh
+        print(
+            f"{n:7d} {F.now.count[PAIRS]:6d} {F.now.count[FOUND]:9d} {step:8.3f} {everything:13.3f} "
+            f"{made / 100:8.1f} ({afresh} times all)"
+        )
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+"""First-order solvers: optimality by definition, one another, an independent optimiser, units, cut solves, histories."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+from scipy.optimize import nnls
+
+from flyball.numerics.cone.apgd import apgd
+from flyball.numerics.cone.barzilai_borwein import barzilai_borwein
+from flyball.numerics.cone.gauss_seidel import gauss_seidel
+from flyball.numerics.cone.jacobi import jacobi
+from flyball.numerics.cone.lean import lean
+from flyball.numerics.cone.problem import (
+    BROKEN,
+    CONVERGED,
+    COULOMB,
+    ENDED,
+    ENOUGH,
+    FORCE_RESIDUAL,
+    ISLAND,
+    MOST,
+    RESIDUAL,
+)
+from flyball.numerics.cone.rooms import rooms
+from flyball.numerics.cone.solve import solve
+from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
+
+GRADIENTS = {"jacobi": jacobi, "barzilai_borwein": barzilai_borwein, "apgd": apgd, "lean": lean}
+SOLVERS = {"gauss_seidel": gauss_seidel, **GRADIENTS}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_the_convex_form_is_solved(kind, name):
+    P, X, W, O, F = random_problem(2, **KINDS[kind])
+    _, DK, N, b = dense(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-10
+    solve(SOLVERS[name], P, X, W, O, F)
+    p = impulses(P, X)
+    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9
+    assert cone_lack(P, p, N @ p + b) < 1e-8 * (1 + abs(p).max())
+    after = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
+
+
+def pyramid_objective(N, b, mu, directions, outside):
+    """The least objective over pyramids in the cones or around them: non-negative least squares of SciPy."""
+    angle = 2 * np.pi * np.arange(directions) / directions
+    wide = 1 / np.cos(np.pi / directions) if outside else 1.0
+    edges = [np.array([np.ones(directions), m * wide * np.cos(angle), m * wide * np.sin(angle)]) for m in mu]
+    G = block_diag(*edges)
+    L = np.linalg.cholesky(N)
+    return 0.5 * nnls(L.T @ G, -np.linalg.solve(L, b), maxiter=10_000)[1] ** 2 - 0.5 * b @ np.linalg.solve(N, b)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pyramids_enclose_the_objective(seed):
+    """Over pyramids inside it is larger, over those around smaller, by no more than d^-2: an independent solver."""
+    P, X, W, O, F = random_problem(seed, nc=5, nn=5, soft=0.1)
+    _, _, N, b = dense(P, X)
+    N = N + 1e-9 * np.eye(len(N))
+    above, below = (pyramid_objective(N, b, P.mu, 64, outside) for outside in (False, True))
+    assert above - below < 5e-3 * abs(above)
+    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-10
+    for solver in SOLVERS.values():
+        Y = rooms(P)[0]
+        Y.v[:] = X.v
+        solve(solver, P, Y, W, O, F)
+        p = impulses(P, Y)
+        assert below - 1e-7 <= 0.5 * p @ N @ p + b @ p <= above + 1e-7
+
+
+@pytest.mark.parametrize("kind", ["nodes", "balls", "groups and lines"])
+@pytest.mark.parametrize("name", [n for n in SOLVERS if n != "barzilai_borwein"])
+def test_coulombs_law(name, kind):
+    """Where it converges it is Coulomb's law, by De Saxce's correction."""
+    fewer = {} if kind == "groups and lines" else {"nc": 5}
+    P, X, W, O, F = random_problem(4, **KINDS[kind], **fewer)
+    P.mu[:] *= 0.5
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.real[ENOUGH], O.count[COULOMB] = 50_000, 1e-10, 1
+    solve(SOLVERS[name], P, X, W, O, F)
+    assert O.count[ENDED] == CONVERGED
+    p = impulses(P, X)
+    assert cone_lack(P, p, N @ p + b, coulomb=True) < 1e-8
+
+
+def test_what_needs_an_objective_leaves_coulombs_law_alone():
+    P, X, W, O, F = random_problem(4)
+    before, O.count[COULOMB] = X.v.copy(), 1
+    assert solve(barzilai_borwein, P, X, W, O, F) == 0
+    assert O.count[ENDED] == BROKEN
+    np.testing.assert_array_equal(X.v, before)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_a_cut_solve_makes_no_energy(kind, name):
+    for most in (1, 3, 10):
+        P, X, W, O, F = random_problem(5, **KINDS[kind])
+        _, _, N, b = dense(P, X)
+        O.count[MOST] = most
+        X.p[:, 0] = 50.0
+        solve(SOLVERS[name], P, X, W, O, F)
+        p = impulses(P, X)
+        assert 0.5 * p @ N @ p + b @ p < 1e-10
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_the_units_of_residuals(name):
+    """Other units of length and mass: one residual is a velocity, the other a number."""
+    told = []
+    for length, mass in ((1.0, 1.0), (1e3, 1.0), (1.0, 1e-3)):
+        P, X, W, O, F = random_problem(6, nc=8)
+        P.arm[:] *= length
+        P.bias[:] *= length
+        P.node[:, 0] /= mass
+        P.node[:, 1:7] /= mass * length**2
+        X.v[:, :3] *= length
+        O.count[MOST], O.real[ENOUGH] = 20, 0.0
+        solve(SOLVERS[name], P, X, W, O, F)
+        told.append(O.real[[RESIDUAL, FORCE_RESIDUAL]] / [length, 1.0])
+    if name != "apgd":  # which takes N - 1 for a vector to start from, whatever the unit of 1
+        np.testing.assert_allclose(told[1:], [told[0]] * 2, rtol=1e-6)
+    assert (np.array(told) > 0).all()
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_a_warm_start_is_used(name):
+    """From the solution one iteration is enough."""
+    P, X, W, O, F = random_problem(7)
+    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-11
+    free = X.v.copy()
+    solve(SOLVERS[name], P, X, W, O, F)
+    X.v[:], O.real[ENOUGH] = free, 1e-9
+    assert solve(SOLVERS[name], P, X, W, O, F) <= 3
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_the_history_tells_every_iteration(name):
+    P, X, W, _, F = random_problem(3)
+    _, _, N, b = dense(P, X)
+    _, _, O, _ = rooms(P, history=40)
+    O.count[MOST], O.real[ENOUGH] = 40, 0.0
+    solve(SOLVERS[name], P, X, W, O, F)
+    p = impulses(P, X)
+    rows = O.history[: O.count[5]]
+    assert rows[-1, 1:3] == pytest.approx(O.real[[RESIDUAL, FORCE_RESIDUAL]])
+    assert rows[-1, 3] == pytest.approx(0.5 * p @ N @ p + b @ p)
+    assert rows[-1, 1] < 0.5 * rows[0, 1]
+
+
+@pytest.mark.parametrize("name", GRADIENTS)
+def test_an_island_alone(name):
+    P, X, W, O, F = random_problem(4, balls=True, nc=8, nn=6)
+    P.at[:4] = [[-1, 0], [0, 1], [1, 2], [-1, 2]]
+    P.at[4:] = [[-1, 3], [3, 4], [4, 5], [-1, 5]]
+    P = P._replace(island=np.array([0, 4, 8]), member_p=np.array([0, 3, 6]), line_p=np.zeros(3, np.int64))
+    both = rooms(P)[0]
+    both.v[:] = X.v
+    O.count[MOST], O.real[ENOUGH] = 10_000, 1e-13
+    solve(SOLVERS[name], P, both, W, O, F)
+    before = X.v.copy()
+    for island in (1, 0):
+        O.count[ISLAND] = island
+        solve(SOLVERS[name], P, X, W, O, F)
+        if island:
+            np.testing.assert_array_equal(X.v[:3], before[:3])
+    np.testing.assert_allclose(X.v, both.v, atol=1e-10)

@@ -1,0 +1,96 @@
+"""What is described of contact is what happens: belts, grains, materials, exclusions, planes that move."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+G = 9.81
+BOX = fb.Box(edges=(0.2, 0.2, 0.1))
+
+
+def floor(planar: bool = False, **fields: object) -> fb.Mechanism:
+    m = fb.Mechanism("floor", planar=planar, gravity=(0, -G) if planar else (0, 0, -G))
+    m.add(fb.Material("oak", **fields))
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1) if planar else None), material="oak"))
+    return m
+
+
+def box(name: str = "box", **fields: object) -> fb.Body:
+    return fb.Body(name, shape=BOX, density=500, **{"position": (0, 0, 0.05)} | fields)
+
+
+def test_a_belt_takes_things_along() -> None:
+    """At mu g up to the speed of the belt: after t1 = v / (mu g) it has come v t1 / 2 and rests on the belt."""
+    m = floor(friction=0.2, surface_velocity=(0, 1, 0))
+    m.add(box(), fb.Contact())
+    run = m.simulate(1.5)
+    t1 = 1 / (0.2 * G)
+    assert run["box"].velocity[-1] == pytest.approx([0, 1, 0], abs=1e-6)
+    assert run["box"].y[-1] == pytest.approx(t1 / 2 + (1.5 - t1), abs=5e-3)
+
+
+def test_friction_along_the_grain_and_across_it() -> None:
+    """v^2 / (2 mu g) to stop, with the friction of either direction; the grain turns with what bears it."""
+    m = floor(friction=(0.2, 0.4), grain=(1, 0, 0))
+    m.replace(fb.Ground("floor", shape=fb.Plane(), material="oak", orientation=(0, 0, np.pi / 2)))  # grain along y
+    m.add(box("along", velocity=(0, 1, 0), angular_velocity=(0, 0, 0)))
+    m.add(box("across", velocity=(1, 0, 0), angular_velocity=(0, 0, 0), position=(5, 0, 0.05)))
+    m.add(fb.Contact(between="floor", others=["along", "across"]))
+    run = m.simulate(1.0)
+    assert run["along"].y[-1] == pytest.approx(1 / (2 * 0.2 * G), rel=2e-2)
+    assert run["across"].x[-1] - 5 == pytest.approx(1 / (2 * 0.4 * G), rel=2e-2)
+
+
+def test_what_is_excluded_goes_through() -> None:
+    m = floor(friction=0.2)
+    m.add(box("a"), box("b", position=(1, 0, 0.05)), fb.Contact(friction=0.2, exclude=[("a", "floor")]))
+    run = m.simulate(0.5)
+    assert run["a"].z[-1] == pytest.approx(0.05 - G * 0.5**2 / 2, abs=1e-9)
+    assert run["b"].z[-1] == pytest.approx(0.05, abs=1e-5)
+
+
+def test_a_plane_that_moves() -> None:
+    """An elastic blow of 2 kg at 1 m/s on 1 kg at rest: 1/3 and 4/3 m/s."""
+    m = fb.Mechanism("board")
+    m.add(fb.Body("board", mass=2, inertia=(1, 1, 1), shape=fb.Plane(), velocity=(0, 0, 1), angular_velocity=(0, 0, 0)))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 0.5)))
+    m.add(fb.Contact(friction=0.3, restitution=1))
+    run = m.simulate(1.0)
+    assert run["board"].vz[-1] == pytest.approx(1 / 3)
+    assert run["ball"].vz[-1] == pytest.approx(4 / 3)
+
+
+def test_many_bodies_move_as_single_ones() -> None:
+    at = np.array([(0, 0, 0.1), (0.03, 0, 0.32), (0, 0.02, 0.6)])
+    one, many = floor(friction=0.3), floor(friction=0.3)
+    for k, p in enumerate(at):
+        one.add(fb.Body(f"b{k}", shape=fb.Sphere(radius=0.1), density=1000, position=p))
+    many.add(fb.Bodies("b", shape=fb.Sphere(radius=0.1), density=1000, position=at))
+    runs = []
+    for m in (one, many):
+        m.add(fb.Contact(friction=0.3))
+        runs.append(m.simulate(1.0))
+    for k in range(3):
+        assert runs[1][f"b[{k}]"].position[-1] == pytest.approx(runs[0][f"b{k}"].position[-1], abs=1e-9)
+
+
+def test_outlines_roll_and_rest_in_the_plane() -> None:
+    """A disc that spins backwards starts to roll at w r / 3; boxes and capsules come to lie."""
+    m = floor(planar=True, friction=0.3)
+    m.add(
+        fb.Bodies(
+            "discs", shape=fb.Cylinder(radius=0.1, length=0.1), density=1000, position=[(1, 0.1)], angular_velocity=-10
+        )
+    )
+    m.add(fb.Body("box", shape=fb.Box(edges=(0.4, 0.2, 0.1)), density=1000, position=(-1, 0.3), angle=0.3))
+    bar = fb.Capsule(radius=0.1, length=0.3, orientation=(0, np.pi / 2, 0))
+    m.add(fb.Body("bar", shape=bar, density=1000, position=(-2, 0.3), angle=0.3))
+    m.add(fb.Contact(friction=0.3))
+    run = m.simulate(2.0)
+    assert run["discs[0]"].velocity[-1] == pytest.approx([1 / 3, 0], abs=1e-6)
+    for name in ("box", "bar"):
+        assert run[name].y[-1] == pytest.approx(0.1, abs=1e-5)
+        assert run[name].angle[-1] == pytest.approx(0.0, abs=1e-5)
