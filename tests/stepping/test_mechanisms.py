@@ -88,3 +88,19 @@ def test_a_force_that_is_no_number_is_told():
     m.add(fb.Actuator("push", "rail.displacement", force="sqrt(0.2 - t)"))
     with pytest.raises(fb.SimulationError, match=r"cannot go on at t = 0\.2"):
         m.simulate(1.0, outputs=11)
+
+
+def test_newtons_cradle_on_joints():
+    """Impacts one after the other: the last of five leaves with the first one's speed."""
+    m = fb.Mechanism("cradle", planar=True, gravity=(0, -G))
+    m.add(fb.Contact(friction=0.2, restitution=1.0))
+    for k in range(5):
+        a = 0.3 if k == 0 else 0.0
+        x = 0.1 * k
+        shape = fb.Sphere(radius=0.05)
+        m.add(fb.Body(f"b{k}", mass=1.0, inertia=1e-6, position=(x - np.sin(a), -np.cos(a)), angle=-a, shape=shape))
+        m.add(fb.Revolute(f"j{k}", "ground", f"b{k}", at=(x, 0)))
+    r = m.simulate(0.75, outputs=31, method=fb.Impulse(step=1e-3, impacts="sequential"))
+    fast = [np.abs(r[f"b{k}"].velocity[:, 0]).max() for k in range(5)]
+    assert fast[4] == pytest.approx(2 * np.sqrt(G) * np.sin(0.15), rel=1e-3)
+    assert max(fast[1:4]) < 0.01 * fast[4]
