@@ -100,7 +100,7 @@ def test_newtons_cradle_on_joints():
         shape = fb.Sphere(radius=0.05)
         m.add(fb.Body(f"b{k}", mass=1.0, inertia=1e-6, position=(x - np.sin(a), -np.cos(a)), angle=-a, shape=shape))
         m.add(fb.Revolute(f"j{k}", "ground", f"b{k}", at=(x, 0)))
-    r = m.simulate(0.75, outputs=31, method=fb.Impulse(step=1e-3, impacts="sequential"))
+    r = m.simulate(0.75, outputs=301, method=fb.Impulse(step=1e-3, impacts="sequential"))
     fast = [np.abs(r[f"b{k}"].velocity[:, 0]).max() for k in range(5)]
     assert fast[4] == pytest.approx(2 * np.sqrt(G) * np.sin(0.15), rel=1e-3)
     assert max(fast[1:4]) < 0.01 * fast[4]
