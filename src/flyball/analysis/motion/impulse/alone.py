@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ....forces.coordinate_spring import CoordinateSpring
+from ....forces.coordinate_spring import measuring
 from ....model.model import Model
 from ....tables.contact.stops import stops
 from ....tables.values import Values
@@ -20,7 +20,7 @@ def with_stops(model: Model) -> Model:
     limits, out.limits = list(out.limits), []
     for e in limits:
         del out.by_name[e.name]
-        out.add(CoordinateSpring(e.name, e.coordinate))
+        out.add(measuring(e.name, e.coordinate))
     return out.snapshot()
 
 

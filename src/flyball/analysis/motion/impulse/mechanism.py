@@ -9,8 +9,6 @@ import numpy as np
 from ....equations.engine import Sheet
 from ....equations.projection import STEPS
 from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
-from ....forces.joint_friction import JointFriction
-from ....forces.rope import Rope
 from ....model.force import CoordinateForce, TwoPointForce
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from ....numerics.integrators.tableaux import tableau
@@ -93,11 +91,11 @@ def lines(s: Structure, S: System, stops: Mapping[str, Stop]) -> tuple[np.ndarra
         if e.name in stops:
             kind = STOP
             x[[LEAST, MOST_AT, REBOUND]] = stops[e.name]
-        elif isinstance(e, Rope):
+        elif e.single == "rope":
             kind = ROPE
             x[[ROPE_K, ROPE_C, SHORTEST]] = S.force_x[k, :3]
             S.force_x[k, :2] = 0.0
-        elif isinstance(e, JointFriction):
+        elif e.single == "friction":
             kind = FRICTION
             x[LEAST] = S.force_x[k, 0]
             S.force_x[k, 0] = 0.0
