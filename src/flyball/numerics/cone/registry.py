@@ -8,14 +8,26 @@ import numpy as np
 
 from ...compiler.door import Door
 from .admm import admm
+from .apgd import apgd
+from .barzilai_borwein import barzilai_borwein
 from .choose import DOORS, LIMITS, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, SMALL_ISLANDS, THE_REST, TOLD, Auto, auto
 from .gauss_seidel import gauss_seidel
 from .islands import room_for_islands
+from .jacobi import jacobi
+from .lean import lean
 from .newton import newton
 from .problem import Choices, Factor, Problem, Scratch, State
 from .rooms import rooms, unfilled
 
-SOLVERS: dict[str, Door] = {"gauss-seidel": gauss_seidel, "newton": newton, "admm": admm}
+SOLVERS: dict[str, Door] = {
+    "gauss-seidel": gauss_seidel,
+    "newton": newton,
+    "jacobi": jacobi,
+    "barzilai-borwein": barzilai_borwein,
+    "apgd": apgd,
+    "apgd-lean": lean,
+    "admm": admm,
+}
 FACTORED = {"newton", "admm"}  # those that want `Factor`: each island by itself, the rest to sweeps where it cannot
 
 # islands up to this size go to Newton, contacts and nodes: with masses that are alike, where 50 sweeps take as long as
