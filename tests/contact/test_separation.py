@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import BOX, ELLIPSOID, HULL, SPHERE
+from flyball.contact.kinds import BOX, ELLIPSOID, HEMISPHERE, HULL, SPHERE
 from tests.contact.pairs import separations
 from tests.contact.scenes import geometry, turned
 
@@ -31,6 +31,8 @@ def farthest(shape, d):
     kind, par, *more = shape
     if kind == HULL:
         return np.max(more[0] @ d)
+    if kind == HEMISPHERE:
+        return par[0] * (1 if d[2] > 0 else np.hypot(d[0], d[1]))
     return {SPHERE: 0.0, BOX: np.abs(d) @ par, ELLIPSOID: np.linalg.norm(par * d)}[kind]
 
 
@@ -44,6 +46,8 @@ def outside(shape, x):
         return np.max(e[:, :3] @ x + e[:, 3])
     if kind == BOX:
         return np.max(np.abs(x) - par)
+    if kind == HEMISPHERE:
+        return max(np.linalg.norm(x) - par[0], -x[2])
     return np.linalg.norm(x / par) - 1 if kind == ELLIPSOID else np.linalg.norm(x)
 
 
@@ -54,7 +58,7 @@ def some(kind, rng):
 
 
 @pytest.mark.parametrize("a", [BOX, ELLIPSOID, HULL, SPHERE])
-@pytest.mark.parametrize("b", [BOX, ELLIPSOID, HULL])
+@pytest.mark.parametrize("b", [BOX, ELLIPSOID, HULL, HEMISPHERE])
 def test_distance_is_proved_from_both_sides(a, b):
     """The points found belong to the shapes; the direction found holds the shapes apart by as much as the points are."""
     rng = np.random.default_rng(4)

@@ -13,7 +13,6 @@ from flyball.tables.contact import touching
 from flyball.tables.numbers import numbers
 from tests.model.test_shapes import SAMPLES
 
-SAMPLES = [s for s in SAMPLES if not isinstance(s, (fb.Hull, fb.Mesh, fb.Prism, fb.Hemisphere))]
 FORMLESS = {"Torus"}
 FLAT = {"Torus", "Ellipsoid"}  # without an outline
 SOME = {"position": (0.3, -0.2, 0.5), "orientation": (0.3, -0.7, 0.4)}
@@ -37,6 +36,7 @@ def far(G: ct.Geometry, i: int, d: np.ndarray) -> float:
             kinds.ELLIPSOID: lambda: np.sqrt((par[:3] ** 2) @ u**2),
             kinds.HULL: lambda: par[0] + (vertex @ u).max(),
             kinds.POLYGON: lambda: par[0] + (vertex @ u).max(),
+            kinds.HEMISPHERE: lambda: par[0] * (1.0 if u[2] > 0 else across),
         }[kind]()
     )
 
@@ -121,3 +121,22 @@ def test_a_landscape() -> None:
     v, f = m["hills"].shape.surface(fb.model.element.resolve(m["hills"].shape, {}))
     a, b, c = (v[f[:, k]] for k in range(3))
     assert (np.cross(b - a, c - a)[:, 2] > 0).all()
+
+
+def test_many_hulls_of_many_sizes() -> None:
+    """Corners of each size are corners of its own; normals do not grow."""
+    points = rng.normal(size=(12, 3))
+    sizes = np.array([1.0, 2.0, 0.5])
+    m = fb.Mechanism("stones")
+    m.add(fb.Bodies("stones", shape=fb.Hull(vertices=points), density=2000, position=np.zeros((3, 3)), scale=sizes))
+    m.add(fb.Contact(friction=0.5))
+    t = touching(m.snapshot(), numbers(m), ["stones"])
+    com = t.carriers.com["stones"]
+    for k, s in enumerate(sizes):
+        d = rng.normal(size=3)
+        assert far(t.geometry, k, d) == pytest.approx(s * ((points - com) @ d).max())
+    equal = fb.Mechanism("stones")
+    equal.add(fb.Bodies("stones", shape=fb.Hull(vertices=points), density=2000, position=np.zeros((100, 3))))
+    equal.add(fb.Contact(friction=0.5))
+    one = touching(equal.snapshot(), numbers(equal), ["stones"])
+    assert len(one.geometry.vertex) * 3 == len(t.geometry.vertex)

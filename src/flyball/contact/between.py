@@ -1,19 +1,43 @@
-"""The narrow phase behind a door: the search is compiled without it, and a pile of spheres never compiles it."""
+"""The narrow phase behind doors: the search is compiled without it, and nobody compiles shapes that are not there.
+
+Each door writes the contacts of the two shapes that ``B`` names into its ``room`` and returns how many; C and D are not
+read.
+"""
 
 from __future__ import annotations
 
-from ..compiler.door import door
+from ..compiler.door import Door, door
 from .desk import ASKED_1, ASKED_2, REACH
-from .narrow import collide
+from .kinds import FIELD, PLANAR
+from .narrow import collide, collide_convex, collide_planar
 
 
 @door
 def between(G, M, B, C, D, task):
-    """Contacts of the two shapes that ``B`` names, into its ``room``: how many; C and D are not read."""
+    """Of any kind."""
     return collide(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
+
+
+@door
+def between_convex(G, M, B, C, D, task):
+    """Of convex kinds."""
+    return collide_convex(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
+
+
+@door
+def between_planar(G, M, B, C, D, task):
+    """Of the kinds of planar mechanisms."""
+    return collide_planar(G, M, B.count[ASKED_1], B.count[ASKED_2], B.real[REACH], B.room)
 
 
 @door
 def nothing(G, M, B, C, D, task):
     """No contacts: stands for `between` where no pair asks for it."""
     return 0
+
+
+def door_for(kinds: set[int]) -> Door:
+    """The one to compile for shapes of these kinds."""
+    if kinds <= PLANAR:
+        return between_planar
+    return between if FIELD in kinds else between_convex

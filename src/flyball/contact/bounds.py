@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HULL, POLYGON, SPHERE
+from .kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, POLYGON, SPHERE
 from .tables import AXES, COUNT, FIRST, KIND, PAR, PLACE, RADIUS, Geometry
 
 
@@ -26,6 +26,7 @@ def holds(G: Geometry) -> np.ndarray:
     for of, columns in _COLUMNS.items():
         half[kind == of] = np.stack(columns(*par[kind == of].T), axis=1)
     middle[kind == CONE, 2] = 0.5 * par[kind == CONE, 1]
+    middle[kind == HEMISPHERE, 2] = 0.5 * par[kind == HEMISPHERE, 0]
     for i in np.flatnonzero((kind == HULL) | (kind == POLYGON)):
         first, count = G.shape_i[i, [FIRST, COUNT]]
         vertices = G.vertex[first : first + count]
@@ -51,4 +52,5 @@ _COLUMNS = {  # half edges from the parameters
     CAPSULE: lambda r, h, z: (r, r, r + h),
     CYLINDER: lambda r, h, z: (r, r, h),
     CONE: lambda r, h, z: (r, r, 0.5 * h),
+    HEMISPHERE: lambda r, a, b: (r, r, 0.5 * r),
 }

@@ -167,14 +167,15 @@ class Finder:
 
     def _door(self) -> int:
         """Address of the search; the narrow phase is compiled only where a pair may ask for it."""
-        from .between import between, nothing
+        from .between import door_for, nothing
 
         G, B = self.geometry, self.search
         tuples = (G, no_movers(0), B, B, B)
         nothing.address(*tuples)
         bounded = np.isfinite(B.hold[:, 3])
         simple = (G.shape_i[:, KIND] == SPHERE) | (~bounded & (G.shape_i[:, KIND] == PLANE))
-        B.count[NARROW] = (nothing if simple.all() else between).address(*tuples)
+        narrow = nothing if simple.all() else door_for(set(G.shape_i[:, KIND].tolist()))
+        B.count[NARROW] = narrow.address(*tuples)
         return search.address(G, no_movers(0), self.now, self.before, B)
 
     def find(self, movers: Movers, afresh: bool = False) -> Contacts:

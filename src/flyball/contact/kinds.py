@@ -16,6 +16,7 @@ kind  name       parameters, in the shape's axes
 7     FIELD      a height field (`shapes/field.py`)
 8     POLYGON    rounding radius; a convex polygon in z = 0, vertices counter-clockwise about z; one of two is a segment
 9     ELLIPSOID  three half axes
+10    HEMISPHERE radius; its flat side in z = 0, its dome towards +z
 ====  =========  =====================================================================================================
 
 In planar mechanisms circles are SPHERE, and what has corners is POLYGON; a PLANE's z axis lies in the plane there.
@@ -23,5 +24,7 @@ In planar mechanisms circles are SPHERE, and what has corners is POLYGON; a PLAN
 
 from __future__ import annotations
 
-SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID = range(10)
+SPHERE, PLANE, BOX, CAPSULE, CYLINDER, CONE, HULL, FIELD, POLYGON, ELLIPSOID, HEMISPHERE = range(11)
 """Numbers of the kinds; a further kind takes the next one."""
+PLANAR = frozenset((SPHERE, PLANE, POLYGON))
+"""Kinds of planar mechanisms."""

@@ -15,7 +15,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, mm, mtv, mv, neg, put3, scale, sub, transpose
-from ..kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
+from ..kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, SPHERE
 from ..manifold import NEAREST_NAME, manifold
 from ..patch import ALIKE, KEPT, gather, holds, lay, over, ridged, thin_out
 from ..room import CORNERS, FACE_2, NEAREST, PIECE
@@ -24,7 +24,7 @@ from ..shapes.field import grid, height
 from ..surface import face, radius, support
 from ..tables import KIND
 
-PAIRS = (*((k, FIELD) for k in (SPHERE, BOX, CAPSULE, CYLINDER, CONE, HULL)), (FIELD, ELLIPSOID))
+PAIRS = (*((k, FIELD) for k in (SPHERE, BOX, CAPSULE, CYLINDER, CONE, HULL)), (FIELD, ELLIPSOID), (FIELD, HEMISPHERE))
 ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PLACES = 4.0 * CORNERS
 LATER = 2.0**45

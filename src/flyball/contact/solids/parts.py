@@ -21,6 +21,7 @@ from .hull import Hull, hull
 TOLERANCE = 0.02  # of the size: how far a part may reach beyond the solid
 MOST = 64  # parts
 TRIED = 10  # planes a cut
+INNER = 0.999  # winding number of what is inside, not on the surface
 SAME = 1e-7  # of the size: what counts as on a plane
 
 
@@ -90,7 +91,7 @@ def parts(vertices: np.ndarray, faces: np.ndarray, tolerance: float | None = Non
         if pieces[worst].beyond <= enough:
             break
         halves = _cut(pieces[worst], solid, enough, size)
-        if halves is None:
+        if not halves:
             break
         pieces[worst : worst + 1] = halves
     return Parts(tuple(p.hull for p in pieces if p.hull is not None), max(p.beyond for p in pieces))
@@ -128,37 +129,36 @@ def _ahead(body: Hull, points: np.ndarray, n: np.ndarray, thick: float) -> np.nd
 def _points(piece: _Piece, solid: np.ndarray, size: float) -> np.ndarray:
     """Corners of its region that are inside the solid."""
     x = corners_of(piece.planes, SAME * size)
-    return x[winding(x, solid) > 0.5]
+    return x[winding(x, solid) > INNER]
 
 
-def _cut(piece: _Piece, solid: np.ndarray, enough: float, size: float) -> list[_Piece] | None:
-    """The two halves along the best plane, or nothing where no plane leaves two."""
-    best, least = None, np.inf
+def _cut(piece: _Piece, solid: np.ndarray, enough: float, size: float) -> list[_Piece]:
+    """The two halves along the best plane, or nothing where no plane makes both smaller."""
+    best: list[tuple[_Piece, np.ndarray]] = []
+    whole = piece.hull.volume if piece.hull is not None else 0.0
+    least = 2 * whole
     for plane in _cutting(piece, enough, size):
-        halves, cost = [], 0.0
+        halves, rooms = [], []
         for side in (plane, -plane):
             half = _Piece(clipped(piece.triangles, side, SAME * size), np.concatenate([piece.planes, side[None]]))
-            more = _points(half, solid, size)
-            halves.append((half, more))
-            cost += _room(np.concatenate([half.triangles.reshape(-1, 3), more]), SLIVER * size**3)
-        if cost < least * (1 - 1e-9):
-            best, least = halves, cost
-    if best is None:
-        return None
+            halves.append((half, _points(half, solid, size)))
+            rooms.append(_room(np.concatenate([half.triangles.reshape(-1, 3), halves[-1][1]]), SLIVER * size**3))
+        if sum(rooms) < least * (1 - 1e-9) and max(rooms) < whole * (1 - 1e-6):
+            best, least = halves, sum(rooms)
     for half, more in best:
         _close(half, size, more)
-    return [half for half, _ in best]
+    return [half for half, _ in best if half.hull is not None]
 
 
 def _room(points: np.ndarray, least: float) -> float:
-    """Volume of the hull of points; inf where there is none."""
+    """Volume of the hull of points; 0 where there is none."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
         volume = float(ConvexHull(points).volume)
     except (QhullError, ValueError):
-        return np.inf
-    return volume if volume > least else np.inf
+        return 0.0
+    return volume if volume > least else 0.0
 
 
 def _cutting(piece: _Piece, enough: float, size: float) -> Iterator[np.ndarray]:

@@ -17,7 +17,8 @@ class Form:
     Attributes
     ----------
     kind : str
-        ``"SPHERE"``, ``"BOX"``, ...
+        ``"SPHERE"``, ``"BOX"``, ...; ``"MESH"`` is a closed surface, whose triangles stand in ``face``, and ``"HULL"``
+        with one parameter the hull of ``vertex``: `tables/contact/solids.py` makes finished hulls of these.
     par : tuple of float
         Parameters of its kind.
     reach : float
@@ -58,3 +59,9 @@ class Form:
         vertex = np.tile(np.asarray(self.vertex, float), (len(sizes), 1, 1))
         vertex[:, : self.corners] *= sizes[:, None, None]
         return par, vertex.reshape(-1, 3)
+
+
+def surface_form(surface: tuple[np.ndarray, np.ndarray]) -> Form:
+    """What a closed surface, vertices (k, 3) and triangles (m, 3), is a description of; not yet in convex parts."""
+    v, f = np.real(surface[0]), np.asarray(surface[1], np.int64)
+    return Form("MESH", (), np.sqrt((v**2).sum(axis=1)).max(), vertex=v, face=f.ravel())

@@ -9,9 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..element import element
+from .form import Form
+from .outline import ALONG, circle, polygon
 from .solid import FINE
 from .sphere import Sphere
 from .surface import arc, lathe, on_axis
+
+OUTLINE = 128  # corners of a circle's outline
 
 
 @element
@@ -30,6 +34,17 @@ class Hemisphere(Sphere):
         """2/5 r^2 about every diameter of the whole ball; across, moved to the centre of mass: 83/320 r^2."""
         k = 83 / 320 * n.radius**2
         return k, k, 0.4 * n.radius**2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Itself."""
+        return (Form("HEMISPHERE", (n.radius,), n.radius),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Seen along its axis a circle; else a polygon about half a circle, or about what is between."""
+        p, R = self.pose(n)
+        if np.hypot(*R[:2, 2]) < ALONG:
+            return (circle(n.radius, p),)
+        return (polygon(p + self.surface(n, OUTLINE)[0] @ R.T),)
 
     def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
         """The flat side and the dome."""

@@ -18,6 +18,7 @@ from pydantic import BeforeValidator
 
 from ...errors import ModelError
 from ..element import Length, element, positive
+from .form import Form, surface_form
 from .polyhedron import Integrals, flaws, integrals, welded
 from .solid import FINE, Solid
 
@@ -222,6 +223,28 @@ class Mesh(Solid):
     def gyration(self, n: SimpleNamespace) -> Any:
         """By Gauss's theorem; its axes need not be principal ones."""
         return self._integrals().gyration * n.scale**2
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Its surface, from which convex parts are made.
+
+        Raises
+        ------
+        ModelError
+            If it is not closed.
+        """
+        return (surface_form(self._closed(self.surface(n))),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """The outlines of its convex parts."""
+        return (surface_form(self._closed(self.mesh(n))),)
+
+    def _closed(self, surface: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        if flaw := self.triangulation.flaws:
+            raise ModelError(
+                f"{self.title}: it cannot touch anything, since {flaw}. Close it, or give it contact=False and a "
+                f"simpler shape beside it"
+            )
+        return surface
 
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """Edges of the box around it."""

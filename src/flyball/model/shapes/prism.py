@@ -9,6 +9,7 @@ import numpy as np
 
 from ...errors import ModelError
 from ..element import Length, Numbers, Unit, element, positive
+from .form import Form, surface_form
 from .solid import FINE, Solid
 from .surface import cross, extrude
 
@@ -74,6 +75,14 @@ class Prism(Solid):
     def size(self, n: SimpleNamespace) -> tuple[float, ...]:
         """The thickness."""
         return (n.thickness,)
+
+    def forms(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """Its surface: one convex part, or several."""
+        return (surface_form(self.surface(n)),)
+
+    def outlines(self, n: SimpleNamespace) -> tuple[Form, ...]:
+        """The outline of each part."""
+        return (surface_form(self.mesh(n)),)
 
     def surface(self, n: SimpleNamespace, fine: int = FINE) -> tuple[np.ndarray, np.ndarray]:
         """The outline, extruded."""

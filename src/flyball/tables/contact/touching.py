@@ -23,6 +23,7 @@ from ..numbers import Numbers
 from .carriers import Carriers, carriers
 from .groups import Groups, groups
 from .pairs import Surface, own_of, pairs
+from .solids import finished, outlined
 
 
 @dataclass(frozen=True)
@@ -152,9 +153,9 @@ class _Rows:
         n = resolve(s, self.given.env)
         try:
             if self.model.planar:
-                return list(s.outlines(n))
+                return [g for f in s.outlines(n) for g in outlined(f)]
             p, R = s.pose(n)
-            return [f.carried(p, R) for f in s.forms(n)]
+            return [g.carried(p, R) for f in s.forms(n) for g in finished(f)]
         except ModelError as error:
             raise type(error)(f"{e.title}: {error}") from None
 
