@@ -7,8 +7,8 @@ import math
 
 import flyball as fb
 
-SIDE, THICK, HIGH = 0.3, 0.01, 0.02  # of the board and its walls [m]
-RADIUS = 0.006  # of the ball
+SIDE, THICK, HIGH = 0.3, 0.01, 0.014  # of the board and its walls [m]
+RADIUS = 0.012  # of the ball
 WALLS = (  # middle x, y; length, direction
     (0.0, SIDE / 2, SIDE, "x"),
     (0.0, -SIDE / 2, SIDE, "x"),
@@ -28,8 +28,8 @@ def mechanism(tilt: float = 0.08) -> fb.Mechanism:
     board = fb.Box(edges=(SIDE + THICK, SIDE + THICK, THICK), position=(0, 0, -THICK / 2))
     start = (-SIDE / 2 + 0.03, SIDE / 2 - 0.03, RADIUS)
     m.add(
-        fb.Body("board", shape=(board, *walls), density=600, color="#c9a11f"),
-        fb.Body("ball", shape=fb.Sphere(radius=RADIUS), density=7800, position=start, color="#5b6b7c"),
+        fb.Body("board", shape=(board, *walls), density=600, color="#d8b98c"),
+        fb.Body("ball", shape=fb.Sphere(radius=RADIUS), density=7800, position=start, color="#2f6fb7"),
         fb.Universal("gimbal", "ground", "board", at=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0))),
         fb.Driver("about x", "gimbal.angle_1", "0.7*tilt*(1 - cos(0.5*t))"),
         fb.Driver("about y", "gimbal.angle_2", f"tilt*sin({math.pi / 2:.6f}*t)"),

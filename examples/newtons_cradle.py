@@ -1,6 +1,6 @@
 """Newton's cradle: one ball comes down on four that hang in a row, and the one at the other end flies off.
 
-Of the many ways to keep momentum and energy among balls that touch, the cradle takes the one in which each ball hits the
+Of the many ways to keep momentum and energy among balls that touch, the cradle takes that in which each ball hits the
 next: ``impacts="sequential"``.
 
 Run it with ``python examples/newtons_cradle.py cradle.html``.
