@@ -52,6 +52,22 @@ def test_a_cut_solve_makes_no_energy(kind, coulomb, most):
     assert 0.5 * p @ N @ p + b @ p < 1e-10
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("coulomb", [0, 1])
+def test_a_start_outside_of_the_cone(kind, coulomb):
+    """What is handed back is what acts: friction without a normal impulse once stayed, unfelt, and grew."""
+    P, X, W, O, F = random_problem(6, **KINDS[kind])
+    _, DK, _, _ = dense(P, X)
+    free = np.concatenate([X.v[:, :6].ravel(), X.wide])
+    X.p[:] = np.random.default_rng(0).standard_normal(X.p.shape)
+    X.p[::2, 0] = 0.0
+    O.count[MOST], O.count[COULOMB] = 3, coulomb
+    solve(gauss_seidel, P, X, W, O, F)
+    p, after = impulses(P, X), np.concatenate([X.v[:, :6].ravel(), X.wide])
+    np.testing.assert_allclose(after, free + DK.T @ p, atol=1e-12 * (1 + abs(p).max()))
+    assert (np.hypot(X.p[:, 1], X.p[:, 2]) <= P.mu * X.p[:, 0] * (1 + 1e-12)).all()
+
+
 def on_a_slope(angle, mu, h=1e-2, g=9.81):
     """A ball of 2 kg and 0.1 m at rest on a slope, one step of gravity."""
     P = unfilled(1, 1)

@@ -1,8 +1,9 @@
-"""Sparse Cholesky factor of a symmetric positive definite matrix of 6 x 6 blocks, order and pattern found on the spot.
+"""Sparse factor L U of a matrix of 6 x 6 blocks with a symmetric pattern, order and pattern found on the spot.
 
 Which bodies touch changes from step to step, so the pattern is found in compiled code: minimum degree on the explicit
 elimination graph (the fill is made as it arises; Rose 1972), then a right-looking factor whose inner products are of
-fixed size. Blocks outside the diagonal stand by columns, rows of a column ascending in the order of elimination.
+fixed size. Blocks outside the diagonal stand by columns, rows of a column ascending in the order of elimination. There
+is no pivoting: matrices here are 1 and something positive semidefinite, or not far from that.
 """
 
 from __future__ import annotations
@@ -90,95 +91,112 @@ def entry_of(Lp, Li, row, column):
 
 
 @formula
-def cholesky_six(D, d):
-    """Factor the block at d in place: L below, its diagonal inverted. False if a pivot is not positive."""
+def factor_six(D, d):
+    """Factor the block at d in place: unit L below, U above, its diagonal inverted. False if a pivot is 0 or nan."""
     for c in range(SIX):
-        s = D[d + SIX * c + c]
-        for k in range(c):
-            s -= D[d + SIX * c + k] * D[d + SIX * c + k]
-        if not s > 0.0:
+        o = d + SIX * c
+        if not abs(D[o + c]) > 0.0:
             return False
-        s = 1.0 / s**0.5
-        D[d + SIX * c + c] = s
+        inverse = 1.0 / D[o + c]
+        D[o + c] = inverse
         for r in range(c + 1, SIX):
-            t = D[d + SIX * r + c]
-            for k in range(c):
-                t -= D[d + SIX * r + k] * D[d + SIX * c + k]
-            D[d + SIX * r + c] = t * s
+            b = d + SIX * r
+            l = D[b + c] * inverse
+            D[b + c] = l
+            for k in range(c + 1, SIX):
+                D[b + k] -= l * D[o + k]
     return True
 
 
 @formula
 def divide(L, e, D, d):
-    """Block e of L becomes itself times the transposed inverse of the factor at d."""
+    """Block e becomes itself times the inverse of U at d."""
     for r in range(SIX):
+        o = e + SIX * r
         for c in range(SIX):
-            s = L[e + SIX * r + c]
+            s = L[o + c]
             for k in range(c):
-                s -= L[e + SIX * r + k] * D[d + SIX * c + k]
-            L[e + SIX * r + c] = s * D[d + SIX * c + c]
+                s -= L[o + k] * D[d + SIX * k + c]
+            L[o + c] = s * D[d + SIX * c + c]
+
+
+@formula
+def divide_above(L, e, u, D, d, symmetric):
+    """Block u becomes the inverse of L at d times itself; for a symmetric matrix that is what `divide` made of e."""
+    for r in range(SIX):
+        o = u + SIX * r
+        for c in range(SIX):
+            if symmetric:
+                L[o + c] = L[e + SIX * c + r] / D[d + SIX * r + r]
+            else:
+                for k in range(r):
+                    L[o + c] -= D[d + SIX * r + k] * L[u + SIX * k + c]
 
 
 @formula
 def subtract_product(C, c, A, a, b):
-    """Block c of C less block a of A times the transpose of its block b."""
+    """Block c of C less block a of A times its block b."""
     for r in range(SIX):
-        a0, a1, a2 = A[a + SIX * r], A[a + SIX * r + 1], A[a + SIX * r + 2]
-        a3, a4, a5 = A[a + SIX * r + 3], A[a + SIX * r + 4], A[a + SIX * r + 5]
-        for j in range(SIX):
-            o = b + SIX * j
-            C[c + SIX * r + j] -= (
-                a0 * A[o] + a1 * A[o + 1] + a2 * A[o + 2] + a3 * A[o + 3] + a4 * A[o + 4] + a5 * A[o + 5]
+        o, p = a + SIX * r, c + SIX * r
+        a0, a1, a2, a3, a4, a5 = A[o], A[o + 1], A[o + 2], A[o + 3], A[o + 4], A[o + 5]
+        for j in range(b, b + SIX):
+            C[p + j - b] -= (
+                a0 * A[j] + a1 * A[j + 6] + a2 * A[j + 12] + a3 * A[j + 18] + a4 * A[j + 24] + a5 * A[j + 30]
             )
 
 
 @formula
-def factor(n, Lp, Li, D, L):
-    """Factor in place; diagonal blocks in D by place, the others in L. False if the matrix is not positive definite."""
+def factor(n, Lp, Li, D, L, symmetric):
+    """Factor in place; diagonal blocks in D by place, those below it in L, those above it behind them.
+
+    Of a symmetric matrix what is above need not be filled. False if a pivot is 0.
+    """
+    above = BLOCK * Lp[n]
     for k in range(n):
-        if not cholesky_six(D, BLOCK * k):
+        if not factor_six(D, BLOCK * k):
             return False
-        for e in range(Lp[k], Lp[k + 1]):
+        last = Lp[k + 1]
+        for e in range(Lp[k], last):
             divide(L, BLOCK * e, D, BLOCK * k)
-        for e in range(Lp[k], Lp[k + 1]):
-            column = Li[e]
-            subtract_product(D, BLOCK * column, L, BLOCK * e, BLOCK * e)
-            t = Lp[column]
-            for f in range(e + 1, Lp[k + 1]):
+            divide_above(L, BLOCK * e, above + BLOCK * e, D, BLOCK * k, symmetric)
+        for e in range(Lp[k], last):
+            subtract_product(D, BLOCK * Li[e], L, BLOCK * e, above + BLOCK * e)
+            t = Lp[Li[e]]
+            for f in range(e + 1, last):
                 while Li[t] != Li[f]:
                     t += 1
-                subtract_product(L, BLOCK * t, L, BLOCK * f, BLOCK * e)
+                subtract_product(L, BLOCK * t, L, BLOCK * f, above + BLOCK * e)
+                if not symmetric:
+                    subtract_product(L, above + BLOCK * t, L, BLOCK * e, above + BLOCK * f)
     return True
 
 
 @formula
 def solve(n, Lp, Li, D, L, x):
     """Solve in place; x by places, six numbers each."""
+    above = BLOCK * Lp[n]
     for k in range(n):
         d, o = BLOCK * k, SIX * k
         for r in range(SIX):
-            s = x[o + r]
             for c in range(r):
-                s -= D[d + SIX * r + c] * x[o + c]
-            x[o + r] = s * D[d + SIX * r + r]
+                x[o + r] -= D[d + SIX * r + c] * x[o + c]
         for e in range(Lp[k], Lp[k + 1]):
-            i, b = SIX * Li[e], BLOCK * e
-            for r in range(SIX):
-                s = x[i + r]
-                for c in range(SIX):
-                    s -= L[b + SIX * r + c] * x[o + c]
-                x[i + r] = s
+            multiply(L, BLOCK * e, x, SIX * Li[e], o)
     for k in range(n - 1, -1, -1):
         d, o = BLOCK * k, SIX * k
         for e in range(Lp[k], Lp[k + 1]):
-            i, b = SIX * Li[e], BLOCK * e
-            for c in range(SIX):
-                s = x[o + c]
-                for r in range(SIX):
-                    s -= L[b + SIX * r + c] * x[i + r]
-                x[o + c] = s
+            multiply(L, above + BLOCK * e, x, o, SIX * Li[e])
         for r in range(SIX - 1, -1, -1):
             s = x[o + r]
             for c in range(r + 1, SIX):
-                s -= D[d + SIX * c + r] * x[o + c]
+                s -= D[d + SIX * r + c] * x[o + c]
             x[o + r] = s * D[d + SIX * r + r]
+
+
+@formula
+def multiply(L, e, x, i, j):
+    """The six of x at i less block e times the six at j."""
+    for r in range(SIX):
+        o = e + SIX * r
+        for c in range(SIX):
+            x[i + r] -= L[o + c] * x[j + c]

@@ -92,6 +92,8 @@ def copy_line(P, X, Q, Y, line, k):
 def small(P, F, I, k):
     """Whether island k is for the solver of small islands."""
     contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
+    if P.turn.shape[0] > 0:
+        return False
     return contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]
 
 
@@ -176,7 +178,7 @@ def by_one(P, X, W, O, F, f):
 @formula
 def one_by_one(P, X, Y, W, O, F, f, count, some):
     """Islands each by its solver, on the copy."""
-    Q, I = held(F.P), held(F.islands)
+    Q, I = F.P, F.islands
     lay_out(P, X, Q, Y, F, I, count, some)
     sofar = (0.0, 0.0, 0, 0)
     for k in range(some):
@@ -195,7 +197,7 @@ def one_by_one(P, X, Y, W, O, F, f, count, some):
 @formula
 def solve_all(P, X, W, O, F):
     """See `auto`."""
-    f, I = held(Factor(F.numbers[:], F.places[:])), held(F.islands)
+    f, I = held(Factor(F.numbers[:], F.places[:])), F.islands
     O.count[USED], O.count[ENDED], O.count[ISLAND] = 0, CONVERGED, -1
     O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = 0.0, 0.0
     nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
@@ -206,7 +208,7 @@ def solve_all(P, X, W, O, F):
     elif count == 1:
         by_one(P, X, W, O, F, f)
     else:
-        one_by_one(P, X, held(State(F.X.p, F.X.torque, F.X.line, X.v[:], X.wide[:])), W, O, F, f, count, some)
+        one_by_one(P, X, held(State(F.X.p[:], F.X.torque[:], F.X.line[:], X.v[:], X.wide[:])), W, O, F, f, count, some)
     return O.count[USED]
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
-from .gather import BLOCKS, ROWS
-from .operator import push, push_line, seen, seen_line
+from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS, what
+from .operator import push, push_line, push_turning, seen, seen_line, seen_turning
 from .problem import BIAS, HIGH, ISLAND, LOW, SOFT
 from .prox import (
     CONE,
     CONTACT,
+    COULOMB_CONTACT,
     FRICTION,
     GIVE,
     HELD,
@@ -20,10 +21,13 @@ from .prox import (
     LINE,
     METRIC,
     MOBILITY,
+    OWN,
     ROOT_N,
     ROOT_T,
     SLIP,
+    TURNING,
     WIDE,
+    Q,
     U,
     nearest,
     on_cone,
@@ -52,21 +56,47 @@ def mobility(R, row, kind):
 @formula
 def fill_rows(P, X, R, span):
     """Numbers of every row; impulses to begin with are those of the state, made admissible. Metric is 1."""
-    contacts = span[1] - span[0]
+    x = R.row
     for row in range(R.size[ROWS]):
         o = WIDE * row
-        if row < contacts:
-            fill_contact(P, X, R.row, o, span[0] + row)
+        c, k = what(span, row)
+        if k >= 0:
+            fill_line(P, X, x, o, k)
+        elif k == -2:
+            fill_turning(P, X, x, o, c)
         else:
-            fill_line(P, X, R.row, o, span[2] + row - contacts)
-        R.row[o + MOBILITY] = mobility(R, row, R.row[o + KIND])
-        if not R.row[o + MOBILITY] > 0.0:
-            R.row[o + KIND], R.row[o + MOBILITY] = IDLE, 1.0
-        for k in range(METRIC, METRIC + 1):
-            R.row[o + k] = 1.0
-        R.row[o + ROOT_N] = R.row[o + ROOT_T] = 1.0
-        x = nearest(R.row, o, R.row[o + HELD], R.row[o + HELD + 1], R.row[o + HELD + 2])
-        R.row[o + HELD], R.row[o + HELD + 1], R.row[o + HELD + 2] = x
+            fill_contact(P, X, x, o, c)
+        x[o + MOBILITY] = mobility(R, row, x[o + KIND])
+        if not x[o + MOBILITY] > 0.0:
+            x[o + KIND], x[o + MOBILITY] = IDLE, 1.0
+        x[o + METRIC] = x[o + ROOT_N] = x[o + ROOT_T] = 1.0
+        if k == -2:
+            set_bounds(R, row, HELD)
+        p = nearest(x, o, x[o + HELD], x[o + HELD + 1], x[o + HELD + 2])
+        for s in range(3):
+            x[o + HELD + s] = x[o + Q + s] = p[s]
+
+
+@formula
+def set_bounds(R, row, at):
+    """Bounds of rolling and spinning friction from the normal impulse in column ``at`` of the contact."""
+    o, c = WIDE * row, WIDE * (row - R.size[BEFORE_TURNING])
+    n = R.row[c + at]
+    if at == Q:
+        n /= R.row[c + ROOT_N]
+    R.row[o + LEAST] = R.row[o + FRICTION] * n * R.row[o + ROOT_N]
+    R.row[o + HIGHEST] = R.row[o + SLIP] * n * R.row[o + ROOT_N]
+
+
+@formula
+def fill_turning(P, X, x, o, c):
+    """Numbers of the rolling and spinning friction of a contact."""
+    u = seen_turning(P, X.v, X.wide, c)
+    for k in range(3):
+        x[o + U + k], x[o + HELD + k] = u[k], X.torque[c, k]
+    x[o + KIND], x[o + GIVE] = TURNING, 0.0
+    x[o + FRICTION] = x[o + CONE] = P.turn[c, 0]
+    x[o + SLIP] = P.turn[c, 1]
 
 
 @formula
@@ -95,56 +125,77 @@ def fill_line(P, X, x, o, k):
 @formula
 def hand_back(P, X, R, span):
     """Impulses held on to become the state's, and its velocities those with them."""
-    contacts = span[1] - span[0]
     for row in range(R.size[ROWS]):
         o = WIDE * row + HELD
         p = R.row[o], R.row[o + 1], R.row[o + 2]
-        if row < contacts:
-            c = span[0] + row
+        c, k = what(span, row)
+        if k >= 0:
+            X.line[k] = p[0]
+            push_line(P, X.wide, k, p[0])
+        elif k == -2:
+            X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = p
+            push_turning(P, X.v, X.wide, c, p)
+        else:
             X.p[c, 0], X.p[c, 1], X.p[c, 2] = p
             if p[0] != 0.0 or p[1] != 0.0 or p[2] != 0.0:
                 push(P, X.v, X.wide, c, p)
-        else:
-            k = span[2] + row - contacts
-            X.line[k] = p[0]
-            push_line(P, X.wide, k, p[0])
 
 
 @formula
 def lack(x, o, n, s, t, u, v, w):
     """How far the impulse (n, s, t) of a row with velocities u, v, w is from p = nearest(p - u / mobility) [m/s]."""
-    m, r = x[o + MOBILITY], x[o + ROOT_N]
+    m, r = x[o + MOBILITY] + x[o + GIVE], x[o + ROOT_N]
     u += x[o + GIVE] * n
-    m += x[o + GIVE]
-    if x[o + KIND] == CONTACT:
+    if x[o + KIND] == CONTACT or x[o + KIND] == COULOMB_CONTACT:
         p = on_cone(x[o + FRICTION], x[o + LEAST] / r, n - u / m, s - v / m, t - w / m)
-    elif x[o + KIND] == LINE:
-        p = min(max(n - u / m, x[o + LEAST] / r), x[o + HIGHEST] / r), 0.0, 0.0
     else:
-        return 0.0
+        a, b, c = nearest(x, o, r * (n - u / m), r * (s - v / m), r * (t - w / m))
+        p = a / r, b / r, c / r
     a, b, c = p[0] - n, p[1] - s, p[2] - t
     return m * sqrt(a * a + b * b + c * c)
 
 
 @formula
-def dilation(x, o, coulomb, v, w):
-    """De Saxce's addition to the normal velocity."""
-    return coulomb * x[o + FRICTION] * sqrt(v * v + w * w)
+def dilation(R, row, coulomb):
+    """What is added to the normal velocity of a contact (velocities in column OWN), so that the cone makes the law.
+
+    Coulomb's: mu |u_t| (De Saxce and Feng 1998). The convex form: of rolling and spinning, which are cut at bounds that
+    the normal impulse has, what makes them parts of its cone.
+    """
+    x, o, o2 = R.row, WIDE * row + OWN, WIDE * (row + R.size[BEFORE_TURNING]) + OWN
+    if coulomb > 0.0:
+        return x[WIDE * row + FRICTION] * sqrt(x[o + 1] * x[o + 1] + x[o + 2] * x[o + 2])
+    if R.size[BEFORE_TURNING] == R.size[ROWS]:
+        return 0.0
+    rolling = x[WIDE * (row + R.size[BEFORE_TURNING]) + FRICTION] * sqrt(x[o2 + 1] * x[o2 + 1] + x[o2 + 2] * x[o2 + 2])
+    return -rolling - x[WIDE * (row + R.size[BEFORE_TURNING]) + SLIP] * abs(x[o2])
 
 
 @formula
-def gap_of_impulses(R, at, coulomb):
-    """Residual [m/s] of impulses in column ``at`` whose velocities e are those in Rows.blocks; they are admissible."""
-    x, worst, largest = R.row, 0.0, 0.0
+def residual(R, coulomb):
+    """Residual [m/s] of the impulses in column Q (scaled), whose velocities are in column OWN."""
+    x, worst = R.row, 0.0
     for row in range(R.size[ROWS]):
         o = WIDE * row
-        n, s, t = x[o + at], x[o + at + 1], x[o + at + 2]
-        u, v, w = product(R, row, 0)
-        u, v, w = u + x[o + U], v + x[o + U + 1], w + x[o + U + 2]
-        d = lack(x, o, n, s, t, u + dilation(x, o, coulomb, v, w), v, w)
+        more = dilation(R, row, coulomb) if row < R.size[CONTACTS] else 0.0
+        if row >= R.size[BEFORE_TURNING]:
+            set_bounds(R, row, Q)
+        n, s, t = x[o + Q] / x[o + ROOT_N], x[o + Q + 1] / x[o + ROOT_T], x[o + Q + 2] / x[o + ROOT_T]
+        d = lack(x, o, n, s, t, x[o + OWN] + more, x[o + OWN + 1], x[o + OWN + 2])
+        if row >= R.size[BEFORE_TURNING]:
+            set_bounds(R, row, HELD)
         worst = d if d > worst or d != d else worst
-        largest = max(largest, n * n + s * s + t * t)
-    return worst, sqrt(largest)
+    return worst
+
+
+@formula
+def set_own(R):
+    """Velocities at e of every row into column OWN."""
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        u = product(R, row, 0)
+        for k in range(3):
+            R.row[o + OWN + k] = u[k] + R.row[o + U + k]
 
 
 @formula

@@ -18,7 +18,8 @@ from ...math.scalar import sqrt
 from .problem import NONE
 
 # entries of Rows.size
-ROWS, BLOCKS, ENTRIES, PAIRS, POOL, FILL = range(6)
+# CONTACTS: contacts, which are the first rows; BEFORE_TURNING: rows before those of their rolling and spinning friction
+ROWS, BLOCKS, ENTRIES, PAIRS, POOL, FILL, CONTACTS, BEFORE_TURNING = range(8)
 SIZES = 16
 RANK, NOTHING = 1e-11, 1e-14  # of a row's own mobility, of the largest in its group
 
@@ -41,7 +42,7 @@ class Rows(NamedTuple):
     row: np.ndarray  # (m, 32): see the columns in `state.py`
     blocks: np.ndarray  # (4, nb, 6) flat: e, gradient, step, e of p
     D: np.ndarray  # (nb, 36)
-    L: np.ndarray  # (nnz, 36)
+    L: np.ndarray  # (2, nnz, 36) flat: below the diagonal, above it
 
 
 @formula
@@ -96,6 +97,8 @@ def survey(P, span, head, chain):
                 blocks += 1
             elif a < NONE and P.block[c, s] >= 0:
                 link(P, head, chain, -2 - a, 2 * (c - first) + s, 3)
+                if P.turn.shape[0] > 0:
+                    link(P, head, chain, -2 - a, 2 * (c - first + last - first + end - line) + s, 3)
     for k in range(line, end):
         link(P, head, chain, P.line_at[k, 0], 2 * (last - first + k - line) + 1, 1)
     for c in range(first, last):
@@ -122,27 +125,40 @@ def number_group(P, head, g, blocks):
 @formula
 def entries_of(P, span, head, row, s):
     """First block and number of blocks of side s of a row."""
-    first, last, line = span[0], span[1], span[2]
     nn, ng = P.size[1], P.size[2]
-    if row < last - first:
-        a = P.at[first + row, s]
-        if a >= 0:
-            return head[a], 1 if head[a] >= 0 else 0
-        if a == NONE or P.block[first + row, s] < 0:
-            return -1, 0
-        g = -2 - a
-    elif s == 1:
-        g = P.line_at[line + row - (last - first), 0]
-    else:
+    c, k = what(span, row)
+    if c >= 0 and P.at[c, s] >= 0:
+        a = head[P.at[c, s]]
+        return a, 1 if a >= 0 else 0
+    g = group_of(P, span, 2 * row + s)
+    if g < 0:
         return -1, 0
     return head[nn + g], head[nn + ng + g]
+
+
+@formula
+def what(span, row):
+    """The contact of a row and -1 (turning: -2), or -1 and the line."""
+    contacts, lines = span[1] - span[0], span[3] - span[2]
+    if row < contacts:
+        return span[0] + row, -1
+    if row < contacts + lines:
+        return -1, span[2] + row - contacts
+    return span[0] + row - contacts - lines, -2
+
+
+@formula
+def rows_in(P, span):
+    """How many rows there are."""
+    contacts = span[1] - span[0]
+    return contacts + span[3] - span[2] + (contacts if P.turn.shape[0] > 0 else 0)
 
 
 @formula
 def count_entries(P, span, head):
     """Entries and pairs of entries of all rows."""
     entries, pairs = 0, 0
-    for row in range(span[1] - span[0] + span[3] - span[2]):
+    for row in range(rows_in(P, span)):
         n = entries_of(P, span, head, row, 0)[1] + entries_of(P, span, head, row, 1)[1]
         entries += n
         pairs += n * (n - 1) // 2
@@ -184,14 +200,16 @@ def root_of_block(P, i):
 
 
 @formula
-def node_entry(P, c, s, root, G, e):
-    """G of a contact's side on a node, reversed on side 1."""
+def node_entry(P, c, s, turning, root, G, e):
+    """G of a contact's side on a node, reversed on side 1; of its turning where ``turning`` is 1."""
     i, sign = P.at[c, s], 2.0 * s - 1.0
-    m = sign * sqrt(P.node[i, 0])
+    m = sign * sqrt(P.node[i, 0]) * (1.0 - turning)
     x, y, z = sign * P.arm[c, 3 * s], sign * P.arm[c, 3 * s + 1], sign * P.arm[c, 3 * s + 2]
     for r in range(3):
         a, b, d = P.frame[c, 3 * r], P.frame[c, 3 * r + 1], P.frame[c, 3 * r + 2]
         p, q, t = y * d - z * b, z * a - x * d, x * b - y * a
+        if turning > 0.0:
+            p, q, t = sign * a, sign * b, sign * d
         o = 18 * e + 6 * r
         G[o], G[o + 1], G[o + 2] = m * a, m * b, m * d
         G[o + 3] = root[0] * p + root[1] * q + root[3] * t
@@ -202,10 +220,11 @@ def node_entry(P, c, s, root, G, e):
 @formula
 def rows_at(P, span, t):
     """Where J and Y of a side in a chain begin, and how many scalar rows they have."""
-    row, s = t // 2, t % 2
-    if row < span[1] - span[0]:
-        return P.block[span[0] + row, s], 3
-    return P.line_at[span[2] + row - (span[1] - span[0]), 1], 1
+    c, k = what(span, t // 2)
+    if c < 0:
+        return P.line_at[k, 1], 1
+    g = -2 - P.at[c, t % 2]
+    return P.block[c, t % 2] + (3 * (P.group[g + 1] - P.group[g]) if k == -2 else 0), 3
 
 
 @formula
@@ -279,15 +298,15 @@ def group_entries(P, span, R, g, D):
 @formula
 def fill_entries(P, span, R, D):
     """All of G."""
-    nn, ng, contacts = P.size[1], P.size[2], span[1] - span[0]
+    nn, ng = P.size[1], P.size[2]
     for k in range(18 * R.size[ENTRIES]):
         R.G[k] = 0.0
     for row in range(R.size[ROWS]):
+        c, k = what(span, row)
         for s in range(2):
-            if row < contacts:
-                a, c = P.at[span[0] + row, s], span[0] + row
-                if a >= 0 and R.side[2 * row + s] >= 0:
-                    node_entry(P, c, s, root_of_block(P, a), R.G, R.side[2 * row + s])
+            if c >= 0 and P.at[c, s] >= 0 and R.side[2 * row + s] >= 0:
+                turning = 1.0 if k == -2 else 0.0
+                node_entry(P, c, s, turning, root_of_block(P, P.at[c, s]), R.G, R.side[2 * row + s])
     for t in range(2 * R.size[ROWS]):
         g = group_of(P, span, t)
         if g >= 0 and R.head[nn + 2 * ng + g] == t:
@@ -297,8 +316,8 @@ def fill_entries(P, span, R, D):
 @formula
 def group_of(P, span, t):
     """Group that a side is in, or -1."""
-    row, s = t // 2, t % 2
-    if row >= span[1] - span[0]:
-        return P.line_at[span[2] + row - (span[1] - span[0]), 0] if s == 1 else -1
-    a = P.at[span[0] + row, s]
-    return -2 - a if a < NONE and P.block[span[0] + row, s] >= 0 else -1
+    c, k = what(span, t // 2)
+    if c < 0:
+        return P.line_at[k, 0] if t % 2 == 1 else -1
+    a = P.at[c, t % 2]
+    return -2 - a if a < NONE and P.block[c, t % 2] >= 0 else -1

@@ -6,7 +6,9 @@ from ...compiler.held import held
 from ...compiler.jit import formula
 from .blocks import columns, eliminate, entry_of, join
 from .gather import (
+    BEFORE_TURNING,
     BLOCKS,
+    CONTACTS,
     ENTRIES,
     FILL,
     PAIRS,
@@ -17,6 +19,7 @@ from .gather import (
     count_entries,
     fill_entries,
     list_entries,
+    rows_in,
     survey,
 )
 from .problem import ENDED, NEEDED_NUMBERS, NEEDED_PLACES, SMALL
@@ -60,7 +63,7 @@ def rows_of(P, F, size):
         x[s:t],
         x[t:u],
         x[u:v],
-        x[v : v + 36 * fill],
+        x[v : v + 72 * fill],
     )
 
 
@@ -75,7 +78,7 @@ def places_of(P, size):
 @formula
 def numbers_of(size):
     """How long `Factor.numbers` must be."""
-    return 18 * size[ENTRIES] + WIDE * size[ROWS] + 60 * size[BLOCKS] + 36 * size[FILL]
+    return 18 * size[ENTRIES] + WIDE * size[ROWS] + 60 * size[BLOCKS] + 72 * size[FILL]
 
 
 @formula
@@ -95,7 +98,9 @@ def measure(P, span, F, O, size):
     """Sizes of all but the factor. False if the rooms are too small."""
     for k in range(SIZES):
         size[k] = 0
-    size[ROWS] = span[1] - span[0] + span[3] - span[2]
+    size[ROWS] = rows_in(P, span)
+    size[CONTACTS] = span[1] - span[0]
+    size[BEFORE_TURNING] = size[CONTACTS] + span[3] - span[2]
     if not fits(P, F, O, size):
         return False
     R = held(rows_of(P, F, size))

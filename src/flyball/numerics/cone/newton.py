@@ -14,9 +14,10 @@ from __future__ import annotations
 from ...compiler.door import door
 from ...compiler.held import held
 from ...compiler.jit import formula
+from ...math.scalar import sqrt
 from .blocks import factor, solve
-from .fill import dilation, fill_rows, gap_of_impulses, hand_back, lack, push_of, span_of
-from .gather import BLOCKS, ROWS
+from .fill import dilation, fill_rows, hand_back, push_of, residual, set_bounds, set_own, span_of
+from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS
 from .layout import prepare, rows_of
 from .problem import (
     BROKEN,
@@ -31,23 +32,47 @@ from .problem import (
     STALLED,
     USED,
 )
-from .prox import DY, HELD, METRIC, OWN, ROOT_N, ROOT_T, SLIP, WIDE, Q, U, Y, set_metric
-from .smooth import along_step, from_held, hessian, product, set_impulses, set_y, slope_along
+from .prox import (
+    CONTACT,
+    COULOMB_CONTACT,
+    DY,
+    FRICTION,
+    HELD,
+    METRIC,
+    MOBILITY,
+    OWN,
+    ROOT_N,
+    ROOT_T,
+    SLIP,
+    WIDE,
+    Q,
+    U,
+    Y,
+    nearest,
+    set_kind,
+    set_metric,
+    slipped,
+)
+from .smooth import add_impulse, along_step, from_held, hessian, product, set_impulses, set_y, slope_along
 
-FIRST_RHO, LEAST_RHO, FALL = 1e-3, 1e-9, 0.03  # of the mobility: compliance to begin with, the least, between
+# compliance, in parts of the mobility: far from the solution, near it, the least
+MOST_RHO, SMALL_RHO, LEAST_RHO, FLAT_RHO = 0.1, 1e-3, 1e-9, 1e-6  # FLAT: without friction
+FALL, FALL_NEAR, NEAR = 0.1, 0.01, 1e-3  # where impulses come closer slowly; residual over velocities that is near
+RAISE = 3.0  # of the compliance where Newton's method on the law itself does not come closer
+ROOM, MANY = 1.0, 12  # see `next_rho`; steps at one compliance, after which it was too small
 SLOW = 0.05  # change of impulses over the one before, from which on the compliance falls
 EXACT = 0.1  # what is left of the slope along a step when its length is right
-SEARCHES = 30
+SEARCHES, HALVINGS = 30, 4
 
 
 @formula
-def direction(R):
+def direction(R, symmetric):
     """Step from the gradient; its e . step, |step|^2 and gradient . step. False if the matrix could not be factored."""
     n = R.size[BLOCKS]
     b, g, s = R.blocks, 6 * n, 12 * n
-    hessian(R)
+    hessian(R, symmetric)
     Lp = R.graph[6 * (n + 1) : 7 * (n + 1)]
-    if not factor(n, Lp, R.Li, R.D, R.L):
+    if not factor(n, Lp, R.Li, R.D, R.L, symmetric):
         return False, 0.0, 0.0, 0.0
     for k in range(g):
         b[s + k] = -b[g + k]
@@ -82,6 +107,37 @@ def length(R, first, second, down):
 
 
 @formula
+def left(R, a):
+    """|e - sum G' p|^2 at the part a of the step."""
+    x, n = R.row, 6 * R.size[BLOCKS]
+    for k in range(n):
+        R.blocks[3 * n + k] = R.blocks[k] + a * R.blocks[2 * n + k]
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        p = nearest(x, o, x[o + Y] + a * x[o + DY], x[o + Y + 1] + a * x[o + DY + 1], x[o + Y + 2] + a * x[o + DY + 2])
+        if p[0] != 0.0:
+            add_impulse(R, row, 3 * n, -p[0] / x[o + ROOT_N], -p[1] / x[o + ROOT_T], -p[2] / x[o + ROOT_T])
+    s = 0.0
+    for k in range(n):
+        s += R.blocks[3 * n + k] * R.blocks[3 * n + k]
+    return s
+
+
+@formula
+def part(R):
+    """How much of a step leaves less of what is to vanish, where that is no gradient; 0 if nothing does."""
+    n = 6 * R.size[BLOCKS]
+    now, a = 0.0, 1.0
+    for k in range(n):
+        now += R.blocks[n + k] * R.blocks[n + k]
+    for _ in range(HALVINGS):
+        if left(R, a) < (1.0 - 0.5 * a) * now:
+            return a
+        a *= 0.5
+    return 0.0
+
+
+@formula
 def advance(R, a):
     """e and the scaled y move by the part a of the step.
 
@@ -104,21 +160,18 @@ def gaps(R, coulomb):
     The velocities that these impulses make are left in column OWN of the rows.
     """
     x, g = R.row, 6 * R.size[BLOCKS]
-    worst, inner, outer = 0.0, 0.0, 0.0
+    near, change = 0.0, 0.0
     for row in range(R.size[ROWS]):
         o = WIDE * row
         a, b, c = product(R, row, g)
         r, p, q = x[o + METRIC], x[o + ROOT_N], x[o + ROOT_T]
-        n, s, t = x[o + Q] / p, x[o + Q + 1] / q, x[o + Q + 2] / q
-        u = r * x[o + HELD] - p * x[o + Y] - x[o + SLIP] - a
-        v, w = r * x[o + HELD + 1] - q * x[o + Y + 1] - b, r * x[o + HELD + 2] - q * x[o + Y + 2] - c
-        x[o + OWN], x[o + OWN + 1], x[o + OWN + 2] = u, v, w
-        d = lack(x, o, n, s, t, u + dilation(x, o, coulomb, v, w), v, w)
-        worst = d if d > worst or d != d else worst
-        inner = max(inner, a * a + b * b + c * c)
-        d, f, h = n - x[o + HELD], s - x[o + HELD + 1], t - x[o + HELD + 2]
-        outer = max(outer, r * r * (d * d + f * f + h * h))
-    return worst, inner**0.5, outer**0.5
+        x[o + OWN] = r * x[o + HELD] - p * x[o + Y] - slipped(x, o) - a
+        x[o + OWN + 1] = r * x[o + HELD + 1] - q * x[o + Y + 1] - b
+        x[o + OWN + 2] = r * x[o + HELD + 2] - q * x[o + Y + 2] - c
+        near = max(near, a * a + b * b + c * c)
+        a, b, c = x[o + Q] / p - x[o + HELD], x[o + Q + 1] / q - x[o + HELD + 1], x[o + Q + 2] / q - x[o + HELD + 2]
+        change = max(change, r * r * (a * a + b * b + c * c))
+    return residual(R, coulomb), sqrt(near), sqrt(change)
 
 
 @formula
@@ -129,52 +182,106 @@ def hold(R, coulomb):
         o = WIDE * row
         x[o + HELD] = x[o + Q] / x[o + ROOT_N]
         x[o + HELD + 1], x[o + HELD + 2] = x[o + Q + 1] / x[o + ROOT_T], x[o + Q + 2] / x[o + ROOT_T]
-        x[o + SLIP] = dilation(x, o, coulomb, x[o + OWN + 1], x[o + OWN + 2])
+    set_slips(R, coulomb)
     for k in range(n):
         R.blocks[k] -= R.blocks[n + k]
 
 
 @formula
-def slide(R, coulomb):
-    """De Saxce's additions at e."""
-    for row in range(R.size[ROWS]):
-        o = WIDE * row
-        _, v, w = product(R, row, 0)
-        R.row[o + SLIP] = dilation(R.row, o, coulomb, v + R.row[o + U + 1], w + R.row[o + U + 2])
+def set_slips(R, coulomb):
+    """What is added to normal velocities, and bounds of rolling and spinning, of what is held on to."""
+    for row in range(R.size[CONTACTS]):
+        R.row[WIDE * row + SLIP] = dilation(R, row, coulomb)
+    for row in range(R.size[BEFORE_TURNING], R.size[ROWS]):
+        set_bounds(R, row, HELD)
 
 
 @formula
-def search(R, O, coulomb):
-    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual."""
-    rho, steps, before = FIRST_RHO, 0, 1e300
-    enough = O.real[ENOUGH]
-    slide(R, coulomb)
+def inner(R, O, coulomb, law, steps):
+    """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
+    enough, last = O.real[ENOUGH], steps + MANY
+    while True:
+        set_impulses(R)
+        worst, near, change = gaps(R, coulomb)
+        if worst != worst:
+            return BROKEN, worst, change, steps
+        if worst <= enough or near <= max(0.1 * change, 0.1 * enough):
+            return CONVERGED, worst, change, steps
+        if steps >= O.count[MOST]:
+            return CUT, worst, change, steps
+        if steps >= last:
+            return STALLED, worst, change, steps
+        steps += 1
+        good, first, second, down = direction(R, not law)
+        if not good:
+            return STALLED if law else BROKEN, worst, change, steps
+        along_step(R)
+        a = part(R) if law else length(R, first, second, down)
+        if law and a == 0.0:
+            return STALLED, worst, change, steps
+        advance(R, a)
+
+
+@formula
+def fastest(R):
+    """The largest velocity without impulses, or of an impulse that is held on to, by itself [m/s]."""
+    s = 0.0
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        for k in range(3):
+            s = max(s, abs(R.row[o + U + k]), R.row[o + MOBILITY] * abs(R.row[o + HELD + k]))
+    return s
+
+
+@formula
+def rough(R):
+    """Whether there is friction anywhere; without it all pieces are flat, and a small compliance is as easy as any."""
+    f = 0.0
+    for row in range(R.size[CONTACTS]):
+        f = max(f, R.row[WIDE * row + FRICTION])
+    return f > 0.0
+
+
+@formula
+def next_rho(rho, slow, near):
+    """Compliance of the next problem; ``near``: residual over the largest velocity."""
+    if slow:  # but not so small that a velocity as large as the residual moves impulses by as much as they are
+        rho = max((FALL if near > NEAR else FALL_NEAR) * rho, min(rho, ROOM * near), LEAST_RHO)
+    return min(rho, max(near, SMALL_RHO))
+
+
+@formula
+def search(R, O, coulomb, worst):
+    """Impulses within `ENOUGH`, held on to. Returns how it ended and the residual.
+
+    Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
+    """
+    steps, before, law, best = 0, 1e300, False, 1e300
+    rho = min(max(worst / fastest(R), SMALL_RHO), MOST_RHO) if rough(R) else FLAT_RHO
+    set_slips(R, coulomb)
     for _ in range(4 * O.count[MOST] + 20):
         set_metric(R, rho)
+        if law:
+            set_kind(R, CONTACT, COULOMB_CONTACT)
         set_y(R)
-        while True:
-            set_impulses(R)
-            worst, inner, outer = gaps(R, coulomb)
-            O.count[USED] = steps
-            if worst != worst:
-                return BROKEN, worst
-            if worst <= enough or inner <= max(0.1 * outer, 0.1 * enough):
-                break
-            if steps >= O.count[MOST]:
-                hold(R, coulomb)
-                return CUT, worst
-            good, first, second, down = direction(R)
-            if not good:
-                return BROKEN, worst
-            steps += 1
-            along_step(R)
-            advance(R, length(R, first, second, down))
+        ended, worst, change, steps = inner(R, O, coulomb, law, steps)
+        O.count[USED] = steps
+        if law:
+            set_kind(R, COULOMB_CONTACT, CONTACT)
+            if ended != CONVERGED or not worst < best:  # it has not come closer: on as before it
+                if ended == CUT:
+                    return CUT, best
+                from_held(R)
+                law, before, rho = False, 1e300, min(RAISE * rho, MOST_RHO)
+                continue
         hold(R, coulomb)
-        if worst <= enough:
-            return CONVERGED, worst
-        if outer > SLOW * before:
-            rho = max(FALL * rho, LEAST_RHO)
-        before = outer
+        if ended == CUT or ended == BROKEN or worst <= O.real[ENOUGH]:
+            return ended, worst
+        best, law = worst, coulomb > 0.0
+        if ended == STALLED:
+            rho, before = min(10.0 * rho, MOST_RHO), 1e300
+        else:
+            rho, before = next_rho(rho, change > SLOW * before, worst / fastest(R)), change
     return STALLED, worst
 
 
@@ -198,7 +305,7 @@ def make_safe(R):
 def newton_solve(P, X, O, F):
     """See `newton`."""
     span = span_of(P, O)
-    if P.turn.shape[0] > 0:
+    if P.turn.shape[0] > 0 and O.count[COULOMB] == 0:
         O.count[ENDED] = BROKEN
         return 0
     if not prepare(P, span, F, O):
@@ -207,11 +314,12 @@ def newton_solve(P, X, O, F):
     fill_rows(P, X, R, span)
     from_held(R)
     coulomb = 1.0 * O.count[COULOMB]
-    worst, largest = gap_of_impulses(R, HELD, coulomb)
+    set_own(R)
+    worst = residual(R, coulomb)
     O.count[USED] = 0
     ended = CONVERGED
     if not worst <= O.real[ENOUGH]:
-        ended, worst = search(R, O, coulomb)
+        ended, worst = search(R, O, coulomb, worst)
         if ended == CUT:
             make_safe(R)
     O.count[ENDED], O.real[RESIDUAL] = ended, worst
@@ -224,6 +332,7 @@ def newton_solve(P, X, O, F):
 def newton(P, X, W, O, F, task):
     """Newton's method; returns factorisations.
 
-    In `Choices.count[ENDED]`: BROKEN with rolling friction, which it does not know; SMALL: enlarge `Factor`, call anew.
+    In `Choices.count[ENDED]` SMALL: enlarge `Factor`, call again; BROKEN: not finite, or the convex form with rolling
+    friction, which it does not take. Then nothing was changed.
     """
     return newton_solve(P, X, O, F)

@@ -13,7 +13,7 @@ from ...math.vec import cross, dot
 from .diagonal import axis, diagonal, turned
 from .operator import push, push_turning
 from .problem import NONE, ROUND
-from .projection import least_of
+from .projection import least_of, share
 
 SMOOTH_BALL, BALL, SMOOTH, ROUGH, ANY, KINDS = range(6)
 WIDTH_BALL, WIDTH_SMOOTH = 16, 20  # numbers of a contact; the rest have 32
@@ -57,10 +57,14 @@ def along_normal(P, c, side):
 
 @formula
 def kind_of(P, W, c, rubbing):
-    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: none is taken as smooth."""
+    """What is to be done for a contact, the arms of balls in W.rows[0]; ``rubbing``: 1 if none is taken
+    as smooth, 2 if none as one of balls either.
+    """
     i, j = P.at[c, 0], P.at[c, 1]
     if i < NONE or j < NONE or P.turn.shape[0] > 0:
         return ANY
+    if rubbing > 1:
+        return ROUGH
     first, second = True, True
     W.rows[0, c, 1], W.rows[0, c, 2] = 0.0, 0.0
     if i >= 0:
@@ -211,16 +215,31 @@ def pack(P, X, W, coulomb, first, many):
 
 
 @formula
+def admit(P, X, c):
+    """Make an impulse to start from one of the cone: where it presses less, or not, its friction is less."""
+    n = X.p[c, 0] if X.p[c, 0] > 0.0 else 0.0  # nan too
+    n = max(n, least_of(P, c))
+    a, b = X.p[c, 1], X.p[c, 2]
+    r = sqrt(a * a + b * b)
+    part = share(n, P.mu[c], r) if n > 0.0 and r == r else 0.0
+    X.p[c, 0], X.p[c, 1], X.p[c, 2] = n, part * a if part > 0.0 else 0.0, part * b if part > 0.0 else 0.0
+    if P.turn.shape[0] > 0:
+        z, a, b = X.torque[c, 0], X.torque[c, 1], X.torque[c, 2]
+        roll = share(n, P.turn[c, 0], sqrt(a * a + b * b)) if n > 0.0 else 0.0
+        spin = share(n, P.turn[c, 1], abs(z)) if n > 0.0 else 0.0
+        X.torque[c, 0], X.torque[c, 1], X.torque[c, 2] = spin * z, roll * a, roll * b
+
+
+@formula
 def put(P, X, W, coulomb, c, kind, visit, place):
     """One contact, with its impulse acting."""
     i, j = P.at[c, 0], P.at[c, 1]
     i, j = i if i >= 0 else P.size[1], j if j >= 0 else P.size[1]
     W.sides[visit, 0], W.sides[visit, 1], W.sides[visit, 2] = i, j, c
+    admit(P, X, c)
     k = W.pack
     if kind == SMOOTH_BALL or kind == BALL:
         pack_ball(P, X, W, c, place)
-        if kind == SMOOTH_BALL:
-            k[place + B_T], k[place + B_T + 1], k[place + B_T + 2] = 0.0, 0.0, 0.0
         if k[place + B_P] != 0.0:
             change_balls(
                 k, W.own, i, j, place, (k[place + B_P], k[place + B_T], k[place + B_T + 1], k[place + B_T + 2])
@@ -229,7 +248,6 @@ def put(P, X, W, coulomb, c, kind, visit, place):
     p = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     if kind == SMOOTH:
         pack_smooth(P, W, c, place)
-        p = p[0], 0.0, 0.0
         k[place + S_P], k[place + S_LEAST] = p[0], least_of(P, c)
     else:
         pack_rough(P, coulomb, W, c, place)

@@ -31,8 +31,9 @@ PER_MASS, BLOCK, ROUND = 0, 1, 7
 BIAS, SOFT, LOW, HIGH = range(4)
 # entries of Choices.count: most iterations (sweeps), island that is meant or -1 for all, keep a history or not;
 # and what comes back: iterations used, how the solver ended, rows of the history written
-# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be)
-MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES = range(9)
+# (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be;
+# DIRECTIONS: of a friction pyramid)
+MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES, DIRECTIONS = range(10)
 CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # Choices.count[ENDED]; SMALL: enlarge what is needed, call again
 # entries of Choices.real: residual [m/s] that is enough; and what comes back: the residual reached as a velocity
 # [m/s], and as a force (what is left of an impulse over the largest impulse) [1]

@@ -7,14 +7,25 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...compiler.door import Door
+from .apgd import apgd
+from .barzilai_borwein import barzilai_borwein
 from .choose import DOORS, LIMITS, MOST_CONTACTS, MOST_NODES, SMALL_ISLANDS, THE_REST, TOLD, Auto, auto
 from .gauss_seidel import gauss_seidel
 from .islands import room_for_islands
+from .jacobi import jacobi
+from .lean import lean
 from .newton import newton
 from .problem import Choices, Factor, Problem, Scratch, State
 from .rooms import rooms, unfilled
 
-SOLVERS: dict[str, Door] = {"gauss-seidel": gauss_seidel, "newton": newton}
+SOLVERS: dict[str, Door] = {
+    "gauss-seidel": gauss_seidel,
+    "newton": newton,
+    "jacobi": jacobi,
+    "barzilai-borwein": barzilai_borwein,
+    "apgd": apgd,
+    "apgd-lean": lean,
+}
 FACTORED = {"newton"}  # those that want `Factor`: each island by itself, the rest to sweeps where it cannot
 
 # islands up to this size go to Newton: measured on stacks, walls and piles (benchmarks)
@@ -83,7 +94,7 @@ def room_for_all(P: Problem, O: Choices, whole: bool) -> Auto:
     size = contacts + nodes + nl + wide
     fill = min(nodes * nodes // 2, 40 * nodes)
     return Auto(
-        np.zeros(NUMBERS * size + 36 * fill),
+        np.zeros(NUMBERS * size + 72 * fill),
         np.zeros(PLACES * size + 4 * fill + nn + 3 * ng, np.int64),
         Q, rooms(Q)[0], islands, np.zeros(most, np.int64),
         np.zeros(DOORS, np.int64), limit, np.zeros(TOLD, np.int64),

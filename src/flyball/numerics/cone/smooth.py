@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .gather import BLOCKS, ROWS
-from .prox import DY, HELD, METRIC, ROOT_N, ROOT_T, SLIP, WIDE, Q, U, Y, nearest, slope
+from .prox import DY, HELD, METRIC, ROOT_N, ROOT_T, WIDE, Q, U, Y, nearest, slipped, slope
 
 E, GRADIENT, STEP, SPARE = range(4)  # rows of Rows.blocks
 
@@ -57,7 +57,7 @@ def set_y(R):
         o = WIDE * row
         n, s, t = product(R, row, 0)
         r = x[o + METRIC]
-        x[o + Y] = (r * x[o + HELD] - x[o + U] - x[o + SLIP] - n) / x[o + ROOT_N]
+        x[o + Y] = (r * x[o + HELD] - x[o + U] - slipped(x, o) - n) / x[o + ROOT_N]
         x[o + Y + 1] = (r * x[o + HELD + 1] - x[o + U + 1] - s) / x[o + ROOT_T]
         x[o + Y + 2] = (r * x[o + HELD + 2] - x[o + U + 2] - t) / x[o + ROOT_T]
 
@@ -77,80 +77,36 @@ def set_impulses(R):
 
 
 @formula
-def weigh(R, e, W):
-    """W G of entry e, W symmetric (nn, ns, nt, ss, st, tt): 18 numbers."""
-    g, G = 18 * e, R.G
-    nn, ns, nt, ss, st, tt = W
-    a0, a1, a2, a3, a4, a5 = G[g], G[g + 1], G[g + 2], G[g + 3], G[g + 4], G[g + 5]
-    b0, b1, b2, b3, b4, b5 = G[g + 6], G[g + 7], G[g + 8], G[g + 9], G[g + 10], G[g + 11]
-    c0, c1, c2, c3, c4, c5 = G[g + 12], G[g + 13], G[g + 14], G[g + 15], G[g + 16], G[g + 17]
-    return (
-        (
-            nn * a0 + ns * b0 + nt * c0,
-            nn * a1 + ns * b1 + nt * c1,
-            nn * a2 + ns * b2 + nt * c2,
-            nn * a3 + ns * b3 + nt * c3,
-            nn * a4 + ns * b4 + nt * c4,
-            nn * a5 + ns * b5 + nt * c5,
-        ),
-        (
-            ns * a0 + ss * b0 + st * c0,
-            ns * a1 + ss * b1 + st * c1,
-            ns * a2 + ss * b2 + st * c2,
-            ns * a3 + ss * b3 + st * c3,
-            ns * a4 + ss * b4 + st * c4,
-            ns * a5 + ss * b5 + st * c5,
-        ),
-        (
-            nt * a0 + st * b0 + tt * c0,
-            nt * a1 + st * b1 + tt * c1,
-            nt * a2 + st * b2 + tt * c2,
-            nt * a3 + st * b3 + tt * c3,
-            nt * a4 + st * b4 + tt * c4,
-            nt * a5 + st * b5 + tt * c5,
-        ),
-    )
-
-
-@formula
-def add_block(R, e, L, o, T, lower):
-    """Add G' T of entry e to a block, (i, j) at o + 6 i + j; of that only the lower triangle if so asked."""
-    g = 18 * e
-    t, u, v = T
+def add_product(R, e, f, W, L, at):
+    """Add G' W G of entries e and f to the block at ``at``; W: nn, ns, nt, ss, st, tt, sn, tn."""
+    G, g, h = R.G, 18 * e, 18 * f
+    nn, ns, nt, ss, st, tt, sn, tn = W
     for i in range(6):
-        a, b, c = R.G[g + i], R.G[g + 6 + i], R.G[g + 12 + i]
-        k = o + 6 * i
-        L[k] += a * t[0] + b * u[0] + c * v[0]
-        if not lower or i > 0:
-            L[k + 1] += a * t[1] + b * u[1] + c * v[1]
-        if not lower or i > 1:
-            L[k + 2] += a * t[2] + b * u[2] + c * v[2]
-        if not lower or i > 2:
-            L[k + 3] += a * t[3] + b * u[3] + c * v[3]
-        if not lower or i > 3:
-            L[k + 4] += a * t[4] + b * u[4] + c * v[4]
-        if not lower or i > 4:
-            L[k + 5] += a * t[5] + b * u[5] + c * v[5]
+        a, b, c = G[g + i], G[g + 6 + i], G[g + 12 + i]
+        x, y, z = a * nn + b * sn + c * tn, a * ns + b * ss + c * st, a * nt + b * st + c * tt
+        o = at + 6 * i
+        for j in range(6):
+            L[o + j] += x * G[h + j] + y * G[h + 6 + j] + z * G[h + 12 + j]
 
 
 @formula
-def add_row(R, row, W):
+def add_row(R, row, W, symmetric):
     """Add G' W G of a row to the matrix."""
-    k = R.pair_p[row]
+    k, above = R.pair_p[row], R.L.shape[0] // 2
     for e in range(R.entry_p[row], R.entry_p[row + 1]):
-        T, i = weigh(R, e, W), R.block[e]
-        add_block(R, e, R.D, 36 * i, T, True)
+        i = R.block[e]
+        add_product(R, e, e, W, R.D, 36 * i)
         for f in range(R.entry_p[row], e):
-            j, at = R.block[f], R.pair[k]
+            j, at = R.block[f], 36 * R.pair[k]
             k += 1
             if at < 0:  # both on one block
-                add_block(R, f, R.D, 36 * i, T, False)
-                V = weigh(R, f, W)
-                add_block(R, e, R.D, 36 * i, V, False)
-            elif i < j:  # rows belong to the block that is eliminated later
-                add_block(R, f, R.L, 36 * at, T, False)
-            else:
-                add_block(R, e, R.L, 36 * at, weigh(R, f, W), False)
+                add_product(R, e, f, W, R.D, 36 * i)
+                add_product(R, f, e, W, R.D, 36 * i)
+                continue
+            later, earlier = (e, f) if i > j else (f, e)
+            add_product(R, later, earlier, W, R.L, at)
+            if not symmetric:
+                add_product(R, earlier, later, W, R.L, above + at)
 
 
 @formula
@@ -166,7 +122,7 @@ def clear_matrix(R):
 
 
 @formula
-def hessian(R):
+def hessian(R, symmetric):
     """1 + sum G' R^-1/2 (derivative) R^-1/2 G."""
     x = R.row
     clear_matrix(R)
@@ -175,8 +131,9 @@ def hessian(R):
         B = slope(x, o, x[o + Y], x[o + Y + 1], x[o + Y + 2])
         if B[0] != 0.0 or B[3] != 0.0 or B[5] != 0.0:
             a, b = 1.0 / x[o + ROOT_N], 1.0 / x[o + ROOT_T]
-            W = a * a * B[0], a * b * B[1], a * b * B[2], b * b * B[3], b * b * B[4], b * b * B[5]
-            add_row(R, row, W)
+            ab, bb = a * b, b * b
+            W = a * a * B[0], ab * B[1], ab * B[2], bb * B[3], bb * B[4], bb * B[5], ab * B[6], ab * B[7]
+            add_row(R, row, W, symmetric)
 
 
 @formula
