@@ -12,12 +12,8 @@ EVERY = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"
 CONTACT = {  # see test_contact_examples
     "conveyor.toml",
     "dominoes.py",
-    "gripper.py",
-    "labyrinth.py",
-    "newtons_cradle.py",
     "pile_in_a_box.py",
     "tippe_top.py",
-    "wrecking_ball.py",
 }
 FILES = [name for name in EVERY if name not in CONTACT]
 PROMISED = {
