@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from flyball.contact.desk import AFRESH_SO_FAR, COMPARED, LOOKED_AT, REMADE
-from flyball.contact.finder import Finder
+from flyball.contact.finder import Finder, no_contacts
+from flyball.contact.same import before
 from flyball.contact.tables import FOUND, GAP, NORMAL, PAIRS, POINT
 from flyball.errors import ModelError
 from tests.contact.crowds import gaps_of, geometry, identities_hold, moving, on_planes, pairs_of, spheres_that_touch
@@ -245,3 +246,28 @@ def test_what_asks_for_more_room_goes_on_as_if_it_had_it():
         assert set(pairs_of(C)) == spheres_that_touch(size * x, 0 * x, np.full(n, 0.05), MARGIN, 0.0)
         assert identities_hold(C, F.before)
     assert C.count[FOUND] > 4 * n + 64
+
+
+def test_crowds_of_none_of_one_and_of_points():
+    none = Finder(geometry([])).find(moving(np.zeros((0, 3))))
+    assert none.count[FOUND] == 0
+    ground = Finder(geometry([], planes=BOX)).find(moving(np.zeros((2, 3))))
+    assert ground.count[FOUND] == 0
+    one = Finder(geometry([0.5], planes=BOX), margin=1e-9).find(moving([[0, 0, 0.5]]))
+    assert pairs_of(one) == [(0, 1)]
+    rng = np.random.default_rng(0)
+    x = rng.integers(0, 8, (400, 3)) * 0.25
+    points = Finder(geometry(np.zeros(400)), margin=1e-6).find(moving(x))
+    assert set(pairs_of(points)) == spheres_that_touch(x, 0 * x, np.zeros(400), 1e-6, 0.0)
+
+
+def test_a_contact_without_a_namesake_is_the_nearest_one():
+    O = no_contacts(8)
+    O.count[FOUND] = 5
+    O.at[:5, :3] = [[0, 1, 7], [2, 3, 5], [2, 3, 6], [2, 3, 8], [2, 4, 5]]
+    O.x[1:4, 0] = 0.0, 1.0, 1.1
+    assert before(O, (2, 3), 1, 8, (0.0, 0, 0), 1.0, 0) == (3, 4)  # by its name, wherever it is
+    assert before(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 0) == (2, 2)  # the nearest
+    assert before(O, (2, 3), 1, 9, (1.02, 0, 0), 1.0, 2) == (3, 4)  # of those that are left
+    assert before(O, (2, 3), 1, 9, (0.5, 0, 0), 1.0, 0) == (-1, 0)  # if it is near
+    assert before(O, (2, 3), -1, 8, (0.0, 0, 0), 1.0, 0) == (-1, 0)

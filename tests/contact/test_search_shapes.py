@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
+from flyball.contact.desk import LISTED
 from flyball.contact.finder import Finder, no_movers
-from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, PLANE, SPHERE
+from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, PLANE, SPHERE
 from flyball.contact.room import ROOM
 from flyball.contact.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
 from tests.contact.crowds import identities_hold, pairs_of
@@ -145,3 +146,35 @@ def test_fast_small_bodies_meet_a_thin_plate_or_fly_past_it(kind):
             assert not found
     assert hits > 10
     assert misses > 10
+
+
+def test_shapes_over_a_height_field_are_asked_about_only_below_its_top():
+    rng = np.random.default_rng(19)
+    n = 40
+    G, M = crowd(rng, n, [SPHERE, BOX, CAPSULE], 2.0)
+    heights = 0.1 * rng.random((12, 10))
+    for i in (n, n + 1):  # the plane and the box that stand still become one field and a plane far below
+        G.shape_x[i, AXES : AXES + 9], G.shape_x[i, RADIUS], G.shape_x[i, PAR : PAR + 4] = (
+            np.eye(3).ravel(),
+            np.inf,
+            0.0,
+        )
+        G.shape_i[i, KIND] = PLANE
+    G.shape_x[n + 1, :3] = 0, 0, -50.0
+    G.shape_i[n, KIND], G.shape_x[n, :3] = FIELD, (-1.1, -0.9, -0.2)
+    G.shape_x[n, PAR : PAR + 4] = 12, 10, 0.2, 0.2
+    G = G._replace(vertex=heights.reshape(-1, 3))
+    M.twist[:] = rng.standard_normal((n, 6))
+    F, touching = Finder(G, margin=MARGIN), 0
+    for _ in range(8):
+        C = F.find(M)
+        want = by_all_pairs(G, M, MARGIN)
+        assert set(pairs_of(C)) == set(want)
+        assert C.count[FOUND] == sum(map(len, want.values()))
+        touching += sum(n in pair for pair in want)
+        move(M, 4 * STEP)
+    assert touching > 20
+    M.pose[:, 2] += 10.0
+    F.find(M)
+    assert F.search.count[LISTED] < 1.5 * n  # pairs of shapes among themselves only
+    assert not any(n in pair for pair in pairs_of(F.now))

@@ -24,9 +24,11 @@ from .desk import (
     ROW,
     SHAPES,
     SIZES,
+    USUAL,
     WHOLE,
 )
 
+LEAST = 1e-6  # edges of cells, in usual radii: shapes may be points
 FAR = 1e15  # cells from the corner; what is further away stands in the last one
 BITS, LAST = 21, (1 << 21) - 1
 
@@ -79,7 +81,7 @@ def lay_out(B):
         n = int(B.sums[g, 0])
         if n == 0:
             continue
-        edge = 2.0 * B.sums[g, 1]
+        edge = max(2.0 * B.sums[g, 1], LEAST * B.real[USUAL])
         B.level_x[count, EDGE], B.level_x[count, PER_EDGE] = edge, 1.0 / edge
         places = 2
         while places < 2 * n:

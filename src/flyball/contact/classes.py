@@ -22,10 +22,12 @@ def classes(G: Geometry) -> tuple[np.ndarray, np.ndarray, bool]:
     """
     member, mask = G.shape_i[:, MEMBER], G.shape_i[:, MASK]
     still = (G.shape_i[:, MOVER] < 0).astype(np.int64)
-    told, kin = np.unique(np.stack([member, mask, still], axis=1), axis=0, return_inverse=True)
-    exact = len(told) <= CLASSES
+    (of, one), (to, other) = np.unique(member, return_inverse=True), np.unique(mask, return_inverse=True)
+    codes, kin = np.unique((one * len(to) + other) * 2 + still, return_inverse=True)
+    exact = len(codes) <= CLASSES
     if not exact:
-        told, kin = np.array([[-1, -1, 0], [-1, -1, 1]]), still
-    one, other = told[:, None, :], told[None, :, :]
-    meets = (one[..., 0] & other[..., 1] != 0) & (one[..., 1] & other[..., 0] != 0) & (one[..., 2] & other[..., 2] == 0)
-    return np.ascontiguousarray(kin.reshape(-1), np.int64), meets.astype(np.int64), exact
+        of, to, codes, kin = np.array([-1]), np.array([-1]), np.array([0, 1]), still
+    of, to, still = of[codes // 2 // len(to)], to[codes // 2 % len(to)], codes % 2
+    met = of[:, None] & to[None, :] != 0
+    meets = met & met.T & (still[:, None] & still[None, :] == 0)
+    return np.ascontiguousarray(kin, np.int64), meets.astype(np.int64), exact

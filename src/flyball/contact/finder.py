@@ -48,7 +48,7 @@ from .tables import (
     Movers,
 )
 
-PAIRS_EACH, PAIRS_ANYWAY = 40, 2_000_000  # pairs for each shape and in all, above which too many are in one place
+PAIRS_EACH, PAIRS_ANYWAY = 30, 2_000_000  # pairs for each shape and in all, above which too many are in one place
 THICK = 0.1  # skins, in radii
 
 
@@ -94,7 +94,7 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
     moving = bounded & (G.shape_i[:, MOVER] >= 0)
     usual = hold[moving if moving.any() else bounded, 3]
-    real[USUAL] = np.median(usual) if len(usual) else 1.0
+    real[USUAL] = (np.median(usual) if len(usual) else 0.0) or 1.0
     count[[BOUNDED, WIDE, TOLD]] = bounded.sum(), ns - bounded.sum(), exact
     slot = np.zeros((ns, 5), np.int64)
     for s, i in enumerate(np.flatnonzero(~bounded), start=int(bounded.sum())):
@@ -234,14 +234,16 @@ class Finder:
     def _more_pairs(self) -> None:
         B, ns = self.search, len(self.geometry.shape_i)
         capacity = len(B.pair)
-        if capacity >= max(PAIRS_EACH * ns, PAIRS_ANYWAY):
+        most = max(PAIRS_EACH * ns, PAIRS_ANYWAY)
+        if capacity >= most:
             i, many = self.most_pairs()
             raise ModelError(
                 f"too many shapes are in one place: {capacity} pairs of {ns} shapes are near each other, "
                 f"{many} of them with shape {i} alone; move bodies that start at the same place apart, or use groups "
                 "for those that may go through each other"
             )
-        pair, seen = np.zeros((2 * capacity, 3), np.int32), np.full((2, 2 * capacity), -1, np.int32)
+        larger = min(2 * capacity, most)
+        pair, seen = np.zeros((larger, 3), np.int32), np.full((2, larger), -1, np.int32)
         pair[:capacity], seen[:, :capacity] = B.pair, B.seen
         self.search = B._replace(pair=pair, seen=seen)
 

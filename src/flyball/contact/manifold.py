@@ -172,11 +172,13 @@ def manifold(G, i, j, A, B, n, nearest, reach, room):
     """
     frame = axes_of(n)
     m1, number_1 = drawn(G, i, A, n, frame, room, FACE_1)
-    m2, number_2 = drawn(G, j, B, neg(n), frame, room, FACE_2)
+    m2 = number_2 = 0
+    if m1 > 1:
+        m2, number_2 = drawn(G, j, B, neg(n), frame, room, FACE_2)
     r1, r2 = radius(G.shape_i[i, KIND], G, i), radius(G.shape_i[j, KIND], G, j)
     same = SAME * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
     at, count, least = CUT_1, 0, inf
-    if m1 > 1 and m2 > 1:
+    if m2 > 1:
         at, count, other, a, b, side = common(room, m1, m2)
         if count:
             name = FACES * (number_1 + PAIRS_OF_FACES * number_2)

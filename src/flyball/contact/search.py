@@ -7,7 +7,8 @@
 `C` gets the contacts of the movers' poses in `M`; `O` are those that the last search that was `DONE` filled (the two
 change places from step to step). A status `FULL_*` or `NOT_FINITE` leaves `O` and what is known of it as it was: what
 is named is enlarged (`finder.Finder.enlarge`) and the search is called again. Of `C.count`: `FOUND` contacts (with
-FULL_CONTACTS: how many there would be; with NOT_FINITE: the mover; with FULL_CELLS: a shape in the midst of too many).
+FULL_CONTACTS: how many there would be; with NOT_FINITE: the mover). While it runs, poses in `M` may be
+others; they are put back.
 """
 
 from __future__ import annotations

@@ -22,7 +22,7 @@ POINT, NORMAL, GAP = 0, 3, 6
 # entries of Contacts.count
 FOUND, STATUS, REBUILT, PAIRS, NUMBER = range(5)
 # what a search may return: FULL_* says what to enlarge before it is called again at the same state
-DONE, FULL_CONTACTS, FULL_PAIRS, FULL_CELLS, NOT_FINITE = range(5)
+DONE, FULL_CONTACTS, FULL_PAIRS, NOT_FINITE = range(4)
 # entries of Search.real: largest gap that is a contact; how far shapes may go, in radii, before their
 # pairs are looked for again; time that movers move on for before the next search (what may meet within it is a contact
 # too)

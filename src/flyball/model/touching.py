@@ -51,6 +51,18 @@ def check_touching(model: Model, e: Element) -> None:
         for material in (e.material, *(s.material for s in e.shapes())):
             if material is not None:
                 _material(model, material, e)
+        _refuse_idle(e)
+
+
+def _refuse_idle(e: Owner) -> None:
+    """Refuse materials of what touches nothing."""
+    shapes = e.shapes()
+    for s in shapes:
+        if s.material is not None and not s.touches:
+            raise ModelError(f"{e.title}: material of {s.title} has no effect, since it does not touch; leave it out")
+    if e.material is not None and not any(s.touches and s.material is None for s in shapes):
+        why = "its shapes name their own or do not touch" if shapes else "it has no shape"
+        raise ModelError(f"{e.title}: material {e.material!r} has no effect, since {why}; leave it out")
 
 
 def named(e: Contact) -> Iterator[str]:

@@ -1,0 +1,51 @@
+"""What analyses say of a mechanism that touches, where they count no contact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+SHAPE = fb.Box(edges=(0.1, 0.2, 0.3), position=(0.1, 0, 0))
+
+
+def scenes() -> tuple[fb.Mechanism, fb.Mechanism]:
+    """Bricks as many, and one by one; a ball besides."""
+    rng = np.random.default_rng(4)
+    p, e, s = rng.normal(size=(5, 3)), rng.normal(size=(5, 4)), rng.uniform(1, 2, 5)
+    many, single = (fb.Mechanism("pile", gravity=(0, 0, -9.81)) for _ in range(2))
+    many.add(fb.Bodies("bricks", shape=SHAPE, density=800, position=p, orientation=e, scale=s))
+    for k in range(5):
+        shape = fb.Box(edges=s[k] * np.array(SHAPE.edges), position=(0.1 * s[k], 0, 0))
+        single.add(fb.Body(f"b{k}", shape=shape, density=800, position=p[k], orientation=tuple(e[k])))
+    for m in (many, single):
+        m.add(fb.Body("ball", shape=fb.Sphere(radius=0.2), density=800))
+        m.add(fb.Contact(friction=0.3))
+    return many, single
+
+
+def test_many_bodies_weigh_what_single_ones_do() -> None:
+    many, single = (m.mass_properties() for m in scenes())
+    assert many.total.mass == pytest.approx(single.total.mass)
+    assert many.total.com == pytest.approx(single.total.com)
+    assert many.total.inertia == pytest.approx(single.total.inertia)
+    assert set(many.bodies) == {"ball", "bricks"}
+
+
+def test_freedoms_are_those_without_contact_and_it_is_said() -> None:
+    many, _ = scenes()
+    many.add(fb.Limit("stop", "ball.z", lower=-1))
+    for text in (str(many.mobility()), "\n".join(many.check().warnings)):
+        assert "Contact 'contact', Limit 'stop': freedoms and the start are those without" in text
+        assert "the 5 bodies of Bodies 'bricks'" in text
+    assert many.mobility().freedoms == 6
+    assert not any("neither a joint nor a force" in x for x in many.check().warnings)
+
+
+def test_a_mechanism_without_its_contact_is_asked_as_told() -> None:
+    many, _ = scenes()
+    with pytest.raises(fb.ModelError) as error:
+        many.kinematics(3)
+    assert "m.changed({'contact': None, 'bricks': None}).kinematics(...)" in str(error.value)
+    assert many.changed({"contact": None, "bricks": None}).check().warnings
