@@ -67,10 +67,10 @@ def bent(G, f, i, j, upper, n, k, room):
 @formula
 def ridged(G, f, i, j, upper, n, room):
     """Whether any edge of the triangle is."""
+    found = False
     for k in range(3):
-        if bent(G, f, i, j, upper, n, k, room):
-            return True
-    return False
+        found = found or bent(G, f, i, j, upper, n, k, room)
+    return found
 
 
 @formula
