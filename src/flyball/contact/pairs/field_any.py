@@ -17,7 +17,7 @@ from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, mm, mtv, mv, neg, put3, scale, sub, transpose
 from ..kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, SPHERE
 from ..manifold import NEAREST_NAME, manifold
-from ..patch import ALIKE, KEPT, gather, holds, lay, over, ridged, thin_out
+from ..patch import ALIKE, BENT, KEPT, gather, holds, lay, on_ridge, over, ridged, thin_out
 from ..room import CORNERS, FACE_2, NEAREST, PIECE
 from ..separation import separation
 from ..shapes.field import grid, height
@@ -28,6 +28,7 @@ PAIRS = (*((k, FIELD) for k in (SPHERE, BOX, CAPSULE, CYLINDER, CONE, HULL)), (F
 ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PLACES = 4.0 * CORNERS
 LATER = 2.0**45
+SPARE = KEPT - 1
 
 
 @formula
@@ -71,20 +72,41 @@ def corners(G, f, s, P, n, r, reach, room, count, near):
 
 @formula
 def ridge(G, f, s, P, cell, n, r, reach, room, count, near):
-    """Contacts at an edge or corner of the triangle."""
+    """Contacts at an edge or corner of the triangle; where these overlap in no way the field has, one to spare."""
     i, j, upper = cell
     gap, m, a = separation(G, f, s, P[0], P[1], n, reach + r, room, NEAREST)
     gap -= r
-    if gap > reach or not holds(G, f, i, j, upper, m, room):
+    if gap > reach:
+        return count
+    if not holds(G, f, i, j, upper, m, room):
+        if gap < room[SPARE, 6]:
+            put3(room, SPARE, 0, a)
+            put3(room, SPARE, 3, n)
+            room[SPARE, 6], room[SPARE, 7] = gap, LATER + room[PIECE + 3, 0]
         return count
     middle = add(a, scale(0.5 * gap, m))
     found = manifold(G, f, s, ((0.0, 0.0, 0.0), ONE), P, m, (gap, middle), reach, room)
+    flush = dot(m, n) > 1.0 - BENT * BENT
     for k in range(found):
+        if flush and not on_ridge(G, f, i, j, upper, n, load3(room, k, 0), room):
+            continue  # a corner of the shape, or on an edge between triangles in one plane
         name = room[k, 7]
         if name == NEAREST_NAME:
             name = LATER + room[PIECE + 3, 0]
         count = gather(room, count, load3(room, k, 0), load3(room, k, 3), room[k, 6], name, near)
     return count
+
+
+@formula
+def last(room, count, near):
+    """Take the contact to spare if the shape is in the field and nothing else says so: out along the triangle."""
+    for k in range(KEPT, KEPT + count):
+        if room[k, 6] < 0.0:
+            return count
+    if not room[SPARE, 6] < 0.0:
+        return count
+    x, n = load3(room, SPARE, 0), load3(room, SPARE, 3)
+    return gather(room, count, x, n, room[SPARE, 6], room[SPARE, 7], near)
 
 
 @formula
@@ -95,6 +117,7 @@ def under(G, f, s, P, r, reach, room, near):
     y0, y1 = extent(G, s, P[0], P[1], r + reach, 1)
     z0, z1 = extent(G, s, P[0], P[1], r + reach, 2)
     count = 0
+    room[SPARE, 6] = 0.0
     if not (x1 >= 0.0 and y1 >= 0.0 and x0 <= (nx - 1) * dx and y0 <= (ny - 1) * dy):
         return 0
     for i in range(int(max(x0, 0.0) / dx), int(min(x1 / dx, nx - 2.0)) + 1):
@@ -107,7 +130,7 @@ def under(G, f, s, P, r, reach, room, near):
                 count = corners(G, f, s, P, n, r, reach, room, count, near)
                 if ridged(G, f, i, j, upper == 1, n, room):
                     count = ridge(G, f, s, P, (i, j, upper == 1), n, r, reach, room, count, near)
-    return count
+    return last(room, count, near)
 
 
 @formula
