@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from flyball.numerics.cone.gauss_seidel import gauss_seidel
-from flyball.numerics.cone.problem import CONVERGED, COULOMB, ENDED, ENOUGH, FORCE_RESIDUAL, HISTORY, MOST, RESIDUAL
+from flyball.numerics.cone.problem import (
+    CONVERGED,
+    COULOMB,
+    ENDED,
+    ENOUGH,
+    FORCE_RESIDUAL,
+    HISTORY,
+    ISLAND,
+    MOST,
+    RESIDUAL,
+)
 from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve
 from tests.cone.problems import KINDS, cone_lack, dense, impulses, random_problem
@@ -134,11 +144,11 @@ def test_islands_are_solved_one_at_a_time():
     both.v[:] = X.v
     O.count[MOST], O.real[ENOUGH] = 10_000, 1e-14
     solve(gauss_seidel, P, both, W, O, F)
-    O.count[1] = 1
+    O.count[ISLAND] = 1
     before = X.v.copy()
     solve(gauss_seidel, P, X, W, O, F)
     np.testing.assert_array_equal(X.v[:3], before[:3])
     np.testing.assert_allclose(X.v[3:], both.v[3:], atol=1e-12)
-    O.count[1] = 0
+    O.count[ISLAND] = 0
     solve(gauss_seidel, P, X, W, O, F)
     np.testing.assert_allclose(X.v, both.v, atol=1e-12)

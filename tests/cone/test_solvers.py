@@ -170,3 +170,30 @@ def test_an_island_alone(name):
         if island:
             np.testing.assert_array_equal(X.v[:3], before[:3])
     np.testing.assert_allclose(X.v, both.v, atol=1e-10)
+
+
+@pytest.mark.parametrize("name", SOLVERS)
+def test_what_is_no_number_is_told(name):
+    """Impulses are zero then, and velocities those without any."""
+    P, X, W, O, F = random_problem(1)
+    P.bias[3, 0] = np.nan
+    free = X.v.copy()
+    solve(SOLVERS[name], P, X, W, O, F)
+    assert O.count[ENDED] == BROKEN
+    np.testing.assert_array_equal(X.v, free)
+    assert not X.p.any()
+
+
+@pytest.mark.parametrize("balls", [False, True])
+@pytest.mark.parametrize("name", SOLVERS)
+def test_a_contact_of_what_cannot_move_is_left_alone(name, balls):
+    """The others are solved as if it were not there."""
+    P, X, W, O, F = random_problem(1, balls=balls)
+    P.node[:3, :7], X.v[:3], P.bias[:, 0] = 0.0, 0.0, abs(P.bias[:, 0])
+    P.bias[(P.at < 3).all(1), 0] = -1.0  # nothing can be done about these
+    O.count[MOST], O.real[ENOUGH] = 50_000, 1e-9
+    solve(SOLVERS[name], P, X, W, O, F)
+    stuck = (P.at < 3).all(1)
+    assert stuck.any() and not stuck.all()
+    assert not X.p[stuck].any() and X.p.any()
+    assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-7

@@ -5,10 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flyball.contact.kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, SPHERE
+from flyball.contact.kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
+from flyball.contact.room import ROOM
 from flyball.contact.solids.field import field
+from flyball.contact.tables import COUNT, FIRST, KIND, MOVER, PAR, RADIUS, Geometry, Movers
 from flyball.errors import ModelError
-from tests.contact.scenes import contacts, turned
+from tests.contact.against import NAMES, pool, rotation, tables
+from tests.contact.pairs import separations
+from tests.contact.scenes import contacts, meet, turned
 
 I, O = np.eye(3), np.zeros(3)
 FLAT = np.zeros((8, 9))
@@ -152,6 +156,48 @@ def test_distance_of_spheres_over_rough_ground_is_that_of_the_nearest_triangle()
         away = np.linalg.norm(x - foot)
         assert best[6] == pytest.approx(away - 0.2, abs=1e-9)
         np.testing.assert_allclose(best[3:6], (x - foot) / away, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", NAMES, ids=NAMES.get)
+def test_any_shape_over_rough_ground_is_as_far_from_it_as_from_its_triangles(kind):
+    """And whatever overlaps a triangle has a contact that says so, upwards."""
+    rng = np.random.default_rng(kind)
+    d, z = 0.3, rng.uniform(0, 0.35, (9, 9))
+    i, j = np.mgrid[:9, :9]
+    knot = np.stack([i * d, j * d, z], axis=-1)
+    a, b, c, e = knot[:-1, :-1], knot[1:, :-1], knot[1:, 1:], knot[:-1, 1:]
+    triangles = np.concatenate([np.stack([a, b, c], axis=2), np.stack([a, c, e], axis=2)]).reshape(-1, 3, 3)
+    rows, par = field(z, d, d)
+    for _ in range(25):
+        s = pool(kind)[rng.integers(60)]
+        R = rotation(rng)
+        p = np.array([*rng.uniform(0.7, 1.7, 2), 0.35 + s.top(-R[2]) - rng.uniform(0, 0.25)])
+        G = tables([s])
+        exact = (of_triangles(G, triangles, p, R) - s.rounding).min()
+        at, x = np.repeat(G.shape_i, 2, axis=0), np.repeat(G.shape_x, 2, axis=0)
+        at[1, KIND], at[1, MOVER], at[1, FIRST], x[1, PAR : PAR + 4], x[1, RADIUS] = FIELD, 1, len(G.vertex), par, 4
+        both = Geometry(at, x, np.concatenate([G.vertex, rows]), G.face, G.apart)
+        pose = np.array([[*p, *R.ravel()], [0, 0, 0, *I.ravel()]])
+        room = np.zeros((ROOM, 8))
+        count = meet(both, Movers(pose, np.zeros((2, 6))), 0, 1, 0.05, room)
+        gap = room[:count, 6].min(initial=np.inf)
+        if exact > 0:
+            assert gap == pytest.approx(exact, abs=1e-6) if exact < 0.05 else count == 0
+        else:
+            assert gap < 0
+        assert (room[:count, 5] < 0).all()  # from the shape to the ground
+
+
+def of_triangles(G, triangles, p, R):
+    """Separation of the one shape's core, at p turned by R, from each triangle."""
+    m = len(triangles)
+    at, x = np.repeat(G.shape_i, 2 * m, axis=0), np.repeat(G.shape_x, 2 * m, axis=0)
+    at[1::2, KIND], at[1::2, COUNT], at[1::2, FIRST] = HULL, 3, len(G.vertex) + 3 * np.arange(m)
+    x[1::2, PAR], x[1::2, PAR + 1] = 0, -1
+    pose = np.tile([*p, *R.ravel()], (2 * m, 1))
+    pose[1::2] = [0, 0, 0, *I.ravel()]
+    vertex = np.concatenate([G.vertex, triangles.reshape(-1, 3)])
+    return separations(Geometry(at, x, vertex, G.face, G.apart), pose)[:, 0]
 
 
 def test_beyond_its_border_there_is_no_ground():

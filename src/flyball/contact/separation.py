@@ -14,6 +14,7 @@ from ..math.vec import add, dot, load3, norm, put3, scale, sub
 from .epa import ROWS as POLYTOPE
 from .epa import deepest
 from .gjk import APART, BEYOND, MEET, nearest, point, reach
+from .manifold import axes_of
 
 OFF = 0.03  # of the size: the gap that is made
 LOOKS = 48  # at most
@@ -21,6 +22,7 @@ NEAR = 1e-6  # of the size: the least
 SAME = 1e-13  # of the size: what one more look brings when it was the last
 SHALLOW = 1e-8  # of the size: depth below which nobody asks whether another direction is less deep
 ONWARD = 10  # doublings
+ASIDE = 1e-3  # angle
 EARLY = 4  # of these, before the polytope is asked
 ROWS = 8 + POLYTOPE  # of scratch
 
@@ -38,6 +40,20 @@ def onward(G, i, j, p, R, room, s, n, d):
         if not -dot(x, e) > s:
             break
         s, best = -dot(x, e), e
+    return s, best
+
+
+@formula
+def aside(G, i, j, p, R, room, s, n):
+    """The better of n, with the separation s, and what lies to its sides: a saddle has no other way to be left."""
+    best = n
+    for k in range(4):
+        u = axes_of(n)[k // 2]
+        d = add(n, scale(ASIDE if k % 2 == 0 else -ASIDE, u))
+        d = scale(1.0 / norm(d), d)
+        a, x = reach(G, i, j, p, R, room, d)
+        if -dot(x, d) > s:
+            return onward(G, i, j, p, R, room, -dot(x, d), n, d)
     return s, best
 
 
@@ -68,13 +84,17 @@ def separation(G, i, j, p, R, start, far, room, at):
             best, n = s, d
         elif better:
             best, n = onward(G, i, j, p, R, room, s, n, d)
-        if look > 0 and (not better or look == EARLY):
-            if (asked and not better) or -best <= SHALLOW * size:
+        if look > 0 and (not better or (look == EARLY and not asked)):
+            if -best <= SHALLOW * size:
                 return best, n, a
+            s, d = best, n
             if not asked:
                 s, d = deepest(G, i, j, p, R, room, at + 8, corners, size, best, n)
-                if not better and s <= best + SAME * size:
+                asked = True
+            if not better and s <= best + SAME * size:
+                s, d = aside(G, i, j, p, R, room, best, n)
+                if s <= best + SAME * size:
                     return best, n, a
-                best, n, asked = s, d, True
+            best, n = s, d
         away = min(OFF * size, max(NEAR * size, -best)) - best
     return best, n, a

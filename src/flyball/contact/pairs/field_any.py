@@ -28,6 +28,7 @@ PAIRS = (*((k, FIELD) for k in (SPHERE, BOX, CAPSULE, CYLINDER, CONE, HULL)), (F
 ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 PLACES = 4.0 * CORNERS
 LATER = 2.0**45
+SPARE = KEPT - 1
 
 
 @formula
@@ -71,11 +72,17 @@ def corners(G, f, s, P, n, r, reach, room, count, near):
 
 @formula
 def ridge(G, f, s, P, cell, n, r, reach, room, count, near):
-    """Contacts at an edge or corner of the triangle."""
+    """Contacts at an edge or corner of the triangle; where these overlap in no way the field has, one to spare."""
     i, j, upper = cell
     gap, m, a = separation(G, f, s, P[0], P[1], n, reach + r, room, NEAREST)
     gap -= r
-    if gap > reach or not holds(G, f, i, j, upper, m, room):
+    if gap > reach:
+        return count
+    if not holds(G, f, i, j, upper, m, room):
+        if gap < room[SPARE, 6]:
+            put3(room, SPARE, 0, a)
+            put3(room, SPARE, 3, n)
+            room[SPARE, 6], room[SPARE, 7] = gap, LATER + room[PIECE + 3, 0]
         return count
     middle = add(a, scale(0.5 * gap, m))
     found = manifold(G, f, s, ((0.0, 0.0, 0.0), ONE), P, m, (gap, middle), reach, room)
@@ -88,6 +95,18 @@ def ridge(G, f, s, P, cell, n, r, reach, room, count, near):
 
 
 @formula
+def last(room, count, near):
+    """Take the contact to spare if the shape is in the field and nothing else says so: out along the triangle."""
+    for k in range(KEPT, KEPT + count):
+        if room[k, 6] < 0.0:
+            return count
+    if not room[SPARE, 6] < 0.0:
+        return count
+    x, n = load3(room, SPARE, 0), load3(room, SPARE, 3)
+    return gather(room, count, x, n, room[SPARE, 6], room[SPARE, 7], near)
+
+
+@formula
 def under(G, f, s, P, r, reach, room, near):
     """Gather contacts with all triangles under the shape: how many."""
     nx, ny, dx, dy = grid(G, f)
@@ -95,6 +114,7 @@ def under(G, f, s, P, r, reach, room, near):
     y0, y1 = extent(G, s, P[0], P[1], r + reach, 1)
     z0, z1 = extent(G, s, P[0], P[1], r + reach, 2)
     count = 0
+    room[SPARE, 6] = 0.0
     if not (x1 >= 0.0 and y1 >= 0.0 and x0 <= (nx - 1) * dx and y0 <= (ny - 1) * dy):
         return 0
     for i in range(int(max(x0, 0.0) / dx), int(min(x1 / dx, nx - 2.0)) + 1):
@@ -107,7 +127,7 @@ def under(G, f, s, P, r, reach, room, near):
                 count = corners(G, f, s, P, n, r, reach, room, count, near)
                 if ridged(G, f, i, j, upper == 1, n, room):
                     count = ridge(G, f, s, P, (i, j, upper == 1), n, r, reach, room, count, near)
-    return count
+    return last(room, count, near)
 
 
 @formula

@@ -58,7 +58,7 @@ def barzilai_borwein(P, X, W, O, F, task):  # type: ignore[no-untyped-def]
     """Iterations until a step would change velocities by less than `ENOUGH`, at most `MOST`; how many there were.
 
     Of the convex form: the line search needs an objective, and Coulomb's law has none. Asked for it, it ends `BROKEN`
-    with everything as it was; De Saxce's loop around it is `desaxce`.
+    with everything as it was.
     """
     if O.count[COULOMB]:
         O.count[ENDED], O.count[USED] = BROKEN, 0

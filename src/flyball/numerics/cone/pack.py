@@ -75,6 +75,8 @@ def kind_of(P, W, c, rubbing):
         return SMOOTH_BALL if first and second else SMOOTH
     if not (first and second) or P.bias[c, 1] != 0.0 or P.bias[c, 2] != 0.0:
         return ROUGH
+    if (i < 0 or P.node[i, 0] == 0.0) and (j < 0 or P.node[j, 0] == 0.0):
+        return ROUGH
     alike = (i < 0 or P.node[i, ROUND] == 1.0) and (j < 0 or P.node[j, ROUND] == 1.0)
     x, y, z = P.frame[c, 6], P.frame[c, 7], P.frame[c, 8]
     return BALL if alike and abs(x * x + y * y + z * z - 1.0) < 1e-12 else ROUGH
@@ -150,7 +152,8 @@ def pack_rough(P, coulomb, W, c, place):
     for s in range(3):
         k[place + BIAS + s] = P.bias[c, s]
     k[place + SOFT], k[place + MU] = P.soft[c], P.mu[c]
-    W.rows[1, c, 0] = 3.0 / (D[0] + D[3] + D[5] + P.soft[c])
+    size = D[0] + D[3] + D[5]
+    W.rows[1, c, 0] = 3.0 / (size + P.soft[c]) if size > 0.0 else 0.0
     steps = local_steps(D, P.soft[c], coulomb)
     for s in range(8):
         k[place + IN + s] = steps[s]

@@ -52,7 +52,7 @@ def pressed(p, u, before, step, least):
     """Of a normal impulse alone; u without bias in it, step: its inverse diagonal, bias and compliance; of `of_*`."""
     inverse, bias, soft = step
     q = p - (u + bias + soft * p) * inverse
-    d = (q if q > least else least) - p
+    d = (least if q < least else q) - p  # nan stays nan
     return d * d, inverse, p * p, p * (before + bias), p * (u - before + soft * p)
 
 

@@ -76,7 +76,7 @@ def least_of(P, c):
 def projected_above(mu, least, n, s, t):
     """The point of the cone with a normal component of at least ``least`` nearest to (n, s, t)."""
     near, a, b = projected(mu, n, s, t)
-    if near >= least:
+    if not near < least:  # nan stays nan
         return near, a, b
     part = share(least, mu, sqrt(s * s + t * t))
     return least, part * s, part * t

@@ -61,7 +61,7 @@ def begin(P, X, W, O, plain):
             at = place_of(many, s)
             if s < many[BALL]:
                 W.pack[at + B_IN], W.pack[at + B_IT], W.pack[at + B_RATIO] = 1.0, 1.0, 1.0
-            else:
+            elif W.pack[at + IN] > 0.0:  # else nothing moves
                 W.pack[at + IN], W.pack[at + SLIDE], W.pack[at + RATIO] = 1.0, 1.0, 1.0
     start, end = lines_of(P, O)
     for k in range(start, end):

@@ -55,6 +55,8 @@ def step_ball(k, at, y, g, size, coulomb):
 def step_rough(k, at, y, g, size, coulomb):
     """As `step_ball`, of any contact, along its frame."""
     lean, slide, gn = k[at + IN], k[at + SLIDE], g[0]
+    if lean == 0.0:  # nothing moves
+        return y, 0.0, 0.0
     if coulomb:
         gn += k[at + MU] * sqrt(g[1] * g[1] + g[2] * g[2])
     n, a, b = y[0] - size * lean * gn, y[1] - size * slide * g[1], y[2] - size * slide * g[2]
