@@ -104,3 +104,12 @@ def test_newtons_cradle_on_joints():
     fast = [np.abs(r[f"b{k}"].velocity[:, 0]).max() for k in range(5)]
     assert fast[4] == pytest.approx(2 * np.sqrt(G) * np.sin(0.15), rel=1e-3)
     assert max(fast[1:4]) < 0.01 * fast[4]
+
+
+def test_what_steps_by_impulses_cannot_do_is_refused():
+    m = scene(friction=0.0)
+    m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
+    with pytest.raises(fb.ModelError, match="absolute coordinates"):
+        m.simulate(0.1, coordinates="joint")
+    with pytest.raises(fb.ModelError, match="go on from a result"):
+        m.simulate(0.2, start=m.simulate(0.1, outputs=2))
