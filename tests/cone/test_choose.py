@@ -13,11 +13,13 @@ from flyball.numerics.cone.choose import (
     HANDED_ON,
     ISLANDS,
     LARGEST,
-    MOST_CONTACTS,
+    THE_REST,
 )
+from flyball.numerics.cone.gauss_seidel import gauss_seidel
 from flyball.numerics.cone.islands import islands_of
 from flyball.numerics.cone.problem import CONVERGED, ENDED, ENOUGH, MOST, RESIDUAL, Factor
 from flyball.numerics.cone.registry import names, ready
+from flyball.numerics.cone.rooms import rooms, unfilled
 from flyball.numerics.cone.solve import solve_kernel
 from tests.cone.problems import KINDS, dense, impulses, random_problem
 from tests.cone.test_gauss_seidel import cone_lack
@@ -37,7 +39,8 @@ def test_islands_one_by_one(limit, kind, seed):
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count[MOST], O.real[ENOUGH] = 200_000, 1e-12
     made = ready("auto", P, X, W, O)
-    made.F.limit[MOST_CONTACTS] = limit
+    made.F.limit[:] = limit, 100, limit, 100
+    made.F.doors[THE_REST] = gauss_seidel.address(P, X, W, O, Factor(made.F.numbers, made.F.places))
     solve_kernel(made.address, P, X, W, O, made.F)
     p = impulses(P, X)
     assert O.count[ENDED] == CONVERGED and O.real[RESIDUAL] < 1e-9
@@ -76,6 +79,14 @@ def test_what_does_not_fit_is_handed_on():
     assert cone_lack(P, p, N @ p + b) < 1e-8
 
 
+def test_few_bodies_need_no_sweeps():
+    P, X, W, O, _ = random_problem(4)
+    made = ready("auto", P, X, W, O)
+    assert made.F.doors[THE_REST] == 0
+    solve_kernel(made.address, P, X, W, O, made.F)
+    assert O.count[ENDED] == CONVERGED and made.told[BY_OTHER] == 0
+
+
 def test_nothing_to_do():
     P, X, W, O, F = random_problem(4, nc=0, nn=2)
     made = ready("auto", P, X, W, O)
@@ -83,3 +94,23 @@ def test_nothing_to_do():
     solve_kernel(made.address, P, X, W, O, made.F)
     assert O.count[ENDED] == CONVERGED and isinstance(F, Factor)
     np.testing.assert_array_equal(X.v, before)
+
+
+@pytest.mark.parametrize(("ratio", "to_newton"), [(1.0, 0), (1000.0, 1)])
+def test_uneven_masses_go_to_newton_in_larger_islands(ratio, to_newton):
+    """A chain of 60 nodes is too long for Newton, unless one of them is heavy."""
+    n = 60
+    P = unfilled(n, n)
+    X, W, O, _ = rooms(P)
+    P.node[:, 0] = P.node[:, 1] = P.node[:, 2] = P.node[:, 3] = 1.0
+    P.node[-1, :4] /= ratio
+    P.at[:, 0], P.at[:, 1] = np.arange(n) - 1, np.arange(n)
+    P.frame[:] = 0, 0, 1, 1, 0, 0, 0, 1, 0
+    X.v[:, 2] = -1.0
+    O.count[MOST], O.real[ENOUGH] = 100_000, 1e-9
+    made = ready("auto", P, X, W, O)
+    solve_kernel(made.address, P, X, W, O, made.F)
+    assert made.told[BY_ONE] == to_newton and made.told[BY_OTHER] == 1 - to_newton
+    assert O.count[ENDED] == CONVERGED
+    assert X.p[:, 0] == pytest.approx((1 / P.node[::-1, 0]).cumsum()[::-1], rel=1e-4)
+    assert abs(X.v).max() < 1e-5

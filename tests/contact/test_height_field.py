@@ -70,6 +70,17 @@ def test_box_on_flat_ground_stands_on_its_corners_whose_names_last():
     assert all(n == names[0] for n in names)
 
 
+def test_box_near_the_border_stands_on_its_corners_too():
+    found = over(np.zeros((3, 3)), (BOX, [0.3, 0.3, 0.1]), (1.1, 0.93, 0.0999))
+    np.testing.assert_allclose(np.sort(np.abs(found[:, :2] - (1.1, 0.93)), axis=0), np.full((4, 2), 0.3), atol=1e-12)
+
+
+def test_box_wider_than_the_field_stands_on_its_border():
+    found = over(np.zeros((3, 3)), (BOX, [3, 3, 0.1]), (1, 1, 0.0999))
+    assert {(0, 0), (2, 0), (0, 2), (2, 2)} <= {tuple(p) for p in np.round(found[:, :2], 9)}
+    np.testing.assert_allclose(found[:, 3:6], [[0, 0, 1]] * len(found), atol=1e-9)
+
+
 def roof(n=9):
     i, _ = np.mgrid[:n, :n]
     return -0.5 * np.abs(i - 4.0)

@@ -55,14 +55,31 @@ def below(G, f, i, j, x, n, width):
 
 
 @formula
-def ridged(G, f, i, j, upper, n, room):
-    """Whether an edge of the triangle with the unit normal n is bent outwards, or the field ends there."""
+def bent(G, f, i, j, upper, n, k, room):
+    """Whether edge k of the triangle with the unit normal n is bent outwards, or the field ends there."""
     nx, ny, dx, dy = grid(G, f)
+    u, v = neighbour(upper, k)
+    if not inside(G, f, i + u, j + v):
+        return True
+    return dot(n, sub(knot(G, f, i + u, j + v), load3(room, PIECE + k, 0))) < -BENT * (dx + dy)
+
+
+@formula
+def ridged(G, f, i, j, upper, n, room):
+    """Whether any edge of the triangle is."""
+    found = False
     for k in range(3):
-        u, v = neighbour(upper, k)
-        if not inside(G, f, i + u, j + v):
-            return True
-        if dot(n, sub(knot(G, f, i + u, j + v), load3(room, PIECE + k, 0))) < -BENT * (dx + dy):
+        found = found or bent(G, f, i, j, upper, n, k, room)
+    return found
+
+
+@formula
+def on_ridge(G, f, i, j, upper, n, x, room):
+    """Whether x, in the plane of the triangle, lies on such an edge."""
+    for k in range(3):
+        a, b = load3(room, PIECE + k, 0), load3(room, PIECE + (k + 1) % 3, 0)
+        across = cross(n, sub(b, a))
+        if dot(across, sub(x, a)) ** 2 <= BENT**2 * dot(across, across) ** 2 and bent(G, f, i, j, upper, n, k, room):
             return True
     return False
 

@@ -17,7 +17,7 @@ from ...math.scalar import sqrt
 from ...math.vec import add, dot, load3, mm, mtv, mv, neg, put3, scale, sub, transpose
 from ..kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, HEMISPHERE, HULL, SPHERE
 from ..manifold import NEAREST_NAME, manifold
-from ..patch import ALIKE, KEPT, gather, holds, lay, over, ridged, thin_out
+from ..patch import ALIKE, BENT, KEPT, gather, holds, lay, on_ridge, over, ridged, thin_out
 from ..room import CORNERS, FACE_2, NEAREST, PIECE
 from ..separation import separation
 from ..shapes.field import grid, height
@@ -86,7 +86,10 @@ def ridge(G, f, s, P, cell, n, r, reach, room, count, near):
         return count
     middle = add(a, scale(0.5 * gap, m))
     found = manifold(G, f, s, ((0.0, 0.0, 0.0), ONE), P, m, (gap, middle), reach, room)
+    flush = dot(m, n) > 1.0 - BENT * BENT
     for k in range(found):
+        if flush and not on_ridge(G, f, i, j, upper, n, load3(room, k, 0), room):
+            continue  # a corner of the shape, or on an edge between triangles in one plane
         name = room[k, 7]
         if name == NEAREST_NAME:
             name = LATER + room[PIECE + 3, 0]

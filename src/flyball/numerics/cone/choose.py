@@ -28,10 +28,11 @@ from .problem import (
     State,
 )
 
-# entries of Auto.doors: addresses of what takes small islands and of what takes the rest; 0: not in use
+# entries of Auto.doors: addresses of what takes small islands and of what takes the rest (0: all are small)
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
-# entries of Auto.limit: most contacts and most nodes of an island that is small
-MOST_CONTACTS, MOST_NODES, LIMITS = range(3)
+# entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN
+MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
+UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
 # entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
 # hand on to the other, contacts by the one; the largest island's contacts
 CALLS, ISLANDS, BY_ONE, BY_OTHER, HANDED_ON, CONTACTS_BY_ONE, LARGEST, TOLD = range(8)
@@ -91,10 +92,25 @@ def copy_line(P, X, Q, Y, line, k):
 @formula
 def small(P, F, I, k):
     """Whether island k is for the solver of small islands."""
-    contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
     if P.turn.shape[0] > 0:
         return False
-    return contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]
+    contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
+    if contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]:
+        return True
+    if contacts > F.limit[MOST_CONTACTS_UNEVEN] or nodes > F.limit[MOST_NODES_UNEVEN]:
+        return False
+    return I.team_p[k + 1] > I.team_p[k] or unevenness(P, I, k) > UNEVEN
+
+
+@formula
+def unevenness(P, I, k):
+    """Largest over smallest mass of the nodes of an island that impulses move."""
+    least, most = 1e300, 0.0
+    for e in range(I.member_p[k], I.member_p[k + 1]):
+        a = P.node[I.member[e], 0]
+        if a > 0.0:
+            least, most = min(least, a), max(most, a)
+    return most / least
 
 
 @formula
@@ -170,7 +186,7 @@ def gather(O, sofar):
 def by_one(P, X, W, O, F, f):
     """An island by the solver of small ones, or by the other where that cannot."""
     enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
-    if O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN:
+    if F.doors[THE_REST] != 0 and (O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN):
         F.told[HANDED_ON] += 1
         enter(F.doors[THE_REST], P, X, W, O, f, 0)
 
@@ -203,6 +219,8 @@ def solve_all(P, X, W, O, F):
     nc, nn, ng, nl = P.size[0], P.size[1], P.size[2], P.size[3]
     count = find_islands(P.at, P.line_at, (nc, nn, ng, nl), I)
     some = pick(P, F, I, count)
+    if count == 0:
+        return 0
     if some == 0:
         enter(F.doors[THE_REST], P, X, W, O, f, 0)
     elif count == 1:

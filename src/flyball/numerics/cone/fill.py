@@ -32,7 +32,7 @@ from .prox import (
     nearest,
     on_cone,
 )
-from .smooth import product
+from .smooth import from_held, product
 
 
 @formula
@@ -205,3 +205,28 @@ def push_of(R):
     for k in range(6 * R.size[BLOCKS]):
         s += R.blocks[k] * R.blocks[k]
     return s
+
+
+@formula
+def make_safe(R):
+    """Scale impulses so that they take energy: least 1/2 p' N p + b' p along them."""
+    from_held(R)
+    square, linear = push_of(R), 0.0
+    for row in range(R.size[ROWS]):
+        o = WIDE * row
+        for k in range(3):
+            linear += R.row[o + U + k] * R.row[o + HELD + k]
+    a = -linear / square if square > 0.0 else 1.0
+    a = min(max(a, 0.0), 1.0)
+    for row in range(R.size[ROWS]):
+        for k in range(3):
+            R.row[WIDE * row + HELD + k] *= a
+
+
+@formula
+def set_slips(R, coulomb):
+    """What is added to normal velocities, and bounds of rolling and spinning, of what is held on to."""
+    for row in range(R.size[CONTACTS]):
+        R.row[WIDE * row + SLIP] = dilation(R, row, coulomb)
+    for row in range(R.size[BEFORE_TURNING], R.size[ROWS]):
+        set_bounds(R, row, HELD)

@@ -16,8 +16,8 @@ from ...compiler.held import held
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from .blocks import factor, solve
-from .fill import dilation, fill_rows, hand_back, push_of, residual, set_bounds, set_own, span_of
-from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS
+from .fill import fill_rows, hand_back, make_safe, residual, set_own, set_slips, span_of
+from .gather import BLOCKS, CONTACTS, ROWS
 from .layout import prepare, rows_of
 from .problem import (
     BROKEN,
@@ -43,7 +43,6 @@ from .prox import (
     OWN,
     ROOT_N,
     ROOT_T,
-    SLIP,
     WIDE,
     Q,
     U,
@@ -188,15 +187,6 @@ def hold(R, coulomb):
 
 
 @formula
-def set_slips(R, coulomb):
-    """What is added to normal velocities, and bounds of rolling and spinning, of what is held on to."""
-    for row in range(R.size[CONTACTS]):
-        R.row[WIDE * row + SLIP] = dilation(R, row, coulomb)
-    for row in range(R.size[BEFORE_TURNING], R.size[ROWS]):
-        set_bounds(R, row, HELD)
-
-
-@formula
 def inner(R, O, coulomb, law, steps):
     """Newton steps at what is held on to: (how it ended, residual, change of what is held on to, steps)."""
     enough, last = O.real[ENOUGH], steps + MANY
@@ -286,22 +276,6 @@ def search(R, O, coulomb, worst):
 
 
 @formula
-def make_safe(R):
-    """Scale impulses so that they take energy: least 1/2 p' N p + b' p along them."""
-    from_held(R)
-    square, linear = push_of(R), 0.0
-    for row in range(R.size[ROWS]):
-        o = WIDE * row
-        for k in range(3):
-            linear += R.row[o + U + k] * R.row[o + HELD + k]
-    a = -linear / square if square > 0.0 else 1.0
-    a = min(max(a, 0.0), 1.0)
-    for row in range(R.size[ROWS]):
-        for k in range(3):
-            R.row[WIDE * row + HELD + k] *= a
-
-
-@formula
 def newton_solve(P, X, O, F):
     """See `newton`."""
     span = span_of(P, O)
@@ -324,7 +298,8 @@ def newton_solve(P, X, O, F):
             make_safe(R)
     O.count[ENDED], O.real[RESIDUAL] = ended, worst
     O.real[FORCE_RESIDUAL] = 0.0
-    hand_back(P, X, R, span)
+    if ended != BROKEN:
+        hand_back(P, X, R, span)
     return O.count[USED]
 
 

@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...compiler.door import Door
+from .admm import admm
 from .apgd import apgd
 from .barzilai_borwein import barzilai_borwein
-from .choose import DOORS, LIMITS, MOST_CONTACTS, MOST_NODES, SMALL_ISLANDS, THE_REST, TOLD, Auto, auto
+from .choose import DOORS, LIMITS, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, SMALL_ISLANDS, THE_REST, TOLD, Auto, auto
 from .gauss_seidel import gauss_seidel
 from .islands import room_for_islands
 from .jacobi import jacobi
@@ -25,11 +26,13 @@ SOLVERS: dict[str, Door] = {
     "barzilai-borwein": barzilai_borwein,
     "apgd": apgd,
     "apgd-lean": lean,
+    "admm": admm,
 }
-FACTORED = {"newton"}  # those that want `Factor`: each island by itself, the rest to sweeps where it cannot
+FACTORED = {"newton", "admm"}  # those that want `Factor`: each island by itself, the rest to sweeps where it cannot
 
-# islands up to this size go to Newton: measured on stacks, walls and piles (benchmarks)
-CONTACTS_FOR_NEWTON, NODES_FOR_NEWTON = 400, 100
+# islands up to this size go to Newton, contacts and nodes: with masses that are alike, where 50 sweeps take as long as
+# five of its steps, and with uneven ones or joints, where sweeps do not get there
+EVEN, UNEVEN = (200, 40), (800, 150)
 PLACES, NUMBERS = 60, 250  # of `Factor`, for each contact and node of the largest island that is to fit
 
 
@@ -70,20 +73,23 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
         F = Factor(np.zeros(0), np.zeros(0, np.int64))
         return Ready(SOLVERS[name].address(P, X, W, O, F), F, np.zeros(0, np.int64))
     whole = name != "auto"
-    made = room_for_all(P, O, whole)
+    made = room_for_all(P, whole)
     f = Factor(made.numbers, made.places)
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLANDS] = first.address(P, X, W, O, f)
-    made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
+    if name == "auto" and len(P.node) <= EVEN[1] and len(P.group) == 1 and len(P.turn) == 0:
+        made.limit[:] = len(P.mu), len(P.node), len(P.mu), len(P.node)  # few bodies: nothing is left for sweeps
+    else:
+        made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
     return Ready(auto.address(P, X, W, O, made), made, made.told)
 
 
-def room_for_all(P: Problem, O: Choices, whole: bool) -> Auto:
+def room_for_all(P: Problem, whole: bool) -> Auto:
     """Rooms of `auto`; ``whole``: for islands of any size."""
     nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
     limit = np.zeros(LIMITS, np.int64)
-    limit[:] = (nc, nn) if whole else (CONTACTS_FOR_NEWTON, NODES_FOR_NEWTON)
-    contacts, nodes = min(nc, int(limit[MOST_CONTACTS])), min(nn, int(limit[MOST_NODES]))
+    limit[:] = (nc, nn, nc, nn) if whole or nn <= EVEN[1] else (*EVEN, *UNEVEN)
+    contacts, nodes = min(nc, int(limit[MOST_CONTACTS_UNEVEN])), min(nn, int(limit[MOST_NODES_UNEVEN]))
     wide = int(P.group[-1]) + 6 * ng
     islands = room_for_islands(nc, nn, ng, nl)
     most = len(islands.island) + 1
