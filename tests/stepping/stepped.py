@@ -14,18 +14,19 @@ from flyball.stepping.joints import joined, joined_kernel
 class Stepped:
     """A mechanism and what it touches; ``touching(M)`` says what: (mover 1, mover 2, point, normal, gap, friction)."""
 
-    def __init__(self, model, h, coordinates="absolute", contacts=0, touching=None):
+    def __init__(self, model, h, coordinates="absolute", contacts=0, touching=None, stops=None):
         start = begin(model.snapshot(), 0.0, None, None, coordinates)
         self.names = [b.name for b in model.bodies]
         self.touching = touching
         self.compiled = start.assembly.compiled
         self.structure = self.compiled.structure
-        A = tables(start, self.names, 0, h)
-        self.A = A._replace(job=np.zeros((2 * contacts, 3), np.int64))
+        A = tables(start, self.names, 0, h, stops)
+        lines = 2 * len(A.line)
+        self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
         n, nv = len(self.names), A.wide.shape[1]
         self.M = Movers(np.zeros((n, 12)), np.zeros((n, 6)))
         self.C = Contacts(np.zeros(8, np.int64), np.zeros((contacts, 4), np.int64), np.zeros((contacts, 8)))
-        self.P = unfilled(contacts, 0, len(A.group) - 1, 0, 6 * contacts * nv)
+        self.P = unfilled(contacts, 0, len(A.group) - 1, lines, (6 * contacts + lines) * nv)
         self.P.group[:] = A.group
         self.X, self.Y = rooms(self.P)[0], rooms(self.P)[0]
         A.door[0] = engine.address(A.S, A.W, A.R, A.clock, A.sheet)
@@ -67,6 +68,7 @@ class Stepped:
                 P.at[c], P.frame[c], P.mu[c], P.bias[c] = (a, b), frame(normal), mu, (max(gap, 0.0) / h, 0.0, 0.0)
                 self.C.x[c, POINT : POINT + 3], self.C.x[c, NORMAL : NORMAL + 3], self.C.x[c, GAP] = point, normal, gap
             X.p[:] = Y.p[:] = 0.0
+            X.line[:] = 0.0
             self.ask(FREE)
             self.ask(ROWS)
             self.ask(BEGIN)
@@ -97,7 +99,8 @@ class Stepped:
 
     def solve(self, X, bias, mu):
         """Gauss and Seidel, Coulomb's law, to the last digit."""
-        n = len(mu)
+        n, nl = len(mu), self.P.size[3]
+        lines = [self.line(k) for k in range(nl)]
         sides = [self.sides(c) for c in range(n)]
         N = [sum(J @ Y.T for _, _, J, Y in s) for s in sides]
         for _ in range(3000):
@@ -113,8 +116,22 @@ class Stepped:
                 for sign, part, _, Y in sides[c]:
                     X.wide[part] += sign * change @ Y
                 worst = max(worst, np.abs(N[c] @ change).max())
+            for k, (part, J, Y) in enumerate(lines):
+                add, soft, low, high = self.P.line_x[k]
+                old, per = X.line[k], J @ Y + soft
+                if per > 0.0:
+                    new = old - (J @ X.wide[part] + add + soft * old) / per
+                    X.line[k] = min(max(new, low), high)
+                    X.wide[part] += (X.line[k] - old) * Y
+                    worst = max(worst, abs(X.line[k] - old) * per)
             if worst < 1e-13:
                 return
+
+    def line(self, k):
+        """Slice of velocities, J, Y of a line."""
+        g, at = self.P.line_at[k]
+        a, b = self.A.group[g], self.A.group[g + 1]
+        return slice(a, b), self.P.J[at : at + b - a], self.P.Y[at : at + b - a]
 
 
 def frame(normal):

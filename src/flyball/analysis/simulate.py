@@ -101,6 +101,12 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
     for name, usual in IDLE.items():
         if getattr(o, name) != usual:
             raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
+    if o.coordinates == "joint":
+        raise ModelError(
+            "steps by impulses are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
+        )
+    if o.start is not None:
+        raise ModelError("steps by impulses do not go on from a result yet: leave out start")
     return replace(o, method=o.method.bounded(o.max_step))
 
 

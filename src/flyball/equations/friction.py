@@ -9,6 +9,7 @@ before that there is none: friction outweighs what causes it and the joint jams.
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..forces.joint_friction import coefficient
 from ..forces.joint_friction import load as pressed
 from ..math.vec import add, load3, scale
 from ..tables.system import (
@@ -60,6 +61,13 @@ def reaction_loads(S, W):
                 force = add(force, scale(c, load3(W.T, term, 0)))
                 torque = add(torque, scale(c, load3(W.T, term, 3)))
         W.sensed[RETURNED, n] = pressed(wide(S.force_x, k), load(W.FK, S.force_i[k, FORCE_M]), force, torque)
+
+
+@formula
+def most_friction(S, k, arm, rate, load):
+    """What friction of force k can hold along its coordinate, where surfaces slide by ``arm`` times the rate."""
+    par = wide(S.force_x, k)
+    return arm * coefficient(par, arm * rate) * (load + par[6])
 
 
 @formula

@@ -77,6 +77,11 @@ class CoordinateSpring(CoordinateForce):
         return self.force is None and self.damping == 0.0
 
 
+def measuring(name: str, coordinate: str) -> CoordinateSpring:
+    """A spring of no stiffness: all that comes of it is that its coordinate is measured."""
+    return CoordinateSpring(name, coordinate)
+
+
 @element
 class Actuator(CoordinateForce):
     """A force or torque along a coordinate by a law: a hydraulic cylinder in a prismatic joint, a controller.

@@ -99,6 +99,7 @@ class JointFriction(CoordinateForce):
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
     load: ClassVar = staticmethod(load)
+    single: ClassVar[str] = "friction"
     outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
 
     def coordinate_text(self) -> str:

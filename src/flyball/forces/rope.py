@@ -77,6 +77,7 @@ class Rope(CoordinateForce):
     sign: ClassVar[float] = -1.0
     outputs: ClassVar[dict[str, str]] = {"length": "m", "rate": "m/s", "tension": "N"}
     drawn: ClassVar[str] = "rope"
+    single: ClassVar[str] = "rope"
     fails: ClassVar[str] = "Two neighbouring points of it coincide, where the rope between them has no direction"
 
     def ends(self) -> dict[str, str]:

@@ -37,6 +37,7 @@ class Force(Element):
     energy: ClassVar[Callable | None] = None
     outputs: ClassVar[dict[str, str]] = {}
     drawn: ClassVar[str] = ""
+    single: ClassVar[str] = ""  # "rope" or "friction": steps by impulses take it as a single row, not as a force
     fails: ClassVar[str] = "Its numbers are too large"  # where its formulas give no number, and what to do
 
     def ends(self) -> dict[str, str]:

@@ -113,7 +113,8 @@ def hits(G, C, bias, R, X, L, pace, now):
         e = elasticity(G, C, L, c)
         now[c, HIT] = 0.0
         plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[FLAT]
-        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= 0.0:
+        flat = pace.real[FLAT] if plain else 0.0  # what rests against what is hit is hit by it
+        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= flat:
             now[c, HIT] = 1.0
             found = found or (e > 0.0 and u[0] < -slowest)
             R.bias[c, 0] = 0.0

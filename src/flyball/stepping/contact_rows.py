@@ -11,7 +11,8 @@ from ..contact.tables import POINT
 from ..math.vec import add, load3, sub
 from ..numerics.cone.problem import NONE
 from .implicit import climb, respond, stiffened
-from .joined import FIRST, IMPULSE, JOB_AT, JOB_NEXT, JOB_ROWS, JOBS, NEEDED, NO_ROOM, STRUCK
+from .joined import FIRST, IMPULSE, JOB_AT, JOB_NEXT, JOB_ROWS, JOBS, LINE_AT, LINE_GROUP, NEEDED, NO_ROOM, STRUCK
+from .lines import line_laws, line_rows
 
 
 @formula
@@ -23,8 +24,9 @@ def contact_rows(A, M, C, P):
     first = A.count[FIRST]
     rows = 6 if P.turn.shape[0] > 0 else 3
     used, jobs = needed(A, P, rows)
+    used, jobs, lines = line_rows(A, P, used, jobs, False)
     A.count[NEEDED], A.count[JOBS] = used, jobs
-    if used > P.J.shape[0] or used > P.Y.shape[0] or jobs > A.job.shape[0]:
+    if used > min(P.J.shape[0], P.Y.shape[0]) or jobs > A.job.shape[0] or lines > P.line_at.shape[0]:
         return NO_ROOM
     for g in range(A.queue.shape[0]):
         A.queue[g] = -1
@@ -38,6 +40,9 @@ def contact_rows(A, M, C, P):
             if mover < first:
                 continue
             b, g = A.mover[mover - first, 0], A.mover[mover - first, 1]
+            if g < 0:  # joints hold it to the ground
+                P.at[c, side] = NONE
+                continue
             n = A.group[g + 1] - A.group[g]
             if g == last:  # both sides in one group: the difference
                 at = P.block[c, 0]
@@ -55,7 +60,11 @@ def contact_rows(A, M, C, P):
             side_rows(A, P, c, (b, at - A.group[g], n), point, rows)
             P.block[c, side], P.at[c, side] = at, -2 - g
             last = g
+    line_rows(A, P, used, jobs, True)
+    for i in range(lines):
+        queue(A, A.active[i, LINE_GROUP], jobs + i, A.active[i, LINE_AT], 1)
     answer(A, P)
+    line_laws(A, P, lines)
     return 0
 
 
@@ -70,7 +79,7 @@ def needed(A, P, rows):
             mover = P.at[c, side]
             if mover >= A.count[FIRST]:
                 g = A.mover[mover - A.count[FIRST], 1]
-                if g != last:
+                if g != last and g >= 0:
                     used += rows * (A.group[g + 1] - A.group[g])
                     jobs += 1
                 last = g

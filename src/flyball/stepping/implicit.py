@@ -4,7 +4,8 @@ A force s along J v, with stiffness k and damping c, is taken at
 
     x + (1 - b) / 4 h (r+ - r-) + b h r+   and   (1 - b) / 2 r- + (1 + b) / 2 r+
 
-x being where it is at half the step, r- and r+ its rates before and after. With b = 0 that is the trapezoidal rule,
+x being where it is at half the step, r- and r+ its rates at the ends of the step: J v- and J v+ less and more what the
+curved way adds by itself in half of it (the bias acceleration, h / 2 of it). With b = 0 that is the trapezoidal rule,
 which keeps the energy of a linear spring; with b = 1 whatever is stiff is at rest after two steps. Between them it is
 stable for any h, k, c: with z = h^2 k / m the matrix of one step has the determinant (1 + (1 - b) / 4 z) / (1 + b' z),
 where b' = (1 + 3 b) / 4. b goes with the square of z, so that the step stays of second order.
@@ -17,13 +18,24 @@ from __future__ import annotations
 from ..compiler.door import enter
 from ..compiler.jit import formula
 from ..equations.records import load
-from ..equations.slopes import ALONG, DAMPING, DIRECTIONS, STIFFNESS, direction
+from ..equations.slopes import DAMPING, DIRECTIONS, STIFFNESS, direction
 from ..equations.solve import inverse_mass
 from ..equations.tasks import SLOPES, SOLVE
 from ..equations.tree import project
 from ..math.scalar import sqrt
 from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_M, NV, PARENT, SCHUR, SOLVER, V0
-from .joined import ADDED, SHARE, SOLVED, SPRING_C, SPRING_FORCE, SPRING_K, SPRING_OF, SPRINGS
+from .joined import (
+    ADDED,
+    BEND,
+    OF_DIRECTION,
+    OF_MANY,
+    SHARE,
+    SOLVED,
+    SPRING_C,
+    SPRING_K,
+    SPRING_OF,
+    SPRINGS,
+)
 
 SOFT = 1e-3  # h^2 k / m + h c / m: what is softer than this is left to the evaluation at half the step
 
@@ -94,7 +106,7 @@ def take_springs(A, h):
             stiffness, damping = max(0.0, found[k, STIFFNESS + i]), max(0.0, found[k, DAMPING + i])
             if stiffness + damping > 0.0 and one_spring(A, h, used, (k, n, i), stiffness, damping):
                 A.spring_x[used, SPRING_OF] = k
-                A.spring_x[used, SPRING_FORCE] = found[k, ALONG + i]
+                A.spring_x[used, OF_MANY], A.spring_x[used, OF_DIRECTION] = n, i
                 used += 1
     A.count[SPRINGS] = used
     factor_springs(A)
@@ -139,9 +151,21 @@ def factor_springs(A):
 @formula
 def stiffened(A, x):
     """Turn a response without springs into one with them, in place."""
+    n, t = A.count[SPRINGS], A.spring_x
+    for i in range(n):
+        t[i, SOLVED] = dot_rows(A.spring_J[i], x)
+    solve_springs(A)
+    for i in range(n):
+        for d in range(x.shape[0]):
+            x[d] -= t[i, SOLVED] * A.spring_Y[i, d]
+
+
+@formula
+def solve_springs(A):
+    """Solve with Cholesky's factor, in place."""
     n, C, t = A.count[SPRINGS], A.stiff, A.spring_x
     for i in range(n):
-        s = dot_rows(A.spring_J[i], x)
+        s = t[i, SOLVED]
         for k in range(i):
             s -= C[i, k] * t[k, SOLVED]
         t[i, SOLVED] = s / C[i, i]
@@ -150,14 +174,12 @@ def stiffened(A, x):
         for k in range(i + 1, n):
             s -= C[k, i] * t[k, SOLVED]
         t[i, SOLVED] = s / C[i, i]
-    for i in range(n):
-        for d in range(x.shape[0]):
-            x[d] -= t[i, SOLVED] * A.spring_Y[i, d]
 
 
 @formula
 def implied(A, h, i, before, change):
     """Impulse against spring i beyond the force at half the step and half the change of velocities."""
     x = A.spring_x[i]
-    r, dr = dot_rows(A.spring_J[i], before), dot_rows(A.spring_J[i], change)
-    return h * h * x[SPRING_K] * (x[SHARE] * r + (0.25 + 0.75 * x[SHARE]) * dr) + 0.5 * h * x[SPRING_C] * x[SHARE] * dr
+    b, bend = x[SHARE], h * x[BEND]
+    r, dr = dot_rows(A.spring_J[i], before) - 0.5 * bend, dot_rows(A.spring_J[i], change) + bend
+    return h * h * x[SPRING_K] * (b * (r - 0.125 * bend) + (0.25 + 0.75 * b) * dr) + 0.5 * h * x[SPRING_C] * b * dr

@@ -19,11 +19,12 @@ from ..tables.system import System, Work
 
 # what may be asked at the door (`joints.joined`), in the order of a step: the start of a motion; velocities without
 # impulses, from those before the step in State.wide (movers' twists follow); those put there; rows of contacts into the
-# problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there; the way
-# gone with these and others beside them in State.wide; velocities at its end put there
-START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES = range(8)
-# entries of Joined.real: time and step
-TIME, STEP = range(2)
+# problem; velocities found taken from State.wide, and put there as joints allow; the mean velocities put there, lines
+# being made those of the second solve; the way gone with these and others beside them in State.wide; velocities at its
+# end put there. Besides, impacts over before the step whose impulses stand in a state
+START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED = range(9)
+# entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop would be overrun
+TIME, STEP, LOST_AT_STOPS, OVERRUN = range(4)
 # entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
 # steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has begun
 FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
@@ -32,11 +33,21 @@ FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
 # and the rest, and what they change; velocities at the end; the way, scratch
 V_BEFORE, CHANGE, SMOOTH, EFFORTS, IMPULSE, STRUCK, V_AFTER, WAY = range(8)
 # columns of Joined.spring_x: stiffness, damping, share of the end of the step, what it adds to the masses, scratch,
-# the force that it is of and what this is along it
-SPRING_K, SPRING_C, SHARE, ADDED, SOLVED, SPRING_OF, SPRING_FORCE = range(7)
+# the force that it is of, its directions, which one it is, where it is along that;
+# its bias acceleration
+SPRING_K, SPRING_C, SHARE, ADDED, SOLVED, SPRING_OF, OF_MANY, OF_DIRECTION, REACH, BEND = range(10)
 # columns of Joined.job: what is answered, where its J and Y begin, how many rows, the next one of the group
 JOB_AT, JOB_ROWS, JOB_NEXT = range(3)
-NO_ROOM = 100  # what ROWS may return; the others return the engine's status
+# columns of Joined.line, single rows that are there to act: what it is (friction in a joint, stop, rope), the quantity,
+# the force that it stands for
+WHAT, MEASURED, OF_FORCE = range(3)
+FRICTION, STOP, ROPE = range(3)
+# columns of Joined.line_x: where a stop is, and by what it bounces off; of a rope stiffness, damping, free length; of
+# friction (in the first) the arm, and the load of the joint; the force of the step
+LEAST, MOST_AT, REBOUND, ROPE_K, ROPE_C, SHORTEST, PRESSED, PULLED = range(8)
+# columns of Joined.active: line of the step, + 1 and negative for an upper stop; its group; where its row begins
+LINE_OF, LINE_GROUP, LINE_AT = range(3)
+NO_ROOM, NO_WAY = 100, 101  # what ROWS may return; what the loop says where the engine has a status
 
 
 class Joined(NamedTuple):
@@ -54,13 +65,17 @@ class Joined(NamedTuple):
     mover: np.ndarray  # (movers, 2): row of the body table, group
     group: np.ndarray  # (ng + 1,)
     wide: np.ndarray  # (8, nv)
-    lam: np.ndarray  # (2, nr): multipliers without contact; impulses of contacts and the rest over the step
-    spring_x: np.ndarray  # (springs, 8)
+    lam: np.ndarray  # (3, nr): multipliers without contact; impulses of contacts and the rest over the step; those of
+    # impacts before it
+    spring_x: np.ndarray  # (springs, 10)
     spring_J: np.ndarray  # (springs, nv)
     spring_Y: np.ndarray  # (springs, nv)
     stiff: np.ndarray  # (springs, springs): Cholesky factor
     mixing: np.ndarray  # (MIXING, nv)
     weight: np.ndarray  # (MIXED + 1, MIXED + 1)
+    line: np.ndarray  # (lines, 3)
+    line_x: np.ndarray  # (lines, 8)
+    active: np.ndarray  # (2 lines, 3)
     job: np.ndarray  # (2 contacts + lines, 3)
     queue: np.ndarray  # (ng,): the next job of each group
 
@@ -80,4 +95,5 @@ def no_mechanism() -> Joined:
     W = _none(Work, "2222221112222112221a")
     clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
     sheet = Sheet(np.zeros((0, 0)))
-    return _none(Joined, "a1aba22222222ba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
+    tables = _none(Joined, "a1aba22222222b2bba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
+    return tables._replace(real=np.zeros(8), count=np.zeros(16, np.int64), group=np.zeros(1, np.int64))

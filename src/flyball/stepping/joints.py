@@ -23,6 +23,7 @@ from ..tables.system import (
     V0,
 )
 from .contact_rows import contact_rows
+from .gauges import put_right
 from .implicit import dot_rows, implied, respond
 from .joined import (
     ADDED,
@@ -35,11 +36,10 @@ from .joined import (
     FREE,
     IMPULSE,
     KEEP,
+    KICKED,
     MEAN,
     ROWS,
     SMOOTH,
-    SPRING_C,
-    SPRING_FORCE,
     SPRING_OF,
     SPRINGS,
     START,
@@ -51,7 +51,10 @@ from .joined import (
     VELOCITIES,
     WAY,
 )
+from .lines import lines_done, press, stops_only
 from .smooth import free_velocities, put_aside
+
+BARELY = 1e-12  # part of the velocities that is no change of them
 
 
 @formula
@@ -64,6 +67,8 @@ def ask(A, M, C, P, X, task):
     if task == BEGIN:
         for d in range(A.wide.shape[1]):
             X.wide[d] = A.wide[V_BEFORE, d] + A.wide[CHANGE, d]
+        for k in range(P.size[3]):
+            X.line[k] = 0.0
         return 0
     if task == ROWS:
         return contact_rows(A, M, C, P)
@@ -73,9 +78,17 @@ def ask(A, M, C, P, X, task):
     if task == MEAN:
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
+        stops_only(A, P, X)
         return 0
     if task == FINISH:
         return finish(A, M, X)
+    if task == KICKED:
+        for d in range(A.wide.shape[1]):
+            A.wide[IMPULSE, d] = 0.0
+        contact_impulses(A, P, X, A.wide[IMPULSE])
+        respond(A, A.wide[IMPULSE], A.wide[STRUCK])
+        for r in range(A.lam.shape[1]):
+            A.lam[2, r] += A.sheet.rows[3, r]
     if task == VELOCITIES:
         for d in range(A.wide.shape[1]):
             X.wide[d] = A.clock.y[0, A.S.kinds[COORDINATES] + d]
@@ -94,7 +107,8 @@ def start(A, M, X):
         X.wide[d] = A.wide[V_BEFORE, d] = A.wide[V_AFTER, d] = A.clock.y[0, nq + d]
         A.wide[STRUCK, d] = 0.0
     for r in range(A.lam.shape[1]):
-        A.lam[1, r] = 0.0
+        A.lam[1, r] = A.lam[2, r] = 0.0
+    press(A)
     show(A, M, True)
     return status
 
@@ -106,6 +120,8 @@ def free(A, M, X):
     if A.count[BEGUN] == 0:
         for i in range(y.shape[1]):
             y[1, i] = y[0, i]
+        for r in range(A.lam.shape[1]):
+            A.lam[2, r] = 0.0
         A.count[BEGUN] = 1
     for i in range(y.shape[1]):
         y[0, i] = y[1, i]
@@ -149,11 +165,34 @@ def keep(A, P, X):
     for r in range(A.lam.shape[1]):
         A.lam[1, r] = A.sheet.rows[3, r]
     for d in range(nv):
+        A.wide[EFFORTS, d] += A.W.vel[EFFORT, d] / h
         A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
+        A.wide[STRUCK, d] = A.wide[V_AFTER, d] - before[d] - A.wide[CHANGE, d]  # by contact and lines
     account(A, h)
+    lines_done(A, P, X)
     turn_on(A, h)
     for d in range(nv):
         X.wide[d] = A.wide[V_AFTER, d]
+
+
+@formula
+def struck(A):
+    """Whether contact or lines changed the velocities."""
+    size, change = 1e-300, 0.0
+    for d in range(A.wide.shape[1]):
+        size = max(size, abs(A.wide[V_BEFORE, d]) + abs(A.wide[V_AFTER, d]))
+        change = max(change, abs(A.wide[STRUCK, d]))
+    return change > BARELY * size
+
+
+@formula
+def evaluate_again(A, part):
+    """Evaluate at half the step once more, at the mean velocities with a part of what impacts changed."""
+    nq = A.S.kinds[COORDINATES]
+    for d in range(A.wide.shape[1]):
+        mean = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d]
+        A.clock.y[0, nq + d] = mean + part * A.wide[STRUCK, d]
+    return enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, MOTION)
 
 
 @formula
@@ -163,19 +202,15 @@ def turn_on(A, h):
     Coriolis' terms make up for masses that change along the way: with those of the velocities before, impacts would
     give energy. In absolute coordinates the projection that ends the step does that.
     """
-    S, y, nq = A.S, A.clock.y, A.S.kinds[COORDINATES]
-    size = 0.0
-    for d in range(A.wide.shape[1]):
-        size += A.wide[STRUCK, d] * A.wide[STRUCK, d]
-        y[0, nq + d] = A.wide[V_BEFORE, d] + 0.5 * A.wide[CHANGE, d] + A.wide[STRUCK, d]
-    if S.kinds[SOLVER] == SCHUR or size == 0.0:
+    y, z = A.clock.y, A.S.kinds[COORDINATES] + A.wide.shape[1]
+    if A.S.kinds[SOLVER] == SCHUR or not struck(A):
         return
-    z = nq + A.wide.shape[1]
     for i in range(z, y.shape[1]):
         y[2, i] = A.clock.K[0, i]
-    if enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, MOTION) == 0:
+    if evaluate_again(A, 1.0) == 0:
         for d in range(A.wide.shape[1]):
-            A.wide[V_AFTER, d] += 0.5 * (h * A.clock.K[0, nq + d] - A.wide[SMOOTH, d])
+            vdot = A.clock.K[0, A.S.kinds[COORDINATES] + d]
+            A.wide[V_AFTER, d] += 0.5 * (h * vdot - A.wide[SMOOTH, d])
     for i in range(z, y.shape[1]):
         A.clock.K[0, i] = y[2, i]
 
@@ -203,36 +238,26 @@ def contact_impulses(A, P, X, total):
 
 @formula
 def account(A, h):
-    """Add what impulses changed to the works, whose rates at half the step stand in the clock."""
+    """Rates of the works over the step, in the clock: forces at the mean velocities, drivers with all they gave."""
     S, W = A.S, A.W
+    if struck(A):
+        evaluate_again(A, 0.5)
     work = A.clock.K[0, S.kinds[COORDINATES] + A.wide.shape[1] :]
     for r in range(S.row_i.shape[0]):
         if S.row_i[r, ROW_WORK] >= 0:
-            work[S.row_i[r, ROW_WORK]] += A.lam[1, r] * W.row[NU, r] / h
+            work[S.row_i[r, ROW_WORK]] = (A.lam[0, r] + A.lam[1, r] / h) * W.row[NU, r]
     for b in range(S.body_i.shape[0]):
         if S.body_i[b, BODY_LAW] >= 0:
             d = S.body_i[b, V0]
             mean = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
-            work[S.body_i[b, BODY_WORK]] += W.vel[EFFORT, d] * mean / h
-            A.wide[EFFORTS, d] += W.vel[EFFORT, d] / h
+            work[S.body_i[b, BODY_WORK]] = A.wide[EFFORTS, d] * mean
     for d in range(A.wide.shape[1]):
         A.wide[WAY, d] = A.wide[V_AFTER, d] - A.wide[V_BEFORE, d]
     for i in range(A.count[SPRINGS]):
         k = int(A.spring_x[i, SPRING_OF])
         if S.force_i[k, FORCE_WORK] >= 0:
-            work[S.force_i[k, FORCE_WORK]] += spring_power(A, h, i)
-
-
-@formula
-def spring_power(A, h, i):
-    """What the power of an implicit force is beyond that at half the step and at the rate without impulses."""
-    J, damping = A.spring_J[i], A.spring_x[i, SPRING_C]
-    r = dot_rows(J, A.wide[V_BEFORE])
-    half = r + 0.5 * dot_rows(J, A.wide[CHANGE])
-    rate = 0.5 * (r + dot_rows(J, A.wide[V_AFTER]))
-    s = A.spring_x[i, SPRING_FORCE] - damping * (half - r)  # as evaluated last
-    less = implied(A, h, i, A.wide[V_BEFORE], A.wide[WAY]) / h + damping * (rate - half)
-    return s * (rate - half) - less * rate
+            rate = dot_rows(A.spring_J[i], A.wide[V_BEFORE]) + 0.5 * dot_rows(A.spring_J[i], A.wide[WAY])
+            work[S.force_i[k, FORCE_WORK]] -= implied(A, h, i, A.wide[V_BEFORE], A.wide[WAY]) / h * rate
 
 
 @formula
@@ -248,6 +273,7 @@ def finish(A, M, X):
         y[0, i] = y[1, i] + h * A.clock.K[0, i]
     A.real[TIME] += h
     A.clock.real[T] = A.real[TIME]
+    put_right(A)
     A.W.option[PLACED] = 1.0
     status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
     A.W.option[PLACED] = 0.0

@@ -9,6 +9,10 @@ from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import bounce
+from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS
+from .joined import STEP as JOINTS_STEP
+from .joined import TIME as JOINTS_TIME
+from .joined import VELOCITIES as VELOCITIES_AFTER
 from .motion import begin, displace, fall, halfway, rest
 from .record import book
 from .rows import fill_rows, static_where_stuck, warm
@@ -19,6 +23,7 @@ from .tables import (
     FIRST_OVERLAP,
     FLAT,
     ITERATIONS,
+    JOINTS,
     LEFT,
     LIFTS,
     MOST_CONTACTS,
@@ -48,11 +53,28 @@ def solved(address, P, X, W, O, F, pace, most, enough):
 
 
 @formula
-def velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before):
+def held_by_joints(A, M, C, P, X, pace, task):
+    """Ask something of the mechanism, if there is one; see ``joined.py``."""
+    if pace.door[JOINTS] == 0:
+        return DONE
+    return enter(pace.door[JOINTS], A, M, C, P, X, task)
+
+
+@formula
+def without_contact(A, M, C, P, X, N, pace):
+    """Velocities that bodies would have at the end of the step if nothing touched."""
+    fall(N, M, P, X, pace)
+    A.real[JOINTS_TIME], A.real[JOINTS_STEP] = pace.real[TIME], pace.real[STEP]
+    return held_by_joints(A, M, C, P, X, pace, FREE)
+
+
+@formula
+def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     """Velocities at the end of the step: the cone problem, and its residual into the sums."""
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
     begin(N, M, X)
+    held_by_joints(A, M, C, P, X, pace, BEGIN)
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
@@ -60,10 +82,11 @@ def velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before):
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
         pace.real[WORST_AT] = pace.real[TIME] + pace.real[STEP]
     pace.real[WORST_FORCE] = max(pace.real[WORST_FORCE], O.real[FORCE_RESIDUAL])
+    held_by_joints(A, M, C, P, X, pace, KEEP)
 
 
 @formula
-def positions(C, P, Q, X, Y, W, O, F, N, pace, now):
+def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
@@ -71,7 +94,8 @@ def positions(C, P, Q, X, Y, W, O, F, N, pace, now):
     """
     h = pace.real[STEP]
     halfway(N, X, Y)
-    deepest = 0.0
+    held_by_joints(A, M, C, P, Y, pace, MEAN)
+    deepest = A.real[OVERRUN] if pace.door[JOINTS] != 0 else 0.0
     for c in range(C.count[FOUND]):
         pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         u = seen(P, Y.v, Y.wide, c)
@@ -90,19 +114,30 @@ def positions(C, P, Q, X, Y, W, O, F, N, pace, now):
 
 
 @formula
-def step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
+def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
     """One step of time; nothing is changed where it returns that a table is full."""
-    fall(N, M, P, X, pace)
+    if without_contact(A, M, C, P, X, N, pace) != DONE:
+        return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
     status = enter(pace.door[SEARCHING], G, M, C, D, B, STEP_ON)
     if status != DONE:
         return status
     fill_rows(G, M, C, P, L, pace)
+    if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
+        return NO_ROOM
     if bounce(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now):
-        fall(N, M, P, X, pace)
-    velocities(G, C, P, X, W, O, F, N, M, L, pace, now, before)
-    positions(C, P, Q, X, Y, W, O, F, N, pace, now)
+        held_by_joints(A, M, C, P, Z, pace, KICKED)
+        if without_contact(A, M, C, P, X, N, pace) != DONE:
+            return NO_WAY
+        if pace.door[JOINTS] != 0:
+            fill_rows(G, M, C, P, L, pace)
+            held_by_joints(A, M, C, P, X, pace, ROWS)
+    velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
+    positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now)
     displace(N, M, X, Y.v, pace)
+    if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+        return NO_WAY
+    held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)
     pace.real[TIME] += pace.real[STEP]
     pace.count[TAKEN] += 1
     pace.count[LEFT] -= 1
@@ -111,22 +146,22 @@ def step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
 
 
 @formula
-def march(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+def march(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
     """See `march_kernel`."""
     while pace.count[LEFT] > 0:
         if pace.count[TAKEN] % 2 == 0:
-            status = step(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
+            status = step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T.kept, U.kept)
         else:
-            status = step(G, M, D, C, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
+            status = step(G, A, M, D, C, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, U.kept, T.kept)
         if status != DONE:
             return status
     return DONE
 
 
 @kernel
-def march_kernel(G, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
-    """Take ``pace.count[LEFT]`` steps. Returns what the search said last."""
+def march_kernel(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, T, U):
+    """Take ``pace.count[LEFT]`` steps. Returns what the search said last, NO_ROOM, or NO_WAY."""
     return march(
-        held(G), held(M), held(C), held(D), held(B), held(P), held(Q), held(R), held(X), held(Y), held(Z), held(E),
-        held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
+        held(G), held(A), held(M), held(C), held(D), held(B), held(P), held(Q), held(R), held(X), held(Y), held(Z),
+        held(E), held(W), held(O), held(F), held(N), held(L), held(pace), held(T), held(U),
     )  # fmt: skip

@@ -15,6 +15,7 @@ from ..numerics.cone.operator import push, seen
 from .tables import BEFORE_KICK, HIT
 
 MANY = 200  # impacts for each contact, after which what still closes is left to the step
+NOTHING = 1e-13  # part of what an impulse moves along all three directions that is none
 STILL = 1e-12  # closing speed that is none, in parts of the fastest
 
 
@@ -56,6 +57,12 @@ def hit_alone(R, Z, X, c, e):
 
 
 @formula
+def part(d, D):
+    """1 / d of a diagonal entry d of D; 0 for a direction along which joints let nothing move."""
+    return 1.0 / d if d > NOTHING * (D[0] + D[3] + D[5]) else 0.0
+
+
+@formula
 def compress(R, Z, X, c, D):
     """Impulses that end the approach; the normal one is returned.
 
@@ -65,13 +72,14 @@ def compress(R, Z, X, c, D):
     s, t = 0.0, 0.0
     for _ in range(MANY):
         u = seen(R, X.v, X.wide, c)
-        d = -u[0] / D[0]
+        d = -u[0] * part(D[0], D)
         if total + d < 0.0:
             d = -total
         add_impulse(R, Z, X, c, (d, 0.0, 0.0))
         total += d
         u = seen(R, X.v, X.wide, c)
-        ps, pt = s - (u[1] + R.bias[c, 1]) / D[3], t - (u[2] + R.bias[c, 2]) / D[5]
+        ps = s - (u[1] + R.bias[c, 1]) * part(D[3], D)
+        pt = t - (u[2] + R.bias[c, 2]) * part(D[5], D)
         size = sqrt(ps * ps + pt * pt)
         if size > R.mu[c] * total:
             ps, pt = ps * R.mu[c] * total / size, pt * R.mu[c] * total / size
@@ -86,7 +94,8 @@ def compress(R, Z, X, c, D):
 @formula
 def within(R, c, D, n, u):
     """Impulses of expansion: n along the normal, and along the tangents what ends sliding, within the cone."""
-    s, t = -(u[1] + R.bias[c, 1] + D[1] * n) / D[3], -(u[2] + R.bias[c, 2] + D[2] * n) / D[5]
+    s = -(u[1] + R.bias[c, 1] + D[1] * n) * part(D[3], D)
+    t = -(u[2] + R.bias[c, 2] + D[2] * n) * part(D[5], D)
     size = sqrt(s * s + t * t)
     if size > R.mu[c] * n:
         s, t = s * R.mu[c] * n / size, t * R.mu[c] * n / size

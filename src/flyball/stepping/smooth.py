@@ -15,6 +15,7 @@ from ..equations.tree import retract
 from ..math.scalar import sqrt
 from ..numerics.integrators.clock import T
 from ..tables.system import COORDINATES, EFFORT, LAM
+from .gauges import note_bends, note_lengths
 from .implicit import implied, stiffened, take_springs
 from .joined import CHANGE, EFFORTS, EVALUATED, SMOOTH, SPRINGS, STEP, TIME, UNSETTLED, V_BEFORE
 
@@ -48,6 +49,8 @@ def free_velocities(A):
         put_aside(A, h)
         if n == 0:
             take_springs(A, h)
+            note_lengths(A)
+        note_bends(A)
         miss(A, h)
         if close(A):
             return 0

@@ -10,9 +10,12 @@ import numpy as np
 from ..contact.finder import Finder
 from ..contact.surfaces import Surfaces
 from ..contact.tables import DONE, Contacts, Geometry, Movers
+from ..equations.engine import engine
 from ..numerics.cone.problem import Choices, Factor, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
+from .joined import JOBS, NEEDED, NO_ROOM, NO_WAY, START, Joined, no_mechanism
+from .joints import joined, joined_kernel
 from .march import march_kernel
 from .tables import (
     FREE_INERTIA,
@@ -20,6 +23,7 @@ from .tables import (
     FREE_MASS,
     FREE_PER_MASS,
     FREE_ROUND,
+    JOINTS,
     LEFT,
     SEARCHING,
     STEP,
@@ -30,6 +34,14 @@ from .tables import (
 )
 
 SLICE = 0.05  # seconds that a call of the loop should take
+
+
+MANY = 100_000  # steps of a call at most
+ROOMIER = 1.5  # times as much room as was needed, when there is none
+
+
+class NoWay(Exception):
+    """The mechanism cannot go on: its equations have no solution, or its joints cannot be closed."""
 
 
 @dataclass
@@ -50,15 +62,17 @@ class Rooms:
     U: Tracks
 
 
-def make_rooms(contacts: int, node: np.ndarray, turning: bool, old: Rooms | None = None) -> Rooms:
+def make_rooms(contacts: int, node: np.ndarray, turning: bool, A: Joined, old: Rooms | None = None) -> Rooms:
     """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
-    P = unfilled(contacts, len(node), turning=turning)._replace(node=node)
+    groups, lines = len(A.group) - 1, len(A.active)
+    P = unfilled(contacts, len(node), groups, lines, int(A.count[NEEDED]), turning)._replace(node=node)
+    P.group[:] = A.group
     Q = P._replace(bias=np.zeros((contacts, 3)), mu=np.zeros(contacts), turn=np.zeros((0, 2)))
     R = P._replace(bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
     X, W, O, F = rooms(P)
     Y, E = rooms(Q)[0], rooms(P)[0]
     if old is not None:
-        X.v[:] = old.X.v
+        X.v[:], X.wide[:] = old.X.v, old.X.wide
         O, F = old.O, old.F
     Z = rooms(P)[0]._replace(v=X.v, wide=X.wide)
     kept = [np.zeros((contacts, 12)) for _ in range(2)]
@@ -121,6 +135,8 @@ class Stepper:
         With time, choices and the solvers' addresses; that of the search is put in here.
     margin : float [m]
         Gap up to which what does not approach is a contact.
+    joints : Joined, optional
+        What joints hold together: the movers behind the free bodies.
     """
 
     def __init__(
@@ -132,18 +148,34 @@ class Stepper:
         laws: Surfaces,
         pace: Pace,
         margin: float,
+        joints: Joined | None = None,
     ) -> None:
         n = len(free.body)
         self.geometry, self.free, self.laws, self.pace = geometry, free, laws, pace
-        self.movers = Movers(np.zeros((n, 12)), velocity.copy())
-        self.movers.pose[:, :3] = position
-        self.movers.pose[:, 3:] = rotation_matrices(free.turn)
+        self.joints = no_mechanism() if joints is None else joints
+        count = n + len(self.joints.mover)
+        self.movers = Movers(np.zeros((count, 12)), np.zeros((count, 6)))
+        self.movers.pose[:n, :3] = position
+        self.movers.pose[:n, 3:] = rotation_matrices(free.turn)
+        self.movers.twist[:n] = velocity
         self.finder = Finder(geometry, margin=margin)
         turning = bool((laws.pair[..., 3:5] > 0.0).any())
-        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning)
+        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning, self.joints)
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
         self.quota = 1
+        self._open(joints is not None)
+
+    def _open(self, joints: bool) -> None:
+        """The door of the mechanism, and its start; where there is none, its types."""
+        r, f, A = self.rooms, self.finder, self.joints
+        if not joints:
+            joined.expects(A, self.movers, f.now, r.P, r.X)
+            return
+        A.door[0] = engine.address(A.S, A.W, A.R, A.clock, A.sheet)
+        self.pace.door[JOINTS] = joined.address(A, self.movers, f.now, r.P, r.X)
+        if joined_kernel(self.pace.door[JOINTS], A, self.movers, f.now, r.P, r.X, START) != 0:
+            raise NoWay
 
     def run(self, steps: int, h: float) -> None:
         """Take as many steps of h seconds, in calls that take so long that an interrupt comes through.
@@ -161,7 +193,7 @@ class Stepper:
             self._march()
             steps -= int(count[TAKEN] - before)
             took = max(time.perf_counter() - began, 1e-6)
-            self.quota = int(max(1.0, min(4.0 * self.quota, self.quota * SLICE / took, 1e6)))
+            self.quota = int(max(1, min(4 * self.quota, self.quota * SLICE / took, MANY)))
 
     def _march(self) -> None:
         """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""
@@ -170,14 +202,27 @@ class Stepper:
             r, f = self.rooms, self.finder
             a, b = f.now, f.before
             status = march_kernel(
-                self.geometry, self.movers, a, b, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E, r.W, r.O, r.F, self.free,
-                self.laws, self.pace, r.T, r.U,
+                self.geometry, self.joints, self.movers, a, b, f.search, r.P, r.Q, r.R, r.X, r.Y, r.Z, r.E, r.W, r.O,
+                r.F, self.free, self.laws, self.pace, r.T, r.U,
             )  # fmt: skip
             if status == DONE:
                 return
+            if status == NO_WAY:
+                raise NoWay
+            if status == NO_ROOM:
+                self._roomier()
+                continue
             f.enlarge(status, (a if self.pace.count[TAKEN] % 2 == 0 else b).count)
             if len(f.now.at) > len(r.P.mu):
-                self.rooms = make_rooms(len(f.now.at), r.P.node, self.turning, r)
+                self.rooms = make_rooms(len(f.now.at), r.P.node, self.turning, self.joints, r)
+
+    def _roomier(self) -> None:
+        """More room for rows of contacts on the mechanism."""
+        A = self.joints
+        A.count[NEEDED] = int(ROOMIER * A.count[NEEDED])
+        self.joints = A._replace(job=np.zeros((int(ROOMIER * A.count[JOBS]) + 1, 3), np.int64))
+        r = self.rooms
+        self.rooms = make_rooms(len(r.P.mu), r.P.node, self.turning, self.joints, r)
 
     def last(self) -> tuple[Contacts, np.ndarray]:
         """Contacts of the last step, and what is remembered of them."""

@@ -32,8 +32,9 @@ REALS = 24
 # whether they are one after the other
 LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL = range(11)
 COUNTS = 16
-# places in Pace.door: addresses of the search and of the solvers of velocities, positions, impacts
-SEARCHING, VELOCITIES, POSITIONS, BOUNCE = range(4)
+# places in Pace.door: addresses of the search, of the solvers of velocities, positions, impacts, and of the mechanism
+# (0: there is none)
+SEARCHING, VELOCITIES, POSITIONS, BOUNCE, JOINTS = range(5)
 NO_RESTITUTION, POISSON, NEWTON, MOREAU = range(4)  # Pace.count[LAW]
 
 

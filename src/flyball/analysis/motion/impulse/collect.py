@@ -17,6 +17,7 @@ from ....stepping.tables import GIVEN, IMPULSE, KICK, LOST_FRICTION, LOST_IMPACT
 from ....tables.contact import Touching
 from ....tables.system import NV, Q0, V0
 from ...assembly.start import Assembly
+from .held import Held
 
 SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN)
 
@@ -27,12 +28,14 @@ class Collected:
     Parameters
     ----------
     stepper : Stepper
+    held : Held, optional
+        The mechanism.
     side_of : (movers + 1,) of int
         Of each mover the side that it is in `Sides`; the last one is that of ground.
     """
 
-    def __init__(self, stepper: Stepper, side_of: np.ndarray) -> None:
-        self.stepper, self.side_of = stepper, side_of
+    def __init__(self, stepper: Stepper, held: Held | None, side_of: np.ndarray) -> None:
+        self.stepper, self.held, self.side_of = stepper, held, side_of
         self.t: list[float] = []
         self.pose: list[np.ndarray] = []
         self.turn: list[np.ndarray] = []
@@ -47,10 +50,12 @@ class Collected:
         """Keep where the stepper is now, and the contacts of the step of length h that led here (0: none did)."""
         s = self.stepper
         self.t.append(float(s.pace.real[TIME]))
-        self.pose.append(s.movers.pose[:, :3].copy())
+        self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
         self.turn.append(s.free.turn.copy())
         self.twist.append(s.rooms.X.v[:, :6].copy())
         self.sums.append(s.pace.real[list(SUMS)])
+        if self.held:
+            self.held.add(s.joints, h > 0.0)
         if h > 0.0:
             self.begin(h)
         self.contacts.append(self._touching(h) if h > 0.0 else {})
@@ -102,6 +107,8 @@ def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.nd
         if b < 0 or name not in scene.carriers.slices:
             continue
         k = scene.carriers.slices[name].start
+        if k >= pose.shape[1]:  # of the mechanism
+            continue
         q0, v0, width = body_i[b, Q0], body_i[b, V0], body_i[b, NV]
         line = slice(v0, v0 + 2 if s.model.planar else v0 + 3)
         v[:, line], a[:, line] = twist[:, k, : line.stop - v0], change[:, k, : line.stop - v0]

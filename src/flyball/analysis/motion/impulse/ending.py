@@ -73,6 +73,9 @@ def result_of(
     }
     states = np.zeros((len(t), len(values.structure.states)))
     lam = np.zeros((len(t), len(values.system.row_i)))
+    if kept.held:
+        states, lam = kept.held.into(values, q, v, vdot)
+        health.violation, health.velocity_violation = max(kept.held.gaps), max(kept.held.slips)
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.final = (float(real[TIME]), np.concatenate([q[-1], v[-1], states[-1]]))
     sums = np.array(kept.sums)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
 from ....equations.engine import Sheet
@@ -10,23 +12,45 @@ from ....equations.slopes import DIRECTIONS, SLOPE_WIDTH
 from ....model.force import CoordinateForce, TwoPointForce
 from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock
 from ....numerics.integrators.tableaux import tableau
-from ....stepping.joined import FIRST, STEP, TIME, Joined
+from ....stepping.joined import (
+    FIRST,
+    FRICTION,
+    LEAST,
+    MOST_AT,
+    REBOUND,
+    ROPE,
+    ROPE_C,
+    ROPE_K,
+    SHORTEST,
+    STEP,
+    STOP,
+    TIME,
+    Joined,
+)
 from ....stepping.smooth import MIXED, MIXING
+from ....tables.specs import Structure
 from ....tables.system import FORCE_ALONG, FORCE_F, FORCE_M, LATER, NV, PARENT, STABILIZE, V0, System
 from ..start import Start
 
+Stop = tuple[float, float, float]
 
-def tables(start: Start, bodies: list[str], first: int, h: float) -> Joined:
+
+def tables(
+    start: Start, bodies: Sequence[str], first: int, h: float, stops: Mapping[str, Stop] | None = None
+) -> Joined:
     """The mechanism's tables for steps of h seconds, at its start.
 
     Parameters
     ----------
     start : Start
         Of the mechanism alone.
-    bodies : list of str
+    bodies : sequence of str
         Those that are movers, in the order of the movers from number ``first`` on.
     first : int
     h : float [s]
+    stops : mapping, optional
+        Forces without any effect that stand for a stop of the coordinate that they act along: name to (lower end, upper
+        end, restitution).
     """
     c = start.assembly.compiled
     s, S = c.structure, c.values.system
@@ -42,18 +66,44 @@ def tables(start: Start, bodies: list[str], first: int, h: float) -> Joined:
     slopes[:, DIRECTIONS] = [directions(f) for f in s.forces]
     springs = int(slopes[:, DIRECTIONS].sum())
     c.work.option[STABILIZE], c.work.option[LATER] = STEPS, 0.0
+    S = S._replace(force_x=S.force_x.copy())
+    line, line_x = lines(s, S, stops or {})
     A = Joined(
         S, c.work, tableau("rk45"), clock, Sheet(np.zeros((4, width))), Sheet(slopes), np.zeros(1, np.int64),
         real=np.zeros(8), count=np.zeros(16, np.int64),
         mover=np.array([(b, of[b]) for b in rows], np.int64).reshape(-1, 2),
-        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((2, len(S.row_i))),
-        spring_x=np.zeros((springs, 8)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
+        group=group, wide=np.zeros((8, s.nv)), lam=np.zeros((3, len(S.row_i))),
+        spring_x=np.zeros((springs, 10)), spring_J=np.zeros((springs, s.nv)), spring_Y=np.zeros((springs, s.nv)),
         stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING, s.nv)), weight=np.zeros((MIXED + 1, MIXED + 1)),
+        line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
         job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
     )  # fmt: skip
     A.count[FIRST] = first
     A.real[TIME], A.real[STEP] = start.assembly.t, h
     return A
+
+
+def lines(s: Structure, S: System, stops: Mapping[str, Stop]) -> tuple[np.ndarray, np.ndarray]:
+    """What is a single row of the step: stops, ropes, friction in joints. As forces the tables lose them."""
+    line, line_x = [], []
+    for k, e in enumerate(s.forces):
+        x = np.zeros(8)
+        if e.name in stops:
+            kind = STOP
+            x[[LEAST, MOST_AT, REBOUND]] = stops[e.name]
+        elif e.single == "rope":
+            kind = ROPE
+            x[[ROPE_K, ROPE_C, SHORTEST]] = S.force_x[k, :3]
+            S.force_x[k, :2] = 0.0
+        elif e.single == "friction":
+            kind = FRICTION
+            x[LEAST] = S.force_x[k, 0]
+            S.force_x[k, 0] = 0.0
+        else:
+            continue
+        line.append((kind, S.force_i[k, FORCE_F], k))
+        line_x.append(x)
+    return np.array(line, np.int64).reshape(-1, 3), np.array(line_x).reshape(-1, 8)
 
 
 def directions(force) -> int:

@@ -8,20 +8,26 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ....errors import AnalysisError, SimulationError
 from ....model.model import Model
 from ....results.result import Result
 from ....results.sides import Sides
-from ....stepping.stepper import Stepper
+from ....stepping.stepper import NoWay, Stepper
 from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
 from ...assemble import assemble
 from ...progress import Tell
 from .collect import Collected
 from .ending import result_of
+from .held import acting_values, held_apart
 from .parts import parts
 from .scene import begin, placed
 from .settings import Impulse
 
+NO_WAY = (
+    "a force or a law gives no finite number, the equations have no solution, or joints cannot be closed: give shorter "
+    "steps, method=fb.Impulse(step=...)"
+)
 EACH = 1000  # steps after which it is told how far it is
 
 
@@ -46,15 +52,26 @@ def impulse_motion(
     model = model.snapshot()
     base = assemble(model, t=span[0], parameters=parameters)
     values = base.compiled.values
-    found = parts(model, values)
+    found = parts(model, acting_values(model, values, parameters))
     scene = touching(model, values.given, (*found.free, *found.held))
     movers = placed(scene, base)
-    stepper = begin(scene, movers, values, o)
+    free = len(scene.carriers.mass) - len(found.held)
+    held = held_apart(values, span[0], parameters, found, free, "absolute")
+    try:
+        stepper = begin(scene, movers, values, o, held)
+    except NoWay:
+        raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY}") from None
     names = [*scene.carriers.names, "ground"]
     counts = [-1 if n in scene.carriers.single or n == "ground" else _size(scene, n) for n in names]
     sides = Sides(names, counts)
-    kept = Collected(stepper, np.arange(len(scene.carriers.mass) + 1))
-    interrupted = march(stepper, span, times, o, kept, tell)
+    kept = Collected(stepper, held, np.arange(len(scene.carriers.mass) + 1))
+    try:
+        interrupted = march(stepper, span, times, o, kept, tell)
+    except NoWay:
+        result = result_of(base, scene, stepper, kept, sides, o, since, True)
+        t = float(stepper.pace.real[TIME])
+        result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY}"
+        raise SimulationError(result.health.message, result, t) from None
     return result_of(base, scene, stepper, kept, sides, o, since, interrupted)
 
 

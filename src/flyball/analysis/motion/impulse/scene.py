@@ -28,6 +28,7 @@ from ....stepping.tables import (
 from ....tables.contact import Touching
 from ....tables.values import Values
 from ...assembly.start import Assembly
+from .held import Held
 from .settings import RESTITUTION, Impulse
 
 MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
@@ -52,7 +53,7 @@ def placed(scene: Touching, base: Assembly) -> Movers:
     return M
 
 
-def begin(scene: Touching, M: Movers, values: Values, o: Impulse) -> Stepper:
+def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | None = None) -> Stepper:
     """The stepper at the start."""
     planar = values.structure.model.planar
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)
@@ -63,11 +64,13 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse) -> Stepper:
     count[SWEEPS], count[LIFTS] = o.iterations or SWEEPS_USUAL, o.position_iterations or LIFTS_USUAL
     law = RESTITUTION.index(o.restitution) + 1
     count[LAW] = law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
-    turn = matrix_to_quaternion(M.pose[:, 3:].reshape(-1, 3, 3))
-    free = free_bodies(scene.carriers.mass, scene.carriers.inertia, turn, planar)
+    n = len(M.pose) - (len(held.joints.mover) if held else 0)
+    turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
+    free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
     count[SEQUENTIAL] = o.impacts == "sequential"
     pace = Pace(real, count, np.zeros(8, np.int64))
-    stepper = Stepper(scene.geometry, free, M.pose[:, :3], M.twist, scene.surfaces, pace, MARGIN * size)
+    joints = held.joints if held else None
+    stepper = Stepper(scene.geometry, free, M.pose[:n, :3], M.twist[:n], scene.surfaces, pace, MARGIN * size, joints)
     r = stepper.rooms
     r.O.count[COULOMB] = o.coulomb
     pace.door[1:4] = gauss_seidel.address(r.P, r.X, r.W, r.O, r.F)

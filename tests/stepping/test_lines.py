@@ -1,0 +1,116 @@
+"""Stops, ropes, joint friction and stiff springs that turn, in steps by impulses."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.layers import LAYERS
+
+from .stepped import Stepped
+
+
+def hanging(length=1.0, **body):
+    """A compact body a length away from a hinge, level."""
+    m = fb.Mechanism("hanging", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("bob", mass=1.0, inertia=1e-4, position=(length, 0.0), **body))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_double_pendulum_stays_between_its_stops(coordinates):
+    m = fb.Mechanism("leg", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("thigh", mass=1.0, inertia=0.02, position=(0.25, 0.0)))
+    m.add(fb.Body("shank", mass=1000.0, inertia=20.0, position=(0.75, 0.0)))
+    m.add(fb.Revolute("hip", "ground", "thigh", at=(0, 0)))
+    m.add(fb.Revolute("knee", "thigh", "shank", at=(0.5, 0)))
+    m.add(fb.CoordinateSpring("stop", "knee.angle"))
+    m.add(fb.CoordinateSpring("other", "hip.angle"))
+    stops = {"stop": (-0.2, 0.3, 0.0), "other": (-2.0, np.inf, 0.5)}
+    s = Stepped(m, 0.002, coordinates, stops=stops)
+    angle = {"thigh": [], "shank": []}
+    energy, mass = [], np.array([1.0, 1000.0])
+    for _ in range(1000):
+        s.step()
+        for name in angle:
+            R = s.pose(name)[1]
+            angle[name].append(np.arctan2(R[1, 0], R[0, 0]))
+        v, w = s.M.twist[:, :3], s.M.twist[:, 5]
+        kinetic = 0.5 * mass @ (v * v).sum(axis=1) + 0.5 * 0.02 * mass @ (w * w)
+        energy.append(kinetic + 9.81 * mass @ s.M.pose[:, 1])
+    hip = np.unwrap(angle["thigh"])
+    knee = np.unwrap(np.array(angle["shank"]) - angle["thigh"])
+    assert hip.min() == pytest.approx(-2.0, abs=1e-4)
+    assert knee.min() > -0.2 - 1e-4 and knee.max() < 0.3 + 1e-4
+    assert min(abs(knee.min() + 0.2), abs(knee.max() - 0.3)) < 1e-4
+    assert max(np.diff(energy)) < 0.02 * 1000 * 9.81
+    assert energy[-1] < 0.9 * abs(energy[0]) + 1.0
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+def test_a_slide_bounces_off_its_stop(e):
+    """It leaves with e times the speed that it comes with."""
+    m = fb.Mechanism("slide", planar=True)
+    m.add(fb.Body("block", mass=2.0, inertia=0.1, position=(0, 0), velocity=(1.0, 0.0)))
+    m.add(fb.Prismatic("rail", "ground", "block", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("stop", "rail.displacement"))
+    s = Stepped(m, 0.003, "joint", stops={"stop": (-np.inf, 0.1, e)})
+    s.step(60)
+    assert s.v[0] == pytest.approx(-e, abs=1e-9)
+    assert s.q[0] <= 0.1 + 1e-9
+
+
+@pytest.mark.parametrize("share", [0.5, 1.5])
+def test_friction_in_a_bearing_holds_or_slips(share):
+    """A wheel on a shaft under a torque of a share of mu r N; it sticks without creep, or turns at (T - mu r N) / I."""
+    m = fb.Mechanism("bearing", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("wheel", mass=10.0, inertia=0.05, position=(0, 0)))
+    m.add(fb.Revolute("shaft", "ground", "wheel", at=(0, 0)))
+    most = 0.3 * 0.02 * 98.1
+    m.add(fb.JointFriction("f", "shaft", static=0.3, radius=0.02))
+    m.add(fb.Motor("motor", "shaft", torque=share * most))
+    s = Stepped(m, 0.005, "absolute")
+    s.step(100)
+    turned = s.q[2]
+    if share < 1.0:
+        assert abs(turned) < 1e-14
+    else:
+        assert s.v[2] == pytest.approx(0.5 * most / 0.05 * 0.5, rel=1e-9)
+        assert s.z[s.structure.state_at["f.work"]] == pytest.approx(-most * turned, rel=1e-9)
+
+
+@pytest.mark.parametrize("ratio", [1e-2, 1.0, 1e4, 1e8])
+def test_a_rope_of_any_stiffness_carries_a_ball(ratio):
+    """h^2 k / m up to 1e8: it swings like a pendulum, and falls freely where the rope is slack."""
+    h = 0.005
+    k = ratio / h**2
+    m = hanging()
+    m.add(fb.Rope("rope", ["ground", "bob"], at=[(0, 0), (1.0, 0)], stiffness=k, length=1.25))
+    s = Stepped(m, h)
+    fallen = int(0.38 / h)  # it reaches 1.25 m at g t^2 / 2 = 0.75 m
+    s.step(fallen)
+    assert s.q[1] == pytest.approx(-9.81 / 2 * (fallen * h) ** 2, rel=1e-12)
+    energy = []
+    for _ in range(600):
+        s.step()
+        stretch = max(0.0, np.hypot(*s.q[:2]) - 1.25)
+        energy.append(0.5 * s.v[:2] @ s.v[:2] + 9.81 * s.q[1] + (0.5 * k * stretch**2 if ratio < 10 else 0.0))
+    assert max(energy) < 1e-2
+    if ratio >= 10:
+        assert stretch < 2e-3
+
+
+@pytest.mark.parametrize("ratio", [1e2, 1e4, 1e6])
+def test_a_pendulum_on_a_stiff_spring_keeps_its_length_and_energy(ratio):
+    """The spring is as long as its force says, 3 m g / k at most: no energy of a curved way is in it."""
+    h = 0.01
+    k = ratio / h**2
+    m = hanging()
+    m.add(fb.SpringDamper("s", "ground", "bob", at=((0, 0), (1.0, 0)), stiffness=k))
+    s = Stepped(m, h)
+    stretch = []
+    for _ in range(300):
+        s.step()
+        stretch.append(np.hypot(*s.q[:2]) - 1.0)
+        energy = 0.5 * s.v[:2] @ s.v[:2] + 9.81 * s.q[1] + 0.5 * k * stretch[-1] ** 2
+        assert abs(energy) < 0.004 * 9.81
+    assert max(np.abs(stretch)) < 1.1 * 3 * 9.81 / k + 1e-5
