@@ -98,4 +98,3 @@ def check_elasticity(e: Element, n: SimpleNamespace) -> None:
         raise ModelError(
             f"{e.title}: poissons_ratio is {n.poissons_ratio:g}; it must be above -1 and at most 0.5, as 0.3 of steel"
         )
-

@@ -6,9 +6,10 @@ step of length h from the overlap a to b, U' = k d^n, the impulse is
     p = h ((1 - s) (U(b) - U(a)) / (b - a) + s U'(b)) (1 + c (b - a) / h) + damping (b - a),
     b = a - h ((1 - s) / 2 u- + (1 + s) / 2 u+).
 
-With s = 0 what bodies give is what is stored, exactly (Gonzalez 1996), and what c takes besides; the step is of second
-order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes with the square
-of h^2 k' / m. As p falls with u+, the problem is monotone: Newton's method on p(u+) makes it a row u + bias + soft p.
+With s = 0 what bodies give is stored, to the last digit (Gonzalez 1996), but for what c and damping take; the step is of
+second order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes with
+the square of h^2 k' / m. As p falls with u+, the problem is monotone; by Newton's method p(u+) becomes rows
+u + bias + soft p >= 0. Displacements end at the overlaps b.
 """
 
 from __future__ import annotations
@@ -43,22 +44,29 @@ SOFTEST = 1e6  # times the mobility: compliance of what does not touch
 
 @formula
 def law_of(G, C, L, c):
-    """Numbers of the surfaces of contact c."""
-    return L.pair[G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]]
+    """Exponent, dissipation and damping of contact c, and what its stiffness is or follows from."""
+    a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
+    return (
+        L.pair[a, b, EXPONENT],
+        L.pair[a, b, DISSIPATION],
+        L.pair[a, b, DAMPING],
+        L.pair[a, b, STIFFNESS],
+        L.pair[a, b, MODULUS],
+    )
 
 
 @formula
 def stiffness(G, C, L, c):
     """Stiffness of contact c, 0 if it is hard; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
-    law = law_of(G, C, L, c)
-    if law[MODULUS] > 0.0:
+    _, _, _, k, modulus = law_of(G, C, L, c)
+    if modulus > 0.0:
         s = 0.0
         for side in (SHAPE_1, SHAPE_2):
             i = C.at[c, side]
             if G.shape_i[i, KIND] == SPHERE:
                 s += 1.0 / G.shape_x[i, PAR]
-        return law[MODULUS] / sqrt(s)
-    return law[STIFFNESS]
+        return modulus / sqrt(s)
+    return k
 
 
 @formula
@@ -91,7 +99,7 @@ def mean_force(k, n, a, b):
 @formula
 def impulse(k, law, a, b, h, share):
     """Impulse, less than 0 where the law would pull, and its slope with b."""
-    n, c, damping = law[EXPONENT], law[DISSIPATION], law[DAMPING]
+    n, c, damping, _, _ = law
     mean, at_end = mean_force(k, n, a, b), force(k, n, b)
     f = (1.0 - share) * mean[0] + share * at_end[0]
     slope = (1.0 - share) * mean[1] + share * at_end[1]
@@ -122,26 +130,26 @@ def find_yielding(G, C, P, L, X, pace, now):
     if pace.count[TAKEN] == 0:
         pace.real[STORED_FIRST] = 0.0
         for c in range(C.count[FOUND]):
-            pace.real[STORED_FIRST] += energy(now[c, STIFF], law_of(G, C, L, c)[EXPONENT], -C.x[c, GAP])
+            pace.real[STORED_FIRST] += energy(now[c, STIFF], law_of(G, C, L, c)[0], -C.x[c, GAP])
     return any_
 
 
 @formula
 def choose_shares(G, C, P, L, X, pace, now):
-    """How much of the law is that of the end of the step, by how stiff it is; ``X`` has the velocities without contact."""
+    """How much of the law is that of the end of the step, by how stiff it is; ``X``: velocities without contact."""
     h = pace.real[STEP]
     for c in range(C.count[FOUND]):
         if now[c, STIFF] > 0.0:
             law = law_of(G, C, L, c)
             deepest = max(now[c, OVERLAP], now[c, OVERLAP] - h * seen(P, X.v, X.wide, c)[0])
-            slope = force(now[c, STIFF], law[EXPONENT], deepest)[1]
+            slope = force(now[c, STIFF], law[0], deepest)[1]
             z = 0.25 * h * h * slope * diagonal(P, c)[0]
             now[c, SHARE] = z * z / (1.0 + z * z)
 
 
 @formula
 def linearise(G, C, P, L, X, pace, now):
-    """Rows that give way, tangent to the law at the velocities of ``X``. Returns by how much those before differ [m/s]."""
+    """Rows that give way, tangent to the law at the velocities of ``X``. Returns how far off the last ones were [m/s]."""
     h = pace.real[STEP]
     worst = 0.0
     for c in range(C.count[FOUND]):
@@ -183,7 +191,7 @@ def store(G, C, P, L, Y, pace, now):
     pace.real[STORED] = 0.0
     for c in range(C.count[FOUND]):
         if now[c, STIFF] > 0.0:
-            k, n = now[c, STIFF], law_of(G, C, L, c)[EXPONENT]
+            k, n = now[c, STIFF], law_of(G, C, L, c)[0]
             after = energy(k, n, -now[c, END_GAP] - h * seen(P, Y.v, Y.wide, c)[0])
             pace.real[STORED] += after
             pace.real[LOST_IMPACT] -= after - energy(k, n, now[c, OVERLAP])

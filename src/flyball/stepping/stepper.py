@@ -28,6 +28,7 @@ from .tables import (
     SEARCHING,
     STEP,
     TAKEN,
+    TRACKS,
     Free,
     Pace,
     Tracks,
@@ -67,15 +68,16 @@ def make_rooms(contacts: int, node: np.ndarray, turning: bool, A: Joined, old: R
     groups, lines = len(A.group) - 1, len(A.active)
     P = unfilled(contacts, len(node), groups, lines, int(A.count[NEEDED]), turning)._replace(node=node)
     P.group[:] = A.group
-    Q = P._replace(bias=np.zeros((contacts, 3)), mu=np.zeros(contacts), turn=np.zeros((0, 2)))
-    R = P._replace(bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
+    hard = {"mu": np.zeros(contacts), "soft": np.zeros(contacts), "turn": np.zeros((0, 2))}
+    Q = P._replace(bias=np.zeros((contacts, 3)), **hard)
+    R = P._replace(at=np.zeros((contacts, 2), np.int64), bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
     X, W, O, F = rooms(P)
     Y, E = rooms(Q)[0], rooms(P)[0]
     if old is not None:
         X.v[:], X.wide[:] = old.X.v, old.X.wide
         O, F = old.O, old.F
     Z = rooms(P)[0]._replace(v=X.v, wide=X.wide)
-    kept = [np.zeros((contacts, 12)) for _ in range(2)]
+    kept = [np.zeros((contacts, TRACKS)) for _ in range(2)]
     if old is not None:
         for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
             a[: len(b)] = b

@@ -29,8 +29,8 @@ STORED, STORED_FIRST = 18, 19  # energy in contacts that give way: now, and at t
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
 # restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
-# whether they are one after the other
-LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL = range(11)
+# whether they are one after the other; whether there may be contacts that give way
+LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL, YIELDING = range(12)
 COUNTS = 16
 # places in Pace.door: addresses of the search, of the solvers of velocities, positions, impacts, and of the mechanism
 # (0: there is none)

@@ -9,6 +9,7 @@ from functools import partial
 import numpy as np
 
 from ....results.contact_health import ContactHealth
+from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
 from ....results.result import Result
 from ....results.sides import Sides
@@ -79,7 +80,7 @@ def result_of(
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.final = (float(real[TIME]), np.concatenate([q[-1], v[-1], states[-1]]))
     sums = np.array(kept.sums)
-    result.exchanged = dict(zip(("friction_loss", "impact_loss", "surface_work"), sums.T, strict=True))
+    result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)
     result.bulk = sets(model, scene, kept)
     return result
