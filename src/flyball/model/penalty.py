@@ -46,7 +46,7 @@ def check_law(e: Element, n: SimpleNamespace) -> None:
         if getattr(n, name) is not None and (n.law is None or name not in NUMBERS[n.law]):
             laws = [law for law, names in NUMBERS.items() if name in names]
             raise ModelError(
-                f"{e.title}: {name} has no effect with law={n.law or HARD!r}; it is a number of {' and '.join(laws)}"
+                f"{e.title}: {name} has no effect with law={n.law or HARD!r}; it is a number of {', '.join(laws)}"
             )
     if n.law in (None, HARD):
         return

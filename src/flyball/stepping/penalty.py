@@ -6,8 +6,8 @@ step of length h from the overlap a to b, U' = k d^n, the impulse is
     p = h ((1 - s) (U(b) - U(a)) / (b - a) + s U'(b)) (1 + c (b - a) / h) + damping (b - a),
     b = a - h ((1 - s) / 2 u- + (1 + s) / 2 u+).
 
-With s = 0 what bodies give is stored, to the last digit (Gonzalez 1996), but for what c and damping take; the step is of
-second order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes with
+With s = 0 what bodies give is stored, exactly (Gonzalez 1996), but for what c and damping take; the step is of second
+order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes with
 the square of h^2 k' / m. As p falls with u+, the problem is monotone; by Newton's method p(u+) becomes rows
 u + bias + soft p >= 0. Displacements end at the overlaps b.
 """
@@ -149,7 +149,7 @@ def choose_shares(G, C, P, L, X, pace, now):
 
 @formula
 def linearise(G, C, P, L, X, pace, now):
-    """Rows that give way, tangent to the law at the velocities of ``X``. Returns how far off the last ones were [m/s]."""
+    """Rows that give way, tangent to the law at the velocities of ``X``. Returns how far off the last were [m/s]."""
     h = pace.real[STEP]
     worst = 0.0
     for c in range(C.count[FOUND]):

@@ -61,7 +61,7 @@ class Collected:
         self.contacts.append(self._touching(h) if h > 0.0 else {})
 
     def begin(self, h: float) -> None:
-        """Keep the mean accelerations of the last step; of the first one for the start, with what contacts stored then."""
+        """Keep the mean accelerations of the last step; of the first one for the start, and what was stored."""
         s = self.stepper
         if not self.acceleration and self.sums:
             self.sums[0][SUMS.index(STORED)] = s.pace.real[STORED_FIRST]
