@@ -82,13 +82,13 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     if yielding:
         choose_shares(G, C, P, L, X, pace, now)
         linearise(G, C, P, L, X, pace, now)
-    ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     for _ in range(PASSES if yielding else 0):
         if settled(linearise(G, C, P, L, X, pace, now), pace):
             break
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
-        ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+        ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
@@ -126,7 +126,7 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
     rest(Y)
     if deepest < -pace.real[FLAT]:
         Q.size[0] = C.count[FOUND]
-        solved(pace.door[POSITIONS], Q, Y, W, O, F, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+        solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
         store(G, C, P, L, Y, pace, now)
 

@@ -8,11 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
 from ....results.result import Result
 from ....results.sides import Sides
+from ....stepping.solvers import told
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
     CUTS,
@@ -86,6 +88,15 @@ def result_of(
     return result
 
 
+def _picked(stepper: Stepper, solver: str) -> str:
+    """The solver, and which islands went where."""
+    picked = told(stepper.rooms.F)
+    if solver != "auto" or not len(picked):
+        return solver
+    newton, sweeps = int(picked[BY_ONE] - picked[HANDED_ON]), int(picked[BY_OTHER] + picked[HANDED_ON])
+    return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
+
+
 def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) -> ContactHealth:
     real, count = stepper.pace.real, stepper.pace.count
     notes = []
@@ -95,7 +106,7 @@ def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) 
             f"which would have made energy there"
         )
     return ContactHealth(
-        solver=o.solver,
+        solver=_picked(stepper, o.solver),
         impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
         most=int(count[MOST_CONTACTS]),
         worst_overlap=max(0.0, -float(real[WORST_OVERLAP])),
