@@ -43,7 +43,7 @@ def extent(G, s, p, R, r, axis):
 
 @formula
 def resting(G, f, point, n, limits, room, count):
-    """Keep a point of the shape's surface, if it touches: where, gap along the unit normal n over the triangle, name."""
+    """Keep a point of the surface, if it touches: where, gap along the unit normal n over the triangle, name."""
     x, gap, name = point
     reach, near = limits
     if gap > reach or not over(x, n, room):
