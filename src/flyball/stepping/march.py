@@ -9,11 +9,12 @@ from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import bounce
-from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS
+from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
 from .motion import begin, displace, fall, halfway, rest
+from .penalty import PASSES, aim, choose_shares, find_yielding, linearise, put_back, settled, store
 from .record import book
 from .rows import fill_rows, static_where_stuck, warm
 from .tables import (
@@ -22,14 +23,18 @@ from .tables import (
     ENOUGH_X,
     FIRST_OVERLAP,
     FLAT,
+    GIVEN,
     ITERATIONS,
     JOINTS,
     LEFT,
     LIFTS,
+    LOST_FRICTION,
+    LOST_IMPACT,
     MOST_CONTACTS,
     POSITIONS,
     SEARCHING,
     STEP,
+    STIFF,
     SWEEPS,
     TAKEN,
     TIME,
@@ -38,6 +43,7 @@ from .tables import (
     WORST_FORCE,
     WORST_OVERLAP,
     WORST_RESIDUAL,
+    YIELDING,
 )
 
 STEP_ON = 0  # the task of a search: go on from the pairs that are known
@@ -73,9 +79,19 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     """Velocities at the end of the step: the cone problem, and its residual into the sums."""
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
+    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
-    ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    if yielding:
+        choose_shares(G, C, P, L, X, pace, now)
+        linearise(G, C, P, L, X, pace, now)
+    ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    for _ in range(PASSES if yielding else 0):
+        if settled(linearise(G, C, P, L, X, pace, now), pace):
+            break
+        put_back(N, M, X)
+        held_by_joints(A, M, C, P, X, pace, BEGIN)
+        ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
@@ -86,7 +102,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 
 @formula
-def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
+def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
     """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
@@ -97,9 +113,12 @@ def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     held_by_joints(A, M, C, P, Y, pace, MEAN)
     deepest = A.real[OVERRUN] if pace.door[JOINTS] != 0 else 0.0
     for c in range(C.count[FOUND]):
-        pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         u = seen(P, Y.v, Y.wide, c)
         gap = C.x[c, GAP] + h * u[0]
+        if now[c, STIFF] > 0.0:
+            gap = aim(now, c, gap)
+        else:
+            pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         deepest = min(deepest, gap)
         Q.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
@@ -110,12 +129,31 @@ def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     rest(Y)
     if deepest < -pace.real[FLAT]:
         Q.size[0] = C.count[FOUND]
-        solved(pace.door[POSITIONS], Q, Y, W, O, F, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+        solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+    if pace.count[YIELDING] != 0:
+        store(G, C, P, L, Y, pace, now)
+
+
+@formula
+def ledger(A, pace):
+    """Energies that contacts, and stops and joints in impacts, exchanged so far."""
+    return pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST]
+
+
+@formula
+def back(N, A, X, pace, sums):
+    """Velocities and energies of the start of the step again, after its impacts."""
+    for k in range(N.body.shape[0]):
+        for i in range(6):
+            X.v[k, i] = N.before[k, i]
+    for d in range(X.wide.shape[0]):
+        X.wide[d] = A.wide[V_BEFORE, d]
+    pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST] = sums
 
 
 @formula
 def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """One step of time; nothing is changed where it returns that a table is full."""
+    """One step of time; where a table is full, or there is NO_WAY, nothing is changed but by impacts."""
     if without_contact(A, M, C, P, X, N, pace) != DONE:
         return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
@@ -125,18 +163,20 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    if bounce(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+    if bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY
         if pace.door[JOINTS] != 0:
             fill_rows(G, M, C, P, L, pace)
             held_by_joints(A, M, C, P, X, pace, ROWS)
+    lost, worn, given, stops = ledger(A, pace)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
-    positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now)
-    displace(N, M, X, Y.v, pace)
+    positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now)
     if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+        back(N, A, X, pace, (lost, worn, given, stops))
         return NO_WAY
+    displace(N, M, X, Y.v, pace)
     held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)
     pace.real[TIME] += pace.real[STEP]
     pace.count[TAKEN] += 1

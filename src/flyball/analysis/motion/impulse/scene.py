@@ -7,7 +7,6 @@ import numpy as np
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
 from ....model.geometry import matrix_to_quaternion
-from ....numerics.cone.gauss_seidel import gauss_seidel
 from ....numerics.cone.problem import COULOMB
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
@@ -23,6 +22,7 @@ from ....stepping.tables import (
     SEQUENTIAL,
     SLOWEST,
     SWEEPS,
+    YIELDING,
     Pace,
 )
 from ....tables.contact import Touching
@@ -68,10 +68,10 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
     count[SEQUENTIAL] = o.impacts == "sequential"
+    count[YIELDING] = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     pace = Pace(real, count, np.zeros(8, np.int64))
     joints = held.joints if held else None
-    stepper = Stepper(scene.geometry, free, M.pose[:n, :3], M.twist[:n], scene.surfaces, pace, MARGIN * size, joints)
-    r = stepper.rooms
-    r.O.count[COULOMB] = o.coulomb
-    pace.door[1:4] = gauss_seidel.address(r.P, r.X, r.W, r.O, r.F)
+    at, twist, margin = M.pose[:n, :3], M.twist[:n], MARGIN * size
+    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
+    stepper.rooms.O.count[COULOMB] = o.coulomb
     return stepper
