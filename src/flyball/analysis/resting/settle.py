@@ -71,7 +71,7 @@ def settled(model: Model, base: Assembly, parameters: Mapping[str, float] | None
     except NoWay:
         raise AnalysisError(f"{model.name!r} cannot be settled: its equations have no solution on the way") from None
     kept = Collected(stepper, held, np.zeros(len(scene.carriers.mass) + 1, np.int64))
-    kept.add(0.0)
+    kept.add(False)
     q, v, vdot = coordinates(base, scene, kept)
     if held:
         held.into(values, q, v, vdot)
