@@ -19,6 +19,7 @@ from ....stepping.tables import (
     LIFTS,
     NO_RESTITUTION,
     REALS,
+    ROUGH,
     SEQUENTIAL,
     SLOWEST,
     SWEEPS,
@@ -36,6 +37,7 @@ FLATTEST = 1e-9  # overlap that is none, in parts of the smallest shape
 SLOW = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
 USUAL = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
 """Most iterations by solver, where nobody says how many; of the others `OFTEN`."""
+COARSE = 100.0  # times the tolerance that a solve which is cut may leave without a word; or what a body falls faster
 OFTEN, LIFTS_USUAL, STEPS_USUAL = 150, 25, 100
 
 
@@ -63,6 +65,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     size = smallest(scene, values)
     real[SLOWEST], real[FLAT] = SLOW, FLATTEST * size
     real[ENOUGH_V], real[ENOUGH_X] = o.tolerance, o.tolerance
+    real[ROUGH] = max(float(np.sqrt((real[GRAVITY : GRAVITY + 3] ** 2).sum())), COARSE * o.tolerance / o.longest)
     usual = USUAL.get(o.solver, OFTEN)
     count[SWEEPS], count[LIFTS] = o.iterations or usual, o.position_iterations or max(LIFTS_USUAL, usual // 2)
     law = RESTITUTION.index(o.restitution) + 1
