@@ -137,7 +137,7 @@ def solve_afresh(address, R, Z, W, O, F, pace):
         Z.line[k] = 0.0
     O.count[MOST] = MORE * pace.count[SWEEPS]
     O.real[ENOUGH] = pace.real[ENOUGH_V]
-    enter(address, R, Z, W, O, F, 0)
+    enter(address, R, Z, W, O, F.impacts, 0)
 
 
 @formula

@@ -75,7 +75,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     static_where_stuck(G, C, P, L, X, pace, now)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
-    ended = solved(pace.door[VELOCITIES], P, X, W, O, F, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
@@ -110,7 +110,7 @@ def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     rest(Y)
     if deepest < -pace.real[FLAT]:
         Q.size[0] = C.count[FOUND]
-        solved(pace.door[POSITIONS], Q, Y, W, O, F, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+        solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
 
 
 @formula

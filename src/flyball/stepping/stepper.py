@@ -11,12 +11,13 @@ from ..contact.finder import Finder
 from ..contact.surfaces import Surfaces
 from ..contact.tables import DONE, Contacts, Geometry, Movers
 from ..equations.engine import engine
-from ..numerics.cone.problem import Choices, Factor, Problem, Scratch, State
+from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
 from .joined import JOBS, NEEDED, NO_ROOM, NO_WAY, START, Joined, no_mechanism
 from .joints import joined, joined_kernel
 from .march import march_kernel
+from .solvers import Solvers, solvers, told
 from .tables import (
     FREE_INERTIA,
     FREE_INVERSE,
@@ -57,28 +58,32 @@ class Rooms:
     E: State
     W: Scratch
     O: Choices
-    F: Factor
+    F: Solvers
     T: Tracks
     U: Tracks
 
 
-def make_rooms(contacts: int, node: np.ndarray, turning: bool, A: Joined, old: Rooms | None = None) -> Rooms:
+def make_rooms(
+    contacts: int, node: np.ndarray, turning: bool, A: Joined, pace: Pace, solver: str, old: Rooms | None = None
+) -> Rooms:
     """Rooms for as many contacts; what is remembered of contacts, and velocities, are taken over from ``old``."""
     groups, lines = len(A.group) - 1, len(A.active)
     P = unfilled(contacts, len(node), groups, lines, int(A.count[NEEDED]), turning)._replace(node=node)
     P.group[:] = A.group
     Q = P._replace(bias=np.zeros((contacts, 3)), mu=np.zeros(contacts), turn=np.zeros((0, 2)))
     R = P._replace(bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
-    X, W, O, F = rooms(P)
+    X, W, O, _ = rooms(P)
     Y, E = rooms(Q)[0], rooms(P)[0]
     if old is not None:
         X.v[:], X.wide[:] = old.X.v, old.X.wide
-        O, F = old.O, old.F
+        O = old.O
     Z = rooms(P)[0]._replace(v=X.v, wide=X.wide)
+    F = solvers(solver, (P, Q, R), X, W, O, pace)
     kept = [np.zeros((contacts, 12)) for _ in range(2)]
     if old is not None:
         for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
             a[: len(b)] = b
+        told(F)[:] += told(old.F)
     return Rooms(P, Q, R, X, Y, Z, E, W, O, F, Tracks(kept[0]), Tracks(kept[1]))
 
 
@@ -135,6 +140,8 @@ class Stepper:
         With time, choices and the solvers' addresses; that of the search is put in here.
     margin : float [m]
         Gap up to which what does not approach is a contact.
+    solver : str
+        Of the cone problems, by its name in ``numerics/cone/registry.py``.
     joints : Joined, optional
         What joints hold together: the movers behind the free bodies.
     """
@@ -148,6 +155,7 @@ class Stepper:
         laws: Surfaces,
         pace: Pace,
         margin: float,
+        solver: str = "auto",
         joints: Joined | None = None,
     ) -> None:
         n = len(free.body)
@@ -160,7 +168,8 @@ class Stepper:
         self.movers.twist[:n] = velocity
         self.finder = Finder(geometry, margin=margin)
         turning = bool((laws.pair[..., 3:5] > 0.0).any())
-        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning, self.joints)
+        self.solver = solver
+        self.rooms = make_rooms(len(self.finder.now.at), nodes(free), turning, self.joints, pace, solver)
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
         self.quota = 1
@@ -214,15 +223,19 @@ class Stepper:
                 continue
             f.enlarge(status, (a if self.pace.count[TAKEN] % 2 == 0 else b).count)
             if len(f.now.at) > len(r.P.mu):
-                self.rooms = make_rooms(len(f.now.at), r.P.node, self.turning, self.joints, r)
+                self.rooms = self._rooms(len(f.now.at))
 
     def _roomier(self) -> None:
         """More room for rows of contacts on the mechanism."""
         A = self.joints
         A.count[NEEDED] = int(ROOMIER * A.count[NEEDED])
         self.joints = A._replace(job=np.zeros((int(ROOMIER * A.count[JOBS]) + 1, 3), np.int64))
+        self.rooms = self._rooms(len(self.rooms.P.mu))
+
+    def _rooms(self, contacts: int) -> Rooms:
+        """Rooms for as many contacts, which go on from those that are there."""
         r = self.rooms
-        self.rooms = make_rooms(len(r.P.mu), r.P.node, self.turning, self.joints, r)
+        return make_rooms(contacts, r.P.node, self.turning, self.joints, self.pace, self.solver, r)
 
     def last(self) -> tuple[Contacts, np.ndarray]:
         """Contacts of the last step, and what is remembered of them."""

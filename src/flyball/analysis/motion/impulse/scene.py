@@ -7,7 +7,6 @@ import numpy as np
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
 from ....model.geometry import matrix_to_quaternion
-from ....numerics.cone.gauss_seidel import gauss_seidel
 from ....numerics.cone.problem import COULOMB
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
@@ -70,8 +69,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     count[SEQUENTIAL] = o.impacts == "sequential"
     pace = Pace(real, count, np.zeros(8, np.int64))
     joints = held.joints if held else None
-    stepper = Stepper(scene.geometry, free, M.pose[:n, :3], M.twist[:n], scene.surfaces, pace, MARGIN * size, joints)
-    r = stepper.rooms
-    r.O.count[COULOMB] = o.coulomb
-    pace.door[1:4] = gauss_seidel.address(r.P, r.X, r.W, r.O, r.F)
+    at, twist, margin = M.pose[:n, :3], M.twist[:n], MARGIN * size
+    stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
+    stepper.rooms.O.count[COULOMB] = o.coulomb
     return stepper

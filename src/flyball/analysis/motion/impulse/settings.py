@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 from ....errors import ModelError
+from ....numerics.cone.registry import names
 from ...options import count, positive, seconds
 
-SOLVERS = ("auto", "gauss-seidel")
 RESTITUTION = ("poisson", "newton", "moreau")
 IMPACTS = ("simultaneous", "sequential")
 
@@ -63,7 +63,7 @@ class Impulse:
         for name in ("iterations", "position_iterations"):
             if getattr(self, name) is not None:
                 count(getattr(self, name), name)
-        for name, known in (("solver", SOLVERS), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
+        for name, known in (("solver", names()), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
             if getattr(self, name) not in known:
                 raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
 

@@ -1,0 +1,67 @@
+"""A ball that bounces: heights, energy, and the time until it lies."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+from .contact_scenes import G, floor, stepped
+
+LAWS = ("poisson", "newton", "moreau")
+
+
+def ball(e, height=1.0, planar=False, **fields):
+    """A ball of 2 kg and radius 0.1 m, so high above the floor."""
+    m = floor(friction=0.3, restitution=e, planar=planar)
+    shape = fb.Sphere(radius=0.1)
+    at = (0, 0.1 + height) if planar else (0, 0, 0.1 + height)
+    m.add(fb.Body("ball", shape=shape, mass=2, position=at, **fields))
+    return m
+
+
+def worst(e, step, law, planar=False):
+    """Error of the heights of the first three bounces, in parts of the first height, from energies at their tops."""
+    fall, up = np.sqrt(2 / G), 2 * e * np.sqrt(2 / G)
+    times = [0.0, *(fall + up * (sum(e**k for k in range(n)) + e**n / 2) for n in range(3))]
+    run = ball(e, planar=planar).simulate(times[-1], outputs=times, method=fb.Impulse(step=step, restitution=law))
+    heights = (run.energy.total - run.energy.total[0]) / (2 * G) + 1
+    return np.abs(heights[1:] - e ** (2 * np.arange(1, 4))).max()
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("planar", [False, True])
+def test_heights_are_squares_of_the_restitution(law, planar):
+    """It turns round up to a step early: the error is below v h (1 - e^2), v = sqrt(2 g)."""
+    for step in (4e-3, 1e-3, 2.5e-4):
+        assert worst(0.7, step, law, planar) < np.sqrt(2 * G) * step * (1 - 0.7**2)
+
+
+def test_it_lies_still_after_all_bounces():
+    """They add up to sqrt(2 h / g) (1 + e) / (1 - e), of which what is left at a step's small speeds is missing."""
+    e, step = 0.5, 1e-3
+    time = np.sqrt(2 / G) * (1 + e) / (1 - e)
+    run = stepped(ball(e), 2.0, step, outputs=2001)
+    moves = run.t[np.abs(run["ball"].vz) > 1e-6]
+    assert moves[-1] == pytest.approx(time, abs=10 * step)
+    assert run["ball"].z[-1] == pytest.approx(0.1, abs=1e-9)
+    assert np.abs(run.energy.balance).max() < 1e-11
+    assert run.exchanged["impact_loss"][-1] == pytest.approx(2 * G, rel=1e-6)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_it_keeps_all_energy(law):
+    """Restitution 1, twenty bounces of different lengths."""
+    run = stepped(ball(1.0, 0.05), 4.0, 7e-3, outputs=101, restitution=law)
+    assert run.energy.total == pytest.approx(run.energy.total[0], rel=1e-10)
+    assert run["ball"].z.max() == pytest.approx(0.15, abs=2e-3)
+
+
+def test_a_ball_that_spins_bounces_askew():
+    """It sticks in the impact if mu is large: Garwin's ball does not turn back under Poisson's law, it rolls off.
+
+    Tangential impulse m k / (1 + k) of the slip, k = 2/5: w = 20 rad/s gives v = 2/7 w r.
+    """
+    m = ball(0.8, 1.0, angular_velocity=(0, 20, 0), velocity=(0, 0, 0))
+    run = stepped(m, 0.7, 1e-3)["ball"]
+    assert run.vx[-1] == pytest.approx(2 / 7 * 2.0, rel=1e-9)
+    assert run.angular_velocity[-1] == pytest.approx([0, 2 / 7 * 20, 0], abs=1e-8)
