@@ -9,7 +9,12 @@ import flyball as fb
 from tests.mechanisms import EXAMPLES
 
 EVERY = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
-CONTACT = {"conveyor.toml", "dominoes.py", "pile_in_a_box.py", "tippe_top.py"}  # see test_contact_examples
+CONTACT = {  # see test_contact_examples
+    "conveyor.toml",
+    "dominoes.py",
+    "pile_in_a_box.py",
+    "tippe_top.py",
+}
 FILES = [name for name in EVERY if name not in CONTACT]
 PROMISED = {
     "andrews.toml",

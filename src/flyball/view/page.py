@@ -12,6 +12,8 @@ from importlib.resources import files
 from .payload import payload
 from .recording import Recording
 
+LARGE = 4_000_000  # bytes before compression
+
 # The player's modules, each after those it imports.
 MODULES = (
     "data",
@@ -113,7 +115,8 @@ def _static(name: str) -> str:
 
 
 def _packed(data: bytes) -> str:
-    return base64.b64encode(gzip.compress(data, 9, mtime=0)).decode()
+    level = 9 if len(data) < LARGE else 6  # poses of very many bodies: a tenth of the time, a hundredth larger
+    return base64.b64encode(gzip.compress(data, level, mtime=0)).decode()
 
 
 @cache
