@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ....contact import surfaces as su
@@ -25,8 +27,8 @@ from ....stepping.tables import (
     Pace,
 )
 from ....tables.contact import Touching
+from ....tables.coordinates import BodyState
 from ....tables.values import Values
-from ...assembly.start import Assembly
 from .held import Held
 from .settings import RESTITUTION, Impulse
 
@@ -42,10 +44,10 @@ def smallest(scene: Touching, values: Values) -> float:
     return float(np.min(sizes[np.isfinite(sizes)], initial=values.length))
 
 
-def placed(scene: Touching, base: Assembly) -> Movers:
-    """Movers where the assembled mechanism has them; sets of bodies are as described."""
+def placed(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
+    """Movers where the single bodies are; sets of bodies are as described."""
     M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
-    for name, b in base.compiled.moving(base.t, base.q, base.v).items():
+    for name, b in bodies.items():
         k = scene.carriers.slices[name].start
         M.pose[k] = np.r_[b.p, b.R.ravel()]
         M.twist[k] = np.r_[b.v, b.w]
