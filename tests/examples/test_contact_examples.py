@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import flyball as fb
+from flyball.cli import app
 from flyball.results.result import Result
 from tests.examples.test_examples import mechanism
+from tests.mechanisms import EXAMPLES
 
 G = 9.81
 
@@ -94,3 +97,72 @@ def test_a_tippe_top_turns_over(tops):
     rise = 0.02 * 2 * 0.006 * G  # its mass centre is higher by twice its depth
     np.testing.assert_allclose(np.ptp(r.energy.potential), rise, rtol=0.02)
     losing(r)
+
+
+def test_a_gripper_lifts_what_friction_holds():
+    """It lifts the box with 20 N on each finger; with 9 N friction holds less than the weight of 9.81 N."""
+    m = mechanism("gripper.py")
+    r = m.simulate(3.0, outputs=61)
+    up = r["box.z"] - r["box.z"][0]
+    np.testing.assert_allclose(up[-10:], 0.25, atol=1e-3)
+    for finger in ("left", "right"):
+        held = r.contacts.between(finger, "box")
+        np.testing.assert_allclose(held.normal_force[-10:], 20.0, rtol=0.02)
+        assert (held.tangential_force[-10:] <= 0.5 * held.normal_force[-10:] * (1 + 1e-6)).all()
+    assert np.ptp((r["box.z"] - r["hand.z"])[-15:]) < 1e-5  # it does not slide
+    np.testing.assert_allclose(r["box"].contact_force[-10:, 2], G, rtol=1e-2)
+    assert np.abs(m.simulate(3.0, outputs=31, parameters={"F": 9.0})["box.z"] - 0.05).max() < 1e-3
+
+
+def test_a_ball_rolls_through_the_labyrinth():
+    """It stays on the board and within its walls, and rolls: the point that touches is as fast as the board."""
+    r = mechanism("labyrinth.py").simulate(6.0, outputs=181)
+    R, p = r["board"].rotation, r["ball"].position
+    on = np.einsum("tji,tj->ti", R, p)
+    assert np.median(np.abs(on[:, 2] - 0.012)) < 1e-5
+    assert np.abs(on[:, 2] - 0.012).max() < 1e-3  # friction on a wall lifts what rolls against it
+    assert (np.abs(on[:, :2]) < 0.15 - 0.005 - 0.012 + 2e-4).all()
+    assert np.ptp(on[:, 0]) > 0.2
+    v, w, wb = r["ball"].velocity, r["ball"].angular_velocity, r["board"].angular_velocity
+    foot = -0.012 * R[:, :, 2]
+    slip = v + np.cross(w, foot) - np.cross(wb, p + foot)
+    assert np.median(np.sqrt((slip**2).sum(axis=1))) < 1e-4
+    assert r.energy.drift < 1e-3 * np.ptp(r.energy.total)
+
+
+def test_a_wall_stands_until_the_ball_hits_it():
+    r = mechanism("wrecking_ball.py").simulate(2.0, outputs=101)
+    way = np.sqrt(((r["bricks"].position - r["bricks"].position[0]) ** 2).sum(axis=2))
+    hit = r.contacts.between("ball", "bricks").normal_force > 0.0
+    first = int(hit.argmax())
+    assert 30 < first < 60
+    assert way[: first - 1].max() < 1e-3
+    assert (way[-1] > 0.1).sum() > 10
+    np.testing.assert_allclose(r["ball"].velocity[first - 2, 0], np.sqrt(2 * G * fall(r, first - 2)), rtol=0.02)
+    assert (np.diff(r.energy.total) < 1e-3 * np.ptp(r.energy.kinetic)).all()
+
+
+def fall(r: Result, k: int) -> float:
+    """How far the wrecking ball has come down, by the speed along its circle."""
+    z, v = r["ball.z"], r["ball"].velocity[k]
+    return float((z[0] - z[k]) * v[0] ** 2 / (v @ v))
+
+
+def test_a_cradle_passes_the_blow_on():
+    """The last ball rises as high as the first was lifted, the others hang still; two lifted, two fly off."""
+    for lifted in (1, 2):
+        m = mechanism("newtons_cradle.py", lifted=lifted)
+        r = m.simulate(0.6, outputs=61, method=fb.Impulse(step=5e-4, impacts="sequential"))
+        a = np.array([r[f"pivot {k}.angle"] for k in range(1, 6)])
+        high = np.abs(a[:, 30:]).max(axis=1)
+        np.testing.assert_allclose(high[5 - lifted :], 0.6, rtol=0.02)
+        assert (high[: 5 - lifted] < 0.03).all()
+        assert r.health.energy_drift < 1e-3 * np.ptp(r.energy.potential)
+
+
+def test_the_command_runs_a_model_of_sets_only(tmp_path):
+    words = ["run", str(EXAMPLES / "dominoes.py"), "--t-end", "0.05", "--outputs", "3", "--out", str(tmp_path / "out")]
+    ended = CliRunner().invoke(app, words)
+    assert ended.exit_code == 0, ended.output
+    assert (tmp_path / "out" / "report.html").stat().st_size > 100_000
+    assert len(fb.load_result(tmp_path / "out" / "result.nc").bulk["dominoes"]) == 100

@@ -13,6 +13,9 @@ import flyball as fb
 from flyball.results.contact_health import ContactHealth
 from flyball.results.contacts import ARRAYS
 from flyball.view.animate import POSES, kept, record
+from flyball.view.artist import draw
+from flyball.view.pictures import standard_pictures
+from flyball.view.recording import Figure, PointPaths
 from tests.results.made_up import thrown
 
 PLANES = pytest.mark.parametrize("planar", [False, True])
@@ -95,6 +98,23 @@ def test_pictures_have_sets_ground_and_contact_forces(planar: bool) -> None:
     np.testing.assert_array_equal(seen.contacts.force, r.contacts.force)  # ground is the first side
     assert "worst overlap" in seen.notes
     assert len(r.html()) < 1e6
+
+
+@PLANES
+def test_standard_pictures_and_reports_of_sets_and_contacts(planar: bool, tmp_path: Path) -> None:
+    r = thrown(planar=planar)
+    for bodies in (list(r.model.bodies), []):
+        r.model.bodies[:] = bodies  # a model of sets only has no other bodies to show
+        found = {p.name: p.shown for p in standard_pictures(r)}
+        paths = found["paths"]
+        assert isinstance(paths, PointPaths)
+        assert ("block" in paths.points) == bool(bodies)
+        if not bodies:
+            np.testing.assert_allclose(paths.points["balls[2]"][:, 0], 3.0 + r.t)
+        shown = found["contacts"]
+        assert isinstance(shown, Figure)
+        np.testing.assert_array_equal(shown.panels[0].curves[0].values, 2.0)
+        draw(standard_pictures(r), tmp_path)
 
 
 def test_contact_forces_are_drawn_on_what_moves() -> None:

@@ -52,16 +52,18 @@ def test_it_lies_still_after_all_bounces():
 def test_it_keeps_all_energy(law):
     """Restitution 1, twenty bounces of different lengths."""
     run = stepped(ball(1.0, 0.05), 4.0, 7e-3, outputs=101, restitution=law)
-    assert run.energy.total == pytest.approx(run.energy.total[0], rel=1e-10)
+    assert run.energy.total == pytest.approx(run.energy.total[0], rel=1e-7)
     assert run["ball"].z.max() == pytest.approx(0.15, abs=2e-3)
 
 
 def test_a_ball_that_spins_bounces_askew():
-    """It sticks in the impact if mu is large: Garwin's ball does not turn back under Poisson's law, it rolls off.
+    """It sticks in the impact where friction is large, and leaves with 2/7 w r, rolling: Poisson's law holds no more.
 
-    Tangential impulse m k / (1 + k) of the slip, k = 2/5: w = 20 rad/s gives v = 2/7 w r.
+    The point that is hit is between ball and floor, up to v h / 2 off the ball (of w, 10/7 as much in parts of it).
     """
-    m = ball(0.8, 1.0, angular_velocity=(0, 20, 0), velocity=(0, 0, 0))
-    run = stepped(m, 0.7, 1e-3)["ball"]
-    assert run.vx[-1] == pytest.approx(2 / 7 * 2.0, rel=1e-9)
-    assert run.angular_velocity[-1] == pytest.approx([0, 2 / 7 * 20, 0], abs=1e-8)
+    for step in (2e-3, 1e-3, 2.5e-4):
+        m = ball(0.8, 1.0, angular_velocity=(0, 20, 0), velocity=(0, 0, 0))
+        run = stepped(m, 0.7, step)["ball"]
+        near = np.sqrt(2 * G) * step / 2 / 0.1
+        assert run.vx[-1] == pytest.approx(2 / 7 * 2.0, rel=near)
+        assert run.angular_velocity[-1] == pytest.approx([0, 2 / 7 * 20, 0], abs=2 / 7 * 20 * 1.5 * near)

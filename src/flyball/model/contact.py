@@ -9,8 +9,9 @@ from typing import Annotated, Any, ClassVar
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from .element import Element, Flag, Length, Ratio, element, plain
+from .element import Damping, Element, Flag, Length, Ratio, element, plain
 from .material import check_surface
+from .penalty import Dissipation, NormalLaw, NormalStiffness, check_law
 
 
 def _names(value: Any) -> Any:
@@ -44,7 +45,7 @@ Pairs = Annotated[tuple[tuple[str, str], ...], BeforeValidator(_pairs)]
 
 @element
 class Contact(Element):
-    """Bodies touch, by their shapes: hard contact with Coulomb friction.
+    """Bodies touch, by their shapes: with Coulomb friction, and hard, unless ``law`` says how they give way.
 
     ``m.add(fb.Contact(friction=0.3))`` lets everything that has a shape touch everything else: bodies, `Bodies`, what
     stands on `Ground`. Bodies that a joint connects are left out. A further `Contact` that names bodies holds for these
@@ -66,6 +67,18 @@ class Contact(Element):
         From 0 (dead) to 1 (elastic); 0 if nothing says it.
     rolling_friction, spinning_friction : number [m]
         Lever arms of the resistance to rolling and to spinning about the normal (see `Material`); 0 if nothing says it.
+    law : {"hard", "linear", "hertz", "hunt-crossley"}
+        Normal force over the overlap d: none may be (hard, if nothing says it); k d + damping ddot; k d^(3/2) (Hertz
+        1881); k d^n (1 + dissipation ddot) (Hunt and Crossley 1975). It never pulls. Friction is the same for all.
+    stiffness : number [N/m^n]
+        k, of each point that touches: in N/m for ``"linear"``, N/m^1.5 for Hertz' exponent. If not given, that of
+        spheres on each other or on flat shapes, by Young's moduli and Poisson's ratios of their materials.
+    exponent : number [1]
+        n of ``"hunt-crossley"``; 1.5 if not given.
+    dissipation : number [s/m]
+        Of ``"hunt-crossley"``: an impact at a small speed v gives back 1 - 2/3 dissipation v of it. 0 if not given.
+    damping : number [N s/m]
+        Of ``"linear"``. 0 if not given.
     joined : bool
         Bodies that a joint connects touch too. What is joined to ground touches the shapes of ground in any case.
     exclude : list of pairs of names
@@ -80,6 +93,11 @@ class Contact(Element):
     restitution: Ratio | None = None
     rolling_friction: Length | None = None
     spinning_friction: Length | None = None
+    law: NormalLaw | None = None
+    stiffness: NormalStiffness | None = None
+    exponent: Ratio | None = None
+    dissipation: Dissipation | None = None
+    damping: Damping | None = None
     joined: Flag = False
     exclude: Pairs = ()
 
@@ -88,6 +106,7 @@ class Contact(Element):
     def check(self, n: SimpleNamespace) -> None:
         """Numbers that surfaces can have, and others only beside something."""
         check_surface(self, n)
+        check_law(self, n)
         if self.others is not None and self.between is None:
             raise ModelError(f"{self.title}: others says what between touches; give between=...")
         for a, b in self.exclude:

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from .element import (
+    Damping,
     Direction,
     Element,
     Length,
@@ -21,6 +22,7 @@ from .element import (
     nonnegative,
     plain,
 )
+from .penalty import Dissipation, NormalLaw, NormalStiffness, Pressure, check_elasticity, check_law
 
 Friction = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plain), Unit("1")]
 NUMBERS = ("friction", "static_friction", "restitution", "rolling_friction", "spinning_friction")
@@ -88,6 +90,10 @@ class Material(Element):
     surface_velocity : vector [m/s]
         Of the surface relative to the body, in the body's reference frame: of a conveyor belt. Only its part along
         the surface counts.
+    youngs_modulus : number [Pa]
+        Of the solid, for a `Contact` whose ``law`` is that of Hertz or of Hunt and Crossley and says no stiffness.
+    poissons_ratio : number [1]
+        The same; both or none.
     """
 
     friction: Friction | None = None
@@ -97,6 +103,8 @@ class Material(Element):
     spinning_friction: Length | None = None
     grain: Direction | None = None
     surface_velocity: Velocity | None = None
+    youngs_modulus: Pressure | None = None
+    poissons_ratio: Ratio | None = None
 
     category: ClassVar[str] = "materials"
 
@@ -108,6 +116,7 @@ class Material(Element):
                 f"{self.title}: friction must be one number, or two, along the grain and across it; got {n.friction}"
             )
         check_surface(self, n)
+        check_elasticity(self, n)
         if two and not n.friction[0].real > 0.0:
             raise ModelError(
                 f"{self.title}: friction along the grain is 0; it must be greater than 0. What is smooth one way only "
@@ -134,6 +143,8 @@ class MaterialPair(Element):
     friction, static_friction, restitution : number [1]
         As for `Material`; what is not given follows from the materials.
     rolling_friction, spinning_friction : number [m]
+    law, stiffness, exponent, dissipation, damping
+        How they give way to each other, as for `Contact`; restitution is of what is hard.
     name : str
         Made of those of the materials if not given.
     """
@@ -146,6 +157,11 @@ class MaterialPair(Element):
     restitution: Ratio | None = None
     rolling_friction: Length | None = None
     spinning_friction: Length | None = None
+    law: NormalLaw | None = None
+    stiffness: NormalStiffness | None = None
+    exponent: Ratio | None = None
+    dissipation: Dissipation | None = None
+    damping: Damping | None = None
 
     category: ClassVar[str] = "material_pairs"
 
@@ -157,5 +173,6 @@ class MaterialPair(Element):
     def check(self, n: SimpleNamespace) -> None:
         """Numbers that surfaces can have, one at least."""
         check_surface(self, n)
-        if all(getattr(n, k) is None for k in NUMBERS):
+        check_law(self, n)
+        if all(getattr(n, k) is None for k in (*NUMBERS, "law")):
             raise ModelError(f"{self.title}: it says nothing; give friction=, restitution= or another of {NUMBERS}")

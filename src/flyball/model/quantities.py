@@ -134,7 +134,7 @@ def _unit_of(model: Model, text: str) -> str:
 
 def _of_energy(touching: bool) -> Table:
     listed = ["kinetic", "potential", "total", "balance"]
-    listed += ["friction_loss", "impact_loss", "surface_work"] if touching else []
+    listed += ["friction_loss", "impact_loss", "surface_work", "contact_elastic"] if touching else []
     return {k: Quantity("J", curve=k in listed, array=True) for k in (*listed, "gravity", "elastic")}
 
 

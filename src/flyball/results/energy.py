@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0}
 """Energies that contacts exchange, and by which sign the bodies have them."""
+STORED = "contact_elastic"
+"""Energy stored in contacts that give way, among what contacts exchange."""
 
 
 class Energy(Named):
@@ -60,8 +62,8 @@ class Energy(Named):
 
     @cached_property
     def elastic(self) -> np.ndarray:
-        """Energy stored in springs."""
-        return sum((self._result[f.name].energy for f in self._result.model.forces), self._result.records.zeros())
+        """Energy stored in springs, and in contacts that give way."""
+        return sum((self._result[f.name].energy for f in self._result.model.forces), self.exchanged(STORED))
 
     @property
     def potential(self) -> np.ndarray:

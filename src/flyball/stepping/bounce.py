@@ -17,7 +17,8 @@ from ..contact.surfaces import RESTITUTION
 from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.operator import across, seen
-from ..numerics.cone.problem import ENOUGH, MOST
+from ..numerics.cone.problem import ENOUGH, MOST, NONE
+from .penalty import stiffness
 from .sequence import one_after_the_other
 from .tables import (
     BEFORE_KICK,
@@ -39,6 +40,7 @@ from .tables import (
     SLOWEST,
     STEP,
     SWEEPS,
+    YIELDING,
 )
 
 ROUNDING = 1e-12
@@ -53,13 +55,13 @@ def elasticity(G, C, L, c):
 
 
 @formula
-def bounce(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+def bounce(G, C, at, bias, R, Z, E, X, W, O, F, L, pace, now):
     """Impacts; velocities in ``X.v`` and ``X.wide`` are those after them. Returns whether there were any.
 
     ``R`` is the problem with biases and least normal impulses of its own, ``Z`` the state of compression, which shares
     its velocities with ``X``, ``E`` that of expansion.
     """
-    if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, bias, R, X, L, pace, now):
+    if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, at, bias, R, X, L, pace, now):
         return False
     poisson = pace.count[LAW] == POISSON
     if pace.count[SEQUENTIAL] != 0:
@@ -95,7 +97,7 @@ def copy_velocities(X, E):
 
 
 @formula
-def hits(G, C, bias, R, X, L, pace, now):
+def hits(G, C, at, bias, R, X, L, pace, now):
     """Whether there are impacts; biases of the contacts that are hit, and their velocities before in ``now``."""
     h = pace.real[STEP]
     g0, g1, g2 = pace.real[GRAVITY], pace.real[GRAVITY + 1], pace.real[GRAVITY + 2]
@@ -104,6 +106,9 @@ def hits(G, C, bias, R, X, L, pace, now):
     law = pace.count[LAW]
     for c in range(C.count[FOUND]):
         R.least[c] = 0.0
+        gives_way = pace.count[YIELDING] != 0 and stiffness(G, C, L, c) > 0.0
+        for i in range(2):  # what gives way has no impulse in no time
+            R.at[c, i] = NONE if gives_way else at[c, i]
         for i in range(3):
             now[c, KICK + i] = 0.0
         u = seen(R, X.v, X.wide, c)
@@ -113,6 +118,9 @@ def hits(G, C, bias, R, X, L, pace, now):
         e = elasticity(G, C, L, c)
         now[c, HIT] = 0.0
         plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[FLAT]
+        if gives_way:
+            R.bias[c, 0] = 0.0
+            continue
         flat = pace.real[FLAT] if plain else 0.0  # what rests against what is hit is hit by it
         if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= flat:
             now[c, HIT] = 1.0

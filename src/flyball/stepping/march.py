@@ -14,6 +14,7 @@ from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
 from .motion import begin, displace, fall, halfway, rest
+from .penalty import PASSES, aim, choose_shares, find_yielding, linearise, put_back, settled, store
 from .record import book
 from .rows import fill_rows, static_where_stuck, warm
 from .tables import (
@@ -30,6 +31,7 @@ from .tables import (
     POSITIONS,
     SEARCHING,
     STEP,
+    STIFF,
     SWEEPS,
     TAKEN,
     TIME,
@@ -38,6 +40,7 @@ from .tables import (
     WORST_FORCE,
     WORST_OVERLAP,
     WORST_RESIDUAL,
+    YIELDING,
 )
 
 STEP_ON = 0  # the task of a search: go on from the pairs that are known
@@ -73,9 +76,19 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     """Velocities at the end of the step: the cone problem, and its residual into the sums."""
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
+    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
+    if yielding:
+        choose_shares(G, C, P, L, X, pace, now)
+        linearise(G, C, P, L, X, pace, now)
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
+    for _ in range(PASSES if yielding else 0):
+        if settled(linearise(G, C, P, L, X, pace, now), pace):
+            break
+        put_back(N, M, X)
+        held_by_joints(A, M, C, P, X, pace, BEGIN)
+        ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
     if ended != CONVERGED:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
@@ -86,7 +99,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 
 @formula
-def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
+def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
     """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
@@ -97,9 +110,12 @@ def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     held_by_joints(A, M, C, P, Y, pace, MEAN)
     deepest = A.real[OVERRUN] if pace.door[JOINTS] != 0 else 0.0
     for c in range(C.count[FOUND]):
-        pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         u = seen(P, Y.v, Y.wide, c)
         gap = C.x[c, GAP] + h * u[0]
+        if now[c, STIFF] > 0.0:
+            gap = aim(now, c, gap)
+        else:
+            pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         deepest = min(deepest, gap)
         Q.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
@@ -111,6 +127,8 @@ def positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now):
     if deepest < -pace.real[FLAT]:
         Q.size[0] = C.count[FOUND]
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+    if pace.count[YIELDING] != 0:
+        store(G, C, P, L, Y, pace, now)
 
 
 @formula
@@ -125,7 +143,7 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    if bounce(G, C, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+    if bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY
@@ -133,7 +151,7 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
             fill_rows(G, M, C, P, L, pace)
             held_by_joints(A, M, C, P, X, pace, ROWS)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
-    positions(A, M, C, P, Q, X, Y, W, O, F, N, pace, now)
+    positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now)
     displace(N, M, X, Y.v, pace)
     if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
         return NO_WAY

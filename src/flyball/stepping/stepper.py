@@ -29,6 +29,7 @@ from .tables import (
     SEARCHING,
     STEP,
     TAKEN,
+    TRACKS,
     Free,
     Pace,
     Tracks,
@@ -70,8 +71,9 @@ def make_rooms(
     groups, lines = len(A.group) - 1, len(A.active)
     P = unfilled(contacts, len(node), groups, lines, int(A.count[NEEDED]), turning)._replace(node=node)
     P.group[:] = A.group
-    Q = P._replace(bias=np.zeros((contacts, 3)), mu=np.zeros(contacts), turn=np.zeros((0, 2)))
-    R = P._replace(bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
+    hard = {"mu": np.zeros(contacts), "soft": np.zeros(contacts), "turn": np.zeros((0, 2))}
+    Q = P._replace(bias=np.zeros((contacts, 3)), **hard)
+    R = P._replace(at=np.zeros((contacts, 2), np.int64), bias=np.zeros((contacts, 3)), least=np.zeros(contacts))
     X, W, O, _ = rooms(P)
     Y, E = rooms(Q)[0], rooms(P)[0]
     if old is not None:
@@ -79,7 +81,7 @@ def make_rooms(
         O = old.O
     Z = rooms(P)[0]._replace(v=X.v, wide=X.wide)
     F = solvers(solver, (P, Q, R), X, W, O, pace)
-    kept = [np.zeros((contacts, 12)) for _ in range(2)]
+    kept = [np.zeros((contacts, TRACKS)) for _ in range(2)]
     if old is not None:
         for a, b in zip(kept, (old.T.kept, old.U.kept), strict=True):
             a[: len(b)] = b

@@ -14,19 +14,23 @@ import numpy as np
 # xz yz), 1 if the inertia is the same about every axis
 FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
-# impact, impulse of that in the world, and its velocities before
+# impact, impulse of that in the world, and its velocities before; of contacts that give way: stiffness (0: hard),
+# overlap and its rate at the start of the step, share of its end in the law, overlap and gap at the end
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
+STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP = range(11, 17)
+TRACKS = 18  # columns
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
 # none; residual [m/s] that is enough for velocities and for positions
 TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
 # ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen, time
 # of the worst residual, overlap at the start
 LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE, WORST_AT, FIRST_OVERLAP = range(10, 18)
+STORED, STORED_FIRST = 18, 19  # energy in contacts that give way: now, and at the start
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
 # restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
-# whether they are one after the other
-LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL = range(11)
+# whether they are one after the other; whether there may be contacts that give way
+LEFT, TAKEN, SWEEPS, LIFTS, LAW, ITERATIONS, CUTS, MOST_CONTACTS, IMPACTS, REDUCED, SEQUENTIAL, YIELDING = range(12)
 COUNTS = 16
 # places in Pace.door: addresses of the search, of the solvers of velocities, positions, impacts, and of the mechanism
 # (0: there is none)
@@ -46,7 +50,7 @@ class Free(NamedTuple):
 class Tracks(NamedTuple):
     """What is remembered of each contact; one for each of the two tables of contacts."""
 
-    kept: np.ndarray  # (capacity, 12)
+    kept: np.ndarray  # (capacity, TRACKS)
 
 
 class Pace(NamedTuple):

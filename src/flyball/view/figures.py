@@ -40,7 +40,7 @@ def figures(result: Result) -> list[Figure]:
     if not len(result.t):
         return []
     makers: Sequence[Callable[[Result], Figure | None]]
-    makers = (energies, coordinates, positions, reactions, actuation, sensors)
+    makers = (energies, coordinates, positions, contacts, reactions, actuation, sensors)
     return [figure for make in makers if (figure := make(result)) is not None]
 
 
@@ -77,10 +77,11 @@ def positions(result: Result) -> Figure | None:
     """Centres of mass of spatial bodies, axis by axis."""
     if result.planar:
         return None
-    bodies = some(result.model.bodies)
-    points = {b.name: centre(result, b.name) for b in bodies}
+    every = movers(result)
+    bodies = some(every)
+    points = {name: centre(result, name) for name in bodies}
     parts = [Panel(axis, tuple(Channel(k, "m", p[:, i]) for k, p in points.items())) for i, axis in enumerate("xyz")]
-    return Figure("positions", "Centres of mass", tuple(parts), few(len(bodies), len(result.model.bodies), "bodies"))
+    return Figure("positions", "Centres of mass", tuple(parts), few(len(bodies), len(every), "bodies"))
 
 
 def reactions(result: Result) -> Figure | None:
@@ -179,8 +180,33 @@ def hidden(curves: Sequence[np.ndarray]) -> list[int]:
     return out
 
 
+def movers(result: Result) -> list[str]:
+    """Names of all bodies; where there are sets only, those of their members."""
+    names = [b.name for b in result.model.bodies]
+    return names or [f"{name}[{k}]" for name, own in result.bulk.items() for k in some(range(len(own)))]
+
+
+def contacts(result: Result) -> Figure | None:
+    """How many contacts there are and what they lose, the deepest overlap, and the largest normal force."""
+    c = result.contacts
+    if c is None or not len(c):
+        return None
+    rows = len(result.t)
+    overlap, force = np.zeros(rows), np.zeros(rows)
+    np.maximum.at(overlap, c.when, -c.gap)
+    np.maximum.at(force, c.when, c.normal_force)
+    lost = [Channel(k, "J", np.asarray(v)) for k, v in result.exchanged.items() if np.any(v)]
+    parts = [Panel("contacts", (Channel("contacts", "1", c.count.astype(float)),))]
+    parts += [Panel("exchanged since the start", tuple(lost))] if lost else []
+    parts += [Panel("largest normal force", (Channel("normal force", "N", force),))]
+    parts += [Panel("deepest overlap", (Channel("overlap", "m", overlap),))]
+    return Figure("contacts", "Contacts", tuple(parts))
+
+
 def centre(result: Result, name: str) -> np.ndarray:
     """Centre of mass of a body over time (n, 3) [m]."""
+    if name not in result.values.structure.place:
+        return np.asarray(result[name].position) @ np.eye(3)[: result[name].position.shape[1]]
     p = result.records.body(result.values.structure.place[name])[0]
     return np.stack([np.broadcast_to(c, len(result.t)) for c in p], axis=1)
 

@@ -7,20 +7,20 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.body import GROUND
-from .figures import centre, few, figures, some
+from .figures import centre, few, figures, movers, some
 from .recording import Figure, Picture, PointPaths
 
 if TYPE_CHECKING:
     from ..results.result import Result
 
-ORDER = ("energy", "coordinates", "positions", "paths", "reactions", "actuation", "sensors")
+ORDER = ("energy", "coordinates", "positions", "paths", "contacts", "reactions", "actuation", "sensors")
 
 
 def standard_pictures(result: Result) -> list[Picture]:
     """The pictures that tell most of a motion, of those that have something to show.
 
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
-    in the plane or from three sides), ``reactions``, ``actuation`` and ``sensors``.
+    in the plane or from three sides), ``contacts``, ``reactions``, ``actuation`` and ``sensors``.
     """
     found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(result)}
     if len(result.t):
@@ -30,11 +30,12 @@ def standard_pictures(result: Result) -> list[Picture]:
 
 def _paths(result: Result) -> PointPaths:
     """Paths of centres of mass and named frames."""
-    bodies = some(result.model.bodies)
-    points = {b.name: centre(result, b.name) for b in bodies}
+    every = movers(result)
+    bodies = some(every)
+    points = {name: centre(result, name) for name in bodies}
     for frame in result.model.frames if len(points) < 6 else ():
         if frame.body != GROUND:
             p = result[frame.name].position
             points[frame.name] = np.column_stack([p, np.zeros((len(p), 3 - p.shape[1]))])
-    note = "; ".join(x for x in (few(len(bodies), len(result.model.bodies), "bodies"), "dots: start") if x)
+    note = "; ".join(x for x in (few(len(bodies), len(every), "bodies"), "dots: start") if x)
     return PointPaths(points, result.planar, note)

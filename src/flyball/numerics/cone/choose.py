@@ -17,11 +17,14 @@ from .islands import Islands, find_islands
 from .problem import (
     BROKEN,
     CONVERGED,
+    CUT,
     ENDED,
+    ENOUGH,
     FORCE_RESIDUAL,
     ISLAND,
     RESIDUAL,
     SMALL,
+    STALLED,
     USED,
     Factor,
     Problem,
@@ -32,6 +35,7 @@ from .problem import (
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
 # entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN
 MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
+FINER = 1e-5  # times the residual that is enough
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
 # entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
 # hand on to the other, contacts by the one; the largest island's contacts
@@ -184,8 +188,17 @@ def gather(O, sofar):
 
 @formula
 def by_one(P, X, W, O, F, f):
-    """An island by the solver of small ones, or by the other where that cannot."""
+    """An island by the solver of small ones, or by the other where that cannot.
+
+    It is asked for ``FINER`` digits than are enough, since Newton's last steps bring many of them: what sticks then
+    does not creep. That it has not got them all is no fault.
+    """
+    enough = O.real[ENOUGH]
+    O.real[ENOUGH] = FINER * enough
     enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
+    O.real[ENOUGH] = enough
+    if (O.count[ENDED] == CUT or O.count[ENDED] == STALLED) and O.real[RESIDUAL] <= enough:
+        O.count[ENDED] = CONVERGED
     if F.doors[THE_REST] != 0 and (O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN):
         F.told[HANDED_ON] += 1
         enter(F.doors[THE_REST], P, X, W, O, f, 0)

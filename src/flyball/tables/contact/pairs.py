@@ -14,11 +14,18 @@ from ...model.material import Material, pair
 from ...model.model import Model
 from ..numbers import Numbers
 from .groups import Groups
+from .penalty import give_way
 
 Surface = tuple[int, str | None]  # group, material
 
 NOTHING = SimpleNamespace(
-    friction=None, static_friction=None, restitution=None, rolling_friction=None, spinning_friction=None
+    friction=None,
+    static_friction=None,
+    restitution=None,
+    rolling_friction=None,
+    spinning_friction=None,
+    law=None,
+    youngs_modulus=None,
 )
 
 
@@ -30,7 +37,7 @@ def pairs(model: Model, given: Numbers, groups: Groups, known: Mapping[Surface, 
     ModelError
         If nothing says the friction of a pair, or both sides have a grain.
     """
-    out = np.full((len(known), len(known), 8), np.nan)
+    out = np.full((len(known), len(known), su.WIDTH), np.nan)
     told = {frozenset((x.first, x.second)): given.of[x.name] for x in model.material_pairs}
     plain = next((given.of[c.name] for c in model.contacts if c.between is None), NOTHING)
     for i, ((a, first), on) in enumerate(known.items()):
@@ -53,11 +60,12 @@ def _two(on: set[str], by: set[str]) -> str:
 
 def _row(who: tuple, told: Sequence[Any], sides: Sequence[Any]) -> np.ndarray:
     """Numbers of one pair: what a contact says that names bodies, else a pair of materials, else both materials."""
-    row = np.zeros(8)
+    row = np.zeros(su.WIDTH)
     _friction(row, who, told, sides)
     row[su.RESTITUTION] = _combined("restitution", told, sides, lambda a, b: np.sqrt(a * b))
     row[su.ROLLING] = _combined("rolling_friction", told, sides, max)
     row[su.SPINNING] = _combined("spinning_friction", told, sides, max)
+    give_way(row, who, told, sides)
     return row
 
 

@@ -23,6 +23,7 @@ from ..numbers import Numbers
 from .carriers import Carriers, carriers
 from .groups import Groups, groups
 from .pairs import Surface, own_of, pairs
+from .penalty import check_curvature
 from .solids import finished, outlined
 
 
@@ -91,6 +92,7 @@ def touching(model: Model, given: Numbers, names: Sequence[str]) -> Touching:
         _joined(rows.face, (0,), np.int64),
         apart,
     )
+    check_curvature(geometry, surfaces.pair, [m or "" for _, m in rows.surfaces], model.planar)
     return Touching(geometry, surfaces, at, tuple(e.name for e in owners), _joined(rows.part, (0,), np.int64))
 
 

@@ -13,13 +13,13 @@ from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
 from ....stepping.free import matrix, unrotated
 from ....stepping.stepper import Stepper
-from ....stepping.tables import GIVEN, IMPULSE, KICK, LOST_FRICTION, LOST_IMPACT, SLIDES, TIME
+from ....stepping.tables import GIVEN, IMPULSE, KICK, LOST_FRICTION, LOST_IMPACT, SLIDES, STORED, STORED_FIRST, TIME
 from ....tables.contact import Touching
 from ....tables.system import NV, Q0, V0
 from ...assembly.start import Assembly
 from .held import Held
 
-SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN)
+SUMS = (LOST_FRICTION, LOST_IMPACT, GIVEN, STORED)
 
 
 class Collected:
@@ -61,8 +61,10 @@ class Collected:
         self.contacts.append(self._touching(h) if h > 0.0 else {})
 
     def begin(self, h: float) -> None:
-        """Keep the mean accelerations of the last step; of the first one, for the start."""
+        """Keep the mean accelerations of the last step; of the first one for the start, and what was stored."""
         s = self.stepper
+        if not self.acceleration and self.sums:
+            self.sums[0][SUMS.index(STORED)] = s.pace.real[STORED_FIRST]
         self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / h)
 
     def _touching(self, h: float) -> dict[str, np.ndarray]:

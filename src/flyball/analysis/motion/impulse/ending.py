@@ -8,10 +8,13 @@ from functools import partial
 
 import numpy as np
 
+from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results.contact_health import ContactHealth
+from ....results.energy import EXCHANGED, STORED
 from ....results.health import Health
 from ....results.result import Result
 from ....results.sides import Sides
+from ....stepping.solvers import told
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
     CUTS,
@@ -79,10 +82,19 @@ def result_of(
     result = Result(model, values, t, q, v, states, vdot, lam, health)
     result.final = (float(real[TIME]), np.concatenate([q[-1], v[-1], states[-1]]))
     sums = np.array(kept.sums)
-    result.exchanged = dict(zip(("friction_loss", "impact_loss", "surface_work"), sums.T, strict=True))
+    result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)
     result.bulk = sets(model, scene, kept)
     return result
+
+
+def _picked(stepper: Stepper, solver: str) -> str:
+    """The solver, and which islands went where."""
+    picked = told(stepper.rooms.F)
+    if solver != "auto" or not len(picked):
+        return solver
+    newton, sweeps = int(picked[BY_ONE] - picked[HANDED_ON]), int(picked[BY_OTHER] + picked[HANDED_ON])
+    return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 
 def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) -> ContactHealth:
@@ -94,11 +106,11 @@ def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) 
             f"which would have made energy there"
         )
     return ContactHealth(
-        solver=o.solver,
+        solver=_picked(stepper, o.solver),
         impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
         most=int(count[MOST_CONTACTS]),
-        worst_overlap=float(-min(0.0, real[WORST_OVERLAP])),
-        overlap_at_start=float(-min(0.0, real[FIRST_OVERLAP])),
+        worst_overlap=max(0.0, -float(real[WORST_OVERLAP])),
+        overlap_at_start=max(0.0, -float(real[FIRST_OVERLAP])),
         residual=float(real[WORST_RESIDUAL]),
         force_residual=float(real[WORST_FORCE]),
         tolerance=o.tolerance,

@@ -24,6 +24,7 @@ from ....stepping.tables import (
     SEQUENTIAL,
     SLOWEST,
     SWEEPS,
+    YIELDING,
     Pace,
 )
 from ....tables.contact import Touching
@@ -69,6 +70,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     turn = matrix_to_quaternion(M.pose[:n, 3:].reshape(-1, 3, 3))
     free = free_bodies(scene.carriers.mass[:n], scene.carriers.inertia[:n], turn, planar)
     count[SEQUENTIAL] = o.impacts == "sequential"
+    count[YIELDING] = (np.nan_to_num(scene.surfaces.pair[..., [su.STIFFNESS, su.MODULUS]]) > 0.0).any()
     pace = Pace(real, count, np.zeros(8, np.int64))
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], MARGIN * size

@@ -1,0 +1,203 @@
+"""Contacts that give way: the law of their normal force as rows of the cone problem with compliance.
+
+With overlap d, f = k d^n (1 + c ddot) + (d/dt) damping d, not less than 0 (Hertz 1881; Hunt and Crossley 1975). Over a
+step of length h from the overlap a to b, U' = k d^n, the impulse is
+
+    p = h ((1 - s) (U(b) - U(a)) / (b - a) + s U'(b)) (1 + c (b - a) / h) + damping (b - a),
+    b = a - h ((1 - s) / 2 u- + (1 + s) / 2 u+).
+
+With s = 0 what bodies give is stored, exactly (Gonzalez 1996), but for what c and damping take; the step is of second
+order. With s = 1 it is Euler's implicit one, which brings to rest what is too stiff for the step; s goes with
+the square of h^2 k' / m. As p falls with u+, the problem is monotone; by Newton's method p(u+) becomes rows
+u + bias + soft p >= 0. Displacements end at the overlaps b.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..contact.kinds import SPHERE
+from ..contact.surfaces import DAMPING, DISSIPATION, EXPONENT, MODULUS, STIFFNESS
+from ..contact.tables import FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
+from ..math.scalar import sqrt
+from ..numerics.cone.diagonal import diagonal
+from ..numerics.cone.operator import seen
+from .tables import (
+    END_GAP,
+    ENOUGH_V,
+    LOST_IMPACT,
+    OVERLAP,
+    RATE,
+    SHARE,
+    STEP,
+    STIFF,
+    STORED,
+    STORED_FIRST,
+    TAKEN,
+    TARGET,
+)
+
+PASSES = 20  # of Newton's method; three or four are usual
+EXACT = 1e-2  # of the residual that is enough: what the law may differ by from its tangent
+NEAR = 1e-3  # change of the overlap, relative to it, over which a mean force is that in its middle, and a correction
+SOFTEST = 1e6  # times the mobility: compliance of what does not touch
+
+
+@formula
+def law_of(G, C, L, c):
+    """Exponent, dissipation and damping of contact c, and what its stiffness is or follows from."""
+    a, b = G.shape_i[C.at[c, SHAPE_1], MATERIAL], G.shape_i[C.at[c, SHAPE_2], MATERIAL]
+    return (
+        L.pair[a, b, EXPONENT],
+        L.pair[a, b, DISSIPATION],
+        L.pair[a, b, DAMPING],
+        L.pair[a, b, STIFFNESS],
+        L.pair[a, b, MODULUS],
+    )
+
+
+@formula
+def stiffness(G, C, L, c):
+    """Stiffness of contact c, 0 if it is hard; of spheres by E*: k = 4/3 E* sqrt(R), 1/R = 1/R_1 + 1/R_2."""
+    _, _, _, k, modulus = law_of(G, C, L, c)
+    if modulus > 0.0:
+        s = 0.0
+        for side in (SHAPE_1, SHAPE_2):
+            i = C.at[c, side]
+            if G.shape_i[i, KIND] == SPHERE:
+                s += 1.0 / G.shape_x[i, PAR]
+        return modulus / sqrt(s)
+    return k
+
+
+@formula
+def energy(k, n, d):
+    """Stored at the overlap d."""
+    return k * d ** (n + 1.0) / (n + 1.0) if d > 0.0 else 0.0
+
+
+@formula
+def force(k, n, d):
+    """Elastic force, and its slope."""
+    if d <= 0.0:
+        return 0.0, 0.0
+    f = k * d**n
+    return f, n * f / d
+
+
+@formula
+def mean_force(k, n, a, b):
+    """What the energy changes by from a to b, over the way; its slope with b."""
+    m, d = 0.5 * (a + b), b - a
+    if abs(d) <= NEAR * abs(m):
+        f, slope = force(k, n, m)
+        f *= 1.0 + n * (n - 1.0) / 24.0 * (d / m) * (d / m) if m > 0.0 else 1.0
+        return f, 0.5 * slope * (1.0 + (n - 1.0) / 6.0 * d / m if m > 0.0 else 1.0)
+    f = (energy(k, n, b) - energy(k, n, a)) / d
+    return f, (force(k, n, b)[0] - f) / d
+
+
+@formula
+def impulse(k, law, a, b, h, share):
+    """Impulse, less than 0 where the law would pull, and its slope with b."""
+    n, c, damping, _, _ = law
+    mean, at_end = mean_force(k, n, a, b), force(k, n, b)
+    f = (1.0 - share) * mean[0] + share * at_end[0]
+    slope = (1.0 - share) * mean[1] + share * at_end[1]
+    loss = 1.0 + c * (b - a) / h
+    p = h * f * loss + damping * (max(b, 0.0) - max(a, 0.0))
+    return p, h * slope * loss + f * c + (damping if b > 0.0 else 0.0)
+
+
+@formula
+def end(now, c, h, u):
+    """Overlap at the end of the step, of which the law is, with the rate u then."""
+    s = now[c, SHARE]
+    return now[c, OVERLAP] - h * (0.5 * (1.0 - s) * now[c, RATE] + 0.5 * (1.0 + s) * u)
+
+
+@formula
+def find_yielding(G, C, P, L, X, pace, now):
+    """Put aside what is known of contacts that give way at the start of the step. Returns whether there are any."""
+    any_ = False
+    for c in range(C.count[FOUND]):
+        k = stiffness(G, C, L, c)
+        now[c, STIFF] = k
+        if k > 0.0:
+            any_ = True
+            now[c, OVERLAP] = -C.x[c, GAP]
+            now[c, RATE] = seen(P, X.v, X.wide, c)[0]
+            now[c, SHARE] = 0.0
+    if pace.count[TAKEN] == 0:
+        pace.real[STORED_FIRST] = 0.0
+        for c in range(C.count[FOUND]):
+            pace.real[STORED_FIRST] += energy(now[c, STIFF], law_of(G, C, L, c)[0], -C.x[c, GAP])
+    return any_
+
+
+@formula
+def choose_shares(G, C, P, L, X, pace, now):
+    """How much of the law is that of the end of the step, by how stiff it is; ``X``: velocities without contact."""
+    h = pace.real[STEP]
+    for c in range(C.count[FOUND]):
+        if now[c, STIFF] > 0.0:
+            law = law_of(G, C, L, c)
+            deepest = max(now[c, OVERLAP], now[c, OVERLAP] - h * seen(P, X.v, X.wide, c)[0])
+            slope = force(now[c, STIFF], law[0], deepest)[1]
+            z = 0.25 * h * h * slope * diagonal(P, c)[0]
+            now[c, SHARE] = z * z / (1.0 + z * z)
+
+
+@formula
+def linearise(G, C, P, L, X, pace, now):
+    """Rows that give way, tangent to the law at the velocities of ``X``. Returns how far off the last were [m/s]."""
+    h = pace.real[STEP]
+    worst = 0.0
+    for c in range(C.count[FOUND]):
+        if now[c, STIFF] > 0.0:
+            law, mobility = law_of(G, C, L, c), diagonal(P, c)[0]
+            u = seen(P, X.v, X.wide, c)[0]
+            now[c, TARGET] = end(now, c, h, u)
+            p, slope = impulse(now[c, STIFF], law, now[c, OVERLAP], now[c, TARGET], h, now[c, SHARE])
+            if P.soft[c] > 0.0:
+                row = -(u + P.bias[c, 0]) / P.soft[c]
+                worst = max(worst, mobility * abs(max(p, 0.0) - max(row, 0.0)))
+            slope *= 0.5 * h * (1.0 + now[c, SHARE])
+            P.soft[c] = 1.0 / slope if slope * SOFTEST * mobility > 1.0 else SOFTEST * mobility
+            P.bias[c, 0] = -u - P.soft[c] * p
+    return worst
+
+
+@formula
+def put_back(N, M, X):
+    """Velocities without contact, from which the rows are solved once more."""
+    for k in range(N.body.shape[0]):
+        for i in range(6):
+            X.v[k, i] = M.twist[k, i]
+
+
+@formula
+def aim(now, c, gap):
+    """What is left of the gap at the end of the step beyond that at which contact c comes to be, if it gives way."""
+    if now[c, STIFF] > 0.0:
+        now[c, END_GAP] = gap
+        return gap + max(now[c, TARGET], 0.0)
+    return gap
+
+
+@formula
+def store(G, C, P, L, Y, pace, now):
+    """Energy in contacts at the end of the step, and what of the work done on them was not stored."""
+    h = pace.real[STEP]
+    pace.real[STORED] = 0.0
+    for c in range(C.count[FOUND]):
+        if now[c, STIFF] > 0.0:
+            k, n = now[c, STIFF], law_of(G, C, L, c)[0]
+            after = energy(k, n, -now[c, END_GAP] - h * seen(P, Y.v, Y.wide, c)[0])
+            pace.real[STORED] += after
+            pace.real[LOST_IMPACT] -= after - energy(k, n, now[c, OVERLAP])
+
+
+@formula
+def settled(worst, pace):
+    """Whether rows are as near to the law as velocities are asked to be."""
+    return worst <= EXACT * pace.real[ENOUGH_V]
