@@ -12,10 +12,10 @@ import numpy as np
 from flyball.compiler.door import enter
 from flyball.compiler.held import held
 from flyball.compiler.jit import formula, kernel
-from flyball.contact.desk import AFRESH_SO_FAR, REMADE
+from flyball.contact.broad.desk import AFRESH_SO_FAR, REMADE
+from flyball.contact.broad.search import AFRESH, STEP
 from flyball.contact.finder import Finder, no_movers
 from flyball.contact.kinds import PLANE, SPHERE
-from flyball.contact.search import AFRESH, STEP
 from flyball.contact.tables import AXES, FOUND, GAP, KIND, MASK, MEMBER, MOVER, NORMAL, PAIRS, PAR, RADIUS, Geometry
 
 R, H, MARGIN = 0.1, 5e-3, 2e-3

@@ -6,8 +6,8 @@ import numpy as np
 
 from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
-from flyball.contact.room import NEAREST, ROOM
-from flyball.contact.separation import separation
+from flyball.contact.narrow.room import NEAREST, ROOM
+from flyball.contact.narrow.separation import separation
 from flyball.math.vec import add, load3, load9, mm, mtv, mv, put3, scale, sub, transpose
 
 

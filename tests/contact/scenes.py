@@ -6,8 +6,8 @@ import numpy as np
 
 from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
-from flyball.contact.narrow import collide
-from flyball.contact.room import ROOM
+from flyball.contact.narrow.collide import collide
+from flyball.contact.narrow.room import ROOM
 from flyball.contact.tables import AXES, FACE_COUNT, FACE_FIRST, PAR, RADIUS, Geometry, Movers
 
 

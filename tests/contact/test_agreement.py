@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.contact.kinds import CONE, PLANE
-from flyball.contact.room import ROOM
+from flyball.contact.narrow.room import ROOM
 from flyball.contact.tables import KIND, MOVER, RADIUS, Movers
 from tests.contact.against import MODES, NAMES, PAIRS, asked, judged, pool, rotation, sample, tables
 from tests.contact.scenes import meet

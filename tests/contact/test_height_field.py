@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flyball.contact.kinds import BOX, CAPSULE, CYLINDER, ELLIPSOID, FIELD, HULL, SPHERE
-from flyball.contact.room import ROOM
+from flyball.contact.narrow.room import ROOM
 from flyball.contact.solids.field import field
 from flyball.contact.tables import COUNT, FIRST, KIND, MOVER, PAR, RADIUS, Geometry, Movers
 from flyball.errors import ModelError

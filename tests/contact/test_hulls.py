@@ -10,8 +10,8 @@ import pytest
 from flyball.compiler.held import held
 from flyball.compiler.jit import kernel
 from flyball.contact.kinds import HULL
-from flyball.contact.room import CORNERS
-from flyball.contact.shapes.hull import face, support
+from flyball.contact.narrow.room import CORNERS
+from flyball.contact.narrow.shapes.hull import face, support
 from flyball.contact.solids.hull import CLIMB, hull
 from flyball.contact.tables import COUNT, FACE_COUNT, KIND, PAR, Geometry
 from flyball.errors import ModelError

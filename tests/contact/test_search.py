@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from flyball.contact.desk import AFRESH_SO_FAR, COMPARED, LOOKED_AT, REMADE
+from flyball.contact.broad.desk import AFRESH_SO_FAR, COMPARED, LOOKED_AT, REMADE
+from flyball.contact.broad.same import before
 from flyball.contact.finder import Finder, no_contacts
-from flyball.contact.same import before
 from flyball.contact.tables import FOUND, GAP, NORMAL, PAIRS, POINT
 from flyball.errors import ModelError
 from tests.contact.crowds import gaps_of, geometry, identities_hold, moving, on_planes, pairs_of, spheres_that_touch

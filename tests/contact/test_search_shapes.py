@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from flyball.contact.desk import LISTED
+from flyball.contact.broad.desk import LISTED
 from flyball.contact.finder import Finder, no_movers
 from flyball.contact.kinds import BOX, CAPSULE, CONE, CYLINDER, ELLIPSOID, FIELD, PLANE, SPHERE
-from flyball.contact.room import ROOM
+from flyball.contact.narrow.room import ROOM
 from flyball.contact.tables import AXES, BEFORE, FOUND, GAP, KIND, MASK, MEMBER, MOVER, PAR, RADIUS, Geometry
 from tests.contact.crowds import identities_hold, pairs_of
 from tests.contact.scenes import meet, turned

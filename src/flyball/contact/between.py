@@ -7,9 +7,9 @@ read.
 from __future__ import annotations
 
 from ..compiler.door import Door, door
-from .desk import ASKED_1, ASKED_2, REACH
+from .broad.desk import ASKED_1, ASKED_2, REACH
 from .kinds import FIELD, PLANAR
-from .narrow import collide, collide_convex, collide_planar
+from .narrow.collide import collide, collide_convex, collide_planar
 
 
 @door

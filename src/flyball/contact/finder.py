@@ -10,9 +10,9 @@ from ..compiler.door import Door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..errors import ModelError
-from .bounds import holds
-from .classes import classes
-from .desk import (
+from .broad.bounds import holds
+from .broad.classes import classes
+from .broad.desk import (
     BOUNDED,
     CLASS,
     COUNTS,
@@ -31,9 +31,9 @@ from .desk import (
     WIDE,
     Search,
 )
+from .broad.search import AFRESH, STEP, search
 from .kinds import PLANE, SPHERE
-from .room import ROOM
-from .search import AFRESH, STEP, search
+from .narrow.room import ROOM
 from .tables import (
     AHEAD,
     DONE,

@@ -1,7 +1,7 @@
 """Kinds of shapes that may touch, and what their parameters (`PAR` of the shape table) are.
 
 A convex shape is a *core* and a rounding radius: all points within that radius of its core. A sphere is a point with a
-radius, a capsule a line with one. What a core is, `shapes/` says, one file a kind.
+radius, a capsule a line with one. What a core is, `narrow/shapes/` says, one file a kind.
 
 ====  =========  =====================================================================================================
 kind  name       parameters, in the shape's axes
@@ -13,7 +13,7 @@ kind  name       parameters, in the shape's axes
 4     CYLINDER   radius, half length along z
 5     CONE       radius, height: the middle of its base at the origin, its tip at +z
 6     HULL       rounding radius; vertices and faces stand in `Geometry.vertex` and `Geometry.face`
-7     FIELD      a height field (`shapes/field.py`)
+7     FIELD      a height field (`narrow/shapes/field.py`)
 8     POLYGON    rounding radius; a convex polygon in z = 0, vertices counter-clockwise about z; one of two is a segment
 9     ELLIPSOID  three half axes
 10    HEMISPHERE radius; its flat side in z = 0, its dome towards +z

@@ -1,0 +1,1 @@
+"""Which shapes may touch: cells, envelopes, the list of pairs, and who is who from step to step."""

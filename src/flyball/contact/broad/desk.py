@@ -1,0 +1,83 @@
+"""The search's own room: what it keeps between steps, and what it works in.
+
+Shapes stand in *slots*, first the bounded ones in the order of their cells, then the *wide* ones (unbounded). All that
+is asked for often is kept by slot, so that neighbours in space are neighbours in memory.
+
+Every bounded shape has an *envelope*: a capsule that holds all of it for a while. A pair of shapes is listed where
+their envelopes meet, and the list stays true as long as every shape, with what it covers in `AHEAD` seconds, is within
+its envelope. One that has left it (or turned too far) gets another, and only its own pairs are looked for again.
+Envelopes live in a *frame* that goes with all movers where these move together, so that a pile that falls lists what a
+pile at rest lists.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# entries of Search.real, after MARGIN, SKIN, AHEAD of `tables`: where the frame is, by how much it goes on with the
+# next search, its velocity, how far it lags behind; a usual radius; largest gap that the narrow phase is asked about
+FRAME, STRIDE, DRIFT, LAG, USUAL, REACH = 3, 6, 9, 12, 15, 16
+REALS = 20
+# entries of Search.count: bounded and wide slots; whether the list of pairs is true; which half of `seen` is read;
+# number of the search whose contacts it speaks of; pairs, pairs when all were looked for; levels; address of the narrow
+# phase and the two shapes that it is asked about; whether classes tell all about groups
+BOUNDED, WIDE, TRUE, HALF, SEARCHES, LISTED, LISTED_ALL, LEVELS, NARROW, ASKED_1, ASKED_2, TOLD = range(12)
+# shapes that have left their envelopes; whether the frame moves; pairs in the table; and of all searches so far: pairs
+# of envelopes compared, envelopes made anew, how often all were, pairs looked at
+MOVED, DRIFTS, KEPT, COMPARED, REMADE, AFRESH_SO_FAR, LOOKED_AT = range(12, 19)
+COUNTS = 24
+# columns of Search.hold: centre (in the mover's axes), radius, half edges of a box about it (along the shape's axes)
+CENTRE, HELD, BOX_HALF = 0, 3, 4
+# columns of Search.slot
+SHAPE, MOVES, LEVEL, FORM, CLASS = range(5)
+BALL, FLAT, OTHER = range(3)  # Search.slot[FORM]: sphere, plane, what the narrow phase is asked about
+BALLS, FLAT_BALL, BALL_FLAT, ANY = range(4)  # Search.pair[:, 2]
+# columns of Search.now: centre, radius, its velocity, speed of the surface by turning
+AT, SIZE, GOES, SPIN = 0, 3, 4, 7
+# columns of Search.fat: middle of the capsule (in the frame), half of its line, its radius, radius of a ball that
+# holds it
+MIDDLE, HALF_LINE, ROUND, WHOLE = 0, 3, 6, 7
+# columns of Search.wide: origin, normal, velocities; origin in the frame and normal when its pairs were looked for, and
+# how far it may have gone since
+ORIGIN, UP, SPEED, TURNS, ORIGIN_0, UP_0, SLACK = 0, 3, 6, 9, 12, 15, 18
+# columns of Search.level_i: class, first place in `head`, places (a power of two) less 1, cells in a row and in a
+# layer, shapes; columns of level_x: edge of a cell, 1 / edge, corner
+OF, BASE, MASKED, ROW, LAYER, SHAPES = range(6)
+EDGE, PER_EDGE, CORNER = 0, 1, 2
+FAT_RAW, LATER_RAW = 8, 16  # columns of Search.raw, after those of Search.now
+SIZES = 24  # levels of a class at most: shapes of a level differ by a factor of two
+CLASSES = 12  # at most
+
+
+class Search(NamedTuple):
+    """All of it; `finder.Finder` makes it."""
+
+    real: np.ndarray  # (REALS,)
+    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
+    hold: np.ndarray  # (ns, 8): by shape
+    kin: np.ndarray  # (ns,): classes of shapes; those of one class meet the same classes
+    meets: np.ndarray  # (classes, classes)
+    slot: np.ndarray  # (ns, 5)
+    now: np.ndarray  # (ns, 8): by slot
+    fat: np.ndarray  # (ns, 8): by slot
+    axes: np.ndarray  # (ns, 9): axes in the world of what is no sphere, by slot
+    turn: np.ndarray  # (ns, 9): these when the envelope was made
+    wide: np.ndarray  # (wide, 20)
+    raw: np.ndarray  # (ns, 18): now, fat, and how large it may become, by shape
+    key: np.ndarray  # (ns,): cells, by slot
+    link: np.ndarray  # (ns,): next slot at the same place of `head`, or -1
+    head: np.ndarray  # first slot at a place, or -1
+    level_i: np.ndarray  # (levels, 6)
+    level_x: np.ndarray  # (levels, 8)
+    sums: np.ndarray  # (classes * SIZES, 10): of the shapes of one size
+    pair: np.ndarray  # (capacity, 3): slots, that of the smaller shape first; in which way they are looked at
+    seen: np.ndarray  # (2, capacity): the pair's first contact of the last search, or -1; and of this one
+    mark: np.ndarray  # (ns,): by slot, whether it has left its envelope
+    moved: np.ndarray  # (ns,): slots that have
+    names: np.ndarray  # (places,): a table of pairs, by hashing
+    firsts: np.ndarray  # (places,): their first contacts
+    taken: np.ndarray  # (places / 2,): places that are not empty
+    room: np.ndarray  # (ROOM, 8): of the narrow phase
+    kept: np.ndarray  # (2, 12): poses of a pair that is carried on

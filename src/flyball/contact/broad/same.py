@@ -1,0 +1,88 @@
+"""Which contact was which: a table of pairs and their first contacts, and the contacts of a pair matched by feature."""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from ..tables import FEATURE, FOUND, POINT, SHAPE_1, SHAPE_2
+from .desk import KEPT
+
+EMPTY = -1
+NEAR = 0.3  # a contact without a feature's namesake is the nearest one, if it is nearer than this, in radii
+
+
+@formula
+def spot(names, i, j, name):
+    """Where a pair stands in the table, or the empty place where it would stand.
+
+    Pairs of shapes with near numbers stand near each other, for these are mostly asked for together.
+    """
+    mask = names.shape[0] - 1
+    k = (3 * i + 5 * j) & mask
+    while names[k] != EMPTY and names[k] != name:
+        k = (k + 1) & mask
+    return k
+
+
+@formula
+def keep(B, i, j, first):
+    """Put a pair of shapes and its first contact into the table."""
+    name = i * B.kin.shape[0] + j
+    k = spot(B.names, i, j, name)
+    if B.names[k] == EMPTY:
+        B.names[k], B.firsts[k] = name, first
+        B.taken[B.count[KEPT]] = k
+        B.count[KEPT] += 1
+
+
+@formula
+def kept(B, i, j):
+    """The first contact of a pair, or -1."""
+    if B.count[KEPT] == 0:
+        return -1
+    name = i * B.kin.shape[0] + j
+    k = spot(B.names, i, j, name)
+    return B.firsts[k] if B.names[k] == name else -1
+
+
+@formula
+def forget(B):
+    """Empty the table."""
+    for k in range(B.count[KEPT]):
+        B.names[B.taken[k]] = EMPTY
+    B.count[KEPT] = 0
+
+
+@formula
+def keep_all(O, B):
+    """Put all pairs that have contacts in O into the table."""
+    i, j = -1, -1
+    for c in range(O.count[FOUND]):
+        if O.at[c, SHAPE_1] != i or O.at[c, SHAPE_2] != j:
+            i, j = O.at[c, SHAPE_1], O.at[c, SHAPE_2]
+            keep(B, i, j, c)
+
+
+@formula
+def before(O, pair, first, feature, point, size, used):
+    """The contact before of a pair of shapes that is the one at ``point`` now; bits of ``used`` say which are taken.
+
+    Returns its place and its bit, or -1 and 0.
+    """
+    end, best, bit = O.count[FOUND], -1, 0
+    c = first
+    while 0 <= c < end and c - first < 62 and O.at[c, SHAPE_1] == pair[0] and O.at[c, SHAPE_2] == pair[1]:
+        b = 1 << (c - first)
+        if O.at[c, FEATURE] == feature and used & b == 0:
+            return c, b
+        c += 1
+    least = (NEAR * size) ** 2
+    for k in range(max(0, c - first)):
+        b = 1 << k
+        if used & b == 0:
+            x = O.x[first + k, POINT] - point[0]
+            y = O.x[first + k, POINT + 1] - point[1]
+            z = O.x[first + k, POINT + 2] - point[2]
+            d = x * x + y * y + z * z
+            if d < least:
+                least, best, bit = d, first + k, b
+    return best, bit

@@ -1,0 +1,166 @@
+"""How deep two convex cores overlap: a polytope inside their difference, grown where it is nearest to the origin.
+
+Van den Bergen (2001). The nearest face of the polytope bounds the depth from below, the support along any face's
+normal from above; where both meet, the depth is the smallest there is. The polytope is a closed set of directed edges
+whatever rounding does: faces that see the new corner go, their edges without counterpart become new faces.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from ...math.scalar import absolute, sqrt
+from ...math.vec import cross, dot, load3, neg, put3, scale, sub
+from .gjk import reach
+
+CORNERS = 96  # corners of the polytope at most
+FACES = 2 * CORNERS
+EDGES = 96  # edges around what a new corner sees, at most
+ROWS = CORNERS + FACES + EDGES  # of scratch
+THIN = 1e-12  # of the size: what counts as no thickness, no progress
+NEAR = 1e-7  # of the depth, by which the smallest may be missed
+A, B, C, DISTANCE, NX = 0, 1, 2, 3, 4  # columns of a face
+
+
+@formula
+def put_face(room, at, f, a, b, c):
+    """Write face f (corners counter-clockwise from outside). One without area is never the nearest."""
+    x = load3(room, at + a, 0)
+    ab, ac = sub(load3(room, at + b, 0), x), sub(load3(room, at + c, 0), x)
+    n = cross(ab, ac)
+    nn = dot(n, n)
+    k = at + CORNERS + f
+    room[k, A], room[k, B], room[k, C], room[k, DISTANCE] = a, b, c, 1e300
+    put3(room, k, NX, n)
+    if nn > 1e-28 * dot(ab, ab) * dot(ac, ac):
+        n = scale(1.0 / sqrt(nn), n)
+        put3(room, k, NX, n)
+        room[k, DISTANCE] = dot(n, x)
+
+
+@formula
+def across(room, at, count, turn):
+    """A direction at right angles to the first ``count`` (1 to 3) corners; ``turn`` 0 to 5 chooses."""
+    if count == 1:
+        s = 1.0 if turn < 3 else -1.0
+        return (s if turn % 3 == 0 else 0.0, s if turn % 3 == 1 else 0.0, s if turn % 3 == 2 else 0.0)
+    a = load3(room, at, 0)
+    e = sub(load3(room, at + 1, 0), a)
+    if count == 3:
+        n = cross(e, sub(load3(room, at + 2, 0), a))
+        return n if turn % 2 == 0 else neg(n)
+    x, y, z = absolute(e[0]), absolute(e[1]), absolute(e[2])
+    least = (x <= y and x <= z, y < x and y <= z)
+    u = cross(e, (1.0 if least[0] else 0.0, 1.0 if least[1] else 0.0, 0.0 if least[0] or least[1] else 1.0))
+    e = scale(1.0 / sqrt(dot(e, e)), e)
+    w = cross(e, u)
+    c, s = ((1.0, 0.0), (0.5, 0.75**0.5), (-0.5, 0.75**0.5))[turn % 3]
+    s = s if turn < 3 else -s
+    c = c if turn < 3 else -c
+    return (c * u[0] + s * w[0], c * u[1] + s * w[1], c * u[2] + s * w[2])
+
+
+@formula
+def solid(G, i, j, p, R, room, at, count, size, best, along):
+    """Add corners until there are four; how many there are, and the best direction met."""
+    while count < 4:
+        thick, taken = THIN * size, (0.0, 0.0, 0.0)
+        for turn in range(6 if count < 3 else 2):
+            d = across(room, at, count, turn)
+            length = sqrt(dot(d, d))
+            if not length > 0.0:
+                return count, best, along
+            d = scale(1.0 / length, d)
+            a, x = reach(G, i, j, p, R, room, d)
+            if -dot(d, x) > best:
+                best, along = -dot(d, x), d
+            off = sub(x, load3(room, at, 0))
+            if count > 1:
+                off = scale(dot(off, d), d)
+            if sqrt(dot(off, off)) > thick:
+                thick, taken = sqrt(dot(off, off)), x
+        if not thick > THIN * size:
+            return count, best, along
+        put3(room, at + count, 0, taken)
+        count += 1
+    return count, best, along
+
+
+@formula
+def begin(room, at):
+    """The four faces of the first tetrahedron, outside counter-clockwise."""
+    a = load3(room, at, 0)
+    e = sub(load3(room, at + 3, 0), a)
+    inner = dot(cross(sub(load3(room, at + 1, 0), a), sub(load3(room, at + 2, 0), a)), e) > 0.0
+    b, c = (2, 1) if inner else (1, 2)
+    put_face(room, at, 0, 0, b, c)
+    put_face(room, at, 1, 0, 3, b)
+    put_face(room, at, 2, b, 3, c)
+    put_face(room, at, 3, c, 3, 0)
+
+
+@formula
+def grow(room, at, faces, corner, thin):
+    """Let the polytope have a further corner; how many faces there are then, or -1: no room."""
+    x = load3(room, at + corner, 0)
+    edge = at + CORNERS + FACES
+    edges, f = 0, 0
+    while f < faces:
+        k = at + CORNERS + f
+        if room[k, DISTANCE] > 1e299 or dot(load3(room, k, NX), x) - room[k, DISTANCE] <= thin:
+            f += 1
+            continue
+        for s in range(3):
+            a, b = room[k, s], room[k, (s + 1) % 3]
+            found = -1
+            for e in range(edges):
+                if room[edge + e, 0] == b and room[edge + e, 1] == a:
+                    found = e
+            if found >= 0:
+                edges -= 1
+                room[edge + found, 0], room[edge + found, 1] = room[edge + edges, 0], room[edge + edges, 1]
+            elif edges == EDGES:
+                return -1
+            else:
+                room[edge + edges, 0], room[edge + edges, 1] = a, b
+                edges += 1
+        faces -= 1
+        for s in range(7):
+            room[k, s] = room[at + CORNERS + faces, s]
+    if faces + edges > FACES:
+        return -1
+    for e in range(edges):
+        put_face(room, at, faces + e, int(room[edge + e, 0]), int(room[edge + e, 1]), corner)
+    return faces + edges
+
+
+@formula
+def deepest(G, i, j, p, R, room, at, count, size, best, along):
+    """Separation (less than zero: the depth) and its direction from 1 to 2, of cores whose difference holds the origin.
+
+    Rows from ``at`` hold ``count`` (at most 4) corners of the difference, and are scratch (`ROWS`). ``best`` and
+    ``along`` are a separation and direction known before; the depth found is larger by no more than `NEAR` of itself
+    than the smallest, where `CORNERS` suffice.
+    """
+    count, best, along = solid(G, i, j, p, R, room, at, count, size, best, along)
+    if count < 4:
+        return best, along
+    begin(room, at)
+    faces = 4
+    while True:
+        near, low = -1, 1e299
+        for f in range(faces):
+            if room[at + CORNERS + f, DISTANCE] < low:
+                near, low = f, room[at + CORNERS + f, DISTANCE]
+        if near < 0 or -best - low <= -NEAR * best or count == CORNERS:
+            return best, along
+        d = load3(room, at + CORNERS + near, NX)
+        a, x = reach(G, i, j, p, R, room, d)
+        if -dot(d, x) > best:
+            best, along = -dot(d, x), d
+        if dot(d, x) - low <= THIN * size:
+            return best, along
+        put3(room, at + count, 0, x)
+        count += 1
+        faces = grow(room, at, faces, count - 1, 0.1 * THIN * size)
+        if faces < 0:
+            return best, along

@@ -1,0 +1,41 @@
+"""Two convex polygons in the plane."""
+
+from __future__ import annotations
+
+from math import inf
+
+from ....compiler.jit import formula
+from ....math.vec import add, mtv, mv, neg, scale, sub
+from ...kinds import POLYGON
+from ...tables import PAR, RADIUS
+from ..manifold import manifold, smallest
+from ..polygons import corners_apart, sides_apart
+from ..shapes.polygon import support
+
+KINDS = (POLYGON, POLYGON)
+PREFER = 1e-9  # of the size: sides come before corners, the first polygon's before the second's
+
+
+@formula
+def collide(G, i, j, A, B, reach, room):
+    """One or two points of the sides that face each other."""
+    r, s = G.shape_x[i, PAR], G.shape_x[j, PAR]
+    prefer = PREFER * min(G.shape_x[i, RADIUS], G.shape_x[j, RADIUS])
+    far, n = sides_apart(G, i, j, A, B, prefer)
+    if far - r - s > reach:
+        return 0
+    if far > -inf:
+        n = (n[0], n[1], 0.0)
+        count = manifold(G, i, j, A, B, n, (inf, n), reach, room)
+        if count > 0 and (far <= 0.0 or smallest(room, count) <= far - r - s + prefer):
+            return count
+    if -inf < far <= 0.0:  # sides too steep to cut: the corner of the second that is deepest
+        p = add(B[0], mv(B[1], support(G, j, mtv(B[1], neg(n)))))
+        p = sub(p, scale(0.5 * far, n))
+    else:
+        far, n, p = corners_apart(G, i, j, A, B, prefer)
+    if not far - r - s <= reach:
+        return 0
+    n = (n[0], n[1], 0.0)
+    p = add(p, scale(0.5 * (r - s), n))
+    return manifold(G, i, j, A, B, n, (far - r - s, (p[0], p[1], 0.0)), reach, room)

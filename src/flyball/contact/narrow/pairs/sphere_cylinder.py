@@ -1,0 +1,33 @@
+"""A sphere and a cylinder."""
+
+from __future__ import annotations
+
+from ....compiler.jit import formula
+from ....math.vec import mtv, mv, neg, scale
+from ...kinds import CYLINDER, SPHERE
+from ...tables import PAR
+from ..balls import point, towards
+from ..disc import across
+
+KINDS = (SPHERE, CYLINDER)
+
+
+@formula
+def collide(G, i, j, A, B, reach, room):
+    """One point; where the middle is inside the cylinder, towards the nearest part of its surface."""
+    r, s, h = G.shape_x[i, PAR], G.shape_x[j, PAR], G.shape_x[j, PAR + 1]
+    c = neg(mtv(B[1], B[0]))  # the sphere's middle in the cylinder's axes
+    (x, y), rho = across(c)
+    q = min(rho, s)
+    d, length = towards(c, (q * x, q * y, max(-h, min(h, c[2]))))
+    if rho <= s and abs(c[2]) <= h:
+        if s - rho < h - abs(c[2]):
+            d, length = (-x, -y, 0.0), rho - s
+        else:
+            d, length = (0.0, 0.0, -1.0 if c[2] >= 0 else 1.0), abs(c[2]) - h
+    gap = length - r
+    if not gap <= reach:
+        return 0
+    n = mv(B[1], d)
+    point(scale(r + 0.5 * gap, n), n, gap, 0.0, room, 0)
+    return 1
