@@ -22,7 +22,7 @@ from .jit import Kernel
 from .second import cores, started
 
 MOST = 3  # processes beside this one
-Wanted = tuple[Door | Kernel, tuple[Any, ...]]
+Wanted = tuple[Any, tuple[Any, ...]]
 """A door with its tuples, or a kernel with its arguments; only types count."""
 
 _one = Lock()  # motions that begin at once in several threads do not each start processes
