@@ -14,7 +14,7 @@ from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
 from .motion import begin, displace, fall, halfway, rest
-from .penalty import PASSES, aim, choose_shares, find_yielding, linearise, put_back, settled, store
+from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book
 from .rows import fill_rows, static_where_stuck, warm
 from .tables import (
@@ -79,15 +79,14 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     """Velocities at the end of the step: the cone problem, and its residual into the sums."""
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
-    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now)
+    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now, before)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
     if yielding:
-        choose_shares(G, C, P, L, X, pace, now)
-        linearise(G, C, P, L, X, pace, now)
+        start_rows(G, C, P, L, X, pace, now)
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    for _ in range(PASSES if yielding else 0):
-        if settled(linearise(G, C, P, L, X, pace, now), pace):
+    for n in range(PASSES if yielding else 0):
+        if settled(linearise(G, C, P, L, X, pace, now), O.real[RESIDUAL], pace) or (ended != CONVERGED and n == FEW):
             break
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
