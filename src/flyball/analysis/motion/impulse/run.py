@@ -27,7 +27,7 @@ from .drawn import as_drawn, moving
 from .ending import result_of
 from .held import acting_values, held_apart
 from .parts import parts
-from .scene import begin, placed
+from .scene import begin, movers, placed
 from .settings import Impulse
 
 NO_WAY = (
@@ -67,9 +67,9 @@ def impulse_motion(
         base = drawn or assemble(model, t=span[0], parameters=parameters)
         held = held_apart(values, span[0], parameters, found, free, "absolute")
         ready.finish()
-    bodies = moving(drawn) if drawn else base.compiled.moving(base.t, base.q, base.v)
+    at = movers(scene, moving(drawn)) if drawn else placed(scene, base)
     try:
-        stepper = begin(scene, placed(scene, bodies), values, o, held)
+        stepper = begin(scene, at, values, o, held)
     except NoWay:
         raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY}") from None
     names = [*scene.carriers.names, "ground"]

@@ -30,6 +30,7 @@ from ....stepping.tables import (
 from ....tables.contact import Touching
 from ....tables.coordinates import BodyState
 from ....tables.values import Values
+from ...assembly.start import Assembly
 from .held import Held
 from .settings import RESTITUTION, Impulse
 
@@ -45,7 +46,12 @@ def smallest(scene: Touching, values: Values) -> float:
     return float(np.min(sizes[np.isfinite(sizes)], initial=values.length))
 
 
-def placed(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
+def placed(scene: Touching, base: Assembly) -> Movers:
+    """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    return movers(scene, base.compiled.moving(base.t, base.q, base.v))
+
+
+def movers(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
     """Movers where the single bodies are; sets of bodies are as described."""
     M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
     for name, b in bodies.items():
