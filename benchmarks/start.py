@@ -18,6 +18,14 @@ from typing import Any
 import timing
 
 ROOT = Path(__file__).resolve().parents[1]
+PILE = """
+import flyball as fb
+m = fb.Mechanism("pile", gravity=(0, 0, -9.81))
+m.add(fb.Ground("floor", shape=fb.Plane()))
+m.add(fb.Bodies("boxes", shape=fb.Box(edges=(0.2, 0.2, 0.2)), density=1000, position=[(0, 0, 0.5), (0.05, 0, 0.8)]))
+m.add(fb.Contact(friction=0.3))
+m.simulate(1.0, progress=False)
+"""
 EXAMPLE = ROOT / "examples" / "slider_crank.toml"
 COLUMNS = {"what": "what", "wall": "wall [s]", "cpu": "CPU [s]"}
 
@@ -65,6 +73,8 @@ def main() -> None:
         rows += [
             measure("slider-crank 10 s, empty cache", motion, cache, 1),
             measure("slider-crank 10 s, warm cache", motion, cache, arguments.repeats),
+            measure("two boxes fall on a floor 1 s, empty cache", [*python, "-c", PILE], Path(folder, "other"), 1),
+            measure("two boxes, warm cache", [*python, "-c", PILE], Path(folder, "other"), arguments.repeats),
         ]
         if not out.is_dir() or not any(out.iterdir()):
             raise SystemExit("the command line wrote nothing: no motion was computed")
