@@ -49,3 +49,13 @@ def test_a_mechanism_without_its_contact_is_asked_as_told() -> None:
         many.kinematics(3)
     assert "m.changed({'contact': None, 'bricks': None}).kinematics(...)" in str(error.value)
     assert many.changed({"contact": None, "bricks": None}).check().warnings
+
+
+def test_a_floor_that_nothing_touches_is_told():
+    """Who forgets the contact is told so, not left with a body below the floor."""
+    m = fb.Mechanism("fall", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("floor", shape=fb.Plane()))
+    m.add(fb.Body("box", mass=1, shape=fb.Box(edges=(0.1, 0.1, 0.1)), position=(0, 0, 1)))
+    assert any("'floor' touches nothing" in w for w in m.simulate(0.1).health.warnings)
+    m.add(fb.Contact(friction=0.3))
+    assert not any("touches nothing" in w for w in m.simulate(0.1).health.warnings)

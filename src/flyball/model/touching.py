@@ -25,6 +25,17 @@ def has_contact(model: Model) -> bool:
     return bool(model.contacts or model.limits or model.bulk)
 
 
+def nothing_touches(model: Model) -> tuple[str, ...]:
+    """What to say where shapes stand on ground, or bodies lie in sets, and no contact lets anything touch."""
+    there = [*model.ground, *model.bulk]
+    if model.contacts or not any(s.touches for e in there for s in e.shapes()):
+        return ()
+    return (
+        f"{there[0].title} touches nothing: {model.name!r} has no Contact; add Contact(friction=...), or give its shapes "
+        f"looks=True",
+    )
+
+
 def owners(model: Model) -> list[Owner]:
     """All that may have shapes: parts of ground, bodies, many bodies."""
     return [*model.ground, *model.bodies, *model.bulk]

@@ -74,7 +74,10 @@ class ContactHealth:
         if self.unconverged:
             when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""
             share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"
-            out.append(f"{share}: forces are rough there; allow more iterations, or take another solver")
+            out.append(
+                f"{share}: forces are rough there; take shorter steps, or allow more by "
+                f"method=fb.Impulse(iterations=...)"
+            )
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
             part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"
             out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")

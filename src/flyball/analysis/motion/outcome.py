@@ -8,6 +8,7 @@ from functools import partial
 import numpy as np
 
 from ...errors import SimulationError
+from ...model.touching import nothing_touches
 from ...numerics.integrators import clock as ex
 from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
@@ -82,7 +83,11 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
         options=o.choices(),
-        remarks=(*map(not_allowed, changed_velocities(start.base.departures)), *remarks(start.assembly, clock)),
+        remarks=(
+            *map(not_allowed, changed_velocities(start.base.departures)),
+            *remarks(start.assembly, clock),
+            *nothing_touches(start.base.compiled.structure.model),
+        ),
         departures=start.base.departures,
         coordinates=start.coordinates,
     )

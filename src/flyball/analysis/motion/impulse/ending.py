@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from ....model.touching import nothing_touches
 from ....numerics.cone.choose import BY_ONE, BY_OTHER, HANDED_ON
 from ....results.contact_health import ContactHealth
 from ....results.energy import EXCHANGED, STORED
@@ -68,6 +69,7 @@ def result_of(
         seconds=time.perf_counter() - since,
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
+        remarks=nothing_touches(model),
         crowd=sum(b.count for b in model.bulk),
         contact=_contact_health(scene, stepper, o, smallest(scene, values)),
     )
