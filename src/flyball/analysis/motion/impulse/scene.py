@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ....contact import surfaces as su
@@ -27,6 +29,7 @@ from ....stepping.tables import (
     Pace,
 )
 from ....tables.contact import Touching
+from ....tables.coordinates import BodyState
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from .held import Held
@@ -49,8 +52,13 @@ def smallest(scene: Touching, values: Values) -> float:
 
 def placed(scene: Touching, base: Assembly) -> Movers:
     """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    return movers(scene, base.compiled.moving(base.t, base.q, base.v))
+
+
+def movers(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
+    """Movers where the single bodies are; sets of bodies are as described."""
     M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
-    for name, b in base.compiled.moving(base.t, base.q, base.v).items():
+    for name, b in bodies.items():
         k = scene.carriers.slices[name].start
         M.pose[k] = np.r_[b.p, b.R.ravel()]
         M.twist[k] = np.r_[b.v, b.w]
