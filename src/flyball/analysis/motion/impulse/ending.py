@@ -72,6 +72,7 @@ def result_of(
         seconds=time.perf_counter() - since,
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
+        crowd=sum(b.count for b in model.bulk),
         contact=contact,
     )
     health.late = {
