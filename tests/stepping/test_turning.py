@@ -34,6 +34,6 @@ def test_rolling_and_spinning_slow_down(solver: str) -> None:
 
 
 def test_a_solver_of_the_convex_form_is_refused_for_coulombs_law() -> None:
-    with pytest.raises(fb.ModelError, match=r"convex form only(?s:.*)coulomb=False"):
+    with pytest.raises(fb.ModelError, match=r"convex problem only(?s:.*)coulomb=False"):
         fb.Impulse(solver="barzilai-borwein")
     assert fb.Impulse(solver="barzilai-borwein", coulomb=False).solver == "barzilai-borwein"

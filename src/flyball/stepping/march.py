@@ -8,11 +8,13 @@ from ..compiler.jit import formula, kernel
 from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
-from .bounce import bounce
+from .bounce import ROUNDS, bounce, no_kicks
 from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
+from .lifts import PASSES as AGAIN
+from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
@@ -32,6 +34,7 @@ from .tables import (
     LOST_IMPACT,
     MOST_CONTACTS,
     POSITIONS,
+    ROUGH,
     SEARCHING,
     STEP,
     STIFF,
@@ -91,7 +94,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    if ended != CONVERGED:
+    if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
@@ -101,7 +104,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 
 @formula
-def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
+def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
     """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
@@ -119,7 +122,7 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
         else:
             pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         deepest = min(deepest, gap)
-        Q.bias[c, 0] = gap / h
+        Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
         if P.turn.shape[0] > 0:
             book_turning(P, X, Y, c, pace)
@@ -133,6 +136,21 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
         store(G, C, P, L, Y, pace, now)
+
+
+@formula
+def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
+    """End the mechanism's step on its joints, and lift again where that made contacts overlap. Returns a status."""
+    for n in range(AGAIN + 1):
+        if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+            return NO_WAY
+        if pace.door[JOINTS] == 0 or pace.count[YIELDING] != 0 or n == AGAIN:
+            break
+        if not sunk(G, A, M, C, P, Q, Y, R.bias, pace):
+            break
+        rest(Y)
+        solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+    return DONE
 
 
 @formula
@@ -164,7 +182,10 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    if bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+    no_kicks(C, now)
+    for _ in range(ROUNDS):  # what is hit may hit what is near
+        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+            break
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY
@@ -173,8 +194,8 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
             held_by_joints(A, M, C, P, X, pace, ROWS)
     lost, worn, given, stops = ledger(A, pace)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
-    positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now)
-    if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+    positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
+    if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
         back(N, A, X, pace, (lost, worn, given, stops))
         return NO_WAY
     displace(N, M, X, Y.v, pace)

@@ -11,7 +11,7 @@ from ....numerics.cone.registry import names
 from ...options import count, positive, seconds
 
 RESTITUTION = ("poisson", "newton", "moreau")
-CONVEX_ONLY = ("barzilai-borwein",)  # solvers
+CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
 
 
@@ -67,9 +67,10 @@ class Impulse:
         for name, known in (("solver", names()), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
             if getattr(self, name) not in known:
                 raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
-        if self.coulomb and self.solver in CONVEX_ONLY:
+
+        if self.solver in CONVEX_ONLY and self.coulomb:
             raise ModelError(
-                f"solver={self.solver!r} of Impulse solves the convex form only: give coulomb=False, or another solver"
+                f"solver {self.solver!r} of Impulse solves the convex problem only: give coulomb=False with it"
             )
 
     @property
