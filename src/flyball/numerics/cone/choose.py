@@ -35,7 +35,7 @@ from .problem import (
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
 # entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN
 MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
-FINER = 1e-5  # times the residual that is enough
+FINER, FINEST = 1e-5, 1e-10  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
 # entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
 # hand on to the other, contacts by the one; the largest island's contacts
@@ -194,7 +194,7 @@ def by_one(P, X, W, O, F, f):
     does not creep. That it has not got them all is no fault.
     """
     enough = O.real[ENOUGH]
-    O.real[ENOUGH] = FINER * enough
+    O.real[ENOUGH] = max(FINER * enough, min(enough, FINEST))
     enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
     O.real[ENOUGH] = enough
     if (O.count[ENDED] == CUT or O.count[ENDED] == STALLED) and O.real[RESIDUAL] <= enough:
