@@ -7,7 +7,7 @@ from flyball.analysis.motion.start import begin
 from flyball.contact.tables import GAP, NORMAL, POINT, Contacts, Movers
 from flyball.equations.engine import engine
 from flyball.numerics.cone.rooms import rooms, unfilled
-from flyball.stepping.joined import BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, STEP, VELOCITIES
+from flyball.stepping.joined import ANYHOW, BEGIN, FINISH, FREE, KEEP, MEAN, ROWS, START, STEP, VELOCITIES
 from flyball.stepping.joints import joined, joined_kernel
 
 
@@ -21,6 +21,7 @@ class Stepped:
         self.compiled = start.assembly.compiled
         self.structure = self.compiled.structure
         A = tables(start, self.names, 0, h, stops)
+        A.count[ANYHOW] = 1  # the loop's shorter steps are not here
         lines = 2 * len(A.line)
         self.A = A._replace(job=np.zeros((2 * contacts + lines, 3), np.int64))
         n, nv = len(self.names), A.wide.shape[1]

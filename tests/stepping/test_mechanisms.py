@@ -44,6 +44,31 @@ def test_a_pendulum_hits_a_ball_and_all_energy_is_accounted_for():
     assert r.health.violation < 1e-12
 
 
+def chain(tip):
+    """20 links of 1 kg on spherical joints, stretched out level over a floor, the last one heavier."""
+    m = scene(friction=0.5)
+    for i in range(20):
+        mass = tip if i == 19 else 1.0
+        m.add(fb.Body(f"b{i}", mass=mass, inertia=(0.01 * mass, 0.014 * mass, 0.005 * mass),
+                      position=(0.2 * i + 0.1, 0, 2.0), shape=fb.Sphere(radius=0.05)))  # fmt: skip
+        m.add(fb.Spherical(f"j{i}", f"b{i - 1}" if i else "ground", f"b{i}", at=(0.2 * i, 0, 2.0)))
+    return m
+
+
+@pytest.mark.parametrize(("tip", "part"), [(1.0, 2e-4), (1000.0, 5e-3)])
+def test_a_chain_that_falls_on_a_floor_accounts_for_its_energy(tip, part):
+    """Stops of links are impacts, in joints too; its joints stay closed, whatever the masses.
+
+    A tip of 1000 kg that stops pulls so hard at light links that steps have to be shorter for a while.
+    """
+    r = chain(tip).simulate(1.0, outputs=101)
+    assert r.energy.drift < part * r.energy.kinetic.max()
+    assert r.exchanged["impact_loss"][-1] > 0.1 * r.energy.kinetic.max()
+    assert np.diff(r.energy.total).max() < part * r.energy.kinetic.max()
+    assert r.health.violation < 1e-12
+    assert r.health.contact.worst_overlap < 0.005
+
+
 def test_a_limit_stops_a_free_body_and_a_joint():
     m = fb.Mechanism("stops", planar=True, gravity=(0, -G))
     m.add(fb.Body("rod", mass=1.0, inertia=0.1, position=(0.5, 0)))
@@ -57,6 +82,8 @@ def test_a_limit_stops_a_free_body_and_a_joint():
     y = r["block"].position[:, 1]
     assert y.min() == pytest.approx(-0.5, abs=1e-9)
     assert y[45:].max() == pytest.approx(-0.5 + 0.25 * 0.5, abs=0.01)
+    assert r.energy.drift < 1e-3 * G
+    assert r.exchanged["impact_loss"].min() >= 0.0
 
 
 def test_a_gripper_lifts_a_box_by_friction():
@@ -86,8 +113,9 @@ def test_a_force_that_is_no_number_is_told():
     m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
     m.add(fb.Prismatic("rail", "ground", "bob", at=(1.0, 0, 1.1), axis=(0, 0, 1)))
     m.add(fb.Actuator("push", "rail.displacement", force="sqrt(0.2 - t)"))
-    with pytest.raises(fb.SimulationError, match=r"cannot go on at t = 0\.2"):
+    with pytest.raises(fb.SimulationError, match="cannot go on") as told:
         m.simulate(1.0, outputs=11)
+    assert told.value.t == pytest.approx(0.2, abs=5e-3)
 
 
 def test_newtons_cradle_on_joints():

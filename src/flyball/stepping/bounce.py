@@ -6,7 +6,8 @@ Contacts that close within the step, faster than smooth forces make them, are hi
   and friction for these (Pfeiffer and Glocker, 1996, section 8.3);
 - Newton: u+ >= -e u- normal to the contact; Moreau: the same along all three directions.
 
-No law may add energy: expansion is taken only as far as what the compression lost.
+No law may add energy: what goes beyond an inelastic impact is done only as far as that leaves energy for it (Newton's
+law with friction would add some: Kane and Levinson, 1985).
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from .tables import (
     YIELDING,
 )
 
-ROUNDING = 1e-12
+LESS = 1.0 - 1e-6  # part of an expansion below which it is told that it was reduced
 MORE = 4  # times as many iterations as for velocities that are warm started
 SHARE = 2.0  # times the speed that gravity makes in a step: what is slower rests
 
@@ -63,32 +64,56 @@ def bounce(G, C, at, bias, R, Z, E, X, W, O, F, L, pace, now):
     """
     if pace.count[LAW] == NO_RESTITUTION or not hits(G, C, at, bias, R, X, L, pace, now):
         return False
-    poisson = pace.count[LAW] == POISSON
     if pace.count[SEQUENTIAL] != 0:
         for c in range(C.count[FOUND]):
             R.least[c] = elasticity(G, C, L, c)
-        if not one_after_the_other(R, Z, X, C, now):
+        if not one_after_the_other(R, Z, X, C, pace, now):
             pace.count[REDUCED] += 1
         close(R, Z, X, C, pace, now)
         return True
-    solve_afresh(pace.door[BOUNCE], R, Z, W, O, F, pace)
-    spent = power(R, Z, X.v, X.wide, C, now)
-    if poisson:
-        for c in range(C.count[FOUND]):
-            R.least[c] = elasticity(G, C, L, c) * Z.p[c, 0] if now[c, HIT] > 0.0 else 0.0
-        copy_velocities(X, E)
-        solve_afresh(pace.door[BOUNCE], R, E, W, O, F, pace)
-        expand(R, E, X, C, pace, spent)
-        for c in range(C.count[FOUND]):
-            for i in range(3):
-                Z.p[c, i] += E.p[c, i]
+    if pace.count[LAW] == POISSON:
+        by_compression(G, C, bias, R, Z, E, X, W, O, F, L, pace, now)
+    else:
+        by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now)
     close(R, Z, X, C, pace, now)
     return True
 
 
 @formula
+def by_compression(G, C, bias, R, Z, E, X, W, O, F, L, pace, now):
+    """Poisson's law: an inelastic impact, then expansion."""
+    solve_afresh(pace.door[BOUNCE], R, Z, W, O, F, pace)
+    for c in range(C.count[FOUND]):
+        R.least[c] = elasticity(G, C, L, c) * Z.p[c, 0] if now[c, HIT] > 0.0 else 0.0
+    copy_velocities(X, E)
+    solve_afresh(pace.door[BOUNCE], R, E, W, O, F, pace)
+    expand(R, bias, Z, E, X, C, pace, now)
+
+
+@formula
+def by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now):
+    """Newton's and Moreau's law; where they make energy, as far as an inelastic impact leaves enough of it."""
+    copy_velocities(X, E)
+    solve_afresh(pace.door[BOUNCE], R, E, W, O, F, pace)
+    if power(R, bias, E, E, C, now) <= 0.0:
+        copy_velocities(E, X)
+        for c in range(C.count[FOUND]):
+            for i in range(3):
+                Z.p[c, i] = E.p[c, i]
+        return
+    for c in range(C.count[FOUND]):
+        for i in range(3):
+            R.bias[c, i] = 0.0 if i == 0 and now[c, HIT] > 0.0 else bias[c, i]
+    solve_afresh(pace.door[BOUNCE], R, Z, W, O, F, pace)
+    for c in range(C.count[FOUND]):
+        for i in range(3):
+            E.p[c, i] -= Z.p[c, i]
+    expand(R, bias, Z, E, X, C, pace, now)
+
+
+@formula
 def copy_velocities(X, E):
-    """E's velocities are X's."""
+    """E's velocities become X's."""
     for k in range(X.v.shape[0]):
         for i in range(6):
             E.v[k, i] = X.v[k, i]
@@ -121,8 +146,7 @@ def hits(G, C, at, bias, R, X, L, pace, now):
         if gives_way:
             R.bias[c, 0] = 0.0
             continue
-        flat = pace.real[FLAT] if plain else 0.0  # what rests against what is hit is hit by it
-        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= flat:
+        if (e > 0.0 or plain) and C.x[c, GAP] + h * u[0] <= pace.real[FLAT]:  # what rests against what is hit, too
             now[c, HIT] = 1.0
             found = found or (e > 0.0 and u[0] < -slowest)
             R.bias[c, 0] = 0.0
@@ -149,40 +173,42 @@ def solve_afresh(address, R, Z, W, O, F, pace):
 
 
 @formula
-def power(R, Z, v, wide, C, now):
-    """Energy that the impulses of ``Z`` gave: p . (u- + u+) / 2 of every contact, its surfaces' own motion included."""
+def power(R, bias, Z, X, C, now):
+    """Energy that impulses of ``Z`` gave, which led to the velocities of ``X``: p . (u- + u+) / 2 of every contact.
+
+    With the own motion of surfaces, ``bias`` along the tangents, from which they may give energy.
+    """
     total = 0.0
     for c in range(C.count[FOUND]):
-        if Z.p[c, 0] > 0.0:
-            u = seen(R, v, wide, c)
-            for i in range(3):
-                own = R.bias[c, i] if i > 0 else 0.0
-                total += Z.p[c, i] * (0.5 * (u[i] + now[c, BEFORE_KICK + i]) + own)
+        u = seen(R, X.v, X.wide, c)
+        for i in range(3):
+            own = bias[c, i] if i > 0 else 0.0
+            total += Z.p[c, i] * (0.5 * (u[i] + now[c, BEFORE_KICK + i]) + own)
     return total
 
 
 @formula
-def expand(R, E, X, C, pace, spent):
-    """Velocities after expansion: those of ``E``, or between X's and these where that is all the energy there is.
+def expand(R, bias, Z, E, X, C, pace, now):
+    """The impulses E.p are added to Z.p: X's velocities become those of ``E``, or what energy there is for on the way.
 
     On the way s from X to E it grows by a s + b s^2, a = p . u, b = p . (u+ - u) / 2. All of the way is allowed by the
     constraints, which are convex.
     """
+    there = max(0.0, -power(R, bias, Z, X, C, now))
     a, b = 0.0, 0.0
     for c in range(C.count[FOUND]):
-        if E.p[c, 0] > 0.0:
-            u = seen(R, X.v, X.wide, c)
-            w = seen(R, E.v, E.wide, c)
-            for i in range(3):
-                own = R.bias[c, i] if i > 0 else 0.0
-                a += E.p[c, i] * (u[i] + own)
-                b += 0.5 * E.p[c, i] * (w[i] - u[i])
+        u = seen(R, X.v, X.wide, c)
+        w = seen(R, E.v, E.wide, c)
+        for i in range(3):
+            own = bias[c, i] if i > 0 else 0.0
+            a += E.p[c, i] * (u[i] + own)
+            b += 0.5 * E.p[c, i] * (w[i] - u[i])
     s = 1.0
-    there = max(0.0, -spent)
-    if a + b > there * (1.0 + ROUNDING) and b > 0.0:
+    if a + b > there and b > 0.0:
         s = (sqrt(a * a + 4.0 * b * there) - a) / (2.0 * b)
         s = min(1.0, max(0.0, s))
-        pace.count[REDUCED] += 1
+        if s < LESS:
+            pace.count[REDUCED] += 1
     for k in range(X.v.shape[0]):
         for i in range(6):
             X.v[k, i] += s * (E.v[k, i] - X.v[k, i])
@@ -190,7 +216,7 @@ def expand(R, E, X, C, pace, spent):
         X.wide[k] += s * (E.wide[k] - X.wide[k])
     for c in range(C.count[FOUND]):
         for i in range(3):
-            E.p[c, i] *= s
+            Z.p[c, i] += s * E.p[c, i]
 
 
 @formula

@@ -23,11 +23,13 @@ from ..tables.system import System, Work
 # being made those of the second solve; the way gone with these and others beside them in State.wide; velocities at its
 # end put there. Besides, impacts over before the step whose impulses stand in a state
 START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED = range(9)
-# entries of Joined.real: time and step; energy lost at stops; by how far (< 0) a stop would be overrun
-TIME, STEP, LOST_AT_STOPS, OVERRUN = range(4)
+# entries of Joined.real: time and step; energy lost at stops and by what impacts do to joints; by how far (< 0) a stop
+# would be overrun; gravity's potential energy, and its work over the step at the mean velocities
+TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED = range(6)
 # entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
-# steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has begun
-FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN = range(7)
+# steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has
+# begun, and whether it is to be taken with velocities that did not settle
+FIRST, SPRINGS, EVALUATED, UNSETTLED, NEEDED, JOBS, BEGUN, ANYHOW = range(8)
 # rows of Joined.wide: velocities at the start of the step; their change without impulses of contact, as far as known,
 # and what the evaluation at half the change makes of it, and of the drivers' efforts; generalised impulses of contacts
 # and the rest, and what they change; velocities at the end; the way, scratch
@@ -47,7 +49,8 @@ FRICTION, STOP, ROPE = range(3)
 LEAST, MOST_AT, REBOUND, ROPE_K, ROPE_C, SHORTEST, PRESSED, PULLED = range(8)
 # columns of Joined.active: line of the step, + 1 and negative for an upper stop; its group; where its row begins
 LINE_OF, LINE_GROUP, LINE_AT = range(3)
-NO_ROOM, NO_WAY = 100, 101  # what ROWS may return; what the loop says where the engine has a status
+# what ROWS may return; what the loop says where the engine has a status; velocities that do not settle
+NO_ROOM, NO_WAY, NOT_SETTLED = 100, 101, 102
 
 
 class Joined(NamedTuple):

@@ -51,6 +51,7 @@ from .joined import (
     VELOCITIES,
     WAY,
 )
+from .ledger import kinetic, reactions_work, settle_account, weigh_mean
 from .lines import lines_done, press, stops_only
 from .smooth import free_velocities, put_aside
 
@@ -87,6 +88,9 @@ def ask(A, M, C, P, X, task):
             A.wide[IMPULSE, d] = 0.0
         contact_impulses(A, P, X, A.wide[IMPULSE])
         respond(A, A.wide[IMPULSE], A.wide[STRUCK])
+        for d in range(A.wide.shape[1]):
+            A.wide[WAY, d] = 0.5 * (A.wide[V_BEFORE, d] + X.wide[d])
+        reactions_work(A, A.sheet.rows[3], A.wide[WAY])
         for r in range(A.lam.shape[1]):
             A.lam[2, r] += A.sheet.rows[3, r]
     if task == VELOCITIES:
@@ -110,6 +114,7 @@ def start(A, M, X):
         A.lam[1, r] = A.lam[2, r] = 0.0
     press(A)
     show(A, M, True)
+    settle_account(A, 0.0, False)
     return status
 
 
@@ -168,6 +173,9 @@ def keep(A, P, X):
         A.wide[EFFORTS, d] += A.W.vel[EFFORT, d] / h
         A.wide[V_AFTER, d] = before[d] + A.wide[SMOOTH, d] + A.wide[STRUCK, d]
         A.wide[STRUCK, d] = A.wide[V_AFTER, d] - before[d] - A.wide[CHANGE, d]  # by contact and lines
+    for d in range(nv):
+        A.wide[WAY, d] = 0.5 * (before[d] + A.wide[V_AFTER, d])
+    reactions_work(A, A.lam[1], A.wide[WAY])
     account(A, h)
     lines_done(A, P, X)
     turn_on(A, h)
@@ -242,6 +250,7 @@ def account(A, h):
     S, W = A.S, A.W
     if struck(A):
         evaluate_again(A, 0.5)
+    weigh_mean(A, h)
     work = A.clock.K[0, S.kinds[COORDINATES] + A.wide.shape[1] :]
     for r in range(S.row_i.shape[0]):
         if S.row_i[r, ROW_WORK] >= 0:
@@ -261,6 +270,15 @@ def account(A, h):
 
 
 @formula
+def moved(lifts):
+    """Whether there are any."""
+    found = False
+    for d in range(lifts.shape[0]):
+        found = found or lifts[d] != 0.0
+    return found
+
+
+@formula
 def finish(A, M, X):
     """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status."""
     S, nq, nv, h = A.S, A.S.kinds[COORDINATES], A.wide.shape[1], A.real[STEP]
@@ -274,13 +292,21 @@ def finish(A, M, X):
     A.real[TIME] += h
     A.clock.real[T] = A.real[TIME]
     put_right(A)
+    hit = struck(A) or moved(X.wide)
+    before = 0.0
+    if hit:
+        enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
+        before = kinetic(A)
     A.W.option[PLACED] = 1.0
     status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
     A.W.option[PLACED] = 0.0
+    if status != 0:
+        return status
     enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
     show(A, M, True)
+    settle_account(A, before, hit)
     A.count[BEGUN] = 0
-    return status
+    return 0
 
 
 @door

@@ -18,7 +18,7 @@ from .joined import (
     LINE_AT,
     LINE_GROUP,
     LINE_OF,
-    LOST_AT_STOPS,
+    LOST,
     MEASURED,
     MOST_AT,
     OF_FORCE,
@@ -163,7 +163,7 @@ def lines_done(A, P, X):
         side = 1.0 if A.active[i, LINE_OF] > 0 else -1.0
         work = X.line[i] * side * 0.5 * (rate_of(A, k, A.wide[V_BEFORE]) + rate_of(A, k, A.wide[V_AFTER]))
         if A.line[k, WHAT] == STOP:
-            A.real[LOST_AT_STOPS] -= work
+            A.real[LOST] -= work
         else:
             f = A.line[k, OF_FORCE]
             if A.S.force_i[f, FORCE_WORK] >= 0:

@@ -9,7 +9,7 @@ from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
 from .bounce import bounce
-from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS
+from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
@@ -23,10 +23,13 @@ from .tables import (
     ENOUGH_X,
     FIRST_OVERLAP,
     FLAT,
+    GIVEN,
     ITERATIONS,
     JOINTS,
     LEFT,
     LIFTS,
+    LOST_FRICTION,
+    LOST_IMPACT,
     MOST_CONTACTS,
     POSITIONS,
     SEARCHING,
@@ -132,8 +135,25 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
 
 
 @formula
+def ledger(A, pace):
+    """Energies that contacts, and stops and joints in impacts, exchanged so far."""
+    return pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST]
+
+
+@formula
+def back(N, A, X, pace, sums):
+    """Velocities and energies of the start of the step again, after its impacts."""
+    for k in range(N.body.shape[0]):
+        for i in range(6):
+            X.v[k, i] = N.before[k, i]
+    for d in range(X.wide.shape[0]):
+        X.wide[d] = A.wide[V_BEFORE, d]
+    pace.real[LOST_IMPACT], pace.real[LOST_FRICTION], pace.real[GIVEN], A.real[LOST] = sums
+
+
+@formula
 def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before):
-    """One step of time; nothing is changed where it returns that a table is full."""
+    """One step of time; where a table is full, or there is NO_WAY, nothing is changed but by impacts."""
     if without_contact(A, M, C, P, X, N, pace) != DONE:
         return NO_WAY
     B.real[AHEAD] = pace.real[STEP]
@@ -150,11 +170,13 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
         if pace.door[JOINTS] != 0:
             fill_rows(G, M, C, P, L, pace)
             held_by_joints(A, M, C, P, X, pace, ROWS)
+    lost, worn, given, stops = ledger(A, pace)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
     positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now)
-    displace(N, M, X, Y.v, pace)
     if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+        back(N, A, X, pace, (lost, worn, given, stops))
         return NO_WAY
+    displace(N, M, X, Y.v, pace)
     held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)
     pace.real[TIME] += pace.real[STEP]
     pace.count[TAKEN] += 1

@@ -12,7 +12,12 @@ from .tables import GRAVITY, IMPULSE, SLIDES, STEP
 
 @formula
 def tangent(n):
-    """A unit vector across the unit vector n (Duff and others, 2017)."""
+    """A unit vector across the unit vector n (Duff and others, 2017); for n in the plane of x and y one in it too.
+
+    So what moves in that plane stays in it to the last digit.
+    """
+    if n[2] == 0.0:
+        return (-n[1], n[0], 0.0 * n[0])
     s = 1.0 if n[2] >= 0.0 else -1.0
     a = -1.0 / (s + n[2])
     return (1.0 + s * n[0] * n[0] * a, s * n[0] * n[1] * a, -s * n[0])

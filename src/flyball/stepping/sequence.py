@@ -8,11 +8,11 @@ impact in two parts, each inelastic along the tangents).
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..contact.tables import FOUND
+from ..contact.tables import FOUND, GAP
 from ..math.scalar import sqrt
 from ..numerics.cone.diagonal import diagonal
 from ..numerics.cone.operator import push, seen
-from .tables import BEFORE_KICK, HIT
+from .tables import BEFORE_KICK, FLAT, HIT, STEP
 
 MANY = 200  # impacts for each contact, after which what still closes is left to the step
 NOTHING = 1e-13  # part of what an impulse moves along all three directions that is none
@@ -20,10 +20,10 @@ STILL = 1e-12  # closing speed that is none, in parts of the fastest
 
 
 @formula
-def one_after_the_other(R, Z, X, C, now):
+def one_after_the_other(R, Z, X, C, pace, now):
     """Impacts of the contacts that are hit; impulses in ``Z.p``, velocities in ``X``. Returns whether all are over.
 
-    Their restitutions stand in ``R.least``.
+    Their restitutions stand in ``R.least``. What closes within the step after others' impacts is hit too.
     """
     n = C.count[FOUND]
     for c in range(n):
@@ -36,12 +36,14 @@ def one_after_the_other(R, Z, X, C, now):
     for _ in range(MANY * n):
         first, most = -1, STILL * fastest
         for c in range(n):
-            if now[c, HIT] > 0.0:
+            if now[c, HIT] > 0.0 or R.least[c] > 0.0:
                 u = seen(R, X.v, X.wide, c)
-                if -u[0] > most:
+                there = now[c, HIT] > 0.0 or C.x[c, GAP] + pace.real[STEP] * u[0] <= pace.real[FLAT]
+                if there and -u[0] > most:
                     first, most = c, -u[0]
         if first < 0:
             return True
+        now[first, HIT] = 1.0
         hit_alone(R, Z, X, first, R.least[first])
     return False
 
@@ -94,8 +96,11 @@ def compress(R, Z, X, c, D):
 @formula
 def within(R, c, D, n, u):
     """Impulses of expansion: n along the normal, and along the tangents what ends sliding, within the cone."""
-    s = -(u[1] + R.bias[c, 1] + D[1] * n) * part(D[3], D)
-    t = -(u[2] + R.bias[c, 2] + D[2] * n) * part(D[5], D)
+    a, b = -(u[1] + R.bias[c, 1] + D[1] * n), -(u[2] + R.bias[c, 2] + D[2] * n)
+    s, t = a * part(D[3], D), b * part(D[5], D)
+    d = D[3] * D[5] - D[4] * D[4]
+    if d > NOTHING * D[3] * D[5] and s != 0.0 and t != 0.0:
+        s, t = (D[5] * a - D[4] * b) / d, (D[3] * b - D[4] * a) / d
     size = sqrt(s * s + t * t)
     if size > R.mu[c] * n:
         s, t = s * R.mu[c] * n / size, t * R.mu[c] * n / size

@@ -17,7 +17,7 @@ from ..numerics.integrators.clock import T
 from ..tables.system import COORDINATES, EFFORT, LAM
 from .gauges import note_bends, note_lengths
 from .implicit import implied, stiffened, take_springs
-from .joined import CHANGE, EFFORTS, EVALUATED, SMOOTH, SPRINGS, STEP, TIME, UNSETTLED, V_BEFORE
+from .joined import ANYHOW, CHANGE, EFFORTS, EVALUATED, NOT_SETTLED, SMOOTH, SPRINGS, STEP, TIME, UNSETTLED, V_BEFORE
 
 MIXED = 5  # evaluations that the next guess is made of
 MOST = 40
@@ -57,7 +57,7 @@ def free_velocities(A):
         if n < MOST - 1:
             guess(A, n)
     A.count[UNSETTLED] += 1
-    return 0
+    return 0 if A.count[ANYHOW] != 0 else NOT_SETTLED
 
 
 @formula

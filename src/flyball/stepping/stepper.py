@@ -14,7 +14,7 @@ from ..equations.engine import engine
 from ..numerics.cone.problem import Choices, Problem, Scratch, State
 from ..numerics.cone.rooms import rooms, unfilled
 from .free import rotation_matrices
-from .joined import JOBS, NEEDED, NO_ROOM, NO_WAY, START, Joined, no_mechanism
+from .joined import ANYHOW, JOBS, NEEDED, NO_ROOM, NO_WAY, START, Joined, no_mechanism
 from .joints import joined, joined_kernel
 from .march import march_kernel
 from .solvers import Solvers, solvers, told
@@ -39,6 +39,7 @@ SLICE = 0.05  # seconds that a call of the loop should take
 
 
 MANY = 100_000  # steps of a call at most
+HALVINGS = 6  # of a step that cannot be taken whole
 ROOMIER = 1.5  # times as much room as was needed, when there is none
 
 
@@ -175,6 +176,7 @@ class Stepper:
         self.rooms.X.v[:, :6] = velocity
         self.turning = turning
         self.quota = 1
+        self.halved = 0  # steps that were taken in shorter ones
         self._open(joints is not None)
 
     def _open(self, joints: bool) -> None:
@@ -191,20 +193,43 @@ class Stepper:
     def run(self, steps: int, h: float) -> None:
         """Take as many steps of h seconds, in calls that take so long that an interrupt comes through.
 
+        A step that the mechanism cannot take is taken in shorter ones; ``pace.real[STEP]`` is the last one's length.
+
         Raises
         ------
         ModelError
             What the search cannot go on with.
+        NoWay
+            If no shorter steps can be taken either.
         """
         count = self.pace.count
-        self.pace.real[STEP] = h
         while steps > 0:
-            began, before = time.perf_counter(), count[TAKEN]
-            count[LEFT] = min(steps, self.quota)
-            self._march()
-            steps -= int(count[TAKEN] - before)
+            began = time.perf_counter()
+            asked = count[LEFT] = min(steps, self.quota)
+            self.pace.real[STEP] = h
+            try:
+                self._march()
+            except NoWay:
+                left = int(count[LEFT])
+                self._in_halves(h, HALVINGS)
+                self.halved += 1
+                count[LEFT] = left - 1
+            steps -= int(asked - count[LEFT])
             took = max(time.perf_counter() - began, 1e-6)
             self.quota = int(max(1, min(4 * self.quota, self.quota * SLICE / took, MANY)))
+
+    def _in_halves(self, h: float, depth: int) -> None:
+        """Take a step of h, which cannot be taken, as two; at the last depth as best as it can be."""
+        if depth == 0:
+            raise NoWay
+        for _ in range(2):
+            self.pace.real[STEP], self.pace.count[LEFT] = 0.5 * h, 1
+            self.joints.count[ANYHOW] = depth == 1
+            try:
+                self._march()
+            except NoWay:
+                self._in_halves(0.5 * h, depth - 1)
+        self.joints.count[ANYHOW] = 0
 
     def _march(self) -> None:
         """Take ``pace.count[LEFT]`` steps, enlarging tables that are full."""

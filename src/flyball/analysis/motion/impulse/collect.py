@@ -12,8 +12,20 @@ from ....results.bulk import Bulk
 from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
 from ....stepping.free import matrix, unrotated
+from ....stepping.joined import LOST
 from ....stepping.stepper import Stepper
-from ....stepping.tables import GIVEN, IMPULSE, KICK, LOST_FRICTION, LOST_IMPACT, SLIDES, STORED, STORED_FIRST, TIME
+from ....stepping.tables import (
+    GIVEN,
+    IMPULSE,
+    KICK,
+    LOST_FRICTION,
+    LOST_IMPACT,
+    SLIDES,
+    STEP,
+    STORED,
+    STORED_FIRST,
+    TIME,
+)
 from ....tables.contact import Touching
 from ....tables.system import NV, Q0, V0
 from ...assembly.start import Assembly
@@ -46,28 +58,30 @@ class Collected:
         self.sums: list[np.ndarray] = []
         self.contacts: list[dict[str, np.ndarray]] = []
 
-    def add(self, h: float) -> None:
-        """Keep where the stepper is now, and the contacts of the step of length h that led here (0: none did)."""
+    def add(self, moved: bool) -> None:
+        """Keep where the stepper is now, and the contacts of the last step if one led here."""
         s = self.stepper
         self.t.append(float(s.pace.real[TIME]))
         self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
         self.turn.append(s.free.turn.copy())
         self.twist.append(s.rooms.X.v[:, :6].copy())
-        self.sums.append(s.pace.real[list(SUMS)])
+        sums = s.pace.real[list(SUMS)]
+        sums[SUMS.index(LOST_IMPACT)] += s.joints.real[LOST]
+        self.sums.append(sums)
         if self.held:
-            self.held.add(s.joints, h > 0.0)
-        if h > 0.0:
-            self.begin(h)
-        self.contacts.append(self._touching(h) if h > 0.0 else {})
+            self.held.add(s.joints, moved)
+        if moved:
+            self.begin()
+        self.contacts.append(self._touching() if moved else {})
 
-    def begin(self, h: float) -> None:
+    def begin(self) -> None:
         """Keep the mean accelerations of the last step; of the first one for the start, and what was stored."""
         s = self.stepper
         if not self.acceleration and self.sums:
             self.sums[0][SUMS.index(STORED)] = s.pace.real[STORED_FIRST]
-        self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / h)
+        self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
 
-    def _touching(self, h: float) -> dict[str, np.ndarray]:
+    def _touching(self) -> dict[str, np.ndarray]:
         """Contacts with a force."""
         s = self.stepper
         C, kept = s.last()
@@ -80,7 +94,7 @@ class Collected:
             "point": C.x[k, POINT : POINT + 3],
             "normal": C.x[k, NORMAL : NORMAL + 3],
             "gap": C.x[k, GAP],
-            "force": impulse[k] / h,
+            "force": impulse[k] / s.pace.real[STEP],
             "state": np.where(kept[k, SLIDES] > 0.5, SLIP, np.where(kept[k, SLIDES] < -0.5, OPEN, STICK)),
             "friction": s.rooms.P.mu[k],
         }

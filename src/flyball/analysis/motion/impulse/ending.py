@@ -100,6 +100,10 @@ def _picked(stepper: Stepper, solver: str) -> str:
 def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) -> ContactHealth:
     real, count = stepper.pace.real, stepper.pace.count
     notes = []
+    if stepper.halved:
+        notes.append(
+            f"{stepper.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps"
+        )
     if count[REDUCED]:
         notes.append(
             f"{count[REDUCED]} of {count[IMPACTS]} impacts gave back less than {o.restitution.title()}'s law says, "

@@ -88,7 +88,7 @@ def march(
     real = stepper.pace.real
     real[TIME] = first
     if times[0] == first:
-        kept.add(0.0)
+        kept.add(False)
     try:
         for t in (*times[times > first].tolist(), last):
             way = t - float(real[TIME])
@@ -96,13 +96,13 @@ def march(
             if steps > 0:
                 stepper.run(1, way / steps)
                 if not kept.acceleration:
-                    kept.begin(way / steps)
+                    kept.begin()
                 for part in range(1, steps, EACH):
                     stepper.run(min(EACH, steps - part), way / steps)
                     tell((float(real[TIME]) - first) / (last - first))
             real[TIME] = t
             if len(kept.t) < len(times):
-                kept.add(way / max(1, steps))
+                kept.add(True)
             tell((t - first) / (last - first))
     except KeyboardInterrupt:
         return True

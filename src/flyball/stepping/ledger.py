@@ -1,0 +1,56 @@
+"""Where energy goes in impacts of the mechanism beside contacts: stops, reactions of joints, the end of the step.
+
+Impulses are found where joints are at half the step, and bodies are then put onto them at its end: velocities by the
+nearest ones there are, measured by the masses, which takes energy and never gives any; positions likewise, by lifts
+and weights moved. All this is of the order of the step, is there only where something is hit, and is the impact's part.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..equations.rows import row_times
+from ..math.vec import dot, load3, load9, mtv, mv
+from ..tables.system import INERTIA, MASS, NU
+from .joined import LOST, POTENTIAL, WEIGHED
+
+
+@formula
+def kinetic(A):
+    """Kinetic energy at the kinematics in the engine's room."""
+    total = 0.0
+    for b in range(A.S.body_i.shape[0]):
+        v, w = load3(A.W.BK, b, 15), mtv(load9(A.W.BK, b, 3), load3(A.W.BK, b, 12))
+        total += 0.5 * A.S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w, mv(load9(A.S.body_x, b, INERTIA), w))
+    return total
+
+
+@formula
+def weighed(A, column):
+    """Sum of m g . x, x in three columns of the bodies' kinematics: places from 0 on, velocities from 15 on."""
+    total = 0.0
+    for b in range(A.S.body_i.shape[0]):
+        x = load3(A.W.BK, b, column)
+        total += A.S.body_x[b, MASS] * (A.S.glob[0] * x[0] + A.S.glob[1] * x[1] + A.S.glob[2] * x[2])
+    return total
+
+
+@formula
+def reactions_work(A, lam, v):
+    """Work of joints' impulses of impacts at velocities v, beyond that of what is prescribed: a loss."""
+    for r in range(A.S.row_i.shape[0]):
+        A.real[LOST] -= lam[r] * (row_times(A.S, A.W, r, v) - A.W.row[NU, r])
+
+
+@formula
+def weigh_mean(A, h):
+    """Keep gravity's work over the step at the mean velocities, at which impulses' works are taken too."""
+    A.real[WEIGHED] = h * weighed(A, 15)
+
+
+@formula
+def settle_account(A, before, hit):
+    """At the end of the step, once ``hit``: what putting onto the joints took; ``before`` was the kinetic energy."""
+    now = -weighed(A, 0)
+    if hit:
+        A.real[LOST] += before - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
+    A.real[POTENTIAL] = now
