@@ -37,7 +37,8 @@ Ask how it moves
     m.prepare()                   -> Prepared: mass matrix, accelerations, Jacobians on plain arrays, for any thread
 
 Ask where it rests, and what small motions do
-    m.equilibrium()               -> Equilibrium, stable or not; m.equilibria(parameter, values) -> EquilibriumSeries
+    m.equilibrium()               -> Equilibrium, stable or not, a Touch for each contact
+    m.equilibria(parameter, values) -> EquilibriumSeries
     m.linearize(inputs, outputs)  -> LinearModel: A, B, C, D, Bode plots
     m.modes()                     -> Modes, animated; m.root_locus(parameter, values) -> RootLocus
 
@@ -118,6 +119,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.root_locus import RootLocus as RootLocus
     from .results.sensitivity import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
+    from .results.touch import Touch as Touch
 
 __version__ = "0.4.0"
 
@@ -169,6 +171,7 @@ _HOME = {
     "RootLocus": "results.root_locus",
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
+    "Touch": "results.touch",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)

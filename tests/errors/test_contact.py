@@ -39,6 +39,9 @@ def scene(planar: bool = False) -> fb.Mechanism:
         ({"spinning_friction": "1 kg"}, r"spinning_friction(?s:.*)kg"),
         ({"friction": "1 mm"}, r"friction of Material 'x'(?s:.*)mm"),
         ({"surface_velocity": (1, 2, 3, 4)}, r"surface_velocity of Material 'x': expected 3 components"),
+        ({"youngs_modulus": "210 GPa"}, r"youngs_modulus needs poissons_ratio"),
+        ({"youngs_modulus": -1, "poissons_ratio": 0.3}, r"youngs_modulus is -1 Pa; it must be greater than 0"),
+        ({"youngs_modulus": 1e9, "poissons_ratio": 0.7}, r"poissons_ratio is 0.7; it must be above -1 and at most 0.5"),
         ({"bounce": 1}, r"unknown field 'bounce'"),
     ],
 )
@@ -166,7 +169,6 @@ def test_analyses_that_know_no_contact_say_so():
     m = scene()
     m.add(fb.Limit("stop", "ball.x", lower=0), fb.Contact(friction=0.1))
     for ask in (
-        m.equilibrium,
         m.linearize,
         m.modes,
         m.prepare,
@@ -187,5 +189,44 @@ def test_analyses_that_know_no_contact_say_so():
 
 @pytest.mark.parametrize("law", ["newton", "moreau"])
 def test_a_law_that_impacts_one_after_the_other_do_not_know(law):
-    with pytest.raises(ModelError, match=f"restitution='{law}' would do nothing"):
+    with pytest.raises(fb.ModelError, match=f"restitution='{law}' would do nothing"):
         fb.Impulse(impacts="sequential", restitution=law)
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        ({"law": "herz"}, r"give one of hard, linear, hertz, hunt-crossley"),
+        ({"stiffness": 1e5}, r"stiffness has no effect with law='hard'"),
+        ({"law": "hertz", "stiffness": 1e5, "dissipation": 1}, r"dissipation has no effect with law='hertz'"),
+        ({"law": "hunt-crossley", "stiffness": 1e5, "damping": 1}, r"damping has no effect(?s:.*)a number of linear"),
+        ({"law": "linear"}, r"needs stiffness"),
+        ({"law": "linear", "stiffness": 0}, r"stiffness is 0; it must be greater than 0"),
+        ({"law": "hertz", "stiffness": "1 N/m"}, r"stiffness: '1 N/m': expected(?s:.*)N/m\^1.5"),
+        ({"law": "hunt-crossley", "stiffness": "1 N/m", "exponent": 2}, r"expected(?s:.*)N/m\^2"),
+        ({"law": "hunt-crossley", "stiffness": 1, "exponent": 0.5}, r"exponent is 0.5; it must be from 1"),
+        ({"law": "hunt-crossley", "stiffness": 1, "dissipation": -1}, r"dissipation is -1 s/m; it must be zero or gr"),
+        ({"law": "hertz", "stiffness": 1, "restitution": 0.5}, r"restitution is of hard contact"),
+    ],
+)
+def test_laws_of_the_normal_force(fields, message):
+    with pytest.raises(fb.ModelError, match=message):
+        scene().add(fb.Contact(friction=0.3, **fields))
+
+
+def test_stiffness_that_nothing_says():
+    m = scene()
+    m.add(fb.Contact(friction=0.3, law="hertz"))
+    with pytest.raises(fb.ModelError, match=r"says no stiffness of(?s:.*)youngs_modulus(?s:.*)give stiffness="):
+        touching(m, numbers(m), ["ball", "other"])
+
+
+def test_elastic_constants_say_nothing_of_a_box_on_a_floor():
+    m = scene()
+    m.add(fb.Material("steel", youngs_modulus="210 GPa", poissons_ratio=0.3))
+    box = fb.Box(edges=(1, 1, 1))
+    m.add(fb.Body("box", shape=box, density=1, material="steel"))
+    m.replace(fb.Ground("floor", shape=fb.Plane(), material="steel"))
+    m.add(fb.Contact(between="box", others="floor", friction=0.3, law="hertz"))
+    with pytest.raises(fb.ModelError, match=r"only for spheres on spheres or on flat shapes(?s:.*)stiffness="):
+        touching(m, numbers(m), ["ball", "other", "box"])

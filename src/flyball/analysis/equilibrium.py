@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import ModelError, SingularityError
 from ..model.model import Model
+from ..model.touching import has_contact
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
 from .assembly.start import Assembly
@@ -21,8 +22,8 @@ from .linear.stability import GROWTH, stability
 from .linear.turning import turning as turn
 from .linearize import without_inputs
 from .options import Options
+from .resting.rest import rest
 from .steps import tangent_step
-from .untouched import refuse_contact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,14 +64,25 @@ def resting(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
-    refuse_contact(model, "equilibrium")
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin = _begun(a, o.start)
+    if has_contact(model):
+        _refuse_smooth_only(o)
+        return rest(model, begin, o.parameters)
     if o.turning:
         return _steady(begin, a, o.turning)
     if o.preload:
         return finished(*preloaded(begin, o.preload), "preload")
     return _searched(Rest.at(a.compiled, a.t, begin.q), o.stable)
+
+
+def _refuse_smooth_only(o: EquilibriumOptions) -> None:
+    """Refuse what has no meaning where a mechanism comes to rest by falling."""
+    for name in ("preload", "turning", "stable"):
+        if getattr(o, name):
+            raise ModelError(
+                f"{name}= is for mechanisms without contact; with contact it comes to rest by itself. Leave it out"
+            )
 
 
 def _begun(a: Assembly, start: Equilibrium | None) -> Assembly:

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from .numbers import number
+from .touch import Touch
 
 if TYPE_CHECKING:
     from .result import Result
 
-STABLE, MARGINAL, UNSTABLE = "stable", "marginal", "unstable"
+STABLE, MARGINAL, UNSTABLE, UNJUDGED = "stable", "marginal", "unstable", "not judged"
+SHOWN = 12  # contacts in a text
 
 
 @dataclass
@@ -27,7 +29,9 @@ class Equilibrium:
     ----------
     stability : str
         ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness,
-        in which reactions turn with the bodies; where forces have no potential, by the eigenvalues too.
+        in which reactions turn with the bodies; where forces have no potential, by the eigenvalues too. With contact it
+        is judged while closed contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide,
+        and ``"not judged"`` where ``notes`` say why.
     freedoms : tuple of str
         Coordinates that the stiffness belongs to.
     stiffness : ndarray (f, f)
@@ -48,7 +52,11 @@ class Equilibrium:
         Forces with another slope on the other side of this very place, in words; stability is then judged from all
         sides, and ``stiffness`` and ``least`` are of the side with the least.
     result : Result
-        Everything by name, as a result with one time.
+        Everything by name, as a result with one time; forces of contacts are in ``result.contacts``.
+    touching : tuple of Touch
+        What every closed contact does, and every stop that is reached.
+    notes : tuple of str
+        What has to be said besides, with contact.
     """
 
     t: float
@@ -65,6 +73,8 @@ class Equilibrium:
     preload: dict[str, float] = field(default_factory=dict)
     speeds: dict[str, float] = field(default_factory=dict)
     kinks: tuple[str, ...] = ()
+    touching: tuple[Touch, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Any:
         """A curve's value there, or a part of the result."""
@@ -82,6 +92,10 @@ class Equilibrium:
             parts = ", ".join(f"{k} {v:+.2g}" for k, v in self.weakest.items())
             out.append(("least stiffness", f"{self.least:.3g} of what acts, along {parts}"))
         out += [("kink", text) for text in self.kinks]
+        out += [("contact", str(k)) for k in self.touching[:SHOWN]]
+        if len(self.touching) > SHOWN:
+            out.append(("contact", f"and {len(self.touching) - SHOWN} more"))
+        out += [("note", text) for text in self.notes]
         out += [("speed", f"{k}: {v:.9g}") for k, v in self.speeds.items()]
         out += [("preload", f"{k}: {v + 0.0:.6g}") for k, v in self.preload.items()]
         return [*out, ("unbalanced", f"{self.unbalanced:.1g} of what acts")]
@@ -103,6 +117,7 @@ class Equilibrium:
         out = {k: getattr(self, k) for k in kept}
         out["least"] = self.least if math.isfinite(self.least) else None  # nothing is free: JSON knows no infinity
         out |= {"freedoms": list(self.freedoms), "stiffness": self.stiffness.tolist(), "kinks": list(self.kinks)}
+        out |= {"touching": [asdict(k) for k in self.touching], "notes": list(self.notes)}
         curves = self.result.channels().items()
         return out | {"values": {k: {"unit": unit, "value": float(x[0])} for k, (unit, x) in curves}}
 

@@ -86,15 +86,14 @@ def put_right(A):
     h = A.real[STEP]
     q = A.clock.y[0, : A.S.kinds[COORDINATES]]
     step = A.mixing[0]
-    for i in range(A.count[SPRINGS]):
-        A.spring_x[i, REACH] += dot_rows(A.spring_J[i], A.wide[WAY]) + 0.125 * h * h * A.spring_x[i, BEND]
     for _ in range(PASSES):
         enter(A.door[0], A.S, A.W, A.R, A.clock, A.sheet, POSITION)
         worst = 0.0
         for i in range(A.count[SPRINGS]):
             x = A.spring_x[i]
-            x[SOLVED] = read(A, i) - x[REACH]
-            worst = max(worst, abs(x[SOLVED]) / (1.0 + abs(x[REACH])))
+            told = x[REACH] + dot_rows(A.spring_J[i], A.wide[WAY]) + 0.125 * h * h * x[BEND]
+            x[SOLVED] = read(A, i) - told
+            worst = max(worst, abs(x[SOLVED]) / (1.0 + abs(told)))
         if not NEAR < worst < 1.0:
             return
         solve_springs(A)

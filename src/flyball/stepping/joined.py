@@ -24,8 +24,9 @@ from ..tables.system import System, Work
 # end put there. Besides, impacts over before the step whose impulses stand in a state
 START, FREE, BEGIN, ROWS, KEEP, MEAN, FINISH, VELOCITIES, KICKED = range(9)
 # entries of Joined.real: time and step; energy lost at stops and by what impacts do to joints; by how far (< 0) a stop
-# would be overrun; gravity's potential energy, and its work over the step at the mean velocities
-TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED = range(6)
+# would be overrun; gravity's potential energy, and its work over the step at the mean velocities; kinetic energy before
+# the mechanism was put onto its joints, -1 where nothing is hit
+TIME, STEP, LOST, OVERRUN, POTENTIAL, WEIGHED, KINETIC = range(7)
 # entries of Joined.count: the first mover that is of the mechanism; springs taken implicitly; evaluations so far,
 # steps whose velocities did not settle; numbers that J and Y, and rows that ``job`` must hold; whether a step has
 # begun, and whether it is to be taken with velocities that did not settle
@@ -81,6 +82,7 @@ class Joined(NamedTuple):
     active: np.ndarray  # (2 lines, 3)
     job: np.ndarray  # (2 contacts + lines, 3)
     queue: np.ndarray  # (ng,): the next job of each group
+    pose: np.ndarray  # (movers, 12): before they were put onto the joints
 
 
 def _none(of: type, dimensions: str, **parts: Any) -> Any:
@@ -98,5 +100,5 @@ def no_mechanism() -> Joined:
     W = _none(Work, "2222221112222112221a")
     clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
     sheet = Sheet(np.zeros((0, 0)))
-    tables = _none(Joined, "a1aba22222222b2bba", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
+    tables = _none(Joined, "a1aba22222222b2bba2", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
     return tables._replace(real=np.zeros(8), count=np.zeros(16, np.int64), group=np.zeros(1, np.int64))

@@ -37,6 +37,7 @@ from .joined import (
     IMPULSE,
     KEEP,
     KICKED,
+    KINETIC,
     MEAN,
     ROWS,
     SMOOTH,
@@ -77,6 +78,8 @@ def ask(A, M, C, P, X, task):
         keep(A, P, X)
         return 0
     if task == MEAN:
+        for i in range(A.S.kinds[COORDINATES]):  # at half the step, from where FINISH goes on
+            A.clock.y[2, i] = A.clock.y[0, i]
         for d in range(A.wide.shape[1]):
             X.wide[d] = 0.5 * (A.wide[V_BEFORE, d] + A.wide[V_AFTER, d])
         stops_only(A, P, X)
@@ -94,6 +97,9 @@ def ask(A, M, C, P, X, task):
         for r in range(A.lam.shape[1]):
             A.lam[2, r] += A.sheet.rows[3, r]
     if task == VELOCITIES:
+        A.real[TIME] += A.real[STEP]
+        A.count[BEGUN] = 0
+        settle_account(A)
         for d in range(A.wide.shape[1]):
             X.wide[d] = A.clock.y[0, A.S.kinds[COORDINATES] + d]
     return 0
@@ -114,7 +120,8 @@ def start(A, M, X):
         A.lam[1, r] = A.lam[2, r] = 0.0
     press(A)
     show(A, M, True)
-    settle_account(A, 0.0, False)
+    A.real[KINETIC] = -1.0
+    settle_account(A)
     return status
 
 
@@ -270,6 +277,14 @@ def account(A, h):
 
 
 @formula
+def put_aside_poses(A):
+    """Poses of the movers as evaluated last."""
+    for k in range(A.mover.shape[0]):
+        put3(A.pose, k, 0, load3(A.W.BK, A.mover[k, 0], 0))
+        put9(A.pose, k, 3, load9(A.W.BK, A.mover[k, 0], 3))
+
+
+@formula
 def moved(lifts):
     """Whether there are any."""
     found = False
@@ -280,23 +295,27 @@ def moved(lifts):
 
 @formula
 def finish(A, M, X):
-    """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status."""
+    """Go on with the mean velocities and those in State.wide beside them, onto the constraints. Returns a status.
+
+    It may be asked again, with others beside them.
+    """
     S, nq, nv, h = A.S, A.S.kinds[COORDINATES], A.wide.shape[1], A.real[STEP]
     y, way = A.clock.y, A.wide[WAY]
     for d in range(nv):
         way[d] = 0.5 * h * A.wide[V_AFTER, d] + h * X.wide[d]
         y[0, nq + d] = A.wide[V_AFTER, d]
+    for i in range(nq):
+        y[0, i] = y[2, i]
     retract(S, y[0, :nq], way)
     for i in range(nq + nv, y.shape[1]):
         y[0, i] = y[1, i] + h * A.clock.K[0, i]
-    A.real[TIME] += h
-    A.clock.real[T] = A.real[TIME]
+    A.clock.real[T] = A.real[TIME] + h
     put_right(A)
-    hit = struck(A) or moved(X.wide)
-    before = 0.0
-    if hit:
+    A.real[KINETIC] = -1.0
+    if struck(A) or moved(X.wide):
         enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
-        before = kinetic(A)
+        A.real[KINETIC] = kinetic(A)
+        put_aside_poses(A)
     A.W.option[PLACED] = 1.0
     status = enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, ARRIVE)
     A.W.option[PLACED] = 0.0
@@ -304,8 +323,6 @@ def finish(A, M, X):
         return status
     enter(A.door[0], S, A.W, A.R, A.clock, A.sheet, POSITION)
     show(A, M, True)
-    settle_account(A, before, hit)
-    A.count[BEGUN] = 0
     return 0
 
 

@@ -11,7 +11,7 @@ from ..compiler.jit import formula
 from ..equations.rows import row_times
 from ..math.vec import dot, load3, load9, mtv, mv
 from ..tables.system import INERTIA, MASS, NU
-from .joined import LOST, POTENTIAL, WEIGHED
+from .joined import KINETIC, LOST, POTENTIAL, WEIGHED
 
 
 @formula
@@ -48,9 +48,9 @@ def weigh_mean(A, h):
 
 
 @formula
-def settle_account(A, before, hit):
-    """At the end of the step, once ``hit``: what putting onto the joints took; ``before`` was the kinetic energy."""
+def settle_account(A):
+    """At the end of the step, where something was hit: what putting onto the joints took."""
     now = -weighed(A, 0)
-    if hit:
-        A.real[LOST] += before - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
+    if A.real[KINETIC] >= 0.0:
+        A.real[LOST] += A.real[KINETIC] - kinetic(A) - (now - A.real[POTENTIAL]) - A.real[WEIGHED]
     A.real[POTENTIAL] = now

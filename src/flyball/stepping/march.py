@@ -13,8 +13,10 @@ from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_W
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
 from .joined import VELOCITIES as VELOCITIES_AFTER
+from .lifts import PASSES as AGAIN
+from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
-from .penalty import PASSES, aim, choose_shares, find_yielding, linearise, put_back, settled, store
+from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book
 from .rows import fill_rows, static_where_stuck, warm
 from .tables import (
@@ -79,15 +81,14 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
     """Velocities at the end of the step: the cone problem, and its residual into the sums."""
     warm(C, P, X, now, before)
     static_where_stuck(G, C, P, L, X, pace, now)
-    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now)
+    yielding = pace.count[YIELDING] != 0 and find_yielding(G, C, P, L, X, pace, now, before)
     begin(N, M, X)
     held_by_joints(A, M, C, P, X, pace, BEGIN)
     if yielding:
-        choose_shares(G, C, P, L, X, pace, now)
-        linearise(G, C, P, L, X, pace, now)
+        start_rows(G, C, P, L, X, pace, now)
     ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    for _ in range(PASSES if yielding else 0):
-        if settled(linearise(G, C, P, L, X, pace, now), pace):
+    for n in range(PASSES if yielding else 0):
+        if settled(linearise(G, C, P, L, X, pace, now), O.real[RESIDUAL], pace) or (ended != CONVERGED and n == FEW):
             break
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
@@ -102,7 +103,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
 
 
 @formula
-def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
+def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
     """Displacements that leave no overlap, from those of the mean velocities; see ``motion.displace``.
 
     min 1/2 d' M d over d with gap + h n . (u(v+ + move) + u(d)) >= 0: the cone problem without friction. On the way
@@ -120,7 +121,7 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
         else:
             pace.real[WORST_OVERLAP] = min(pace.real[WORST_OVERLAP], C.x[c, GAP])
         deepest = min(deepest, gap)
-        Q.bias[c, 0] = gap / h
+        Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
         for i in range(3):
             Y.p[c, i] = 0.0
@@ -132,6 +133,21 @@ def positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now):
         solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
     if pace.count[YIELDING] != 0:
         store(G, C, P, L, Y, pace, now)
+
+
+@formula
+def onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace):
+    """End the mechanism's step on its joints, and lift again where that made contacts overlap. Returns a status."""
+    for n in range(AGAIN + 1):
+        if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+            return NO_WAY
+        if pace.door[JOINTS] == 0 or pace.count[YIELDING] != 0 or n == AGAIN:
+            break
+        if not sunk(G, A, M, C, P, Q, Y, R.bias, pace):
+            break
+        rest(Y)
+        solved(pace.door[POSITIONS], Q, Y, W, O, F.positions, pace, pace.count[LIFTS], pace.real[ENOUGH_X])
+    return DONE
 
 
 @formula
@@ -172,8 +188,8 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
             held_by_joints(A, M, C, P, X, pace, ROWS)
     lost, worn, given, stops = ledger(A, pace)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
-    positions(G, A, M, C, P, Q, X, Y, W, O, F, N, L, pace, now)
-    if held_by_joints(A, M, C, P, Y, pace, FINISH) != DONE:
+    positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
+    if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
         back(N, A, X, pace, (lost, worn, given, stops))
         return NO_WAY
     displace(N, M, X, Y.v, pace)

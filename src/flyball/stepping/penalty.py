@@ -17,13 +17,14 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..contact.kinds import SPHERE
 from ..contact.surfaces import DAMPING, DISSIPATION, EXPONENT, MODULUS, STIFFNESS
-from ..contact.tables import FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
+from ..contact.tables import BEFORE, FOUND, GAP, KIND, MATERIAL, PAR, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..numerics.cone.diagonal import diagonal
 from ..numerics.cone.operator import seen
 from .tables import (
     END_GAP,
     ENOUGH_V,
+    KEPT,
     LOST_IMPACT,
     OVERLAP,
     RATE,
@@ -37,7 +38,9 @@ from .tables import (
 )
 
 PASSES = 20  # of Newton's method; three or four are usual
+FEW = 3  # after which it is enough where solves are cut off
 EXACT = 1e-2  # of the residual that is enough: what the law may differ by from its tangent
+PART = 0.1  # of the residual that is left: the same
 NEAR = 1e-3  # change of the overlap, relative to it, over which a mean force is that in its middle, and a correction
 SOFTEST = 1e6  # times the mobility: compliance of what does not touch
 
@@ -116,17 +119,23 @@ def end(now, c, h, u):
 
 
 @formula
-def find_yielding(G, C, P, L, X, pace, now):
+def find_yielding(G, C, P, L, X, pace, now, before):
     """Put aside what is known of contacts that give way at the start of the step. Returns whether there are any."""
     any_ = False
+    gone = pace.real[STORED]
     for c in range(C.count[FOUND]):
-        k = stiffness(G, C, L, c)
+        k, o = stiffness(G, C, L, c), C.at[c, BEFORE]
         now[c, STIFF] = k
         if k > 0.0:
             any_ = True
-            now[c, OVERLAP] = -C.x[c, GAP]
+            now[c, OVERLAP] = now[c, TARGET] = now[c, KEPT] = -C.x[c, GAP]
             now[c, RATE] = seen(P, X.v, X.wide, c)[0]
-            now[c, SHARE] = 0.0
+            if o >= 0:
+                now[c, TARGET], now[c, KEPT] = before[o, TARGET], before[o, KEPT]
+                gone -= energy(k, law_of(G, C, L, c)[0], before[o, KEPT])
+            elif pace.count[TAKEN] > 0:
+                now[c, KEPT] = 0.0
+    pace.real[LOST_IMPACT] += gone
     if pace.count[TAKEN] == 0:
         pace.real[STORED_FIRST] = 0.0
         for c in range(C.count[FOUND]):
@@ -135,35 +144,70 @@ def find_yielding(G, C, P, L, X, pace, now):
 
 
 @formula
-def choose_shares(G, C, P, L, X, pace, now):
-    """How much of the law is that of the end of the step, by how stiff it is; ``X``: velocities without contact."""
+def elastic(share, overlap, wanted):
+    """The part of an overlap that is its spring's."""
+    return overlap - share * max(0.0, overlap - max(wanted, 0.0))
+
+
+@formula
+def begin_with(now, c, k, n, new):
+    """Set the overlap that contact c begins the step with; energy that comes of what is no spring's.
+
+    What is too stiff for the step has the overlap that its law ended with. Where surfaces have turned, they overlap by
+    more, which displacements take away. Points that come and go take their energy from those that go and come.
+    """
+    s, kept = now[c, SHARE], now[c, KEPT]
+    now[c, OVERLAP] = elastic(s, now[c, OVERLAP], kept)
+    if new:
+        return energy(k, n, now[c, OVERLAP])
+    return s * (energy(k, n, now[c, OVERLAP]) - energy(k, n, kept))
+
+
+@formula
+def start_rows(G, C, P, L, X, pace, now):
+    """Choose shares, by how stiff the contacts are, and the first rows; ``X``: velocities without contact.
+
+    Rows are tangent to the law at the overlap that there was, or at that with these velocities.
+    """
     h = pace.real[STEP]
     for c in range(C.count[FOUND]):
-        if now[c, STIFF] > 0.0:
-            law = law_of(G, C, L, c)
-            deepest = max(now[c, OVERLAP], now[c, OVERLAP] - h * seen(P, X.v, X.wide, c)[0])
-            slope = force(now[c, STIFF], law[0], deepest)[1]
-            z = 0.25 * h * h * slope * diagonal(P, c)[0]
-            now[c, SHARE] = z * z / (1.0 + z * z)
+        k = now[c, STIFF]
+        if k > 0.0:
+            n = law_of(G, C, L, c)[0]
+            u = seen(P, X.v, X.wide, c)[0]
+            z = max(now[c, OVERLAP], now[c, OVERLAP] - h * u)
+            z = 0.25 * h * h * force(k, n, z)[1] * diagonal(P, c)[0]
+            s = now[c, SHARE] = z * z / (1.0 + z * z)
+            if pace.count[TAKEN] > 0:
+                pace.real[LOST_IMPACT] -= begin_with(now, c, k, n, C.at[c, BEFORE] < 0)
+            if now[c, TARGET] > 0.0:
+                u = (now[c, OVERLAP] - now[c, TARGET] - 0.5 * h * (1.0 - s) * now[c, RATE]) / (0.5 * h * (1.0 + s))
+            tangent_row(G, C, P, L, pace, now, c, u)
+
+
+@formula
+def tangent_row(G, C, P, L, pace, now, c, u):
+    """Make row c tangent to the law at the velocity u."""
+    h, mobility = pace.real[STEP], diagonal(P, c)[0]
+    now[c, TARGET] = end(now, c, h, u)
+    law = law_of(G, C, L, c)
+    p, slope = impulse(now[c, STIFF], law, now[c, OVERLAP], now[c, TARGET], h, now[c, SHARE])
+    slope *= 0.5 * h * (1.0 + now[c, SHARE])
+    P.soft[c] = 1.0 / slope if slope * SOFTEST * mobility > 1.0 else SOFTEST * mobility
+    P.bias[c, 0] = -u - P.soft[c] * p
+    return p
 
 
 @formula
 def linearise(G, C, P, L, X, pace, now):
-    """Rows that give way, tangent to the law at the velocities of ``X``. Returns how far off the last were [m/s]."""
-    h = pace.real[STEP]
+    """Rows that give way, tangent to the law at the velocities of ``X``; how far off the last were [m/s]."""
     worst = 0.0
     for c in range(C.count[FOUND]):
         if now[c, STIFF] > 0.0:
-            law, mobility = law_of(G, C, L, c), diagonal(P, c)[0]
             u = seen(P, X.v, X.wide, c)[0]
-            now[c, TARGET] = end(now, c, h, u)
-            p, slope = impulse(now[c, STIFF], law, now[c, OVERLAP], now[c, TARGET], h, now[c, SHARE])
-            if P.soft[c] > 0.0:
-                row = -(u + P.bias[c, 0]) / P.soft[c]
-                worst = max(worst, mobility * abs(max(p, 0.0) - max(row, 0.0)))
-            slope *= 0.5 * h * (1.0 + now[c, SHARE])
-            P.soft[c] = 1.0 / slope if slope * SOFTEST * mobility > 1.0 else SOFTEST * mobility
-            P.bias[c, 0] = -u - P.soft[c] * p
+            row = -(u + P.bias[c, 0]) / P.soft[c] if P.soft[c] > 0.0 else 0.0
+            p = tangent_row(G, C, P, L, pace, now, c, u)
+            worst = max(worst, diagonal(P, c)[0] * abs(max(p, 0.0) - max(row, 0.0)))
     return worst
 
 
@@ -192,12 +236,14 @@ def store(G, C, P, L, Y, pace, now):
     for c in range(C.count[FOUND]):
         if now[c, STIFF] > 0.0:
             k, n = now[c, STIFF], law_of(G, C, L, c)[0]
-            after = energy(k, n, -now[c, END_GAP] - h * seen(P, Y.v, Y.wide, c)[0])
+            overlap = -now[c, END_GAP] - h * seen(P, Y.v, Y.wide, c)[0]
+            now[c, KEPT] = elastic(now[c, SHARE], overlap, now[c, TARGET])
+            after = energy(k, n, now[c, KEPT])
             pace.real[STORED] += after
             pace.real[LOST_IMPACT] -= after - energy(k, n, now[c, OVERLAP])
 
 
 @formula
-def settled(worst, pace):
-    """Whether rows are as near to the law as velocities are asked to be."""
-    return worst <= EXACT * pace.real[ENOUGH_V]
+def settled(worst, residual, pace):
+    """Whether rows are as near to the law as velocities are asked to be, or as they came."""
+    return worst <= max(EXACT * pace.real[ENOUGH_V], PART * residual)

@@ -77,6 +77,7 @@ def tables(
         stiff=np.zeros((springs, springs)), mixing=np.zeros((MIXING, s.nv)), weight=np.zeros((MIXED + 1, MIXED + 1)),
         line=line, line_x=line_x, active=np.zeros((2 * len(line), 3), np.int64),
         job=np.zeros((0, 3), np.int64), queue=np.zeros(len(group) - 1, np.int64),
+        pose=np.zeros((len(rows), 12)),
     )  # fmt: skip
     A.count[FIRST] = first
     A.real[TIME], A.real[STEP] = start.assembly.t, h

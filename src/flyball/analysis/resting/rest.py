@@ -1,0 +1,173 @@
+"""Equilibrium of a mechanism that touches: where it comes to rest, what carries it, and whether it is stable."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import AnalysisError, ModelError, NotConverged
+from ...model.model import Model
+from ...results.equilibrium import MARGINAL, UNJUDGED, Equilibrium
+from ...results.touch import LIMIT, PARTING, SMOOTH, STICKS, Touch
+from ..assemble import assemble
+from ..assembly.start import Assembly
+from ..compiled import compiled
+from ..linear.curves import snapshot
+from ..linear.derivatives import State
+from ..linear.found import finished
+from ..linear.rest import Rest
+from ..linear.search import newton
+from .closed import Place, closed
+from .copy import joined_copy, open_copy, told
+from .forces import LIMIT as NEAR
+from .forces import PARTING as NOTHING
+from .forces import Carried, as_contacts, carried
+from .settle import settled
+
+NEARBY = 0.02  # a way in parts of the mechanism's length, or radians, that what rests is put right by
+BALANCED = 1e-6  # forces left, of those that act, above which it does not rest
+
+
+def rest(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> Equilibrium:
+    """Where a mechanism comes to rest, and what carries it there.
+
+    Parameters
+    ----------
+    model : Model
+        With its contacts.
+    begin : Assembly
+        Where it begins.
+    parameters : mapping, optional
+
+    Raises
+    ------
+    ModelError
+        If it has many bodies, or surfaces that statics does not know.
+    NotConverged
+        If it does not come to rest.
+    """
+    refuse_bulk(model, "equilibrium")
+    model = model.snapshot()
+    place = closed(model, settled(model, begin, parameters))
+    bare, signs = open_copy(model, place.at)
+    place, judged, missing = _judged(model, bare, place, parameters)
+    c = compiled(bare, parameters=parameters)
+    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
+    x = Rest(c, place.at.t, q, np.zeros(len(c.structure.rows)))
+    found = carried(place, x, signs)
+    if found.unbalanced > BALANCED:
+        raise NotConverged(
+            f"{model.name!r} came to rest where contacts and joints leave {found.unbalanced:.2g} of what acts "
+            f"unbalanced; begin nearer to where it rests",
+            {},
+        )
+    return _told(x, place, found, judged, missing, signs)
+
+
+def refuse_bulk(model: Model, analysis: str) -> None:
+    """Refuse many bodies."""
+    if model.bulk:
+        names = ", ".join(e.title for e in model.bulk)
+        raise ModelError(f"{analysis} does not know {names}; describe what touches as single bodies, or simulate it")
+
+
+def place_of(model: Model, t: float, parameters: Mapping[str, float] | None) -> Place:
+    """What touches as described."""
+    return closed(model, assemble(model, t=t, parameters=parameters))
+
+
+def _judged(
+    model: Model, bare: Model, place: Place, parameters: Mapping[str, float] | None
+) -> tuple[Place, Equilibrium | None, str]:
+    """The place put right to rounding by the closed contacts as joints, and what these say of its stability."""
+    joined, missing = joined_copy(bare, place)
+    if missing:
+        return place, None, told(missing)
+    c = compiled(joined, parameters=parameters)
+    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
+    start = Rest(c, place.at.t, q, np.zeros(len(c.structure.rows)))
+    try:
+        arrived = newton(start)
+        if arrived is None:
+            return place, None, "Newton's method does not settle with the closed contacts as joints"
+        far = c.values.length * NEARBY
+        own, still = place.at.compiled, np.zeros(c.structure.nv)
+        moved = Assembly(own, place.at.t, own.take(c, place.at.t, arrived.q, still)[0], still)
+        now = own.moving(moved.t, moved.q, moved.v)
+        if max(float(np.abs(now[k].p - b.p).max()) for k, b in place.bodies.items()) > far:
+            return place, None, "the balance of forces is elsewhere with the closed contacts as joints"
+        again = closed(model, moved)
+        if [k.name for k in again.contacts] != [k.name for k in place.contacts]:
+            return place, None, "contacts open where forces balance"
+        return again, finished(arrived, {}, ""), ""
+    except AnalysisError as error:
+        return place, None, str(error)
+
+
+def _told(
+    x: Rest, place: Place, found: Carried, judged: Equilibrium | None, missing: str, signs: Mapping[str, float]
+) -> Equilibrium:
+    c = x.c
+    touches = touching(place, found, x, signs)
+    result = snapshot(State.resting(c, x.t, x.q, found.lam))
+    result.contacts = as_contacts(place, found.force)
+    notes = _notes(touches, found, missing)
+    kind = judged.stability if judged else UNJUDGED
+    if judged and any(k.state in (LIMIT, PARTING) for k in touches) and kind != "unstable":
+        kind = MARGINAL
+    own = judged or Equilibrium(
+        t=x.t, stability=UNJUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
+        unbalanced=0.0, method="", parameters={}, result=result, assembly=None,
+    )  # fmt: skip
+    return replace(
+        own,
+        stability=kind,
+        unbalanced=found.unbalanced,
+        method="steps of impulses" + (", then Newton's method" if judged else ""),
+        parameters=dict(c.parameters),
+        result=result,
+        assembly=Assembly(c, x.t, x.q, np.zeros(len(x.scale))),
+        touching=touches,
+        notes=notes,
+    )
+
+
+def touching(place: Place, found: Carried, x: Rest, signs: Mapping[str, float]) -> tuple[Touch, ...]:
+    """What every closed contact and stop does."""
+    out = []
+    stops = {name: sign * float(found.lam[x.c.structure.slices[name]].sum()) for name, sign in signs.items()}
+    most = max([*found.force[:, 0].tolist(), 0.0])
+    for c, f in zip(place.contacts, found.force, strict=True):
+        slides = float(np.hypot(f[1], f[2]))
+        bears = c.friction * float(f[0])
+        used = slides / bears if bears > 0.0 else 0.0
+        state = PARTING if f[0] <= NOTHING * most else SMOOTH if c.friction == 0.0 else STICKS
+        state = LIMIT if state == STICKS and used >= 1.0 - NEAR else state
+        out.append(Touch(c.name, state, float(f[0]), slides, used, c.gap))
+    for name, effort in stops.items():
+        out.append(Touch(name, PARTING if effort <= NOTHING * max(map(abs, stops.values())) else SMOOTH, effort))
+    return tuple(out)
+
+
+def _notes(touches: tuple[Touch, ...], found: Carried, missing: str) -> tuple[str, ...]:
+    """What has to be said besides."""
+    out = []
+    for state, rule in (
+        (PARTING, "nothing is carried there; what is said holds while it stays closed"),
+        (LIMIT, "any more load along it would make it slide"),
+    ):
+        names = [k.name for k in touches if k.state == state]
+        if names:
+            out.append(f"{', '.join(names)} {state}: {rule}")
+    if any(k.state in (STICKS, LIMIT) for k in touches):
+        out.append(
+            "friction holds it: positions nearby are equilibria too, and this is where it comes to rest from where it "
+            "begins; it is judged while its contacts stick"
+        )
+    if not found.unique:
+        out.append("contacts and joints share the load in more than one way: their forces are one of these")
+    if missing:
+        out.append(f"stability is not judged: {missing}")
+    return tuple(out)
