@@ -34,6 +34,7 @@ from .tables import (
     LOST_IMPACT,
     MOST_CONTACTS,
     POSITIONS,
+    ROUGH,
     SEARCHING,
     STEP,
     STIFF,
@@ -93,7 +94,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    if ended != CONVERGED:
+    if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]

@@ -21,8 +21,9 @@ IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP, KEPT = range(11, 18)
 TRACKS = 18  # columns
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
-# none; residual [m/s] that is enough for velocities and for positions
-TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
+# none; residual [m/s] that is enough for velocities and for positions; residual over the step [m/s^2] above which a
+# solve that was cut is told
+TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X, ROUGH = 0, 1, 2, 5, 6, 7, 8, 9
 # ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen, time
 # of the worst residual, overlap at the start
 LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE, WORST_AT, FIRST_OVERLAP = range(10, 18)
