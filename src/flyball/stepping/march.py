@@ -8,7 +8,7 @@ from ..compiler.jit import formula, kernel
 from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
-from .bounce import bounce
+from .bounce import ROUNDS, bounce, no_kicks
 from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
@@ -180,7 +180,10 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    if bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+    no_kicks(C, now)
+    for _ in range(ROUNDS):  # what is hit may hit what is near
+        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+            break
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY

@@ -13,6 +13,7 @@ import numpy as np
 # columns of Free.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy zz xy
 # xz yz), 1 if the inertia is the same about every axis
 FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
+ANGLE = 6  # column of Free.move, behind velocities: angle [rad] about z turned since the start, of what is round
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
 # impact, impulse of that in the world, and its velocities before; of contacts that give way: stiffness (0: hard),
 # overlap and its rate at the start of the step, share of its end in the law, overlap of the law and gap at

@@ -11,6 +11,7 @@ from ....numerics.cone.registry import names
 from ...options import count, positive, seconds
 
 RESTITUTION = ("poisson", "newton", "moreau")
+CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
 
 
@@ -70,6 +71,11 @@ class Impulse:
             raise ModelError(
                 f"impacts='sequential' of Impulse go by Poisson's law, so restitution={self.restitution!r} would do "
                 f"nothing; leave one of the two out"
+            )
+
+        if self.solver in CONVEX_ONLY and self.coulomb:
+            raise ModelError(
+                f"solver {self.solver!r} of Impulse solves the convex problem only: give coulomb=False with it"
             )
 
     @property
