@@ -68,6 +68,7 @@ def result_of(
         seconds=time.perf_counter() - since,
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
+        crowd=sum(b.count for b in model.bulk),
         contact=_contact_health(scene, stepper, o, smallest(scene, values)),
     )
     health.late = {
