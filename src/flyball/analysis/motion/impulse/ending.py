@@ -111,9 +111,11 @@ def _made_energy(result: Result) -> tuple[str, ...]:
 def _picked(stepper: Stepper, solver: str) -> str:
     """The solver, and which islands went where."""
     picked = told(stepper.rooms.F)
-    if solver != "auto" or not len(picked):
+    if not len(picked):
         return solver
     newton, sweeps = int(picked[BY_ONE] - picked[HANDED_ON]), int(picked[BY_OTHER] + picked[HANDED_ON])
+    if solver != "auto":
+        return f"{solver}; {sweeps} of {newton + sweeps} islands by Gauss-Seidel" if sweeps else solver
     return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 
