@@ -31,8 +31,8 @@ def nothing_touches(model: Model) -> tuple[str, ...]:
     if model.contacts or not any(s.touches for e in there for s in e.shapes()):
         return ()
     return (
-        f"{there[0].title} touches nothing: {model.name!r} has no Contact; add Contact(friction=...), or give its shapes "
-        f"looks=True",
+        f"{there[0].title} touches nothing: {model.name!r} has no Contact; add Contact(friction=...), or give its "
+        f"shapes looks=True",
     )
 
 
