@@ -15,10 +15,10 @@ from ....results.sides import Sides
 from ....stepping.stepper import NoWay, Stepper
 from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
-from ...assemble import assemble
 from ...progress import Tell
 from .collect import Collected
 from .ending import result_of
+from .going_on import base_of, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
 from .scene import begin, placed
@@ -38,6 +38,7 @@ def impulse_motion(
     o: Impulse,
     parameters: Mapping[str, float] | None,
     tell: Tell,
+    before: Result | None = None,
 ) -> Result:
     """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
 
@@ -50,13 +51,15 @@ def impulse_motion(
     """
     since = time.perf_counter()
     model = model.snapshot()
-    base = assemble(model, t=span[0], parameters=parameters)
+    base = base_of(model, span[0], parameters, before)
     values = base.compiled.values
     found = parts(model, acting_values(model, values, parameters))
     scene = touching(model, values.given, (*found.free, *found.held))
     movers = placed(scene, base)
+    if before is not None:
+        place_sets(scene, movers, before)
     free = len(scene.carriers.mass) - len(found.held)
-    held = held_apart(values, span[0], parameters, found, free, "absolute")
+    held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
     try:
         stepper = begin(scene, movers, values, o, held)
     except NoWay:
