@@ -169,8 +169,6 @@ def test_analyses_that_know_no_contact_say_so():
     m = scene()
     m.add(fb.Limit("stop", "ball.x", lower=0), fb.Contact(friction=0.1))
     for ask in (
-        m.linearize,
-        m.modes,
         m.prepare,
         lambda: m.kinematics(3),
         lambda: m.compare(1.0),

@@ -94,3 +94,21 @@ def test_outlines_roll_and_rest_in_the_plane() -> None:
     for name in ("box", "bar"):
         assert run[name].y[-1] == pytest.approx(0.1, abs=1e-5)
         assert run[name].angle[-1] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_whole_turns_count_and_round_bodies_turn_exactly():
+    """100 rad/s for 0.4 s, told only at the end, at any step."""
+    for step in (1e-3, 2e-2):
+        m = fb.Mechanism("wheel", planar=True, gravity=(0, -9.81))
+        m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0.1))
+        wheel = fb.Sphere(radius=0.1)
+        m.add(fb.Body("wheel", shape=wheel, mass=1, inertia=0.01, position=(0, 2), angle=1.0, angular_velocity=100.0))
+        run = m.simulate(0.4, outputs=2, method=fb.Impulse(step=step))["wheel"]
+        assert run.angle == pytest.approx([1.0, 41.0], abs=1e-9)
+
+
+def test_a_solver_of_the_convex_problem_does_not_take_coulombs():
+    """It would leave everything as it was: bodies would fall through the floor."""
+    with pytest.raises(fb.ModelError, match="coulomb=False"):
+        fb.Impulse(solver="barzilai-borwein")
+    assert not fb.Impulse(solver="barzilai-borwein", coulomb=False).coulomb

@@ -67,3 +67,20 @@ def test_a_ball_that_spins_bounces_askew():
         near = np.sqrt(2 * G) * step / 2 / 0.1
         assert run.vx[-1] == pytest.approx(2 / 7 * 2.0, rel=near)
         assert run.angular_velocity[-1] == pytest.approx([0, 2 / 7 * 20, 0], abs=2 / 7 * 20 * 1.5 * near)
+
+
+@pytest.mark.parametrize(
+    ("gap", "impacts"),
+    [(0.0, "sequential"), (1e-6, "simultaneous"), (1e-4, "sequential"), (1e-4, "simultaneous"), (1e-3, "simultaneous")],
+)
+@pytest.mark.parametrize("law", LAWS)
+def test_blows_that_follow_within_a_step(gap, impacts, law):
+    """Five equal balls in a row, 1 mm a step: each hands its speed on to the next however near that is."""
+    m = fb.Mechanism("row", gravity=(0, 0, 0))
+    m.add(fb.Contact(friction=0.0, restitution=1.0))
+    for k in range(5):
+        x, v = (-0.05, 1.0) if k == 0 else ((0.1 + gap) * k, 0.0)
+        m.add(fb.Body(f"ball {k}", shape=fb.Sphere(radius=0.05), mass=1, position=(x, 0, 0), velocity=(v, 0, 0)))
+    run = stepped(m, 0.3, 1e-3, restitution=law, impacts=impacts)
+    assert [run[f"ball {k}"].vx[-1] for k in range(5)] == pytest.approx([0, 0, 0, 0, 1], abs=1e-9)
+    assert run.energy.total[-1] == pytest.approx(0.5, rel=1e-9)

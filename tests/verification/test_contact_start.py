@@ -106,3 +106,16 @@ def test_poses_that_are_none_are_refused(bad):
     m = floor(friction=0.3)
     with pytest.raises(fb.ModelError, match="grains"):
         m.add(fb.Bodies("grains", shape=fb.Sphere(radius=0.01), density=2500, position=[(0, 0, 1), (0, bad, 1)]))
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-6])
+def test_a_planar_stack_stands_for_long(angle):
+    """Rounding once left the plane, grew as exp(35 t), and threw boxes 60 m high."""
+    m = floor(planar=True, friction=0.4)
+    shape = fb.Box(edges=(0.2, 0.1, 0.1))
+    for k in range(4):
+        m.add(fb.Body(f"b{k}", shape=shape, density=1000, position=(0.01 * (-1) ** k, 0.05 + 0.1 * k), angle=angle))
+    run = stepped(m, 10.0, 5e-3, outputs=11)
+    for k in range(4):
+        assert run[f"b{k}"].y[-1] == pytest.approx(0.05 + 0.1 * k, abs=1e-9)
+    assert run.energy.kinetic.max() < 1e-12

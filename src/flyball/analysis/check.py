@@ -96,7 +96,7 @@ def _warnings(model: Model, a: Assembly, bodies: dict[str, BodyReport], m: Mobil
         yield "no freedom is left even without the drivers: it is locked as it is drawn and will not move"
     elif model.drivers and freedoms == 0:
         yield "drivers take every freedom: the motion is prescribed, forces change only reactions and efforts"
-    elif freedoms == 0:
+    elif freedoms == 0 and not model.bulk:
         yield "no freedom is left: it is a structure and will not move"
     if any(x.beyond == "refuse" for x in model.tables) and (missed := missed_at_start(a)):
         yield missed.message

@@ -16,6 +16,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import one
+from ..model.touching import has_contact
 from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel, StateSpace
@@ -36,7 +37,7 @@ from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
-from .untouched import refuse_contact
+from .resting.instant import closed_instant
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
@@ -78,7 +79,11 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
-    refuse_contact(model, "linearize")
+    if has_contact(model):
+        joined, there, notes = closed_instant(model, o, "linearize")
+        out = linearize(joined, there)
+        out.notes = notes
+        return out
     for name in o.outputs:
         one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     here = model

@@ -93,7 +93,8 @@ def mobility(
                 raise
             a, gap = error.best, str(error)
     c = a.compiled
-    c.at(a.t, a.q, a.v)
+    if c.structure.rows:  # else nothing is asked of where it is, and the engine need not be compiled
+        c.at(a.t, a.q, a.v)
     s, S = c.structure, c.values.system
     G, size, scale = scaled_jacobian(c, few(c))
     nr, nv = (int(n) for n in G.shape)

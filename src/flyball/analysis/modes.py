@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..model.model import Model
+from ..model.touching import has_contact
 from ..numerics.rank import span
 from ..results.modes import GROWS, STILL, Modes
 from ..tables.names import velocity_names
@@ -16,7 +17,7 @@ from .linear.large import DENSE, Large, is_large
 from .linear.spectrum import EQUAL, spectrum
 from .linearize import InstantOptions, without_inputs
 from .options import count as at_least
-from .untouched import refuse_contact
+from .resting.instant import closed_instant
 
 FEW = 10
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
@@ -37,7 +38,9 @@ class ModesOptions(InstantOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
-    refuse_contact(model, "modes")
+    if has_contact(model):
+        joined, there, notes = closed_instant(model, o, "modes")
+        return replace(modes(joined, there), notes=notes)
     count, frozen = o.count, o.frozen
     x = o.state(model, DENSE)
     if is_large(x):

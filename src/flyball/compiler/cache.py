@@ -82,6 +82,15 @@ def _cache_class() -> Any:
                 warnings.warn(f"compiled code cannot be kept: {error}", PerformanceNotice, stacklevel=2)
 
         @property
+        def kept(self) -> bool:
+            """Whether what is compiled can be written to where other processes look for it."""
+            try:
+                self._impl.locator.ensure_cache_path()
+            except OSError:
+                return False
+            return True
+
+        @property
         def empty(self) -> bool:
             """Whether nothing of this version is kept."""
             try:

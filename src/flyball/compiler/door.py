@@ -38,6 +38,10 @@ class Door:
                     self._make(tuples)
         return self._made.address
 
+    def prepare(self, *tuples: Any) -> None:
+        """Compile it for tuples of these types, or find it in the cache."""
+        self.address(*tuples)
+
     def expects(self, *tuples: Any) -> None:
         """Say what it is for before it is made: loops that may never go through compile without it."""
         with LOCK:

@@ -84,6 +84,16 @@ class Kernel:
 
         return compile_once
 
+    def prepare(self, *args: Any) -> None:
+        """Compile it for arguments of these types, or find it in the cache; it is not run."""
+        from numba import typeof
+
+        from .ways import optimise_once
+
+        dispatcher = self.dispatcher
+        with LOCK, optimise_once(self.function.__qualname__):
+            dispatcher.compile(tuple(typeof(x) for x in args))
+
     @property
     def used(self) -> bool:
         """Whether this process has asked for it."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from ..compiler.door import enter
+from ..compiler.door import Door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..errors import ModelError
@@ -132,6 +134,25 @@ def search_room(G: Geometry, pairs: int, contacts: int) -> Search:
     )
 
 
+def narrow(G: Geometry) -> Door:
+    """The narrow phase that shapes like these ask for; `nothing` where no pair does."""
+    from .between import door_for, nothing
+
+    kind, bounded = G.shape_i[:, KIND], np.isfinite(holds(G)[:, 3])
+    simple = (kind == SPHERE) | (~bounded & (kind == PLANE))
+    return nothing if simple.all() else door_for(set(kind.tolist()))
+
+
+def needed(G: Geometry) -> list[tuple[Door, tuple[Any, ...]]]:
+    """The doors that a `Finder` asks for, with tuples of the types that these get."""
+    from .between import nothing
+
+    none = Geometry(*(x[:0] for x in G))
+    B, C, M = search_room(none, 0, 0), no_contacts(0), no_movers(0)
+    doors = [nothing, n] if (n := narrow(G)) is not nothing else [nothing]
+    return [*((d, (none, M, B, B, B)) for d in doors), (search, (none, M, C, C, B))]
+
+
 class Finder:
     """Contacts between shapes, step by step.
 
@@ -167,15 +188,12 @@ class Finder:
 
     def _door(self) -> int:
         """Address of the search; the narrow phase is compiled only where a pair may ask for it."""
-        from .between import door_for, nothing
+        from .between import nothing
 
         G, B = self.geometry, self.search
         tuples = (G, no_movers(0), B, B, B)
         nothing.address(*tuples)
-        bounded = np.isfinite(B.hold[:, 3])
-        simple = (G.shape_i[:, KIND] == SPHERE) | (~bounded & (G.shape_i[:, KIND] == PLANE))
-        narrow = nothing if simple.all() else door_for(set(G.shape_i[:, KIND].tolist()))
-        B.count[NARROW] = narrow.address(*tuples)
+        B.count[NARROW] = narrow(G).address(*tuples)
         return search.address(G, no_movers(0), self.now, self.before, B)
 
     def find(self, movers: Movers, afresh: bool = False) -> Contacts:

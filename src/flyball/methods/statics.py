@@ -33,6 +33,8 @@ class Statics(Model):
         """Find a static equilibrium near the mechanism as drawn, or a steady motion, and whether it is stable.
 
         Drivers hold their coordinates where they are at ``t``; velocities, dampers and inertia play no part at rest.
+        With contact it is let come to rest from where it is described; ``stable``, ``preload`` and ``turning`` mean
+        nothing then.
 
         Parameters
         ----------
@@ -134,7 +136,7 @@ class Statics(Model):
 
         Exact: the stiffness includes what reactions, inertia and gyroscopic terms do when positions change, constraints
         are eliminated. About a motion that turns evenly the equations are those seen from the evenly turning frame in
-        which it is steady.
+        which it is steady. Closed contacts stay closed: what sticks rolls where it is round, what is smooth slides.
 
         Parameters
         ----------

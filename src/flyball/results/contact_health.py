@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-ENOUGH = 10.0  # a residual above so many times what was asked for is told
-
 
 @dataclass(frozen=True)
 class ContactHealth:
@@ -31,7 +29,8 @@ class ContactHealth:
     tolerance : float [m/s]
         What the residual was asked to be.
     solves, iterations, unconverged : int
-        How many solves there were, their iterations, and how many were cut off before they had converged.
+        How many solves of velocities there were, all iterations, and how many solves were cut off with more left than
+        what gravity makes in a step.
     worst_at : float or None [s]
         Time of the largest residual.
     size : float [m]
@@ -76,8 +75,6 @@ class ContactHealth:
             when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""
             share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"
             out.append(f"{share}: forces are rough there; allow more iterations, or take another solver")
-        elif self.tolerance > 0.0 and self.residual > ENOUGH * self.tolerance:
-            out.append(f"a contact solve left {self.residual:.2g} m/s where {self.tolerance:.2g} m/s was asked for")
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
             part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"
             out.append(f"bodies overlap by up to {self.worst_overlap:.2g} m, {part}; take shorter steps")

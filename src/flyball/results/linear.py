@@ -60,6 +60,8 @@ class LinearModel:
         The frame from which the motion is steady, in words; empty about an equilibrium.
     large : bool
         Whether there are so many velocities that what is dense is made when asked for.
+    notes : tuple of str
+        What holds for one side only: closed contacts that are about to part.
     """
 
     def __init__(
@@ -75,6 +77,7 @@ class LinearModel:
         seen_from: str = "",
     ) -> None:
         self.name, self.point, self.t = name, point, float(point.t[0])
+        self.notes: tuple[str, ...] = ()
         self.inputs, self.input_units = (tuple(x[k] for x in inputs) for k in range(2))
         self.outputs, self.output_units = (tuple(x[k] for x in outputs) for k in range(2))
         self.output_values = output_values
@@ -260,6 +263,7 @@ class LinearModel:
                 out.append((what, f"{name} [{unit}]{now}"))
         if self.seen_from:
             out.append(("seen from", self.seen_from))
+        out += [("note", text) for text in self.notes]
         if self.large:
             slow = self.descriptor.nearest(SHOWN)
             return out + [("slowest", f"{_written(w)} 1/s") for w in slow if w.imag >= 0.0]

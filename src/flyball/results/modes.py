@@ -44,6 +44,8 @@ class Modes:
         1e-9.
     seen_from : str
         The frame from which the motion is steady, in words; empty at rest.
+    notes : tuple of str
+        What holds for one side only: closed contacts that are about to part.
     """
 
     eigenvalues: np.ndarray
@@ -58,6 +60,7 @@ class Modes:
     geometric_multiplicity: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
     residual: float = 0.0
     seen_from: str = ""
+    notes: tuple[str, ...] = ()
 
     @property
     def _still(self) -> np.ndarray:
@@ -112,11 +115,11 @@ class Modes:
             figures = f"{self.frequency[k]:15.6g} {self.omega[k]:15.6g} {self.damping_ratio[k]:14.4g}"
             out.append((str(k), f"{figures}  {self.kinds[k]:<12} {most}"))
         if not len(self):
-            return [("modes", "none: no freedom is left to move in")]
+            return [("modes", "none: no freedom is left to move in"), *(("note", text) for text in self.notes)]
         out += [("repeated", text) for text in self.repeated()]
         if self.seen_from:
             out.append(("seen from", self.seen_from))
-        return out
+        return out + [("note", text) for text in self.notes]
 
     def repeated(self) -> list[str]:
         """What is to be known of eigenvalues that are repeated, a text for each."""

@@ -8,6 +8,8 @@ Contacts that close within the step, faster than smooth forces make them, are hi
 
 No law may add energy: what goes beyond an inelastic impact is done only as far as that leaves energy for it (Newton's
 law with friction would add some: Kane and Levinson, 1985).
+
+What is hit may reach something else within the same step: impacts go in rounds until nothing more is hit.
 """
 
 from __future__ import annotations
@@ -44,6 +46,8 @@ from .tables import (
     YIELDING,
 )
 
+ROUNDS = 100  # of impacts in one step, after which what still closes comes to rest against what it meets
+NEAR = 1e3  # gaps up to so many times what is none are hit at once
 LESS = 1.0 - 1e-6  # part of an expansion below which it is told that it was reduced
 MORE = 4  # times as many iterations as for velocities that are warm started
 SHARE = 2.0  # times the speed that gravity makes in a step: what is slower rests
@@ -77,6 +81,14 @@ def bounce(G, C, at, bias, R, Z, E, X, W, O, F, L, pace, now):
         by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now)
     close(R, Z, X, C, pace, now)
     return True
+
+
+@formula
+def no_kicks(C, now):
+    """Nothing has been hit in this step yet."""
+    for c in range(C.count[FOUND]):
+        for i in range(3):
+            now[c, KICK + i] = 0.0
 
 
 @formula
@@ -134,8 +146,6 @@ def hits(G, C, at, bias, R, X, L, pace, now):
         gives_way = pace.count[YIELDING] != 0 and stiffness(G, C, L, c) > 0.0
         for i in range(2):  # what gives way has no impulse in no time
             R.at[c, i] = NONE if gives_way else at[c, i]
-        for i in range(3):
-            now[c, KICK + i] = 0.0
         u = seen(R, X.v, X.wide, c)
         for i in range(3):
             now[c, BEFORE_KICK + i] = u[i]
@@ -154,6 +164,9 @@ def hits(G, C, at, bias, R, X, L, pace, now):
                 R.bias[c, 0] = e * u[0]
                 for i in range(1, 3 if law == MOREAU else 1):
                     R.bias[c, i] += e * u[i]
+        elif C.x[c, GAP] > NEAR * pace.real[FLAT]:
+            for i in range(2):  # an impact takes no time in which it could close: it has its turn in the next round
+                R.at[c, i] = NONE
     return found
 
 
@@ -232,5 +245,5 @@ def close(R, Z, X, C, pace, now):
                 pace.real[LOST_FRICTION] -= Z.p[c, i] * mean
         k = across(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])
         for i in range(3):
-            now[c, KICK + i] = k[i]
+            now[c, KICK + i] += k[i]
     pace.count[IMPACTS] += 1

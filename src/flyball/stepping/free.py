@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiler.jit import formula
-from ..math.scalar import sqrt
+from ..math.scalar import cos, sin, sqrt
 from ..math.vec import add, cross, scale, sub
 from .tables import FREE_INERTIA, FREE_INVERSE
 
@@ -69,6 +69,27 @@ def turned(q, w, h):
     b = q[1] + x * q[0] + y * q[3] - z * q[2]
     c = q[2] + y * q[0] + z * q[1] - x * q[3]
     d = q[3] + z * q[0] + x * q[2] - y * q[1]
+    return unit(a, b, c, d)
+
+
+@formula
+def spun(q, w, h):
+    """The unit quaternion after turning by the angle |w| h about w, which is exact where w stays what it is."""
+    a = sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
+    half = 0.5 * h * a
+    s, c = sin(half) / a, cos(half)
+    x, y, z = s * w[0], s * w[1], s * w[2]
+    return unit(
+        c * q[0] - x * q[1] - y * q[2] - z * q[3],
+        c * q[1] + x * q[0] + y * q[3] - z * q[2],
+        c * q[2] + y * q[0] + z * q[1] - x * q[3],
+        c * q[3] + z * q[0] + x * q[2] - y * q[1],
+    )
+
+
+@formula
+def unit(a, b, c, d):
+    """A quaternion of length 1."""
     s = 1.0 / sqrt(a * a + b * b + c * c + d * d)
     return (a * s, b * s, c * s, d * s)
 

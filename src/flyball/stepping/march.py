@@ -8,7 +8,7 @@ from ..compiler.jit import formula, kernel
 from ..contact.tables import AHEAD, DONE, FOUND, GAP
 from ..numerics.cone.operator import seen
 from ..numerics.cone.problem import CONVERGED, ENDED, ENOUGH, FORCE_RESIDUAL, MOST, RESIDUAL
-from .bounce import bounce
+from .bounce import ROUNDS, bounce, no_kicks
 from .joined import BEGIN, FINISH, FREE, KEEP, KICKED, LOST, MEAN, NO_ROOM, NO_WAY, OVERRUN, ROWS, V_BEFORE
 from .joined import STEP as JOINTS_STEP
 from .joined import TIME as JOINTS_TIME
@@ -34,6 +34,7 @@ from .tables import (
     LOST_IMPACT,
     MOST_CONTACTS,
     POSITIONS,
+    ROUGH,
     SEARCHING,
     STEP,
     STIFF,
@@ -93,7 +94,7 @@ def velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before):
         put_back(N, M, X)
         held_by_joints(A, M, C, P, X, pace, BEGIN)
         ended = solved(pace.door[VELOCITIES], P, X, W, O, F.velocities, pace, pace.count[SWEEPS], pace.real[ENOUGH_V])
-    if ended != CONVERGED:
+    if ended != CONVERGED and O.real[RESIDUAL] > pace.real[ROUGH] * pace.real[STEP]:
         pace.count[CUTS] += 1
     if O.real[RESIDUAL] > pace.real[WORST_RESIDUAL]:
         pace.real[WORST_RESIDUAL] = O.real[RESIDUAL]
@@ -179,7 +180,10 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     fill_rows(G, M, C, P, L, pace)
     if held_by_joints(A, M, C, P, X, pace, ROWS) != DONE:
         return NO_ROOM
-    if bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+    no_kicks(C, now)
+    for _ in range(ROUNDS):  # what is hit may hit what is near
+        if not bounce(G, C, P.at, P.bias, R, Z, E, X, W, O, F, L, pace, now):
+            break
         held_by_joints(A, M, C, P, Z, pace, KICKED)
         if without_contact(A, M, C, P, X, N, pace) != DONE:
             return NO_WAY

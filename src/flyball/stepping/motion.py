@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from .free import inverse_in_world, matrix, middle, momentum_of, rotated, times, turned, unrotated
-from .tables import FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
+from ..math.vec import add
+from .free import inverse_in_world, matrix, middle, momentum_of, rotated, spun, times, turned, unrotated
+from .tables import ANGLE, FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
 
 EPS = 1e-300
 
@@ -89,7 +90,11 @@ def displace(N, M, X, lifts, pace):
             continue
         q = (N.turn[k, 0], N.turn[k, 1], N.turn[k, 2], N.turn[k, 3])
         if N.body[k, FREE_ROUND] > 0.0:
-            q = turned(q, (w[0] + d[0], w[1] + d[1], w[2] + d[2]), h)
+            w = add(w, d)
+            if w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < EPS:
+                continue
+            q = spun(q, w, h)
+            N.move[k, ANGLE] += h * w[2]
         else:
             R = axes(M.pose, k)
             mean, p = middle(N.body, k, momentum_of(N.body, k, unrotated(R, w)), h)

@@ -13,6 +13,7 @@ import numpy as np
 # columns of Free.body: mass, its inverse, inertia and its inverse about the mass centre in body axes (each xx yy zz xy
 # xz yz), 1 if the inertia is the same about every axis
 FREE_MASS, FREE_PER_MASS, FREE_INERTIA, FREE_INVERSE, FREE_ROUND = 0, 1, 2, 8, 14
+ANGLE = 6  # column of Free.move, behind velocities: angle [rad] about z turned since the start, of what is round
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
 # impact, impulse of that in the world, and its velocities before; of contacts that give way: stiffness (0: hard),
 # overlap and its rate at the start of the step, share of its end in the law, overlap of the law and gap at
@@ -21,8 +22,9 @@ IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP, KEPT = range(11, 18)
 TRACKS = 18  # columns
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
-# none; residual [m/s] that is enough for velocities and for positions
-TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X = 0, 1, 2, 5, 6, 7, 8
+# none; residual [m/s] that is enough for velocities and for positions; residual over the step [m/s^2] above which a
+# solve that was cut is told
+TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X, ROUGH = 0, 1, 2, 5, 6, 7, 8, 9
 # ... and sums: work lost in friction, in impacts, given by surfaces that move; worst overlap and residuals seen, time
 # of the worst residual, overlap at the start
 LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE, WORST_AT, FIRST_OVERLAP = range(10, 18)

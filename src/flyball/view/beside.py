@@ -6,7 +6,6 @@ result; whatever goes wrong in it, this one draws the pictures itself, so that a
 
 from __future__ import annotations
 
-import os
 import pickle
 import subprocess
 import sys
@@ -15,16 +14,9 @@ from pathlib import Path
 from threading import Thread
 from typing import Any
 
+from ..compiler.second import cores, started
 from .artist import draw, files
 from .recording import Picture
-
-# Modules are found where this process finds them, and an interrupt is this process' to answer.
-CODE = """import signal, sys
-signal.signal(signal.SIGINT, signal.SIG_IGN)
-sys.path[:] = {path!r}
-from flyball.view.artist import main
-main()
-"""
 
 
 class Artist:
@@ -72,15 +64,4 @@ class Artist:
 
 def _started() -> subprocess.Popen | None:
     """The second process, importing already; None where it would not help, or cannot be had."""
-    if _cores() < 2 or "matplotlib" in sys.modules or getattr(sys, "frozen", False) or not sys.executable:
-        return None
-    command = [sys.executable, "-P", "-c", CODE.format(path=sys.path)]
-    try:
-        return subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
-    except OSError:
-        return None
-
-
-def _cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return None if cores() < 2 or "matplotlib" in sys.modules else started("flyball.view.artist")

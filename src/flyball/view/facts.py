@@ -30,7 +30,7 @@ def between(e: Any) -> str:
         return " – ".join(e.bodies)
     if hasattr(e, "body"):
         return f"on {e.body}"
-    if hasattr(e, "law"):
+    if hasattr(e, "law") and hasattr(e, "coordinate"):
         return f"{e.coordinate} = {e.law}"
     coupled = getattr(e, "coupled", None)
     if callable(coupled):

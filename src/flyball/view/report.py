@@ -72,12 +72,14 @@ def _headline(result: Result) -> str:
     m = result.model
     counts: dict[str, list] = {
         "body": m.bodies,
+        "set of bodies": m.bulk,
         "joint": m.joints,
         "coupling": m.couplings,
         "force": m.forces,
         "driver": m.drivers,
+        "contact": m.contacts,
     }
-    many = {"body": "bodies"}
+    many = {"body": "bodies", "set of bodies": "sets of bodies"}
     parts = [f"{len(x)} {k if len(x) == 1 else many.get(k, k + 's')}" for k, x in counts.items() if x]
     span = f"{result.t[0]:g} to {result.t[-1]:g} s, {len(result.t)} output times"
     return f"{'Planar' if result.planar else 'Spatial'} mechanism: {', '.join(parts)}; {span}"

@@ -73,7 +73,7 @@ class Integration(Options):
         try:
             tableau(self.method)
         except ValueError as error:
-            raise ModelError(str(error)) from None
+            raise ModelError(f"{error}; simulate knows impulse too, for contact") from None
 
     def _rates(self) -> None:
         """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""

@@ -22,6 +22,8 @@ from .problem import (
     ENOUGH,
     FORCE_RESIDUAL,
     ISLAND,
+    MOST,
+    MOST_STEPS,
     RESIDUAL,
     SMALL,
     STALLED,
@@ -37,6 +39,8 @@ SMALL_ISLANDS, THE_REST, DOORS = range(3)
 MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
 FINER = 1e-5  # times the residual that is enough
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
+CROWD = 400  # contacts of all islands from which on small ones are those of few contacts: what falls together hits anew
+FEW_CONTACTS, FEW_NODES = 12, 4  # in every step, and Newton's method has no warm start there
 # entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
 # hand on to the other, contacts by the one; the largest island's contacts
 CALLS, ISLANDS, BY_ONE, BY_OTHER, HANDED_ON, CONTACTS_BY_ONE, LARGEST, TOLD = range(8)
@@ -99,7 +103,8 @@ def small(P, F, I, k):
     if P.turn.shape[0] > 0:
         return False
     contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
-    if contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]:
+    crowded = P.size[0] > CROWD and (contacts > FEW_CONTACTS or nodes > FEW_NODES)
+    if not crowded and contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]:
         return True
     if contacts > F.limit[MOST_CONTACTS_UNEVEN] or nodes > F.limit[MOST_NODES_UNEVEN]:
         return False
@@ -193,10 +198,12 @@ def by_one(P, X, W, O, F, f):
     It is asked for ``FINER`` digits than are enough, since Newton's last steps bring many of them: what sticks then
     does not creep. That it has not got them all is no fault.
     """
-    enough = O.real[ENOUGH]
+    enough, most = O.real[ENOUGH], O.count[MOST]
     O.real[ENOUGH] = FINER * enough
+    if O.count[MOST_STEPS] > 0:
+        O.count[MOST] = O.count[MOST_STEPS]
     enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)
-    O.real[ENOUGH] = enough
+    O.real[ENOUGH], O.count[MOST] = enough, most
     if (O.count[ENDED] == CUT or O.count[ENDED] == STALLED) and O.real[RESIDUAL] <= enough:
         O.count[ENDED] = CONVERGED
     if F.doors[THE_REST] != 0 and (O.count[ENDED] == SMALL or O.count[ENDED] == BROKEN):

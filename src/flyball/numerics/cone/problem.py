@@ -32,8 +32,9 @@ BIAS, SOFT, LOW, HIGH = range(4)
 # entries of Choices.count: most iterations (sweeps), island that is meant or -1 for all, keep a history or not;
 # and what comes back: iterations used, how the solver ended, rows of the history written
 # (COULOMB: 1 for Coulomb's law by De Saxce's correction, 0 for the convex form; NEEDED: how large Factor must be;
-# DIRECTIONS: of a friction pyramid)
-MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES, DIRECTIONS = range(10)
+# DIRECTIONS: of a friction pyramid; MOST_STEPS: most steps of Newton's method where it takes islands in turn with
+# sweeps, 0 for as many as these)
+MOST, ISLAND, HISTORY, USED, ENDED, WRITTEN, COULOMB, NEEDED_NUMBERS, NEEDED_PLACES, DIRECTIONS, MOST_STEPS = range(11)
 CONVERGED, CUT, STALLED, BROKEN, SMALL = range(5)  # Choices.count[ENDED]; SMALL: enlarge what is needed, call again
 # entries of Choices.real: residual [m/s] that is enough; and what comes back: the residual reached as a velocity
 # [m/s], and as a force (what is left of an impulse over the largest impulse) [1]

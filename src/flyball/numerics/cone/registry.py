@@ -77,11 +77,27 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
     f = Factor(made.numbers, made.places)
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLANDS] = first.address(P, X, W, O, f)
-    if name == "auto" and len(P.node) <= EVEN[1] and len(P.group) == 1 and len(P.turn) == 0:
+    if name == "auto" and is_small(len(P.node), len(P.group) - 1, len(P.turn) > 0):
         made.limit[:] = len(P.mu), len(P.node), len(P.mu), len(P.node)  # few bodies: nothing is left for sweeps
     else:
         made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
     return Ready(auto.address(P, X, W, O, made), made, made.told)
+
+
+def is_small(nodes: int, groups: int, turning: bool) -> bool:
+    """Whether Newton's method is all that `auto` needs."""
+    return nodes <= EVEN[1] and groups == 0 and not turning
+
+
+def needed(name: str, small: bool) -> list[tuple[Door, tuple[Any, ...]]]:
+    """The doors that `ready` asks for, with tuples of the types that these get; ``small``: see `is_small`."""
+    P = unfilled(1, 1)
+    X, W, O, F = rooms(P)
+    if name != "auto" and name not in FACTORED:
+        return [(SOLVERS[name], (P, X, W, O, F))]
+    first = [SOLVERS["newton" if name == "auto" else name]]
+    rest = [] if name == "auto" and small else [gauss_seidel]
+    return [*((d, (P, X, W, O, F)) for d in [*first, *rest]), (auto, (P, X, W, O, room_for_all(P, False)))]
 
 
 def room_for_all(P: Problem, whole: bool) -> Auto:

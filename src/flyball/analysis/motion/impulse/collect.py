@@ -15,6 +15,7 @@ from ....stepping.free import matrix, unrotated
 from ....stepping.joined import LOST
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
+    ANGLE,
     GIVEN,
     IMPULSE,
     KICK,
@@ -51,6 +52,7 @@ class Collected:
         self.t: list[float] = []
         self.pose: list[np.ndarray] = []
         self.turn: list[np.ndarray] = []
+        self.angle: list[np.ndarray] = []  # of bodies in the plane: whole turns count
         self.twist: list[np.ndarray] = []
         self.acceleration: list[
             np.ndarray
@@ -64,6 +66,7 @@ class Collected:
         self.t.append(float(s.pace.real[TIME]))
         self.pose.append(s.movers.pose[: len(s.free.turn), :3].copy())
         self.turn.append(s.free.turn.copy())
+        self.angle.append(s.free.move[:, ANGLE].copy())
         self.twist.append(s.rooms.X.v[:, :6].copy())
         sums = s.pace.real[list(SUMS)]
         sums[SUMS.index(LOST_IMPACT)] += s.joints.real[LOST]
@@ -131,8 +134,7 @@ def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.nd
         if s.model.planar:
             q[:, q0 : q0 + 2] = pose[:, k, :2]
             if width == 3:
-                half = np.unwrap(np.arctan2(turn[:, k, 3], turn[:, k, 0]))  # of the angle: tells whole turns apart
-                q[:, q0 + 2] = base.q[q0 + 2] + 2.0 * (half - half[0])
+                q[:, q0 + 2] = base.q[q0 + 2] + np.array(kept.angle)[:, k]
                 v[:, v0 + 2], a[:, v0 + 2] = twist[:, k, 5], change[:, k, 5]
             continue
         q[:, q0 : q0 + 3] = pose[:, k]

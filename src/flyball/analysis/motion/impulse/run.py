@@ -8,26 +8,33 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ....errors import AnalysisError, SimulationError
+from ....compiler.beside import Beside
+from ....contact.surfaces import ROLLING, SPINNING
+from ....errors import AnalysisError, PerformanceNotice, SimulationError, warn
 from ....model.model import Model
+from ....numerics.cone.registry import is_small
 from ....results.result import Result
 from ....results.sides import Sides
+from ....stepping.needed import needed
 from ....stepping.stepper import NoWay, Stepper
 from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
+from ...compiled import compiled
 from ...progress import Tell
 from .collect import Collected
+from .drawn import as_drawn, moving
 from .ending import result_of
 from .going_on import base_of, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
-from .scene import begin, placed
+from .scene import begin, movers, placed
 from .settings import Impulse
 
 NO_WAY = (
     "a force or a law gives no finite number, the equations have no solution, or joints cannot be closed: give shorter "
     "steps, method=fb.Impulse(step=...)"
 )
+NOTICE = "compiling steps with contact for this machine, once: about a quarter of a minute"
 EACH = 1000  # steps after which it is told how far it is
 
 
@@ -51,17 +58,21 @@ def impulse_motion(
     """
     since = time.perf_counter()
     model = model.snapshot()
-    base = base_of(model, span[0], parameters, before)
-    values = base.compiled.values
+    plain = compiled(model, parameters=parameters)
+    values = plain.values
     found = parts(model, acting_values(model, values, parameters))
     scene = touching(model, values.given, (*found.free, *found.held))
-    movers = placed(scene, base)
-    if before is not None:
-        place_sets(scene, movers, before)
     free = len(scene.carriers.mass) - len(found.held)
-    held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
+    with made_ready(scene, o, free, bool(found.held)) as ready:
+        drawn = as_drawn(plain, span[0]) if before is None else None
+        base = drawn or base_of(model, span[0], parameters, before)
+        held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
+        ready.finish()
+    at = movers(scene, moving(drawn)) if drawn else placed(scene, base)
+    if before is not None:
+        place_sets(scene, at, before)
     try:
-        stepper = begin(scene, movers, values, o, held)
+        stepper = begin(scene, at, values, o, held)
     except NoWay:
         raise AnalysisError(f"{model.name!r} cannot start: {NO_WAY}") from None
     names = [*scene.carriers.names, "ground"]
@@ -76,6 +87,17 @@ def impulse_motion(
         result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY}"
         raise SimulationError(result.health.message, result, t) from None
     return result_of(base, scene, stepper, kept, sides, o, since, interrupted)
+
+
+def made_ready(scene: Touching, o: Impulse, free: int, mechanism: bool) -> Beside:
+    """What compiles what the steps need; says so if it takes long."""
+    turning = bool((scene.surfaces.pair[..., ROLLING : SPINNING + 1] > 0.0).any())
+    small = is_small(free, int(mechanism), turning)
+    parts = needed(scene.geometry, o.solver, small, mechanism)
+    ready = Beside(parts.wanted, parts.behind)
+    if ready.cold:
+        warn(NOTICE, PerformanceNotice)
+    return ready
 
 
 def _size(scene: Touching, name: str) -> int:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ....contact import surfaces as su
 from ....contact.tables import RADIUS, Movers
 from ....model.geometry import matrix_to_quaternion
-from ....numerics.cone.problem import COULOMB
+from ....numerics.cone.problem import COULOMB, MOST_STEPS
 from ....stepping.stepper import Stepper, free_bodies
 from ....stepping.tables import (
     COUNTS,
@@ -19,6 +21,7 @@ from ....stepping.tables import (
     LIFTS,
     NO_RESTITUTION,
     REALS,
+    ROUGH,
     SEQUENTIAL,
     SLOWEST,
     SWEEPS,
@@ -26,6 +29,7 @@ from ....stepping.tables import (
     Pace,
 )
 from ....tables.contact import Touching
+from ....tables.coordinates import BodyState
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from .held import Held
@@ -34,7 +38,10 @@ from .settings import RESTITUTION, Impulse
 MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
 FLATTEST = 1e-9  # overlap that is none, in parts of the smallest shape
 SLOW = 1e-6  # speed [m/s] below which nothing bounces, whatever gravity is
-SWEEPS_USUAL, LIFTS_USUAL = 50, 30
+USUAL = {"auto": 30, "newton": 100, "gauss-seidel": 50, "admm": 200}
+"""Most iterations by solver, where nobody says how many; of the others `OFTEN`."""
+COARSE = 100.0  # times the tolerance that a solve which is cut may leave without a word; or what a body falls faster
+OFTEN, LIFTS_USUAL, STEPS_USUAL = 150, 25, 100
 
 
 def smallest(scene: Touching, values: Values) -> float:
@@ -45,8 +52,13 @@ def smallest(scene: Touching, values: Values) -> float:
 
 def placed(scene: Touching, base: Assembly) -> Movers:
     """Movers where the assembled mechanism has them; sets of bodies are as described."""
+    return movers(scene, base.compiled.moving(base.t, base.q, base.v))
+
+
+def movers(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
+    """Movers where the single bodies are; sets of bodies are as described."""
     M = Movers(scene.carriers.movers.pose.copy(), scene.carriers.movers.twist.copy())
-    for name, b in base.compiled.moving(base.t, base.q, base.v).items():
+    for name, b in bodies.items():
         k = scene.carriers.slices[name].start
         M.pose[k] = np.r_[b.p, b.R.ravel()]
         M.twist[k] = np.r_[b.v, b.w]
@@ -61,7 +73,9 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     size = smallest(scene, values)
     real[SLOWEST], real[FLAT] = SLOW, FLATTEST * size
     real[ENOUGH_V], real[ENOUGH_X] = o.tolerance, o.tolerance
-    count[SWEEPS], count[LIFTS] = o.iterations or SWEEPS_USUAL, o.position_iterations or LIFTS_USUAL
+    real[ROUGH] = max(float(np.sqrt((real[GRAVITY : GRAVITY + 3] ** 2).sum())), COARSE * o.tolerance / o.longest)
+    usual = USUAL.get(o.solver, OFTEN)
+    count[SWEEPS], count[LIFTS] = o.iterations or usual, o.position_iterations or max(LIFTS_USUAL, usual // 2)
     law = RESTITUTION.index(o.restitution) + 1
     count[LAW] = law if (np.nan_to_num(scene.surfaces.pair[..., su.RESTITUTION]) > 0.0).any() else NO_RESTITUTION
     n = len(M.pose) - (len(held.joints.mover) if held else 0)
@@ -73,5 +87,7 @@ def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | N
     joints = held.joints if held else None
     at, twist, margin = M.pose[:n, :3], M.twist[:n], MARGIN * size
     stepper = Stepper(scene.geometry, free, at, twist, scene.surfaces, pace, margin, o.solver, joints)
-    stepper.rooms.O.count[COULOMB] = o.coulomb
+    choices = stepper.rooms.O.count
+    choices[COULOMB] = o.coulomb
+    choices[MOST_STEPS] = STEPS_USUAL if o.iterations is None else 0
     return stepper

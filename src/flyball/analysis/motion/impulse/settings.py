@@ -11,6 +11,7 @@ from ....numerics.cone.registry import names
 from ...options import count, positive, seconds
 
 RESTITUTION = ("poisson", "newton", "moreau")
+CONVEX_ONLY = ("barzilai-borwein",)
 IMPACTS = ("simultaneous", "sequential")
 
 
@@ -66,6 +67,11 @@ class Impulse:
         for name, known in (("solver", names()), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
             if getattr(self, name) not in known:
                 raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
+
+        if self.solver in CONVEX_ONLY and self.coulomb:
+            raise ModelError(
+                f"solver {self.solver!r} of Impulse solves the convex problem only: give coulomb=False with it"
+            )
 
     @property
     def longest(self) -> float:
