@@ -6,7 +6,17 @@ import numpy as np
 import pytest
 
 from flyball.numerics.cone.newton import newton
-from flyball.numerics.cone.problem import BROKEN, CONVERGED, COULOMB, ENDED, ENOUGH, MOST, RESIDUAL, SMALL
+from flyball.numerics.cone.problem import (
+    BROKEN,
+    CONVERGED,
+    COULOMB,
+    ENDED,
+    ENOUGH,
+    FORCE_RESIDUAL,
+    MOST,
+    RESIDUAL,
+    SMALL,
+)
 from flyball.numerics.cone.solve import solve
 from tests.cone.enlarge import solved
 from tests.cone.problems import KINDS, dense, impulses, random_problem
@@ -76,6 +86,25 @@ def test_least_impulses_are_held():
         near = max(n if r <= mu * n else (n + mu * r) / (1 + mu * mu), 0.7)
         a = min(1, mu * near / r)
         np.testing.assert_allclose(p[c], (near, a * s, a * t), atol=1e-10)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_left_is_told_as_a_force_too(seed):
+    """The impulse that is lacking by the natural map, over the largest impulse; rough solves, so that some is left."""
+    P, X, W, O, F = random_problem(seed)
+    _, _, N, b = dense(P, X)
+    O.count[MOST], O.real[ENOUGH] = 200, 0.3
+    solved(newton, P, X, W, O, F)
+    p, u = X.p, (N @ X.p.ravel() + b).reshape(-1, 3)
+    lacking = 0.0
+    for c in range(12):
+        n, s, t = p[c] - 3.0 * u[c] / np.trace(N[3 * c : 3 * c + 3, 3 * c : 3 * c + 3])
+        r, mu = np.hypot(s, t), P.mu[c]
+        near = n if r <= mu * n else max(0.0, (n + mu * r) / (1 + mu * mu))
+        a = min(1.0, mu * near / r)
+        lacking = max(lacking, np.linalg.norm(p[c] - (near, a * s, a * t)))
+    assert lacking > 0.0
+    assert O.real[FORCE_RESIDUAL] == pytest.approx(lacking / np.linalg.norm(p, axis=1).max(), rel=1e-6)
 
 
 def test_rooms_too_small_are_said():

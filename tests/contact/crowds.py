@@ -38,13 +38,15 @@ def moving(x, v=None):
 
 
 def spheres_that_touch(x, v, r, margin, ahead):
-    """{(i, j): whether it touches at rest} of spheres whose surfaces come within the margin as they go, by trying all."""
+    """{(i, j)} of spheres whose surfaces come within the margin, as they go or if one of them is stopped, by all pairs."""
     i, j = np.triu_indices(len(x), 1)
-    d, u = x[j] - x[i], v[j] - v[i]
-    u2 = np.maximum((u * u).sum(1), 1e-300)
-    t = np.clip(-(d * u).sum(1) / u2, 0.0, ahead)
-    nearest = np.linalg.norm(d + t[:, None] * u, axis=1) - r[i] - r[j]
-    return {(a, b) for a, b in zip(i[nearest < margin], j[nearest < margin])}
+    d = x[j] - x[i]
+    near = np.zeros(len(i), bool)
+    for u in (v[j] - v[i], v[j], -v[i]):
+        u2 = np.maximum((u * u).sum(1), 1e-300)
+        t = np.clip(-(d * u).sum(1) / u2, 0.0, ahead)
+        near |= np.linalg.norm(d + t[:, None] * u, axis=1) - r[i] - r[j] < margin
+    return {(a, b) for a, b in zip(i[near], j[near])}
 
 
 def on_planes(G, x, v, r, margin, ahead):

@@ -119,3 +119,16 @@ def test_a_planar_stack_stands_for_long(angle):
     for k in range(4):
         assert run[f"b{k}"].y[-1] == pytest.approx(0.05 + 0.1 * k, abs=1e-9)
     assert run.energy.kinetic.max() < 1e-12
+
+
+@pytest.mark.parametrize("shape", [fb.Sphere(radius=0.01), fb.Box(edges=(0.02, 0.02, 0.02))])
+@pytest.mark.parametrize("gap", [0.0005, 0.004])
+def test_what_falls_together_stops_together(shape, gap):
+    """A column falls; what stops its lowest stops the others in the same step, though none came nearer before."""
+    m = floor(friction=0.3)
+    at = [(0, 0, 0.01 + gap + (0.02 + gap) * k) for k in range(20)]
+    m.add(fb.Bodies("column", shape=shape, density=2500, position=at))
+    run = m.simulate(0.3, outputs=61)
+    z = run.bulk["column"].position[:, :, 2]
+    assert np.diff(z, axis=1).min() > 0.02 - (1e-6 if isinstance(shape, fb.Sphere) else 2e-3)
+    assert z[-1] == pytest.approx(0.01 + 0.02 * np.arange(20), abs=1e-5)

@@ -13,6 +13,7 @@ import numpy as np
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
+from ..math.vec import quaternion_matrix
 from ..rotations.checks import unit_quaternions
 from .body import Body, Inertia, Shapes, listed
 from .element import LARGEST, Density, Element, Mass, Name, element
@@ -209,14 +210,7 @@ class Bodies(Element):
         if self.orientation is None:
             return np.broadcast_to(np.eye(3), (n, 3, 3))
         e = unit_quaternions(_rows(self, "orientation", n, (4,)), f"orientation of {self.title}")
-        s, u = e[:, 0, None, None], e[:, 1:]
-        out = 2.0 * u[:, :, None] * u[:, None, :]
-        out += np.eye(3) * (2.0 * s * s - 1.0)
-        x, y, z = (2.0 * e[:, 0] * u[:, k] for k in range(3))
-        for i, j, part in ((1, 0, z), (0, 2, y), (2, 1, x)):
-            out[:, i, j] += part
-            out[:, j, i] -= part
-        return out
+        return np.stack(quaternion_matrix(*e.T), axis=1).reshape(n, 3, 3)
 
     def sizes(self) -> np.ndarray:
         """Scale (n,) of each."""

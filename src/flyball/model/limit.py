@@ -7,7 +7,8 @@ from types import SimpleNamespace
 from typing import ClassVar
 
 from ..errors import ModelError
-from .element import Element, Number, Ratio, element, nonnegative
+from .element import Element, Number, Ratio, element
+from .material import check_restitution
 
 
 @element
@@ -35,10 +36,6 @@ class Limit(Element):
 
     def check(self, n: SimpleNamespace) -> None:
         """One stop at least, and a restitution from 0 to 1."""
-        nonnegative(self, n, "restitution")
-        if not n.restitution.real <= 1.0:
-            raise ModelError(
-                f"{self.title}: restitution is {n.restitution:g}; it must be from 0 to 1, since no impact makes energy"
-            )
+        check_restitution(self, n)
         if self.lower is None and self.upper is None:
             raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")

@@ -28,6 +28,15 @@ Friction = Annotated[float | str | tuple[float | str, ...], BeforeValidator(plai
 NUMBERS = ("friction", "static_friction", "restitution", "rolling_friction", "spinning_friction")
 
 
+def check_restitution(e: Element, n: SimpleNamespace) -> None:
+    """Refuse a restitution that is not from 0 to 1."""
+    nonnegative(e, n, "restitution")
+    if n.restitution is not None and not n.restitution.real <= 1.0:
+        raise ModelError(
+            f"{e.title}: restitution is {n.restitution:g}; it must be from 0 to 1, since no impact makes energy"
+        )
+
+
 def check_surface(e: Element, n: SimpleNamespace) -> None:
     """Refuse numbers that no surface has.
 
@@ -36,11 +45,8 @@ def check_surface(e: Element, n: SimpleNamespace) -> None:
     ModelError
         If friction or a length is negative, restitution not from 0 to 1, or static friction below that of sliding.
     """
-    nonnegative(e, n, "static_friction", "restitution", "rolling_friction", "spinning_friction")
-    if n.restitution is not None and not n.restitution.real <= 1.0:
-        raise ModelError(
-            f"{e.title}: restitution is {n.restitution:g}; it must be from 0 to 1, since no impact makes energy"
-        )
+    nonnegative(e, n, "static_friction", "rolling_friction", "spinning_friction")
+    check_restitution(e, n)
     for x in pair(n.friction):
         if x is not None and not x.real >= 0.0:
             raise ModelError(f"{e.title}: friction is {x:g}; it must be zero or greater")

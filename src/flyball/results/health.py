@@ -33,6 +33,7 @@ class Health:
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
+    crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
     contact: ContactHealth | None = None  # how contacts were solved, where there are any
@@ -103,7 +104,7 @@ class Health:
             ("status", self.status),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             *([("assembly", summary(self.departures))] if self.departures else []),
-            ("freedoms", str(self.freedoms)),
+            ("freedoms", str(self.freedoms) + (f", and those of {self.crowd} bodies in sets" if self.crowd else "")),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
             ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),

@@ -17,7 +17,7 @@ from .lifts import PASSES as AGAIN
 from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
-from .record import book
+from .record import book, book_turning
 from .rows import fill_rows, static_where_stuck, warm
 from .tables import (
     CUTS,
@@ -124,6 +124,8 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
         deepest = min(deepest, gap)
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
+        if P.turn.shape[0] > 0:
+            book_turning(P, X, Y, c, pace)
         for i in range(3):
             Y.p[c, i] = 0.0
     if pace.count[TAKEN] == 0:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..math.scalar import sqrt
-from ..numerics.cone.operator import across
+from ..numerics.cone.operator import across, seen_turning
 from .tables import GIVEN, IMPULSE, LOST_FRICTION, LOST_IMPACT, SLIDES
 
 ON = 1e-9  # part of the friction cone's radius within which an impulse is on it
@@ -25,3 +25,11 @@ def book(P, X, c, u, pace, now):
         now[c, SLIDES] = 1.0 if sqrt(s * s + t * t) >= (1.0 - ON) * P.mu[c] * n else 0.0
     else:
         now[c, SLIDES] = -1.0
+
+
+@formula
+def book_turning(P, X, Y, c, pace):
+    """Work of rolling and spinning friction at contact c, with the mean velocities ``Y`` of the step."""
+    w = seen_turning(P, Y.v, Y.wide, c)
+    for i in range(3):
+        pace.real[LOST_FRICTION] -= X.torque[c, i] * w[i]

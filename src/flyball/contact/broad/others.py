@@ -6,7 +6,7 @@ from ...compiler.jit import formula
 from ...math.vec import add, dot, load3, norm, scale, sub
 from ..tables import AHEAD, MARGIN
 from .carried import velocity
-from .desk import AT, BOUNDED, FLAT, FORM, GOES, MOVES, ORIGIN, SHAPE, SIZE, SPIN, TURNS, UP
+from .desk import AT, BOUNDED, DRIFT, FLAT, FORM, GOES, MOVES, ORIGIN, SHAPE, SIZE, SPIN, TURNS, UP
 from .envelopes import bodies_meet, depth
 from .rows import sign, write
 from .same import before
@@ -16,11 +16,26 @@ FAR = 0.25  # what goes further than this with a step, in radii of the smaller s
 
 
 @formula
+def frame_velocity(B):
+    """The velocity with which all go together, if they do."""
+    return (B.real[DRIFT], B.real[DRIFT + 1], B.real[DRIFT + 2])
+
+
+@formula
+def way(B, s, t):
+    """What two bounded slots cover of their distance in `AHEAD` seconds at most."""
+    u = norm(sub(load3(B.now, t, GOES), load3(B.now, s, GOES)))
+    return B.real[AHEAD] * (u + B.now[s, SPIN] + B.now[t, SPIN])
+
+
+@formula
 def farthest(B, s, t):
     """The largest gap at which a pair of bounded slots may touch within `AHEAD` seconds; below 0 if it cannot."""
     now = B.now
     reach = B.real[MARGIN]
-    u = norm(sub(load3(now, t, GOES), load3(now, s, GOES)))
+    D = frame_velocity(B)
+    v, w = sub(load3(now, s, GOES), D), sub(load3(now, t, GOES), D)
+    u = max(norm(sub(w, v)), norm(v), norm(w))
     d = sub(load3(now, t, AT), load3(now, s, AT))
     reach += B.real[AHEAD] * (u + now[s, SPIN] + now[t, SPIN])
     whole = reach + now[s, SIZE] + now[t, SIZE]
@@ -54,6 +69,9 @@ def take(M, C, O, B, pair, rows, time, found):
         v, u = velocity(M, B.slot[s, MOVES], p), velocity(M, B.slot[t, MOVES], p)
         closing = dot(e, sub(v, u))
         gap = B.room[k, 6] + time * closing
+        D = frame_velocity(B)
+        if s < B.count[BOUNDED] and t < B.count[BOUNDED]:  # something else may stop one of them
+            closing = max(closing, dot(e, sub(v, D)), dot(e, sub(D, u)))
         if gap < B.real[MARGIN] + ahead * max(0.0, closing):
             p = sub(p, scale(0.5 * time, add(v, u)))
             feature = int(B.room[k, 7])
@@ -75,14 +93,15 @@ def others(G, M, C, O, B, pair, first, n):
         return 0
     a, b, size = B.slot[s, MOVES], B.slot[t, MOVES], min(B.now[s, SIZE], B.now[t, SIZE])
     flat = (s >= bounded and B.slot[s, FORM] == FLAT) or (t >= bounded and B.slot[t, FORM] == FLAT)
-    if flat or reach - B.real[MARGIN] <= FAR * size:
+    near = way(B, s, t) if s < bounded and t < bounded else reach - B.real[MARGIN]
+    if flat or near <= FAR * size:
         return take(M, C, O, B, pair, (first, n), 0.0, ask(G, M, B, s, t, reach))
     found = ask(G, M, B, s, t, B.real[MARGIN])
     if found > 0:
         return take(M, C, O, B, pair, (first, n), 0.0, ask(G, M, B, s, t, reach))
     remember(M, B, 0, a)
     remember(M, B, 1, b)
-    found, time = first_touch(G, M, B, s, t, reach, size)
+    found, time = first_touch(G, M, B, s, t, B.real[MARGIN] + near, size)
     found = take(M, C, O, B, pair, (first, n), time, found)
     recall(M, B, 0, a)
     recall(M, B, 1, b)

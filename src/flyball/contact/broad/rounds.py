@@ -4,18 +4,34 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
+from ...math.vec import dot, load3, scale, sub
 from ..tables import AHEAD, MARGIN
-from .desk import AT, BOUNDED, GOES, ORIGIN, SIZE, SPEED, TURNS, UP
+from .desk import AT, BOUNDED, DRIFT, GOES, ORIGIN, SIZE, SPEED, TURNS, UP
 from .rows import write
+
+
+@formula
+def met(d, r, reach, u, ahead):
+    """When spheres a vector d apart that goes on with u touch, or are nearest; -1 if not within ``reach``."""
+    du, u2, d2 = dot(d, u), dot(u, u), dot(d, d)
+    if du >= 0.0:
+        return -1.0
+    time = min(ahead, -du / u2)
+    if d2 + time * (2.0 * du + time * u2) >= reach * reach:
+        return -1.0
+    deep = du * du - u2 * (d2 - r * r)  # discriminant: when the surfaces meet
+    if deep > 0.0:
+        time = min(time, (d2 - r * r) / (sqrt(deep) - du))
+    return time
 
 
 @formula
 def balls(C, B, s, t, n):
     """The contact of two spheres, as row n: how many.
 
-    Spheres whose surfaces come to within the margin in `AHEAD` seconds, as they go, touch already: along the normal
-    at which they will (first) be nearest, with the gap between their tangent planes across it. A sphere that passes
-    another has no contact with it.
+    Spheres whose surfaces come to within the margin in `AHEAD` seconds, as they go or if something stops one of them,
+    touch already: along the normal at which they will (first) be nearest, with the gap between their tangent planes
+    across it. A sphere that passes another has no contact with it.
     """
     now, far = B.now, 0.0
     x, y, z = now[t, AT] - now[s, AT], now[t, AT + 1] - now[s, AT + 1], now[t, AT + 2] - now[s, AT + 2]
@@ -24,17 +40,18 @@ def balls(C, B, s, t, n):
     d2 = x * x + y * y + z * z
     a, b, c = x, y, z
     if d2 >= reach * reach:
-        u = (now[t, GOES] - now[s, GOES], now[t, GOES + 1] - now[s, GOES + 1], now[t, GOES + 2] - now[s, GOES + 2])
-        du = x * u[0] + y * u[1] + z * u[2]
-        if du >= 0.0:
+        D = (B.real[DRIFT], B.real[DRIFT + 1], B.real[DRIFT + 2])
+        v, w = sub(load3(now, s, GOES), D), sub(load3(now, t, GOES), D)
+        u = sub(w, v)
+        time = met((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
+            u = w
+            time = met((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
+            u = scale(-1.0, v)
+            time = met((x, y, z), r, reach, u, B.real[AHEAD])
+        if time < 0.0:
             return 0
-        u2 = u[0] * u[0] + u[1] * u[1] + u[2] * u[2]
-        time = min(B.real[AHEAD], -du / u2)
-        if d2 + time * (2.0 * du + time * u2) >= reach * reach:
-            return 0
-        deep = du * du - u2 * (d2 - r * r)  # discriminant: when the surfaces meet
-        if deep > 0.0:
-            time = min(time, (d2 - r * r) / (sqrt(deep) - du))
         a, b, c = x + time * u[0], y + time * u[1], z + time * u[2]
         d2 = a * a + b * b + c * c
         far = 1.0

@@ -29,6 +29,8 @@ def census(M, B):
         v2 += a * a + b * b + c * c
     mean2 = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]) / max(1.0, n)  # n times the square of the mean velocity
     goes = n > 1.0 and mean2 > (TOGETHER if B.count[DRIFTS] == 0 else APART) * v2
+    for s in range(B.count[BOUNDED] + B.count[WIDE]):  # what stands may stop what moves past the frame
+        goes = goes and B.slot[s, MOVES] >= 0
     slow = SLOW * B.real[SKIN] * B.real[USUAL]
     goes = goes and mean2 * (STEPS * B.real[AHEAD]) ** 2 > n * slow * slow
     for c in range(3):

@@ -105,7 +105,7 @@ def iterate(R, O, coulomb):
         apart, moved = impulses(R)
         from_held(R)
         set_own(R)
-        worst = residual(R, coulomb)
+        worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
         O.count[USED] = k + 1
         if worst != worst:
             return BROKEN, worst
@@ -141,10 +141,11 @@ def admm_solve(P, X, O, F):
     from_held(R)
     set_own(R)
     coulomb = 1.0 * O.count[COULOMB]
-    ended, worst = CONVERGED, residual(R, coulomb)
+    worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
+    ended = CONVERGED
     if not worst <= O.real[ENOUGH]:
         ended, worst = iterate(R, O, coulomb)
-    O.count[ENDED], O.real[RESIDUAL], O.real[FORCE_RESIDUAL] = ended, worst, 0.0
+    O.count[ENDED], O.real[RESIDUAL] = ended, worst
     if ended == BROKEN:
         return O.count[USED]
     if ended == CUT:

@@ -37,7 +37,7 @@ from .problem import (
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
 # entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN
 MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
-FINER = 1e-5  # times the residual that is enough
+FINER, FINEST = 1e-5, 1e-10  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
 CROWD = 400  # contacts of all islands from which on small ones are those of few contacts: what falls together hits anew
 FEW_CONTACTS, FEW_NODES = 12, 4  # in every step, and Newton's method has no warm start there
@@ -199,7 +199,7 @@ def by_one(P, X, W, O, F, f):
     does not creep. That it has not got them all is no fault.
     """
     enough, most = O.real[ENOUGH], O.count[MOST]
-    O.real[ENOUGH] = FINER * enough
+    O.real[ENOUGH] = max(FINER * enough, min(enough, FINEST))
     if O.count[MOST_STEPS] > 0:
         O.count[MOST] = O.count[MOST_STEPS]
     enter(F.doors[SMALL_ISLANDS], P, X, W, O, f, 0)

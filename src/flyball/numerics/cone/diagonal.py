@@ -6,24 +6,15 @@ A symmetric block is six numbers: nn, ns, nt, ss, st, tt.
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from ...math.vec import cross, dot
+from ...math.vec import cross, dot, load3
+from .operator import turned
 from .problem import NONE
 
 
 @formula
 def axis(P, c, k):
     """Row k of the contact's frame."""
-    return P.frame[c, 3 * k], P.frame[c, 3 * k + 1], P.frame[c, 3 * k + 2]
-
-
-@formula
-def turned(P, i, t):
-    """B t of node i."""
-    return (
-        P.node[i, 1] * t[0] + P.node[i, 4] * t[1] + P.node[i, 5] * t[2],
-        P.node[i, 4] * t[0] + P.node[i, 2] * t[1] + P.node[i, 6] * t[2],
-        P.node[i, 5] * t[0] + P.node[i, 6] * t[1] + P.node[i, 3] * t[2],
-    )
+    return load3(P.frame, c, 3 * k)
 
 
 @formula
@@ -72,7 +63,7 @@ def diagonal(P, c):
     for side in range(2):
         i = P.at[c, side]
         if i >= 0:
-            a = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
+            a = load3(P.arm, c, 3 * side)
             D = plus(D, squares(P, i, P.node[i, 0], e, (cross(a, e[0]), cross(a, e[1]), cross(a, e[2]))))
         elif i < NONE and P.block[c, side] >= 0:
             D = plus(D, squares_of_group(P, c, side, 0))

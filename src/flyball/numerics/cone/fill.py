@@ -6,7 +6,8 @@ from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from .gather import BEFORE_TURNING, BLOCKS, CONTACTS, ROWS, what
 from .operator import push, push_line, push_turning, seen, seen_line, seen_turning
-from .problem import BIAS, HIGH, ISLAND, LOW, SOFT
+from .problem import BIAS, HIGH, LOW, SOFT
+from .projection import least_of, projected_above
 from .prox import (
     CONE,
     CONTACT,
@@ -30,18 +31,17 @@ from .prox import (
     Q,
     U,
     nearest,
-    on_cone,
 )
+from .residual import contacts_of, lines_of
 from .smooth import from_held, product
 
 
 @formula
 def span_of(P, O):
     """First contact, the one after the last, and the same of lines, of the island that is meant."""
-    k = O.count[ISLAND]
-    if k < 0:
-        return 0, P.size[0], 0, P.size[3]
-    return P.island[k], P.island[k + 1], P.line_p[k], P.line_p[k + 1]
+    first, last = contacts_of(P, O)
+    line, end = lines_of(P, O)
+    return first, last, line, end
 
 
 @formula
@@ -109,7 +109,7 @@ def fill_contact(P, X, x, o, c):
     x[o + KIND], x[o + SLIP] = CONTACT, 0.0
     x[o + FRICTION] = x[o + CONE] = P.mu[c]
     x[o + GIVE], x[o + HIGHEST] = P.soft[c], 0.0
-    x[o + LEAST] = P.least[c] if P.least.shape[0] > 0 else 0.0
+    x[o + LEAST] = least_of(P, c)
 
 
 @formula
@@ -143,16 +143,16 @@ def hand_back(P, X, R, span):
 
 @formula
 def lack(x, o, n, s, t, u, v, w):
-    """How far the impulse (n, s, t) of a row with velocities u, v, w is from p = nearest(p - u / mobility) [m/s]."""
+    """How far the impulse (n, s, t) of a row with velocities u, v, w is from p = nearest(p - u / mobility)."""
     m, r = x[o + MOBILITY] + x[o + GIVE], x[o + ROOT_N]
     u += x[o + GIVE] * n
     if x[o + KIND] == CONTACT or x[o + KIND] == COULOMB_CONTACT:
-        p = on_cone(x[o + FRICTION], x[o + LEAST] / r, n - u / m, s - v / m, t - w / m)
+        p = projected_above(x[o + FRICTION], x[o + LEAST] / r, n - u / m, s - v / m, t - w / m)
     else:
         a, b, c = nearest(x, o, r * (n - u / m), r * (s - v / m), r * (t - w / m))
         p = a / r, b / r, c / r
     a, b, c = p[0] - n, p[1] - s, p[2] - t
-    return m * sqrt(a * a + b * b + c * c)
+    return sqrt(a * a + b * b + c * c)
 
 
 @formula
@@ -173,19 +173,27 @@ def dilation(R, row, coulomb):
 
 @formula
 def residual(R, coulomb):
-    """Residual [m/s] of the impulses in column Q (scaled), whose velocities are in column OWN."""
-    x, worst = R.row, 0.0
+    """Residual [m/s] and force residual [1] of the impulses in column Q (scaled), velocities in column OWN.
+
+    The impulse that is lacking is a velocity by the row's mobility, and a number by the largest impulse; torques are
+    counted as the impulses that make as much energy.
+    """
+    x, worst, lacking, largest = R.row, 0.0, 0.0, 0.0
     for row in range(R.size[ROWS]):
         o = WIDE * row
-        more = dilation(R, row, coulomb) if row < R.size[CONTACTS] else 0.0
+        more, part = dilation(R, row, coulomb) if row < R.size[CONTACTS] else 0.0, 1.0
         if row >= R.size[BEFORE_TURNING]:
             set_bounds(R, row, Q)
         n, s, t = x[o + Q] / x[o + ROOT_N], x[o + Q + 1] / x[o + ROOT_T], x[o + Q + 2] / x[o + ROOT_T]
         d = lack(x, o, n, s, t, x[o + OWN] + more, x[o + OWN + 1], x[o + OWN + 2])
         if row >= R.size[BEFORE_TURNING]:
             set_bounds(R, row, HELD)
+            c = WIDE * (row - R.size[BEFORE_TURNING])
+            part = sqrt(x[o + MOBILITY] / x[c + MOBILITY])
+        lacking, largest = max(lacking, part * d), max(largest, part * sqrt(n * n + s * s + t * t))
+        d *= x[o + MOBILITY] + x[o + GIVE]
         worst = d if d > worst or d != d else worst
-    return worst
+    return worst, lacking / largest if largest > 0.0 else lacking
 
 
 @formula

@@ -39,7 +39,7 @@ class Rows(NamedTuple):
     pool: np.ndarray  # lists of neighbours
     Li: np.ndarray  # rows of the factor's columns
     G: np.ndarray  # (ne, 18)
-    row: np.ndarray  # (m, 32): see the columns in `state.py`
+    row: np.ndarray  # (m, 32): see the columns in `prox.py`
     blocks: np.ndarray  # (4, nb, 6) flat: e, gradient, step, e of p
     D: np.ndarray  # (nb, 36)
     L: np.ndarray  # (2, nnz, 36) flat: below the diagonal, above it

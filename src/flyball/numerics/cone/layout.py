@@ -25,7 +25,6 @@ from .gather import (
 from .problem import ENDED, NEEDED_NUMBERS, NEEDED_PLACES, SMALL
 
 WIDE = 32  # numbers of a row
-OK = 0
 
 
 @formula

@@ -154,7 +154,7 @@ def advance(R, a):
 
 @formula
 def gaps(R, coulomb):
-    """Of the impulses at y: residual, velocity that is still to come of the gradient, compliance times change [m/s].
+    """Of the impulses at y: residuals, velocity that is still to come of the gradient, compliance times change [m/s].
 
     The velocities that these impulses make are left in column OWN of the rows.
     """
@@ -192,7 +192,7 @@ def inner(R, O, coulomb, law, steps):
     enough, last = O.real[ENOUGH], steps + MANY
     while True:
         set_impulses(R)
-        worst, near, change = gaps(R, coulomb)
+        (worst, O.real[FORCE_RESIDUAL]), near, change = gaps(R, coulomb)
         if worst != worst:
             return BROKEN, worst, change, steps
         if worst <= enough or near <= max(0.1 * change, 0.1 * enough):
@@ -246,7 +246,7 @@ def search(R, O, coulomb, worst):
 
     Coulomb's law by turns: convex problems with De Saxce's additions held on to, and Newton's method on the law itself.
     """
-    steps, before, law, best = 0, 1e300, False, 1e300
+    steps, before, law, best, force = 0, 1e300, False, 1e300, 0.0
     rho = min(max(worst / fastest(R), SMALL_RHO), MOST_RHO) if rough(R) else FLAT_RHO
     set_slips(R, coulomb)
     for _ in range(4 * O.count[MOST] + 20):
@@ -260,6 +260,7 @@ def search(R, O, coulomb, worst):
             set_kind(R, COULOMB_CONTACT, CONTACT)
             if ended != CONVERGED or not worst < best:  # it has not come closer: on as before it
                 if ended == CUT:
+                    O.real[FORCE_RESIDUAL] = force
                     return CUT, best
                 from_held(R)
                 law, before, rho = False, 1e300, min(RAISE * rho, MOST_RHO)
@@ -267,7 +268,7 @@ def search(R, O, coulomb, worst):
         hold(R, coulomb)
         if ended == CUT or ended == BROKEN or worst <= O.real[ENOUGH]:
             return ended, worst
-        best, law = worst, coulomb > 0.0
+        best, force, law = worst, O.real[FORCE_RESIDUAL], coulomb > 0.0
         if ended == STALLED:
             rho, before = min(10.0 * rho, MOST_RHO), 1e300
         else:
@@ -289,7 +290,7 @@ def newton_solve(P, X, O, F):
     from_held(R)
     coulomb = 1.0 * O.count[COULOMB]
     set_own(R)
-    worst = residual(R, coulomb)
+    worst, O.real[FORCE_RESIDUAL] = residual(R, coulomb)
     O.count[USED] = 0
     ended = CONVERGED
     if not worst <= O.real[ENOUGH]:
@@ -297,7 +298,6 @@ def newton_solve(P, X, O, F):
         if ended == CUT:
             make_safe(R)
     O.count[ENDED], O.real[RESIDUAL] = ended, worst
-    O.real[FORCE_RESIDUAL] = 0.0
     if ended != BROKEN:
         hand_back(P, X, R, span)
     return O.count[USED]

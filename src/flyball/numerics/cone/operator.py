@@ -7,49 +7,39 @@ normal, about the two tangential axes. ``v`` (nn, 6 or more) and ``wide`` are an
 from __future__ import annotations
 
 from ...compiler.jit import formula
+from ...math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub
 from .problem import NONE, SOFT
+
+
+@formula
+def at_point(v, i, P, c, side):
+    """Velocity of a node at the contact."""
+    return add(load3(v, i, 0), cross(load3(v, i, 3), load3(P.arm, c, 3 * side)))
 
 
 @formula
 def seen(P, v, wide, c):
     """D v of contact c [m/s], without bias: velocity of side 2 less that of side 1."""
     i, j = P.at[c, 0], P.at[c, 1]
-    x, y, z = 0.0, 0.0, 0.0
+    u = (0.0, 0.0, 0.0)
     if j >= 0:
-        a, b, d = P.arm[c, 3], P.arm[c, 4], P.arm[c, 5]
-        x += v[j, 0] + v[j, 4] * d - v[j, 5] * b
-        y += v[j, 1] + v[j, 5] * a - v[j, 3] * d
-        z += v[j, 2] + v[j, 3] * b - v[j, 4] * a
+        u = at_point(v, j, P, c, 1)
     if i >= 0:
-        a, b, d = P.arm[c, 0], P.arm[c, 1], P.arm[c, 2]
-        x -= v[i, 0] + v[i, 4] * d - v[i, 5] * b
-        y -= v[i, 1] + v[i, 5] * a - v[i, 3] * d
-        z -= v[i, 2] + v[i, 3] * b - v[i, 4] * a
-    un, us, ut = along(P, c, x, y, z)
-    if i < NONE or j < NONE:
-        a, b, d = grouped(P, wide, c, 0)
-        un, us, ut = un + a, us + b, ut + d
-    return un, us, ut
+        u = sub(u, at_point(v, i, P, c, 0))
+    u = along(P, c, u)
+    return add(u, grouped(P, wide, c, 0)) if i < NONE or j < NONE else u
 
 
 @formula
-def along(P, c, x, y, z):
+def along(P, c, x):
     """Components along the contact's frame of a vector in the world."""
-    return (
-        P.frame[c, 0] * x + P.frame[c, 1] * y + P.frame[c, 2] * z,
-        P.frame[c, 3] * x + P.frame[c, 4] * y + P.frame[c, 5] * z,
-        P.frame[c, 6] * x + P.frame[c, 7] * y + P.frame[c, 8] * z,
-    )
+    return mv(load9(P.frame, c, 0), x)
 
 
 @formula
 def across(P, c, n, s, t):
     """The vector in the world with these components along the contact's frame."""
-    return (
-        P.frame[c, 0] * n + P.frame[c, 3] * s + P.frame[c, 6] * t,
-        P.frame[c, 1] * n + P.frame[c, 4] * s + P.frame[c, 7] * t,
-        P.frame[c, 2] * n + P.frame[c, 5] * s + P.frame[c, 8] * t,
-    )
+    return mtv(load9(P.frame, c, 0), (n, s, t))
 
 
 @formula
@@ -87,33 +77,38 @@ def push_groups(P, wide, c, first, p):
 
 
 @formula
-def twist_node(P, v, i, x, y, z):
-    """Change a node's angular velocity by an angular impulse."""
-    v[i, 3] += P.node[i, 1] * x + P.node[i, 4] * y + P.node[i, 5] * z
-    v[i, 4] += P.node[i, 4] * x + P.node[i, 2] * y + P.node[i, 6] * z
-    v[i, 5] += P.node[i, 5] * x + P.node[i, 6] * y + P.node[i, 3] * z
+def turned(P, i, t):
+    """What an angular impulse changes the angular velocity of node i by."""
+    return (
+        P.node[i, 1] * t[0] + P.node[i, 4] * t[1] + P.node[i, 5] * t[2],
+        P.node[i, 4] * t[0] + P.node[i, 2] * t[1] + P.node[i, 6] * t[2],
+        P.node[i, 5] * t[0] + P.node[i, 6] * t[1] + P.node[i, 3] * t[2],
+    )
 
 
 @formula
-def push_node(P, v, c, side, x, y, z):
+def twist_node(P, v, i, t):
+    """Change a node's angular velocity by an angular impulse."""
+    put3(v, i, 3, add(load3(v, i, 3), turned(P, i, t)))
+
+
+@formula
+def push_node(P, v, c, side, f):
     """Change a node's velocities by an impulse at the contact."""
-    i, m = P.at[c, side], P.node[P.at[c, side], 0]
-    a, b, d = P.arm[c, 3 * side], P.arm[c, 3 * side + 1], P.arm[c, 3 * side + 2]
-    v[i, 0] += m * x
-    v[i, 1] += m * y
-    v[i, 2] += m * z
-    twist_node(P, v, i, b * z - d * y, d * x - a * z, a * y - b * x)
+    i = P.at[c, side]
+    put3(v, i, 0, add(load3(v, i, 0), scale(P.node[i, 0], f)))
+    twist_node(P, v, i, cross(load3(P.arm, c, 3 * side), f))
 
 
 @formula
 def push(P, v, wide, c, p):
     """Change the velocities by the impulse p of contact c."""
     i, j = P.at[c, 0], P.at[c, 1]
-    x, y, z = across(P, c, p[0], p[1], p[2])
+    f = across(P, c, p[0], p[1], p[2])
     if j >= 0:
-        push_node(P, v, c, 1, x, y, z)
+        push_node(P, v, c, 1, f)
     if i >= 0:
-        push_node(P, v, c, 0, -x, -y, -z)
+        push_node(P, v, c, 0, neg(f))
     if i < NONE or j < NONE:
         push_groups(P, wide, c, 0, p)
 
@@ -122,27 +117,24 @@ def push(P, v, wide, c, p):
 def seen_turning(P, v, wide, c):
     """Relative angular velocity of contact c [rad/s] along its frame."""
     i, j = P.at[c, 0], P.at[c, 1]
-    x, y, z = 0.0, 0.0, 0.0
+    w = (0.0, 0.0, 0.0)
     if j >= 0:
-        x, y, z = v[j, 3], v[j, 4], v[j, 5]
+        w = load3(v, j, 3)
     if i >= 0:
-        x, y, z = x - v[i, 3], y - v[i, 4], z - v[i, 5]
-    un, us, ut = along(P, c, x, y, z)
-    if i < NONE or j < NONE:
-        a, b, d = grouped(P, wide, c, 3)
-        un, us, ut = un + a, us + b, ut + d
-    return un, us, ut
+        w = sub(w, load3(v, i, 3))
+    w = along(P, c, w)
+    return add(w, grouped(P, wide, c, 3)) if i < NONE or j < NONE else w
 
 
 @formula
 def push_turning(P, v, wide, c, p):
     """Change the velocities by the torque impulse p of contact c [N m s]."""
     i, j = P.at[c, 0], P.at[c, 1]
-    x, y, z = across(P, c, p[0], p[1], p[2])
+    t = across(P, c, p[0], p[1], p[2])
     if j >= 0:
-        twist_node(P, v, j, x, y, z)
+        twist_node(P, v, j, t)
     if i >= 0:
-        twist_node(P, v, i, -x, -y, -z)
+        twist_node(P, v, i, neg(t))
     if i < NONE or j < NONE:
         push_groups(P, wide, c, 3, p)
 

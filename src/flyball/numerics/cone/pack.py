@@ -10,8 +10,8 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from ...math.vec import cross, dot
-from .diagonal import axis, diagonal, turned
-from .operator import push, push_turning
+from .diagonal import axis, diagonal
+from .operator import push, push_turning, turned
 from .problem import NONE, ROUND
 from .projection import least_of, share
 

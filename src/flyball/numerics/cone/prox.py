@@ -10,6 +10,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from ...math.scalar import sqrt
 from .gather import ROWS
+from .projection import projected_above
 
 # columns of Rows.row: velocities with bias and no impulse; scaled y; its change along a step; scaled impulse; impulse
 # that is held on to; room of solvers
@@ -23,23 +24,8 @@ CONTACT, LINE, IDLE, COULOMB_CONTACT, TURNING = 0.0, 1.0, 2.0, 3.0, 4.0
 
 
 @formula
-def on_cone(mu, least, n, s, t):
-    """Nearest point of |(s, t)| <= mu n, n >= least."""
-    r = sqrt(s * s + t * t)
-    if r <= mu * n and n >= least:
-        return n, s, t
-    near = (n + mu * r) / (1.0 + mu * mu) if r > mu * n else n
-    if near <= least:
-        near = least
-        if r <= mu * least:
-            return least, s, t
-    a = mu * near / r if r > 0.0 else 0.0
-    return near, a * s, a * t
-
-
-@formula
 def derivative_on_cone(mu, least, n, s, t):
-    """Of `on_cone`: nn, ns, nt, ss, st, tt, and sn, tn, here the same as ns and nt."""
+    """Of `projected_above`: nn, ns, nt, ss, st, tt, and sn, tn, here the same as ns and nt."""
     r = sqrt(s * s + t * t)
     if r <= mu * n and n >= least:
         return 1.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0
@@ -85,7 +71,7 @@ def derivative_by_coulomb(mu, least, n, s, t):
 def nearest(x, o, n, s, t):
     """Scaled impulse nearest to a scaled one, of the row that begins at o in x."""
     if x[o + KIND] == CONTACT:
-        return on_cone(x[o + CONE], x[o + LEAST], n, s, t)
+        return projected_above(x[o + CONE], x[o + LEAST], n, s, t)
     if x[o + KIND] == COULOMB_CONTACT:
         return by_coulomb(x[o + CONE], x[o + LEAST], n, s, t)
     if x[o + KIND] == LINE:

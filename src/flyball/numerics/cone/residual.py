@@ -20,30 +20,30 @@ NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0)  # residual, impulse lacking, square of the 
 
 
 @formula
-def contacts_of(P, O):
-    """First contact of what is meant, and the one after its last."""
+def part_of(begin, whole, O):
+    """First of what is meant and the one after its last, where islands begin at ``begin``."""
     k = O.count[ISLAND]
     if k < 0:
-        return 0, P.size[0]
-    return P.island[k], P.island[k + 1]
+        return 0, whole
+    return begin[k], begin[k + 1]
+
+
+@formula
+def contacts_of(P, O):
+    """First contact of what is meant, and the one after its last."""
+    return part_of(P.island, P.size[0], O)
 
 
 @formula
 def nodes_of(P, O):
     """First node of what is meant and the one after its last, in ``member``."""
-    k = O.count[ISLAND]
-    if k < 0:
-        return 0, P.size[1]
-    return P.member_p[k], P.member_p[k + 1]
+    return part_of(P.member_p, P.size[1], O)
 
 
 @formula
 def lines_of(P, O):
     """First line of what is meant, and the one after its last."""
-    k = O.count[ISLAND]
-    if k < 0:
-        return 0, P.size[3]
-    return P.line_p[k], P.line_p[k + 1]
+    return part_of(P.line_p, P.size[3], O)
 
 
 @formula

@@ -68,6 +68,7 @@ def result_of(
         seconds=time.perf_counter() - since,
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
+        crowd=sum(b.count for b in model.bulk),
         contact=_contact_health(scene, stepper, o, smallest(scene, values)),
     )
     health.late = {
@@ -91,9 +92,11 @@ def result_of(
 def _picked(stepper: Stepper, solver: str) -> str:
     """The solver, and which islands went where."""
     picked = told(stepper.rooms.F)
-    if solver != "auto" or not len(picked):
+    if not len(picked):
         return solver
     newton, sweeps = int(picked[BY_ONE] - picked[HANDED_ON]), int(picked[BY_OTHER] + picked[HANDED_ON])
+    if solver != "auto":
+        return f"{solver}; {sweeps} of {newton + sweeps} islands by Gauss-Seidel" if sweeps else solver
     return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 

@@ -39,7 +39,7 @@ class Impulse:
         Coulomb's law. If not, the convex problem that approximates it, in which what slides floats up by friction
         coefficient times sliding speed times step.
     restitution : {"poisson", "newton", "moreau"}
-        Law of impacts.
+        Law of impacts that come together; one after the other they go by Poisson's.
     impacts : {"simultaneous", "sequential"}
         Whether what is hit at once is solved at once, or one contact after the other, the fastest first, as in Newton's
         cradle.
@@ -67,6 +67,11 @@ class Impulse:
         for name, known in (("solver", names()), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
             if getattr(self, name) not in known:
                 raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
+        if self.impacts == "sequential" and self.restitution != "poisson":
+            raise ModelError(
+                f"impacts='sequential' of Impulse go by Poisson's law, so restitution={self.restitution!r} would do "
+                f"nothing; leave one of the two out"
+            )
 
         if self.solver in CONVEX_ONLY and self.coulomb:
             raise ModelError(
