@@ -112,3 +112,20 @@ def test_a_solver_of_the_convex_problem_does_not_take_coulombs():
     with pytest.raises(fb.ModelError, match="coulomb=False"):
         fb.Impulse(solver="barzilai-borwein")
     assert not fb.Impulse(solver="barzilai-borwein", coulomb=False).coulomb
+
+
+def test_a_belt_gives_the_energy_of_what_bounces_on_it():
+    """Friction never gives any: a ball that drops on a belt gets its speed from the belt."""
+    m = fb.Mechanism("belt", gravity=(0, 0, -G))
+    m.add(fb.Material("belt", friction=0.5, restitution=0.8, surface_velocity=(1, 0, 0)))
+    m.add(fb.Ground("floor", shape=fb.Plane(), material="belt"))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 0.5)))
+    m.add(fb.Contact(friction=0.5, restitution=0.8))
+    run = m.simulate(0.6, outputs=61, method=fb.Impulse(step=1e-3))
+    friction, belt = run.exchanged["friction_loss"], run.exchanged["surface_work"]
+    assert np.diff(friction).min() > -1e-12
+    before = np.searchsorted(run.t, np.sqrt(2 * 0.4 / G)) + 1
+    impulse = run["ball"].vx[before]  # times 1 kg, all of it from the belt, which moves with 1 m/s
+    assert impulse > 0.1
+    assert belt[before] == pytest.approx(impulse, rel=1e-9)
+    assert np.abs(run.energy.balance).max() < 1e-10

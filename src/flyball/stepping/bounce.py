@@ -28,6 +28,7 @@ from .tables import (
     BOUNCE,
     ENOUGH_V,
     FLAT,
+    GIVEN,
     GRAVITY,
     HIT,
     IMPACTS,
@@ -73,13 +74,13 @@ def bounce(G, C, at, bias, R, Z, E, X, W, O, F, L, pace, now):
             R.least[c] = elasticity(G, C, L, c)
         if not one_after_the_other(R, Z, X, C, pace, now):
             pace.count[REDUCED] += 1
-        close(R, Z, X, C, pace, now)
+        close(R, bias, Z, X, C, pace, now)
         return True
     if pace.count[LAW] == POISSON:
         by_compression(G, C, bias, R, Z, E, X, W, O, F, L, pace, now)
     else:
         by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now)
-    close(R, Z, X, C, pace, now)
+    close(R, bias, Z, X, C, pace, now)
     return True
 
 
@@ -233,7 +234,7 @@ def expand(R, bias, Z, E, X, C, pace, now):
 
 
 @formula
-def close(R, Z, X, C, pace, now):
+def close(R, bias, Z, X, C, pace, now):
     """Impulses of the impacts, and what was lost in them."""
     for c in range(C.count[FOUND]):
         u = seen(R, X.v, X.wide, c)
@@ -241,8 +242,9 @@ def close(R, Z, X, C, pace, now):
             mean = 0.5 * (u[i] + now[c, BEFORE_KICK + i])
             if i == 0:
                 pace.real[LOST_IMPACT] -= Z.p[c, 0] * mean
-            else:
-                pace.real[LOST_FRICTION] -= Z.p[c, i] * mean
+            else:  # of a surface that moves the bias is its own motion
+                pace.real[LOST_FRICTION] -= Z.p[c, i] * (mean + bias[c, i])
+                pace.real[GIVEN] -= Z.p[c, i] * bias[c, i]
         k = across(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])
         for i in range(3):
             now[c, KICK + i] += k[i]

@@ -37,6 +37,9 @@ from .collect import Collected, coordinates, sets
 from .scene import smallest
 from .settings import Impulse
 
+ROUNDING = 1e-9
+NOTABLE = 0.01  # part of the largest kinetic energy
+
 
 def result_of(
     base: Assembly,
@@ -54,6 +57,7 @@ def result_of(
     t = np.array(kept.t)
     count = stepper.pace.count
     real = stepper.pace.real
+    contact = _contact_health(scene, stepper, o, smallest(scene, values))
     health = Health(
         success=not interrupted,
         message=f"interrupted by the user at t = {real[TIME]:.6g} s; what was computed is kept"
@@ -69,7 +73,7 @@ def result_of(
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
         crowd=sum(b.count for b in model.bulk),
-        contact=_contact_health(scene, stepper, o, smallest(scene, values)),
+        contact=contact,
     )
     health.late = {
         "mobility": partial(mobility, model, base),
@@ -86,7 +90,22 @@ def result_of(
     result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)
     result.bulk = sets(model, scene, kept)
+    health.contact = dataclasses.replace(contact, notes=(*contact.notes, *_made_energy(result)))
     return result
+
+
+def _made_energy(result: Result) -> tuple[str, ...]:
+    """A note where contacts gave energy, which what rolls or turns on them gets from long steps."""
+    lost = result.exchanged["friction_loss"] + result.exchanged["impact_loss"]
+    made = float(np.max(np.maximum.accumulate(lost) - lost, initial=0.0))
+    if made <= ROUNDING * float(np.max(np.abs(lost), initial=0.0)):
+        return ()
+    moving = float(np.max(result.energy.kinetic, initial=0.0))
+    if made <= NOTABLE * moving:
+        return ()
+    return (
+        f"contacts gave {made:.2g} J that they have not, {made / moving:.2g} of the kinetic energy: take shorter steps",
+    )
 
 
 def _picked(stepper: Stepper, solver: str) -> str:
