@@ -139,5 +139,28 @@ def test_what_steps_by_impulses_cannot_do_is_refused():
     m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
     with pytest.raises(fb.ModelError, match="absolute coordinates"):
         m.simulate(0.1, coordinates="joint")
-    with pytest.raises(fb.ModelError, match="go on from a result"):
-        m.simulate(0.2, start=m.simulate(0.1, outputs=2))
+
+
+def test_a_motion_with_contact_goes_on_from_where_one_ended():
+    """Free bodies, sets of bodies, a mechanism with a driver and a stop: in two parts as in one."""
+    m = scene(friction=0.3)
+    m.add(fb.Body("ball", mass=1.0, inertia=(0.004, 0.005, 0.006), position=(0, 0, 0.3), velocity=(1, 0, 0),
+                  angular_velocity=(3, 20, 1), shape=fb.Sphere(radius=0.1)))  # fmt: skip
+    m.add(fb.Bodies("many", mass=0.5, shape=fb.Sphere(radius=0.05), position=[(k, 2.0, 0.2) for k in range(3)]))
+    m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, -2, 0.6), shape=fb.Sphere(radius=0.1)))
+    m.add(fb.Spherical("hinge", "ground", "bob", at=(0.0, -2, 0.6)))
+    m.add(fb.Body("cart", mass=1.0, inertia=(0.1,) * 3, position=(0, -4, 1)))
+    m.add(fb.Prismatic("rail", "ground", "cart", at=(0, -4, 1), axis=(1, 0, 0)))
+    m.add(fb.Driver("push", "rail.displacement", law="sin(3*t)"))
+    whole = m.simulate(0.8, outputs=9)
+    first = m.simulate(0.4, outputs=5)
+    then = m.simulate(0.8, outputs=5, start=first)
+    assert then.t[0] == 0.4
+    for name in ("ball", "bob", "cart"):
+        for part, at in ((first, slice(0, 5)), (then, slice(4, 9))):
+            assert part[name].position == pytest.approx(whole[name].position[at], abs=1e-6)
+            assert part[name].velocity == pytest.approx(whole[name].velocity[at], abs=1e-5)
+    assert then.bulk["many"].position == pytest.approx(whole.bulk["many"].position[4:], abs=1e-6)
+    assert then["push"].work == pytest.approx(whole["push"].work[4:], abs=1e-9)
+    with pytest.raises(fb.ModelError, match="start"):
+        m.simulate(0.8, t_start=0.1, start=first)

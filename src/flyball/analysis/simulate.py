@@ -67,7 +67,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     o = chosen(model, o)
     if isinstance(o.method, Impulse):
         with shown(o.progress, "simulating") as tell:
-            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell)
+            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
@@ -105,8 +105,6 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         raise ModelError(
             "steps by impulses are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
         )
-    if o.start is not None:
-        raise ModelError("steps by impulses do not go on from a result yet: leave out start")
     return replace(o, method=o.method.bounded(o.max_step))
 
 

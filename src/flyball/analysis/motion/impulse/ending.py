@@ -87,7 +87,7 @@ def result_of(
         states, lam = kept.held.into(values, q, v, vdot)
         health.violation, health.velocity_violation = max(kept.held.gaps), max(kept.held.slips)
     result = Result(model, values, t, q, v, states, vdot, lam, health)
-    result.final = (float(real[TIME]), np.concatenate([q[-1], v[-1], states[-1]]))
+    result.final = (float(t[-1]), np.concatenate([q[-1], v[-1], states[-1]]))
     sums = np.array(kept.sums)
     result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)

@@ -11,8 +11,10 @@ from ....model.model import Model
 from ....stepping.joined import STEP, V_AFTER, V_BEFORE, Joined
 from ....tables.system import G_VALUE, NQ, NU, NV, Q0, V0
 from ....tables.values import Values
+from ...assembly.start import Assembly
 from ..start import Start, begin
 from .alone import alone, stops_of, with_stops
+from .going_on import part_of
 from .mechanism import tables
 from .parts import Parts
 
@@ -74,13 +76,22 @@ class Held:
 
 
 def held_apart(
-    whole: Values, t: float, parameters: Mapping[str, float] | None, found: Parts, first: int, coordinates: str
+    whole: Values,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    found: Parts,
+    first: int,
+    base: Assembly | None = None,
 ) -> Held | None:
-    """The mechanism of a model, if joints, forces or stops hold any of its bodies; ``first`` is its first mover."""
+    """The mechanism of a model, if joints, forces or stops hold any of its bodies; ``first`` is its first mover.
+
+    It begins where ``base`` is, or else as described.
+    """
     if not found.held:
         return None
     model = whole.structure.model
-    start = begin(alone(with_stops(model), found.held), t, parameters, None, coordinates)
+    own = alone(with_stops(model), found.held)
+    start = part_of(base, own, parameters) if base else begin(own, t, parameters, None, "absolute")
     return Held(start, tables(start, found.held, first, 1.0, stops_of(model, whole)))
 
 

@@ -19,12 +19,12 @@ from ....stepping.needed import needed
 from ....stepping.stepper import NoWay, Stepper
 from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
-from ...assemble import assemble
 from ...compiled import compiled
 from ...progress import Tell
 from .collect import Collected
 from .drawn import as_drawn, moving
 from .ending import result_of
+from .going_on import base_of, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
 from .scene import begin, movers, placed
@@ -45,6 +45,7 @@ def impulse_motion(
     o: Impulse,
     parameters: Mapping[str, float] | None,
     tell: Tell,
+    before: Result | None = None,
 ) -> Result:
     """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
 
@@ -63,11 +64,13 @@ def impulse_motion(
     scene = touching(model, values.given, (*found.free, *found.held))
     free = len(scene.carriers.mass) - len(found.held)
     with made_ready(scene, o, free, bool(found.held)) as ready:
-        drawn = as_drawn(plain, span[0])
-        base = drawn or assemble(model, t=span[0], parameters=parameters)
-        held = held_apart(values, span[0], parameters, found, free, "absolute")
+        drawn = as_drawn(plain, span[0]) if before is None else None
+        base = drawn or base_of(model, span[0], parameters, before)
+        held = held_apart(values, span[0], parameters, found, free, base if before is not None else None)
         ready.finish()
     at = movers(scene, moving(drawn)) if drawn else placed(scene, base)
+    if before is not None:
+        place_sets(scene, at, before)
     try:
         stepper = begin(scene, at, values, o, held)
     except NoWay:
