@@ -27,7 +27,7 @@ def has_contact(model: Model) -> bool:
 
 def nothing_touches(model: Model) -> tuple[str, ...]:
     """What to say where shapes stand on ground, or bodies lie in sets, and no contact lets anything touch."""
-    there = [*model.ground, *model.bulk]
+    there: list[Owner] = [*model.ground, *model.bulk]
     if model.contacts or not any(s.touches for e in there for s in e.shapes()):
         return ()
     return (
