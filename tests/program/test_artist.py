@@ -29,7 +29,7 @@ PICTURES = [
 def second(monkeypatch: pytest.MonkeyPatch) -> None:
     """A second process, whatever this one has imported and however many cores there are."""
     monkeypatch.delitem(sys.modules, "matplotlib", raising=False)
-    monkeypatch.setattr(beside, "_cores", lambda: 2)
+    monkeypatch.setattr(beside, "cores", lambda: 2)
 
 
 def folder(path: Path, name: str) -> Path:
@@ -98,13 +98,13 @@ def test_it_ends_in_silence_when_nothing_is_asked() -> None:
 
 def test_one_core_or_no_pictures_want_none(second: None, monkeypatch: pytest.MonkeyPatch) -> None:
     assert Artist(beside=False)._process is None
-    monkeypatch.setattr(beside, "_cores", lambda: 1)
+    monkeypatch.setattr(beside, "cores", lambda: 1)
     assert Artist()._process is None
 
 
 def test_the_command_imports_neither_units_nor_sparse_matrices_nor_pictures(tmp_path: Path) -> None:
     code = (
-        "import sys; from flyball.view import beside; beside._cores = lambda: 2\n"
+        "import sys; from flyball.view import beside; beside.cores = lambda: 2\n"
         "from flyball.cli import main\n"
         "try: main(sys.argv[1:])\n"
         "except SystemExit as end: assert not end.code\n"

@@ -64,6 +64,8 @@ def test_switches_show_and_hide(opened: Open) -> None:
     assert tab.evaluate("[flyball.shown(), flyball.arrows(), flyball.axes()]") == [[], [], []]
     bare = tab.picture()
     for name in SHOW:
+        if name == "contacts":  # nothing touches: no such switch
+            continue
         tab.evaluate("(name) => flyball.show(name)", name)
         assert tab.evaluate("flyball.shown()") == [name]
         # moments alone add to nothing, of the elements there is a moment only, names are no part of the drawing

@@ -44,7 +44,9 @@ class Sought(Found):
 
     def motions(self, m: Mobility) -> tuple[FreeMotion, ...]:
         """See `Mobility.motions`."""
-        return free_motions(self.assembly, self.velocities)
+        a = self.assembly
+        a.compiled.at(a.t, a.q, a.v)  # turns are named by where bodies are
+        return free_motions(a, self.velocities)
 
     def geometry(self, m: Mobility) -> Geometry:
         """See `Mobility.geometry`."""

@@ -23,7 +23,7 @@ EXPONENT = 1.5  # of Hertz' law
 
 
 def _law(value: Any) -> Any:
-    if value not in NUMBERS:
+    if not isinstance(value, str) or value not in NUMBERS:
         raise ValueError(f"give one of {', '.join(NUMBERS)}")
     return value
 
