@@ -7,7 +7,7 @@ import numpy as np
 
 import flyball as fb
 
-SIDE, TALL, THICK = 1.0, 0.45, 0.04  # of the box [m]
+SIDE, TALL, THICK = 1.0, 0.6, 0.04  # of the box [m]
 PITCH, ROW = 0.16, 5  # distance of what is poured, and how many lie in a row
 
 

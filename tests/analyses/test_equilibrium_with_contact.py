@@ -64,8 +64,8 @@ def test_a_ladder_stands_at_coulombs_angle() -> None:
     assert sum(k.normal for k in head) == pytest.approx(10 * G / (2 * math.tan(least + 0.01)), rel=1e-6)
     assert max(k.used for k in foot) == pytest.approx(math.tan(least) / math.tan(least + 0.01), rel=1e-5)
     assert e.stability == "stable"
-    with pytest.raises(fb.NotConverged):
-        ladder(least - 0.01, 0.4).equilibrium()
+    fallen = ladder(least - 0.01, 0.4).equilibrium()  # below it slides down, and lies on the floor
+    assert fallen["rod.y"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_three_balls_need_the_friction_of_the_pile() -> None:

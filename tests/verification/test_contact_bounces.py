@@ -76,6 +76,8 @@ def test_a_ball_that_spins_bounces_askew():
 @pytest.mark.parametrize("law", LAWS)
 def test_blows_that_follow_within_a_step(gap, impacts, law):
     """Five equal balls in a row, 1 mm a step: each hands its speed on to the next however near that is."""
+    if impacts == "sequential" and law != "poisson":
+        pytest.skip("one after the other they go by Poisson's law")
     m = fb.Mechanism("row", gravity=(0, 0, 0))
     m.add(fb.Contact(friction=0.0, restitution=1.0))
     for k in range(5):
