@@ -39,7 +39,7 @@ def test_islands_one_by_one(limit, kind, seed):
     free = np.concatenate([X.v[:, :6].ravel(), X.wide])
     O.count[MOST], O.real[ENOUGH] = 200_000, 1e-12
     made = ready("auto", P, X, W, O)
-    made.F.limit[:] = limit, 100, limit, 100
+    made.F.limit[:] = limit, 100, limit, 100, 1000
     made.F.doors[THE_REST] = gauss_seidel.address(P, X, W, O, Factor(made.F.numbers, made.F.places))
     solve_kernel(made.address, P, X, W, O, made.F)
     p = impulses(P, X)

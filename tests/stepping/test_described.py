@@ -129,3 +129,16 @@ def test_a_belt_gives_the_energy_of_what_bounces_on_it():
     assert impulse > 0.1
     assert belt[before] == pytest.approx(impulse, rel=1e-9)
     assert np.abs(run.energy.balance).max() < 1e-10
+
+
+def test_few_bodies_on_many_feet_stand():
+    """Contacts of a crowd, but bodies so few that Newton's method is all that was compiled."""
+    m = fb.Mechanism("tables", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("floor", shape=fb.Plane()), fb.Contact(friction=0.3))
+    feet = [fb.Box(edges=(0.1, 0.1, 0.1), position=(x, 0, 0)) for x in (-0.3, -0.1, 0.1, 0.3)]
+    where = np.stack([np.arange(30.0), np.zeros(30), np.full(30, 0.05)], axis=1)
+    m.add(fb.Bodies("tables", shape=feet, density=1000, position=where))
+    r = m.simulate(0.1, outputs=3)
+    assert r.health.contact.most == 30 * 16
+    assert r.bulk["tables"].position[-1] == pytest.approx(where, abs=1e-9)
+    assert r.contacts.on("tables").force[-1] == pytest.approx([0, 0, 30 * 4 * 9.81], abs=1e-6)

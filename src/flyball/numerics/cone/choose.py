@@ -35,12 +35,13 @@ from .problem import (
 
 # entries of Auto.doors: addresses of what takes small islands and of what takes the rest (0: all are small)
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
-# entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN
-MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, LIMITS = range(5)
+# entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN;
+# contacts of all islands above which it is a CROWD: what falls together hits anew in every step, and Newton's method has
+# no warm start there
+MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, CROWD, LIMITS = range(6)
 FINER, FINEST = 1e-5, 1e-10  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long
-CROWD = 400  # contacts of all islands from which on small ones are those of few contacts: what falls together hits anew
-FEW_CONTACTS, FEW_NODES = 12, 4  # in every step, and Newton's method has no warm start there
+FEW_CONTACTS, FEW_NODES = 12, 4  # of an island that is small in a crowd
 # entries of Auto.told, added up over calls: calls, islands, islands by the one and by the other, what the one had to
 # hand on to the other, contacts by the one; the largest island's contacts
 CALLS, ISLANDS, BY_ONE, BY_OTHER, HANDED_ON, CONTACTS_BY_ONE, LARGEST, TOLD = range(8)
@@ -103,7 +104,7 @@ def small(P, F, I, k):
     if P.turn.shape[0] > 0:
         return False
     contacts, nodes = I.island[k + 1] - I.island[k], I.member_p[k + 1] - I.member_p[k]
-    crowded = P.size[0] > CROWD and (contacts > FEW_CONTACTS or nodes > FEW_NODES)
+    crowded = P.size[0] > F.limit[CROWD] and (contacts > FEW_CONTACTS or nodes > FEW_NODES)
     if not crowded and contacts <= F.limit[MOST_CONTACTS] and nodes <= F.limit[MOST_NODES]:
         return True
     if contacts > F.limit[MOST_CONTACTS_UNEVEN] or nodes > F.limit[MOST_NODES_UNEVEN]:

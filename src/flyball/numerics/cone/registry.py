@@ -33,6 +33,7 @@ FACTORED = {"newton", "admm"}  # those that want `Factor`: each island by itself
 # islands up to this size go to Newton, contacts and nodes: with masses that are alike, where 50 sweeps take as long as
 # five of its steps, and with uneven ones or joints, where sweeps do not get there
 EVEN, UNEVEN = (200, 40), (800, 150)
+MANY = 400  # contacts of a crowd
 PLACES, NUMBERS = 60, 250  # of `Factor`, for each contact and node of the largest island that is to fit
 
 
@@ -78,7 +79,7 @@ def ready(name: str, P: Problem, X: State, W: Scratch, O: Choices) -> Ready:
     first = SOLVERS["newton" if name == "auto" else name]
     made.doors[SMALL_ISLANDS] = first.address(P, X, W, O, f)
     if name == "auto" and is_small(len(P.node), len(P.group) - 1, len(P.turn) > 0):
-        made.limit[:] = len(P.mu), len(P.node), len(P.mu), len(P.node)  # few bodies: nothing is left for sweeps
+        made.limit[:] = room_for_any(P)  # few bodies: nothing is left for sweeps, which have no door
     else:
         made.doors[THE_REST] = gauss_seidel.address(P, X, W, O, f)
     return Ready(auto.address(P, X, W, O, made), made, made.told)
@@ -100,11 +101,17 @@ def needed(name: str, small: bool) -> list[tuple[Door, tuple[Any, ...]]]:
     return [*((d, (P, X, W, O, F)) for d in [*first, *rest]), (auto, (P, X, W, O, room_for_all(P, False)))]
 
 
+def room_for_any(P: Problem) -> tuple[int, ...]:
+    """Limits by which every island is small, of problems of these capacities."""
+    nc, nn = len(P.mu), len(P.node)
+    return nc, nn, nc, nn, nc
+
+
 def room_for_all(P: Problem, whole: bool) -> Auto:
     """Rooms of `auto`; ``whole``: for islands of any size."""
     nc, nn, ng, nl = len(P.mu), len(P.node), len(P.group) - 1, len(P.line_at)
     limit = np.zeros(LIMITS, np.int64)
-    limit[:] = (nc, nn, nc, nn) if whole or nn <= EVEN[1] else (*EVEN, *UNEVEN)
+    limit[:] = room_for_any(P) if whole or nn <= EVEN[1] else (*EVEN, *UNEVEN, MANY)
     contacts, nodes = min(nc, int(limit[MOST_CONTACTS_UNEVEN])), min(nn, int(limit[MOST_NODES_UNEVEN]))
     wide = int(P.group[-1]) + 6 * ng
     islands = room_for_islands(nc, nn, ng, nl)
