@@ -19,9 +19,9 @@ velocity d, U, D and 1 / D.
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.vec import add, cross, dot, load3, load9, mtv, mv, put3, put9, scale, sub
+from ..math.vec import add, cross, dot, load3, load9, mtv, mv, put3, put9, scale, sub, symmetric
 from ..tables.system import BODY_LAW, NV, PARENT, V0
-from .mass import load6, plus, put6, rigid, root_columns, symmetric
+from .mass import load6, plus, put6, rigid, root_columns
 
 # columns of W.IC: parts of an inertia, after J; whether any waits there; a wrench or acceleration that does
 COUPLING, LINEAR, LOST, TOTAL, WAITING, PASSED = 6, 15, 21, 22, 23, 24

@@ -9,7 +9,7 @@ diagonal and none of this runs.
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.vec import add, cross, dot, load3, load9, put3, scale, sub
+from ..math.vec import add, cross, dot, load3, load9, put3, scale, sub, symmetric
 from ..tables.system import INERTIA, MASS, NV, PARENT, POINT, REVOLUTE, TREE, V0
 from .tree import column
 
@@ -35,16 +35,6 @@ def put6(A, k, o, a):
 def plus(a, b):
     """Sum of two symmetric matrices."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3], a[4] + b[4], a[5] + b[5])
-
-
-@formula
-def symmetric(J, v):
-    """J v for a symmetric matrix."""
-    return (
-        J[0] * v[0] + J[1] * v[1] + J[2] * v[2],
-        J[1] * v[0] + J[3] * v[1] + J[4] * v[2],
-        J[2] * v[0] + J[4] * v[1] + J[5] * v[2],
-    )
 
 
 @formula

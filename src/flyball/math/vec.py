@@ -73,6 +73,30 @@ def mtv(R, a):
 
 
 @formula
+def symmetric(J, a):
+    """J a of a symmetric J = (xx, xy, xz, yy, yz, zz)."""
+    return (
+        J[0] * a[0] + J[1] * a[1] + J[2] * a[2],
+        J[1] * a[0] + J[3] * a[1] + J[4] * a[2],
+        J[2] * a[0] + J[4] * a[1] + J[5] * a[2],
+    )
+
+
+@formula
+def axes_across(n):
+    """Two unit vectors square to the unit vector n and to each other (Duff and others, 2017).
+
+    Where n lies in z = 0, z is the second, so that what moves in that plane stays in it to the last bit.
+    """
+    if n[2] == 0.0:
+        return (-n[1], n[0], 0.0 * n[0]), (0.0 * n[0], 0.0 * n[0], 1.0 + 0.0 * n[0])
+    s = 1.0 if n[2] >= 0.0 else -1.0
+    a = -1.0 / (s + n[2])
+    b = n[0] * n[1] * a
+    return (1.0 + s * n[0] * n[0] * a, s * b, -s * n[0]), (b, s + n[1] * n[1] * a, -n[1])
+
+
+@formula
 def mm(A, B):
     """A B."""
     return (

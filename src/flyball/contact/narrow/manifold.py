@@ -11,7 +11,7 @@ from __future__ import annotations
 from math import inf
 
 from ...compiler.jit import formula
-from ...math.vec import add, dot, mtv, neg, put3, scale
+from ...math.vec import add, axes_across, dot, mtv, neg, put3, scale
 from ..tables import KIND, RADIUS
 from .any_shape import face, radius
 from .cut import DEPTH, EDGE, X, Y, Z, along_line, cut_face, cut_line, slope
@@ -25,16 +25,9 @@ PAIRS_OF_FACES = 65536.0
 
 @formula
 def axes_of(n):
-    """Two unit vectors square to the unit vector n and to each other, and n (Duff et al. 2017).
-
-    Where n lies in z = 0, z is one of them, so that planar contacts stay at z = 0 to the last bit.
-    """
-    if n[2] == 0.0:
-        return (-n[1], n[0], 0.0), (0.0, 0.0, 1.0), n
-    s = 1.0 if n[2] >= 0.0 else -1.0
-    a = -1.0 / (s + n[2])
-    b = n[0] * n[1] * a
-    return (1.0 + s * n[0] * n[0] * a, s * b, -s * n[0]), (b, s + n[1] * n[1] * a, -n[1]), n
+    """Two unit vectors square to the unit vector n, and n."""
+    u, v = axes_across(n)
+    return u, v, n
 
 
 @formula

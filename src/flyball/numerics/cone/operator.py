@@ -77,13 +77,15 @@ def push_groups(P, wide, c, first, p):
 
 
 @formula
+def block_at(A, i, o):
+    """A symmetric matrix that stands as xx yy zz xy xz yz in row i of a table, from column o, for ``vec.symmetric``."""
+    return (A[i, o], A[i, o + 3], A[i, o + 4], A[i, o + 1], A[i, o + 5], A[i, o + 2])
+
+
+@formula
 def turned(P, i, t):
     """What an angular impulse changes the angular velocity of node i by."""
-    return (
-        P.node[i, 1] * t[0] + P.node[i, 4] * t[1] + P.node[i, 5] * t[2],
-        P.node[i, 4] * t[0] + P.node[i, 2] * t[1] + P.node[i, 6] * t[2],
-        P.node[i, 5] * t[0] + P.node[i, 6] * t[1] + P.node[i, 3] * t[2],
-    )
+    return symmetric(block_at(P.node, i, BLOCK), t)
 
 
 @formula
