@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.vec import add
-from .free import inverse_in_world, matrix, middle, momentum_of, rotated, spun, times, turned, unrotated
-from .tables import ANGLE, FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
+from ..math.vec import add, dot, load3, load9, mtv, mv, put3, put9, quaternion_matrix, symmetric
+from ..numerics.cone.operator import block_at
+from .free import inverse_in_world, middle, spun, turned
+from .tables import ANGLE, FREE_INERTIA, FREE_INVERSE, FREE_MASS, FREE_PER_MASS, FREE_ROUND, GRAVITY, LOST_IMPACT, STEP
 
 EPS = 1e-300
 
@@ -20,23 +21,7 @@ def fall(N, M, P, X, pace):
             M.twist[k, 3 + i] = X.v[k, 3 + i]
         P.node[k, 0] = N.body[k, FREE_PER_MASS]
         if N.body[k, FREE_ROUND] == 0.0:
-            inverse_in_world(axes(M.pose, k), N.body, k, P.node)
-
-
-@formula
-def axes(pose, k):
-    """Rotation of a mover, row by row."""
-    return (
-        pose[k, 3],
-        pose[k, 4],
-        pose[k, 5],
-        pose[k, 6],
-        pose[k, 7],
-        pose[k, 8],
-        pose[k, 9],
-        pose[k, 10],
-        pose[k, 11],
-    )
+            inverse_in_world(load9(M.pose, k, 3), N.body, k, P.node)
 
 
 @formula
@@ -80,34 +65,20 @@ def displace(N, M, X, lifts, pace):
         for i in range(3):
             pace.real[LOST_IMPACT] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * lifts[k, i]
             M.pose[k, i] += h * (X.v[k, i] + N.move[k, i] + lifts[k, i])
-        w = (X.v[k, 3], X.v[k, 4], X.v[k, 5])
-        d = (
-            N.move[k, 3] + lifts[k, 3],
-            N.move[k, 4] + lifts[k, 4],
-            N.move[k, 5] + lifts[k, 5],
-        )
-        if w[0] * w[0] + w[1] * w[1] + w[2] * w[2] + d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < EPS:
+        w, d = load3(X.v, k, 3), add(load3(N.move, k, 3), load3(lifts, k, 3))
+        if dot(w, w) + dot(d, d) < EPS:
             continue
         q = (N.turn[k, 0], N.turn[k, 1], N.turn[k, 2], N.turn[k, 3])
         if N.body[k, FREE_ROUND] > 0.0:
             w = add(w, d)
-            if w[0] * w[0] + w[1] * w[1] + w[2] * w[2] < EPS:
+            if dot(w, w) < EPS:
                 continue
             q = spun(q, w, h)
             N.move[k, ANGLE] += h * w[2]
         else:
-            R = axes(M.pose, k)
-            mean, p = middle(N.body, k, momentum_of(N.body, k, unrotated(R, w)), h)
-            q = turned(q, rotated(R, mean), h)
-            q = turned(q, d, h)
-            put(X.v, k, rotated(matrix(q), times(N.body, k, FREE_INVERSE, p)))
+            R, inverse = load9(M.pose, k, 3), block_at(N.body, k, FREE_INVERSE)
+            mean, p = middle(inverse, symmetric(block_at(N.body, k, FREE_INERTIA), mtv(R, w)), h)
+            q = turned(turned(q, mv(R, mean), h), d, h)
+            put3(X.v, k, 3, mv(quaternion_matrix(q[0], q[1], q[2], q[3]), symmetric(inverse, p)))
         N.turn[k, 0], N.turn[k, 1], N.turn[k, 2], N.turn[k, 3] = q
-        R = matrix(q)
-        for i in range(9):
-            M.pose[k, 3 + i] = R[i]
-
-
-@formula
-def put(v, k, w):
-    """Angular velocity of node k."""
-    v[k, 3], v[k, 4], v[k, 5] = w
+        put9(M.pose, k, 3, quaternion_matrix(q[0], q[1], q[2], q[3]))

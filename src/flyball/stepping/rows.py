@@ -6,21 +6,9 @@ from ..compiler.jit import formula
 from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
+from ..math.vec import axes_across, cross, dot, load3, load9, mv, put3, scale, sub
 from ..numerics.cone.operator import seen
 from .tables import GRAVITY, IMPULSE, SLIDES, STEP
-
-
-@formula
-def tangent(n):
-    """A unit vector across the unit vector n (Duff and others, 2017); for n in the plane of x and y one in it too.
-
-    So what moves in that plane stays in it to the last digit.
-    """
-    if n[2] == 0.0:
-        return (-n[1], n[0], 0.0 * n[0])
-    s = 1.0 if n[2] >= 0.0 else -1.0
-    a = -1.0 / (s + n[2])
-    return (1.0 + s * n[0] * n[0] * a, s * n[0] * n[1] * a, -s * n[0])
 
 
 @formula
@@ -34,11 +22,10 @@ def fill_rows(G, M, C, P, L, pace):
         i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
         a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
         P.at[c, 0], P.at[c, 1] = a, b
-        n = (C.x[c, NORMAL], C.x[c, NORMAL + 1], C.x[c, NORMAL + 2])
-        for k in range(3):
-            P.frame[c, k] = n[k]
-            P.arm[c, k] = C.x[c, POINT + k] - M.pose[a, k] if a >= 0 else 0.0
-            P.arm[c, 3 + k] = C.x[c, POINT + k] - M.pose[b, k] if b >= 0 else 0.0
+        n, point = load3(C.x, c, NORMAL), load3(C.x, c, POINT)
+        put3(P.frame, c, 0, n)
+        put3(P.arm, c, 0, sub(point, load3(M.pose, a, 0)) if a >= 0 else (0.0, 0.0, 0.0))
+        put3(P.arm, c, 3, sub(point, load3(M.pose, b, 0)) if b >= 0 else (0.0, 0.0, 0.0))
         law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
         cross_frame(P.frame, c, direction(G, M, L, i, a, n), law[ACROSS])
         gap = C.x[c, GAP]
@@ -56,50 +43,34 @@ def fill_rows(G, M, C, P, L, pace):
 @formula
 def direction(G, M, L, i, a, n):
     """A tangent: along the grain of shape i where anisotropic friction has one, any other where it has none."""
-    t = tangent(n)
     if L.grain.shape[0] > 0:
-        g = (L.grain[i, 0], L.grain[i, 1], L.grain[i, 2])
-        if a >= 0:
-            g = along_world(M, a, g)
-        d = g[0] * n[0] + g[1] * n[1] + g[2] * n[2]
-        g = (g[0] - d * n[0], g[1] - d * n[1], g[2] - d * n[2])
-        s = g[0] * g[0] + g[1] * g[1] + g[2] * g[2]
+        g = along_world(M, a, load3(L.grain, i, 0))
+        g = sub(g, scale(dot(g, n), n))
+        s = dot(g, g)
         if s > 1e-12:
-            s = 1.0 / sqrt(s)
-            return (s * g[0], s * g[1], s * g[2])
-    return t
+            return scale(1.0 / sqrt(s), g)
+    return axes_across(n)[0]
 
 
 @formula
 def along_world(M, a, g):
-    """A vector in the axes of mover a, along the world's."""
-    return (
-        M.pose[a, 3] * g[0] + M.pose[a, 4] * g[1] + M.pose[a, 5] * g[2],
-        M.pose[a, 6] * g[0] + M.pose[a, 7] * g[1] + M.pose[a, 8] * g[2],
-        M.pose[a, 9] * g[0] + M.pose[a, 10] * g[1] + M.pose[a, 11] * g[2],
-    )
+    """A vector in the axes of mover a, or of what stands still, along the world's."""
+    return mv(load9(M.pose, a, 3), g) if a >= 0 else g
 
 
 @formula
 def cross_frame(frame, c, t, ratio):
     """Rows t1 = t and t2 = ratio n x t: in a circular cone, forces across are ``ratio`` times as large."""
-    n0, n1, n2 = frame[c, 0], frame[c, 1], frame[c, 2]
-    frame[c, 3], frame[c, 4], frame[c, 5] = t
-    frame[c, 6] = ratio * (n1 * t[2] - n2 * t[1])
-    frame[c, 7] = ratio * (n2 * t[0] - n0 * t[2])
-    frame[c, 8] = ratio * (n0 * t[1] - n1 * t[0])
+    put3(frame, c, 3, t)
+    put3(frame, c, 6, scale(ratio, cross(load3(frame, c, 0), t)))
 
 
 @formula
 def add_belt(M, L, P, c, shape, mover, sign):
     """The velocity of a surface on its mover, such as a conveyor's."""
-    g = (L.belt[shape, 0], L.belt[shape, 1], L.belt[shape, 2])
-    if mover >= 0:
-        g = along_world(M, mover, g)
+    g = along_world(M, mover, load3(L.belt, shape, 0))
     for k in range(2):
-        f = 3 + 3 * k
-        u = P.frame[c, f] * g[0] + P.frame[c, f + 1] * g[1] + P.frame[c, f + 2] * g[2]
-        P.bias[c, 1 + k] += sign * u
+        P.bias[c, 1 + k] += sign * dot(load3(P.frame, c, 3 + 3 * k), g)
 
 
 @formula

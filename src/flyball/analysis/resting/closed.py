@@ -10,9 +10,9 @@ from ...contact import surfaces as su
 from ...contact.finder import Finder
 from ...contact.tables import FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ...errors import ModelError
+from ...math.vec import axes_across
 from ...model.body import GROUND
 from ...model.model import Model
-from ...stepping.rows import tangent
 from ...tables.contact import Touching, touching
 from ...tables.coordinates import BodyState
 from ...tables.system import NV, V0
@@ -55,7 +55,7 @@ class Closed:
     def frame(self) -> np.ndarray:
         """Rows: the normal and two tangents; in the plane the first of these lies in it."""
         n = self.normal
-        t = np.array([n[1], -n[0], 0.0]) if n[2] == 0.0 else np.array(tangent(tuple(n)))
+        t = np.array([n[1], -n[0], 0.0]) if n[2] == 0.0 else np.array(axes_across(tuple(n))[0])
         return np.array([n, t, np.cross(n, t)])
 
 

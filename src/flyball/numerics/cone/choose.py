@@ -36,8 +36,8 @@ from .problem import (
 # entries of Auto.doors: addresses of what takes small islands and of what takes the rest (0: all are small)
 SMALL_ISLANDS, THE_REST, DOORS = range(3)
 # entries of Auto.limit: most contacts and most nodes of an island that is small; the same where masses are UNEVEN;
-# contacts of all islands above which it is a CROWD: what falls together hits anew in every step, and Newton's method has
-# no warm start there
+# contacts of all islands above which it is a CROWD: what falls together hits anew in every step, and Newton's method
+# has no warm start there
 MOST_CONTACTS, MOST_NODES, MOST_CONTACTS_UNEVEN, MOST_NODES_UNEVEN, CROWD, LIMITS = range(6)
 FINER, FINEST = 1e-5, 1e-10  # times the residual that is enough; but no finer than this [m/s], which rounding may hide
 UNEVEN = 30.0  # ratio of masses in an island from which on sweeps take too long

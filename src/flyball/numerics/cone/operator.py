@@ -7,8 +7,8 @@ normal, about the two tangential axes. ``v`` (nn, 6 or more) and ``wide`` are an
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from ...math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub
-from .problem import NONE, SOFT
+from ...math.vec import add, cross, load3, load9, mtv, mv, neg, put3, scale, sub, symmetric
+from .problem import BLOCK, NONE, SOFT
 
 
 @formula
@@ -80,6 +80,12 @@ def push_groups(P, wide, c, first, p):
 def block_at(A, i, o):
     """A symmetric matrix that stands as xx yy zz xy xz yz in row i of a table, from column o, for ``vec.symmetric``."""
     return (A[i, o], A[i, o + 3], A[i, o + 4], A[i, o + 1], A[i, o + 5], A[i, o + 2])
+
+
+@formula
+def put_block(A, i, o, a):
+    """Write a symmetric matrix, as ``vec.symmetric`` takes it, where `block_at` reads it."""
+    A[i, o], A[i, o + 3], A[i, o + 4], A[i, o + 1], A[i, o + 5], A[i, o + 2] = a
 
 
 @formula

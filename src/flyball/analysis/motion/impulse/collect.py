@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 
 from ....contact.tables import FOUND, GAP, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
+from ....math.vec import mtv, quaternion_matrix
 from ....model.model import Model
 from ....results.bulk import Bulk
 from ....results.contacts import Contacts
 from ....results.sides import OPEN, SLIP, STICK, Sides
-from ....stepping.free import matrix, unrotated
 from ....stepping.joined import LOST
 from ....stepping.stepper import Stepper
 from ....stepping.tables import (
@@ -141,9 +141,9 @@ def coordinates(base: Assembly, scene: Touching, kept: Collected) -> tuple[np.nd
         if width == 6:
             e = turn[:, k] * (1.0 if turn[0, k] @ base.q[q0 + 3 : q0 + 7] >= 0.0 else -1.0)
             q[:, q0 + 3 : q0 + 7] = e
-            R = matrix(e.T)
-            v[:, v0 + 3 : v0 + 6] = np.stack(unrotated(R, twist[:, k, 3:].T), axis=1)
-            a[:, v0 + 3 : v0 + 6] = np.stack(unrotated(R, change[:, k, 3:].T), axis=1)
+            R = quaternion_matrix(*e.T)
+            v[:, v0 + 3 : v0 + 6] = np.stack(mtv(R, twist[:, k, 3:].T), axis=1)
+            a[:, v0 + 3 : v0 + 6] = np.stack(mtv(R, change[:, k, 3:].T), axis=1)
     return q, v, a
 
 
