@@ -25,11 +25,19 @@ NATIVE: WeakValueDictionary[int, Any] = WeakValueDictionary()
 
 
 def call(address, stack, row):
-    """Run the code at an address on the stack from a row on; in plain Python the function itself, errors included."""
+    """Run the code at an address on the stack from a row on; in plain Python the function itself, errors included.
+
+    Of expressions an expression: what their ``called(function, *args)`` says.
+    """
     native = NATIVE.get(int(address))
     if native is None:
         raise RuntimeError("a law calls a Python function that is no longer kept")
-    stack[row, 1] = native.python(*(stack[row + k, 0].item() for k in range(native.count)))
+    args = [stack[row + k, 0] for k in range(native.count)]
+    expression = next((x for x in args if hasattr(x, "called")), None)
+    if expression is not None:
+        stack[row, 1] = expression.called(native.python, *args)
+    else:
+        stack[row, 1] = native.python(*(x.item() if hasattr(x, "item") else x for x in args))
 
 
 @formula

@@ -18,6 +18,7 @@ from ..math.scalar import (
     asin,
     atan,
     atan2,
+    choose,
     cos,
     cosh,
     cubic_rise,
@@ -118,7 +119,7 @@ def evaluate(code, const, at, stack, x, sensed):
             stack[top, 0] = called(code, operand, stack, top)
         elif operation == WHERE:
             top -= 2
-            stack[top, 0] = stack[top + 1, 0] if stack[top, 0].real > 0.5 else stack[top + 2, 0]
+            stack[top, 0] = choose(stack[top, 0] - 0.5, stack[top + 1, 0], stack[top + 2, 0])
         elif operation >= ADD:
             top -= 1
             stack[top, 0] = combined(operation, stack[top, 0], stack[top + 1, 0])
@@ -168,8 +169,9 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
             put(stack, top, f, f1 * stack[top, 1], f2 * stack[top, 1] * stack[top, 1] + f1 * stack[top, 2])
         elif operation == WHERE:
             top -= 2
-            k = top + 1 if stack[top, 0].real > 0.5 else top + 2
-            put(stack, top, stack[k, 0], stack[k, 1], stack[k, 2])
+            yes = stack[top, 0] - 0.5
+            for k in range(3):
+                stack[top, k] = choose(yes, stack[top + 1, k], stack[top + 2, k])
         elif operation == FREEZE:
             put(stack, top, stack[top, 0], 0.0, 0.0)
         elif operation == FUNCTION:  # its derivatives are not known
@@ -310,7 +312,7 @@ def slopes(function, x, f):
         d = divide(0.5, f)
         return d, divide(-0.5 * d, x)
     if function == ABS:
-        return (-1.0 if x.real < 0.0 else 1.0), 0.0
+        return choose(-x, -1.0, 1.0), 0.0
     if function == CUBIC:
         return 6.0 * x * (1.0 - x), 6.0 - 12.0 * x
     if function == QUINTIC:
@@ -351,8 +353,8 @@ def combined(operation, a, b):
     if operation == MAXIMUM:
         return maximum(a, b)
     if operation == LESS:
-        return 1.0 if a.real < b.real else 0.0
-    return 1.0 if a.real <= b.real else 0.0
+        return choose(b - a, 1.0, 0.0)
+    return 1.0 - choose(a - b, 1.0, 0.0)
 
 
 @formula
@@ -378,7 +380,7 @@ def combine_jets(operation, stack, k):
         f1 = divide(b * a1 - a * b1, r)
         put(stack, k, f, f1, divide(b * a2 - a * b2 - 2.0 * (a * a1 + b * b1) * f1, r))
     elif operation == MINIMUM or operation == MAXIMUM:
-        first = a.real <= b.real if operation == MINIMUM else a.real >= b.real
-        put(stack, k, f, a1 if first else b1, a2 if first else b2)
+        second = a - b if operation == MINIMUM else b - a
+        put(stack, k, f, choose(second, b1, a1), choose(second, b2, a2))
     else:
         put(stack, k, f, 0.0, 0.0)

@@ -1,7 +1,8 @@
 """Scalar functions for every kind of number a formula meets.
 
-The same call works on floats, complex numbers, NumPy arrays (a formula over time), SymPy expressions (SymPy is
-imported only then) and, through overloads, inside compiled code for real and complex numbers.
+The same call works on floats, complex numbers, NumPy arrays (a formula over time), expressions (whatever has a method
+``apply(name, *args)``: nodes of `graph/`; else SymPy's) and, through overloads, inside compiled code for real and
+complex numbers.
 
 Outside its domain a real function gives nan or inf, as in C, and never raises: a solver checks its state once a step
 and reports, it must not be torn out of the middle of one. Complex numbers follow the principal branches of `cmath`;
@@ -45,6 +46,23 @@ def _has_array(*args: Any) -> bool:
     return any(isinstance(a, np.ndarray | np.generic) for a in args)
 
 
+def _on_expressions(name: str, *args: Any) -> Any:
+    """Expression of a function by its name here."""
+    for x in args:
+        if hasattr(x, "apply"):
+            return x.apply(name, *args)
+    import sympy
+
+    known = {
+        "absolute": sympy.Abs,
+        "rounded": lambda x: sympy.floor(x + sympy.Rational(1, 2)),
+        "minimum": sympy.Min,
+        "maximum": sympy.Max,
+        "choose": lambda x, a, b: sympy.Piecewise((a, x > 0), (b, True)),
+    }
+    return known.get(name, getattr(sympy, name, None))(*args)
+
+
 def _analytic(name: str, ufunc: Function, meaning: str) -> Function:
     """One analytic function of one argument, by its name in `math`, `cmath` and SymPy."""
     real, complex_ = getattr(math, name), getattr(cmath, name)
@@ -59,9 +77,7 @@ def _analytic(name: str, ufunc: Function, meaning: str) -> Function:
             return _quietly(ufunc, x)
         if _has_array(x):
             return _on_array(function, ufunc, x)
-        import sympy
-
-        return getattr(sympy, name)(x)
+        return _on_expressions(name, x)
 
     function.__name__ = function.__qualname__ = name
     function.__doc__ = meaning
@@ -94,9 +110,7 @@ def atan2(y, x):
         if np.iscomplexobj(y) or np.iscomplexobj(x):
             return np.vectorize(atan2, otypes=[complex])(y, x)
         return _on_array(atan2, np.arctan2, y, x)
-    import sympy
-
-    return sympy.atan2(y, x)
+    return _on_expressions("atan2", y, x)
 
 
 def absolute(x):
@@ -105,9 +119,7 @@ def absolute(x):
         return -x if x.real < 0 else x
     if _has_array(x):
         return _on_array(absolute, lambda x: np.where(x.real < 0, -x, x)[()], x)
-    import sympy
-
-    return sympy.Abs(x)
+    return _on_expressions("absolute", x)
 
 
 def sign(x):
@@ -118,9 +130,7 @@ def sign(x):
         return complex(sign(x.real))
     if _has_array(x):
         return _on_array(sign, lambda x: np.sign(x.real) + 0 * x, x)
-    import sympy
-
-    return sympy.sign(x)
+    return _on_expressions("sign", x)
 
 
 def rounded(x):
@@ -131,9 +141,7 @@ def rounded(x):
         return complex(rounded(x.real))
     if _has_array(x):
         return _on_array(rounded, lambda x: np.floor(x.real + 0.5) + 0 * x, x)
-    import sympy
-
-    return sympy.floor(x + sympy.Rational(1, 2))
+    return _on_expressions("rounded", x)
 
 
 def minimum(a, b):
@@ -142,9 +150,7 @@ def minimum(a, b):
         return a if a.real <= b.real or a != a else b
     if _has_array(a, b):
         return _on_array(minimum, lambda a, b: np.where((np.real(a) <= np.real(b)) | (a != a), a, b)[()], a, b)
-    import sympy
-
-    return sympy.Min(a, b)
+    return _on_expressions("minimum", a, b)
 
 
 def maximum(a, b):
@@ -153,9 +159,7 @@ def maximum(a, b):
         return a if a.real >= b.real or a != a else b
     if _has_array(a, b):
         return _on_array(maximum, lambda a, b: np.where((np.real(a) >= np.real(b)) | (a != a), a, b)[()], a, b)
-    import sympy
-
-    return sympy.Max(a, b)
+    return _on_expressions("maximum", a, b)
 
 
 def choose(x, a, b):
@@ -164,9 +168,7 @@ def choose(x, a, b):
         return a if x.real > 0 else b
     if _has_array(x):
         return np.where(np.real(x) > 0, a, b)
-    import sympy
-
-    return sympy.Piecewise((a, x > 0), (b, True))
+    return _on_expressions("choose", x, a, b)
 
 
 def divide(a, b):

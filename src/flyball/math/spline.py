@@ -26,13 +26,19 @@ BREAKS = 2  # place of the first break
 PIECE = 4  # numbers a piece
 
 
-@formula
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
-    ``x`` is a float, a complex number (its real part chooses the piece), or an array; ``data`` an array of floats or
-    complex numbers (a list will do for single numbers).
+    ``x`` is a float, a complex number (its real part chooses the piece), an array, or an expression, whose
+    ``tabulated(data, at)`` says what becomes of it; ``data`` an array of floats or complex numbers (a list will do for
+    single numbers).
     """
+    return x.tabulated(data, at) if hasattr(x, "tabulated") else on_pieces(data, at, x)
+
+
+@formula
+def on_pieces(data, at, x):
+    """`spline` where x is a number: it chooses the piece."""
     start, origin = piece(data, at, x)
     s = x - origin
     c0, c1, c2, c3 = data[start], data[start + 1], data[start + 2], data[start + 3]
@@ -152,6 +158,12 @@ def _register() -> None:
     """In compiled code x is one number."""
     from numba.extending import overload
 
-    @overload(piece, jit_options={"error_model": "numpy"})
+    options: Any = {"error_model": "numpy"}
+
+    @overload(piece, jit_options=options)
     def choose(data, at, x):
         return found
+
+    @overload(spline, jit_options=options)
+    def choose_spline(data, at, x):
+        return lambda data, at, x: on_pieces(data, at, x)

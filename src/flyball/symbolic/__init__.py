@@ -1,0 +1,1 @@
+"""Equations of motion as expressions: shown, solved, made linear, written as code."""

@@ -1,0 +1,1 @@
+"""The engine's own loops run in plain Python on expressions."""
