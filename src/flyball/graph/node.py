@@ -100,6 +100,15 @@ class Node:
     def __pos__(self) -> Node:
         return self
 
+    def __and__(self, other: Any) -> Node:
+        return self.graph.multiply(self, other)
+
+    def __or__(self, other: Any) -> Node:
+        return self.graph.function("maximum", self, other)
+
+    def __invert__(self) -> Node:
+        return self.graph.subtract(1.0, self)
+
     def __abs__(self) -> Node:
         return self.graph.function("absolute", self)
 
@@ -125,9 +134,6 @@ class Node:
 
     def __ge__(self, other: Any) -> bool:
         return self.real >= other.real
-
-    def __bool__(self) -> bool:
-        return self.real != 0.0
 
     def __float__(self) -> float:
         if self.op != NUMBER:
@@ -183,6 +189,9 @@ class Node:
         if name in FUNCTIONS:
             return lambda: self.graph.function(name, self)
         raise AttributeError(name)
+
+    def __format__(self, how: str) -> str:
+        return repr(self) if self.moving else format(self.value, how)
 
     def __repr__(self) -> str:
         if self.op == NUMBER:
