@@ -36,7 +36,7 @@ def agree(m):
                 numeric = traced(symbolic.structure, plain(values(symbolic.structure, told).system))
             except ModelError:
                 continue  # right angles and the like allow no change
-            state = {x.data.name: rng.normal() for x in (*numeric.q, *numeric.v, *numeric.lam, *numeric.loads)}
+            state = {x.data.name: 0.4 * rng.normal() for x in (*numeric.q, *numeric.v, *numeric.lam, *numeric.loads)}
             state |= {x.data.name: 0.1 for x in numeric.z} | {"t": 0.3}
             heavy = max(1.0, np.abs(evaluated(numeric.M, state).astype(float)).max(initial=0.0))
             for name in EQUATIONS:

@@ -20,21 +20,7 @@ import numpy as np
 
 from ..math import scalar
 from .function import Function, Functions
-
-NUMBER, SYMBOL, ADD, MULTIPLY, DIVIDE, POWER, CALL = "number", "symbol", "add", "multiply", "divide", "power", "call"
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    f.__name__: f
-    for f in (
-        scalar.sqrt, scalar.sin, scalar.cos, scalar.tan, scalar.asin, scalar.acos, scalar.atan, scalar.exp, scalar.log,
-        scalar.sinh, scalar.cosh, scalar.tanh, scalar.atan2, scalar.absolute, scalar.sign, scalar.rounded,
-        scalar.minimum, scalar.maximum, scalar.choose,
-    )
-}  # fmt: skip
-"""Every function that a node may be of, by its name in `math/scalar.py`."""
-
-ODD = ("sin", "tan", "asin", "atan", "sinh", "tanh", "sign")
-EVEN = ("cos", "cosh", "absolute")
+from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
 
 
 class Undecided(Exception):
@@ -385,16 +371,6 @@ class Graph:
         made = Node(self, op, args, data, len(self.nodes), moving, value)
         self.nodes.append(made)
         return made
-
-
-OPERATIONS: dict[str, Callable[..., Any]] = {
-    ADD: lambda a, b: a + b,
-    MULTIPLY: lambda a, b: a * b,
-    DIVIDE: scalar.divide,
-    POWER: scalar.power,
-    **FUNCTIONS,
-}
-"""What an operation does with numbers of any kind."""
 
 
 def _value(op: str, args: tuple[Node, ...], data: Any) -> float:

@@ -92,4 +92,4 @@ def _never_else(R: np.ndarray) -> np.ndarray:
     """Whether rows are what they are for other values of the parameters too, as far as these numbers carry it."""
     if R.dtype == object:
         return np.array([not any(hasattr(x, "called") and not x.known for x in row) for row in R], bool)
-    return ~R.imag.any(axis=1)
+    return np.asarray(~R.imag.any(axis=1))

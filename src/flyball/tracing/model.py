@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ..graph.node import Graph, Node, Symbol
 from ..model.expressions import is_number_text
 from ..model.model import Model
@@ -32,7 +34,7 @@ def expressed(model: Model, tree: tuple[str, ...] = (), symbols: bool = True, na
     """
     model = model.snapshot()
     graph = Graph()
-    given = parameters(model, graph) if symbols else {}
+    given: dict[str, Any] = dict(parameters(model, graph)) if symbols else {}
     s = structure(model, Choices(tree=tuple(tree), coupled=bool(tree)))
     S = values(s, given).system
     return traced(s, S if given else plain(S), graph, names)
