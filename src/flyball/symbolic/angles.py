@@ -39,7 +39,7 @@ def counted(x: Values, S: System) -> tuple[System, list[int]]:
     s = x.structure
     row_i, term_i, term_x = S.row_i.copy(), S.term_i.copy(), S.term_x.copy()
     row_i[:, ROW_WRAP] = 0
-    more = []
+    more: list[int] = []
     for k, t in enumerate(s.terms):
         if KINDS[t.formula.kind].turns and term_i[k, TERM_HINT] < 0:
             term_i[k, TERM_HINT] = len(s.states) + len(more)

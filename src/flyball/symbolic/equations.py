@@ -20,9 +20,9 @@ from ..model.model import Model, listing, suggest
 from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
-from .formulated import Formulated, Place, formulated
-from .quantities import Quantities
+from .formulated import Formulated, Place, formulated, objects
 from .names import text
+from .quantities import Quantities
 from .state import named_state, places_at
 
 
@@ -69,8 +69,9 @@ class Equations:
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))
         self._inputs = {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
         self._given = self._parameters(o)
-        x = values(s, self._given or None)
-        self.formulated: Formulated = formulated(x, self.graph, self._given, self._inputs)
+        given: Any = self._given
+        x = values(s, given or None)
+        self.formulated: Formulated = formulated(x, self.graph)
 
     # -- symbols
 
@@ -135,9 +136,7 @@ class Equations:
     # -- equations
 
     def _symbols(self, nodes: Sequence[Node]) -> Expressions:
-        out = np.empty(len(nodes), object)
-        out[:] = nodes
-        return Expressions(self, out, [x.data.name for x in nodes])
+        return Expressions(self, objects(nodes), [x.data.name for x in nodes])
 
     @property
     def t(self) -> Expressions:
@@ -176,7 +175,7 @@ class Equations:
 
     @property
     def places(self) -> dict[str, Place]:
-        """Places of followers on curves, by name: symbol, the equation that it fulfils (its left side is zero), rate."""
+        """Places of followers on curves, by name: symbol, what is zero there, rate."""
         return {p.symbol.data.name: p for p in self.formulated.places}
 
     @property
@@ -278,8 +277,10 @@ class Equations:
             if name not in named:
                 raise ModelError(f"{self.model.name!r} has no symbol {name!r}{suggest(str(name), named)}")
         known = dict(values)
-        if missing := [p for p in self.formulated.places if p.symbol.data.name in wanted and p.symbol.data.name not in known]:
-            known |= places_at(self.formulated, missing, known, self._start.assembly.compiled.hints)
+        if missing := [
+            p for p in self.formulated.places if p.symbol.data.name in wanted and p.symbol.data.name not in known
+        ]:
+            known |= places_at(self.formulated, missing, known)
         lacking = [k for k, x in wanted.items() if x.moving and k not in known]
         if lacking:
             raise ModelError(f"no value is given for {listing(lacking)}; eq.start has those at the start")

@@ -11,7 +11,7 @@ from ..errors import ModelError
 from ..graph.derivative import jacobian, replaced
 from ..graph.function import Opaque
 from ..graph.node import SYMBOL, Node
-from ..graph.values import evaluated, reached
+from ..graph.values import evaluate, evaluated, reached
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -91,7 +91,9 @@ class Expressions:
             If a name is unknown, or the value of a symbol is missing.
         """
         known = self.equations.checked(values, self.symbols)
-        return np.asarray(evaluated(self.nodes, known)) if self.nodes.size else np.zeros(self.shape)
+        if not self.shape:
+            return np.asarray(evaluate(self.list(), known)[0])
+        return evaluated(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
 
     def __float__(self) -> float:
         if self.shape:
@@ -126,7 +128,9 @@ class Expressions:
         made = self.sympy()
         if not self.shape:
             return str(made)
-        lines = [f"{name}: {made[k, :].tolist()[0] if len(self.shape) > 1 else made[k]}" for k, name in self._labelled()]
+        lines = [
+            f"{name}: {made[k, :].tolist()[0] if len(self.shape) > 1 else made[k]}" for k, name in self._labelled()
+        ]
         return "\n".join(lines)
 
     def _labelled(self) -> Iterable[tuple[int, str]]:

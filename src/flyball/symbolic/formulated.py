@@ -7,7 +7,7 @@ constraints with a multiplier, the effort, whichever coordinates these are. Angl
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,14 +17,14 @@ from ..constraints.curve import point
 from ..constraints.registry import KINDS
 from ..equations.records import load
 from ..equations.rows import BY_TIME, parameters
-from ..graph.node import Graph, Node
+from ..graph.node import Graph, Node, Symbol
 from ..laws.evaluation import evaluate_jet
 from ..math.vec import mtv, sub
 from ..tables.system import BODY_LAW, BODY_WORK, OFFSET, Q0, TERM_HINT, V0
 from ..tables.values import Values
 from ..tracing.trace import Names, Traced, plain, traced
 from .angles import Angles, Cleaned, counted
-from .names import Called, Symbol, called
+from .names import called
 
 
 @dataclass
@@ -44,13 +44,14 @@ class Formulated:
     values: Values  # its tables hold objects
     traced: Traced  # with the rows of prescribed coordinates, which the engine has not
     own_q: list[Any]  # the engine's coordinates: those of `traced` less what they are as drawn
+    drawn: list[Any]  # that
     vdot: list[Node]
     places: list[Place]
     cleaned: Cleaned
     named: dict[str, Node]  # every symbol by its name
 
 
-def formulated(x: Values, graph: Graph, given: Mapping[str, Node], renamed: Mapping[str, Symbol]) -> Formulated:
+def formulated(x: Values, graph: Graph) -> Formulated:
     """Trace a mechanism and tell its equations in its own names.
 
     Parameters
@@ -58,14 +59,9 @@ def formulated(x: Values, graph: Graph, given: Mapping[str, Node], renamed: Mapp
     x : Values
         Filled in with numbers or with expressions of ``graph``.
     graph : Graph
-    given : mapping
-        Symbols of parameters.
-    renamed : mapping
-        Parameters that are inputs -> their symbols.
     """
     s = x.structure
     S = x.system if x.system.body_x.dtype == object else plain(x.system)
-    S = S._replace(const=_constants(S.const, given))
     x = replace(x, system=S)
     S, more = counted(x, S)
     names = called(x)
@@ -83,11 +79,7 @@ def formulated(x: Values, graph: Graph, given: Mapping[str, Node], renamed: Mapp
     places = [replace(p, equation=_one(cleaned, p.equation), rate=_one(cleaned, p.rate)) for p in places]
     vdot = [graph.symbol(a) for a in names.vdot]
     named = {n.data.name: n for n in (T.t, *T.q, *T.v, *vdot, *lam, *T.loads, *(p.symbol for p in places))}
-    return Formulated(x, T, own_q, vdot, places, cleaned, named)
-
-
-def _constants(const: np.ndarray, given: Mapping[str, Node]) -> np.ndarray:
-    return const
+    return Formulated(x, T, own_q, drawn, vdot, places, cleaned, named)
 
 
 def _drawn(S: Any, nq: int) -> list[Any]:
@@ -117,9 +109,7 @@ def _places(x: Values, T: Traced) -> tuple[list[Place], list[Node]]:
     return places, feet
 
 
-def _cleaner(
-    x: Values, T: Traced, own_q: list[Any], more: list[int], new: list[tuple[Node, Any]]
-) -> Cleaned:
+def _cleaner(x: Values, T: Traced, own_q: list[Any], more: list[int], new: list[tuple[Node, Any]]) -> Cleaned:
     angles = Angles(x, own_q, T.work)
     s, unknown = x.structure, []
     owners = {f"{t.owner.name}.{t.what}": t for t in s.terms if t.owner is not None}
@@ -160,14 +150,15 @@ def _prescribed(T: Traced, S: Any, lam: list[Node]) -> Traced:
     return replace(
         T,
         lam=lam,
-        g=np.r_[T.g, _objects(g)],
-        nu=np.r_[T.nu, _objects(nu)],
+        g=np.r_[T.g, objects(g)],
+        nu=np.r_[T.nu, objects(nu)],
         G=np.vstack([T.G, G]),
-        gamma=np.r_[T.gamma, _objects(gamma)],
+        gamma=np.r_[T.gamma, objects(gamma)],
     )
 
 
-def _objects(x: Sequence[Any]) -> np.ndarray:
+def objects(x: Sequence[Any]) -> np.ndarray:
+    """A vector of objects."""
     out = np.empty(len(x), object)
     out[:] = x
     return out
@@ -177,8 +168,9 @@ ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powe
 
 
 def _told(T: Traced, cleaned: Cleaned) -> Traced:
-    return replace(T, **{name: cleaned(getattr(T, name)) for name in ARRAYS})
+    new: dict[str, Any] = {name: cleaned(getattr(T, name)) for name in ARRAYS}
+    return replace(T, **new)
 
 
 def _one(cleaned: Cleaned, x: Any) -> Any:
-    return cleaned(_objects([x]))[0]
+    return cleaned(objects([x]))[0]

@@ -1,9 +1,9 @@
 """What the symbols of a mechanism are called: ``"hinge.angle"``, ``"crank.x'"``, ``"ball.w_x"``, ``"A.lam_nx"``.
 
-Positions have the names of coordinates. A rate has a prime behind it, an acceleration two. A body that is free in space
-has the Euler parameters ``e0`` to ``e3`` (scalar first) and the angular velocity ``w_x``, ``w_y``, ``w_z`` along its own
-axes, a spherical joint those of what turns in it. Where a body's centre of mass is not its reference point, its
-coordinates are ``com_x``, ``com_y``, ``com_z``, since ``x`` is the reference point's.
+Positions have the names of coordinates. A rate has a prime behind it, an acceleration two. A body that is free in
+space has the Euler parameters ``e0`` to ``e3`` (scalar first) and the angular velocity ``w_x``, ``w_y``, ``w_z`` along
+its own axes, a spherical joint those of what turns in it. Where a body's centre of mass is not its reference point,
+its coordinates are ``com_x``, ``com_y``, ``com_z``, since ``x`` is the reference point's.
 """
 
 from __future__ import annotations
@@ -12,6 +12,8 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from ..graph.node import Symbol
+from ..model.body import Driver
+from ..model.element import Element
 from ..model.joint import Joint
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
@@ -41,9 +43,7 @@ def called(x: Values) -> Called:
     rates = [_rate(p) if p.kind == "coordinate" else p for p in v]
     seconds = [_second(p) if p.kind == "coordinate" else _rate(p, "acceleration") for p in v]
     states = [_state(name) for name in s.states]
-    loads = [
-        Symbol(f"{e.name}.load", "load", rf"P_{{{text(e.name)}}}", "N", e.name) for e in s.loads
-    ]
+    loads = [Symbol(f"{e.name}.load", "load", rf"P_{{{text(e.name)}}}", "N", e.name) for e in s.loads]
     return Called(q, rates, seconds, states, _multipliers(s), loads)
 
 
@@ -51,16 +51,18 @@ def _velocity(x: Values, name: str, unit: str) -> Symbol:
     """The coordinate that a velocity is the rate of; an angular velocity is its own."""
     owner, _, what = name.rpartition(".")
     kind, _, axis = what.rpartition(" ")
+    index = text(owner)
     if kind == "turn":
-        return Symbol(f"{owner}.w_{axis}", "velocity", rf"\omega_{{{axis},{text(owner)}}}", "rad/s", owner)
-    body = x.bodies.get(owner)
-    if body is not None and owner not in x.structure.tree_joints and what in ("x", "y", "z"):
-        if any(c.real != 0.0 for c in body.com):
-            what = f"com_{what}"
-    letter = LETTERS.get(what, what.split("_")[-1] if what.startswith("com_") else rf"\mathrm{{{what}}}")
-    letter = what if what in ("x", "y", "z") else letter
-    more = "S," if what.startswith("com_") else ""
-    return Symbol(f"{owner}.{what}", "coordinate", _indexed(letter, more + text(owner)), unit, owner)
+        return Symbol(f"{owner}.w_{axis}", "velocity", rf"\omega_{{{axis},{index}}}", "rad/s", owner)
+    letter = LETTERS.get(what, what if what in "xyz" else rf"\mathrm{{{what}}}")
+    if what in "xyz" and _beside(x, owner):
+        what, index = f"com_{what}", f"S,{index}"
+    return Symbol(f"{owner}.{what}", "coordinate", _indexed(letter, index), unit, owner)
+
+
+def _beside(x: Values, owner: str) -> bool:
+    """Whether that is a body whose centre of mass is not its reference point."""
+    return owner in x.bodies and any(c.real != 0.0 for c in x.bodies[owner].com)
 
 
 def _indexed(letter: str, index: str) -> str:
@@ -101,29 +103,31 @@ def _state(name: str) -> Symbol:
     owner, _, what = name.rpartition(".")
     latex = {"place": "s", "work": "W"}.get(what, rf"\mathrm{{{what}}}")
     unit = {"place": "m", "work": "J"}.get(what, "rad")
-    return Symbol(name if what in ("place", "work") else f"{name} (turns)", "state", f"{latex}_{{{text(owner)}}}", unit, owner)
+    return Symbol(
+        name if what in ("place", "work") else f"{name} (turns)", "state", f"{latex}_{{{text(owner)}}}", unit, owner
+    )
 
 
 def _multipliers(s: Structure) -> list[Symbol]:
     """One for each row; what a driver or a coupling gives is its effort."""
     names = [_row_name(row.element, row.label) for row in s.rows]
     names = list(numbered(names))
-    out = [_multiplier(name, row.element.name) for name, row in zip(names, s.rows, strict=True)]
+    out = [_multiplier(s, name, row.element) for name, row in zip(names, s.rows, strict=True)]
     later = sorted(s.prescribed, key=lambda k: s.slices[k].start)
-    return out + [_multiplier(f"{name}.effort", name) for name in later]
+    return out + [_multiplier(s, f"{name}.effort", s.model[name]) for name in later]
 
 
-def _row_name(element: object, label: str) -> str:
-    name: str = element.name  # type: ignore[attr-defined]
-    if not isinstance(element, Joint):
-        return f"{name}.lam" if label == "coupling" else f"{name}.effort"
-    return f"{name}.lam_{label}" if label else f"{name}.lam"
+def _row_name(e: Element, label: str) -> str:
+    if isinstance(e, Driver):
+        return f"{e.name}.effort"
+    return f"{e.name}.lam_{label}" if label and isinstance(e, Joint) else f"{e.name}.lam"
 
 
-def _multiplier(name: str, owner: str) -> Symbol:
-    what = name.removeprefix(f"{owner}.")
+def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
+    what = name.removeprefix(f"{e.name}.")
     letter, index = (r"\tau", "") if what == "effort" else (r"\lambda", what.removeprefix("lam").removeprefix("_"))
-    return Symbol(name, "multiplier", _indexed(letter, (index + "," if index else "") + text(owner)), "", owner)
+    unit = ("N*m" if s.model.unit(e.coordinate, e) == "rad" else "N") if isinstance(e, Driver) else ""
+    return Symbol(name, "multiplier", _indexed(letter, (index + "," if index else "") + text(e.name)), unit, e.name)
 
 
 def numbered(names: Iterable[str]) -> Iterable[str]:

@@ -12,6 +12,7 @@ from ..model.quantities import ENERGY
 from ..results.result import Result
 from ..tables.system import FREE, TREE
 from .expressions import Expressions
+from .formulated import objects
 
 if TYPE_CHECKING:
     from .equations import Equations
@@ -34,8 +35,8 @@ class Quantities:
         if not dot:
             what = "value"
         self._refuse(owner, what)
-        if what == "quaternion" and (found := self._quaternion(owner)) is not None:
-            return found
+        if what == "quaternion":
+            return self._quaternion(owner)
         if what == "power" and (found := self._power(owner)) is not None:
             return found
         try:
@@ -60,18 +61,17 @@ class Quantities:
         if owner == ENERGY and what == "balance":
             raise ModelError("'energy.balance' compares with the start of a motion; it is no function of the state")
 
-    def _quaternion(self, owner: str) -> Expressions | None:
+    def _quaternion(self, owner: str) -> Expressions:
         """Of a body that hangs freely: its coordinates."""
         x = self.equations.formulated
         b = x.values.structure.place.get(owner, -1)
         S = x.values.system
         if b < 0 or S.body_i[b, TREE] != FREE:
-            raise ModelError(
-                f"the quaternion of {owner!r} is no coordinate here and has no formula of its own; take "
-                f"{owner}.rotation, or coordinates='absolute'"
-            )
-        names = [f"{owner}.e{k}" for k in range(4)]
-        return self.equations._symbols([x.named[n] for n in names])
+            instead = f"{owner}.angle" if x.values.structure.model.planar else f"{owner}.rotation"
+            more = "" if x.values.structure.model.planar or b < 0 else ", or coordinates='absolute'"
+            raise ModelError(f"the quaternion of {owner!r} is no coordinate here: take {instead!r}{more}")
+        e = [x.named[f"{owner}.e{k}"] for k in range(4)]
+        return Expressions(self.equations, objects(e), [n.data.name for n in e], unit="1")
 
     def _power(self, owner: str) -> Expressions | None:
         """Of a driver: its effort times the rate that it asks for."""
