@@ -11,10 +11,10 @@ import numpy as np
 
 from ..function import Function
 from ..values import reached
+from .lines import Language, lines
 from .naming import Names
 from .routine import Argument, Routine
 from .tables import Table, refuse_opaque, tables
-from .text import Language, lines
 
 KEYWORDS = [
     *("auto", "break", "case", "char", "const", "continue", "default", "do", "double", "else", "enum", "extern"),

@@ -9,11 +9,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..function import Function
+from .lines import Language, lines
 from .naming import Names
 from .python import docstring, escaped, literal, table_data
 from .routine import Routine
 from .tables import refuse_opaque, tables
-from .text import Language, lines
 
 FUNCTIONS = {
     **{f: f"math.{f}({{0}})" for f in ("sqrt", "sin", "cos", "tan", "asin", "acos", "atan", "exp", "log")},

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..function import Function
+from .lines import Language, lines
 from .naming import Names
 from .routine import Argument, Routine
 from .tables import Table, opaque, tables
-from .text import Language, lines
 
 FUNCTIONS = {
     "sqrt": "np.sqrt({0})", "sin": "np.sin({0})", "cos": "np.cos({0})", "tan": "np.tan({0})",
