@@ -19,10 +19,11 @@ import numpy as np
 from ...errors import ModelError
 from ...graph.node import Node
 from ...model.model import listing
+from ...numerics.rank import parts
 from ...tables.names import velocity_names
 from ...tracing.trace import Traced
 from .blocks import blocks
-from .constraints import Constraints, constraints
+from .constraints import constraints
 from .definition import Definition, inlined
 from .partition import free, named, positions
 from .place import Place
@@ -156,7 +157,7 @@ def _positions(x: Traced, place: Place, chosen: list[int]) -> tuple[list[int], l
         else:
             unknown += q
             moved += v
-    G = place.G[np.ix_(which, moved)]
+    G = place.G[np.ix_(which, np.array(moved, int))]
     rows = free(G, place.scale[moved]).rows
     return known, which[rows].tolist(), unknown
 
@@ -205,7 +206,7 @@ class _Reduction:
             self._all(rows, lam), self.singular, self._undetermined(rows),
         )  # fmt: skip
 
-    def _each(self, symbols: Sequence[Node], values: Sequence[Any], how: str) -> list[Definition]:
+    def _each(self, symbols: Sequence[Node], values: Any, how: str) -> list[Definition]:
         return [Definition((s,), (y,), (), how) for s, y in zip(symbols, values, strict=True)]
 
     def _multipliers(self, rows: list[int], lam: np.ndarray) -> list[Definition]:
@@ -228,11 +229,10 @@ class _Reduction:
 
     def _undetermined(self, rows: list[int]) -> tuple[str, ...]:
         """Elements whose reactions redundancy leaves open."""
-        from ...numerics.rank import parts
-
         G = self.place.G * self.place.scale
         y = parts(G).dependencies
-        return tuple(dict.fromkeys(e for e, p in zip(self.place.c.elements, y, strict=True) if np.abs(p).max(initial=0.0) > 1e-8))
+        open_ = np.abs(y).max(axis=1, initial=0.0) > 1e-8
+        return tuple(dict.fromkeys(e for e, yes in zip(self.place.c.elements, open_, strict=True) if yes))
 
     def _told(self, what: str, dets: Determinants, names: Sequence[str]) -> None:
         for columns, value in dets.found:

@@ -72,7 +72,7 @@ def free(G: np.ndarray, scale: np.ndarray, wanted: Sequence[int] = (), only: boo
     left = N.copy()
     for d in wanted:
         along = left[d]
-        if len(chosen) == f or np.linalg.norm(along) <= DEPENDENT * max(1e-300, np.linalg.norm(N[d])):
+        if len(chosen) == f or np.linalg.norm(along) <= DEPENDENT * float(np.linalg.norm(N[d])):
             raise ValueError(d)
         e = along / np.linalg.norm(along)
         left = left - np.outer(left @ e, e)
@@ -99,7 +99,8 @@ def named(names: Sequence[str], wanted: Sequence[str], model: str) -> list[int]:
     at = {n: k for k, n in enumerate(names)}
     for n in wanted:
         if n not in at:
-            raise ModelError(f"{model!r} has no coordinate {n!r} in these coordinates{suggest(n, at)}; {listing(list(at))}")
+            known = f"{suggest(n, at)}; {listing(list(at))}"
+            raise ModelError(f"{model!r} has no coordinate {n!r} in these coordinates{known}")
         if list(wanted).count(n) > 1:
             raise ModelError(f"independent names {n!r} twice")
     return [at[n] for n in wanted]
@@ -120,8 +121,8 @@ def positions(s: Structure) -> list[tuple[list[int], list[int]]]:
 def singular(names: Sequence[str], t: float) -> SingularityError:
     """The error of a start where the constraints lose rank."""
     return SingularityError(
-        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} depend on each "
-        "other here and not nearby, so that no coordinates are independent of the others; draw it away from there",
+        f"the mechanism is in a singular position at t = {t:.6g} s: the constraints of {', '.join(names)} depend on "
+        "each other here and not nearby, so that coordinates cannot be told apart; draw it away from there",
         t,
         tuple(names),
     )

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...graph.values import evaluate, evaluated
-from ...numerics.rank import TOLERANCE
+from ...numerics.rank import TOLERANCE, null_space, parts, rank
 from ...tables.names import velocity_names
 from ...tables.system import LENGTH
 from ...tracing.trace import Traced
@@ -63,16 +63,16 @@ class Place:
         which = np.flatnonzero(self.c.holonomic)
         if not f.chosen or not len(which):
             return
-        here = _rank(self.G[which] * self.scale)
+        here = rank(self.G[which] * self.scale)
         rng = np.random.default_rng(0)
         for _ in range(2):
             G = self._nearby(f, rng, which)
-            if G is not None and _rank(G * self.scale) > here:
+            if G is not None and rank(G * self.scale) > here:
                 raise singular(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
 
     def _nearby(self, f: Free, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
         """Constraints on positions at the closed position near a random step away; None if none is found."""
-        null = _null(self.G[which] * self.scale)
+        null = null_space(self.G[which] * self.scale)
         a = null @ rng.standard_normal(null.shape[1])
         step = STEP * self.scale * self.length * a / np.abs(a).max()
         values = dict(self.values)
@@ -98,21 +98,7 @@ class Place:
 
     def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
         """Elements whose rows take part in dependencies that are not there nearby."""
-        from ...numerics.rank import parts
-
         y, span = parts(here * self.scale).dependencies, parts(there * self.scale).span
         part = np.abs(y @ (y.T @ span)).max(axis=1)
         found = [self.c.elements[k] for k, p in zip(which, part, strict=True) if p > 1e-3]
         return list(dict.fromkeys(found))
-
-
-def _rank(A: np.ndarray) -> int:
-    from ...numerics.rank import rank
-
-    return rank(A)
-
-
-def _null(A: np.ndarray) -> np.ndarray:
-    from ...numerics.rank import null_space
-
-    return null_space(A)

@@ -1,4 +1,4 @@
-"""Dependent coordinates from the constraints on positions: by formulas where these are found, else by their equations."""
+"""Dependent coordinates from the constraints on positions: by formulas where there are some, else by equations."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def solved_positions(x: Traced, place: Place, c: Constraints, what: tuple[list[i
     g = [x.graph.node(y) for y in c.g[rows]]
     for q, v in positions(x.structure):
         if len(q) > len(v) and q[0] in unknown:
-            g.append(sum((x.q[k] * x.q[k] for k in q), -1.0))
+            g.append(x.graph.node(sum((x.q[k] * x.q[k] for k in q), -1.0)))
     symbols = [x.q[k] for k in unknown]
     J = place.probe.cleaned(jacobian(g, symbols))
     out = []
@@ -35,5 +35,3 @@ def solved_positions(x: Traced, place: Place, c: Constraints, what: tuple[list[i
     for equations, columns in [(list(range(len(g))), list(range(len(g))))] if order is None else order:
         out.append(Definition(tuple(symbols[k] for k in columns), (), tuple(g[k] for k in equations)))
     return out
-
-

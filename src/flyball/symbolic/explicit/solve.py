@@ -154,5 +154,3 @@ def solve_symmetric(M: np.ndarray, B: np.ndarray, pivots: Determinants) -> np.nd
     for k in reversed(range(n)):
         X[k] = X[k] - times(L[k + 1 :, k : k + 1].T, X[k + 1 :])[0]
     return X
-
-

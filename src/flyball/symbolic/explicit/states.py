@@ -10,13 +10,15 @@ import numpy as np
 from ...errors import ModelError
 from ...graph.derivative import jacobian, replaced
 from ...graph.node import Node, Symbol
-from ...graph.values import evaluate, symbols
+from ...graph.values import evaluate
 from ...tracing.trace import Traced
 from .definition import rates, with_formulas
 from .explicit import ExplicitEquations, Start, explicit
 from .newton import Implicit
 from .partition import positions
-from .solve import Determinants, times, zeros
+from .solve import Determinants, times
+
+Numbers = Sequence[float] | np.ndarray
 
 
 class StateEquations:
@@ -81,7 +83,7 @@ class StateEquations:
     # -- numbers
 
     def point(
-        self, x: Sequence[float], u: Sequence[float] = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
+        self, x: Numbers, u: Numbers = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
     ) -> dict[str, float]:
         """Numbers of all symbols at a state, what has no formula found by Newton's method.
 
@@ -100,7 +102,7 @@ class StateEquations:
         return values
 
     def evaluate(
-        self, x: Sequence[float], u: Sequence[float] = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
+        self, x: Numbers, u: Numbers = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Numbers x' (nx,) and y (ny,) at a state; see `point`."""
         found = np.array(evaluate([*self.f, *self.h], self.point(x, u, t, parameters)), float)
@@ -110,9 +112,7 @@ class StateEquations:
         """x' as ``scipy.integrate.solve_ivp`` asks for it; further arguments are the inputs."""
         return self.evaluate(x, u or (0.0,) * len(self.u), t)[0]
 
-    def _given(
-        self, x: Sequence[float], u: Sequence[float], t: float, parameters: Mapping[str, float] | None
-    ) -> dict[str, float]:
+    def _given(self, x: Numbers, u: Numbers, t: float, parameters: Mapping[str, float] | None) -> dict[str, float]:
         for what, symbols_, numbers in (("state", self.x, x), ("input", self.u, u)):
             if len(numbers) != len(symbols_):
                 names = ", ".join(self.states if what == "state" else self.inputs)
