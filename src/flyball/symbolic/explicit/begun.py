@@ -36,9 +36,7 @@ def asked(
     known = parameters(copy.snapshot(), x.graph)
     derived = [i.name for i in found if i.parameter not in known]
     if derived:
-        raise ModelError(
-            f"{derived[0]!r} follows from other parameters: no input; there are {', '.join(known)}"
-        )
+        raise ModelError(f"{derived[0]!r} follows from other parameters: no input; there are {', '.join(known)}")
     return x, start, {i.name: known[i.parameter] for i in found}
 
 
