@@ -1,1 +1,1 @@
-"""Expressions written out: a printer a file, all from the same layout of signs, fractions, powers and sums."""
+"""Expressions written out, a printer a file: text, LaTeX and MathML from one layout of signs, fractions and powers; code."""

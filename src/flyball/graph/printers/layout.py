@@ -6,7 +6,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from ..node import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node
+from ..node import Node
+from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from ..simplify.cost import read
 from ..simplify.numbers import Known, known
 

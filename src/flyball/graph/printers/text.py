@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..node import NUMBER, SYMBOL, Node
+from ..node import Node
+from ..operations import NUMBER, SYMBOL
 from ..simplify.numbers import Known
 from .layout import Layout, Power, Term, number_text
 

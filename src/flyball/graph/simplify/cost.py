@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from ..node import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node
+from ..node import Node
+from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from .numbers import known
 
 UNBOUNDED = 1e9

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from ..node import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node
+from ..node import Node
+from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from .angles import opened
 from .factors import factors
 from .terms import (

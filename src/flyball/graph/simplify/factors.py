@@ -7,7 +7,8 @@ from collections import defaultdict
 from collections.abc import Container
 from typing import Any
 
-from ..node import ADD, DIVIDE, MULTIPLY, NUMBER, Graph, Node
+from ..node import Graph, Node
+from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER
 from .cost import read
 from .numbers import fraction, snapped
 from .quadratic import as_product

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..node import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Graph, Node
+from ..node import Graph, Node
+from ..operations import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from ..values import reached
 from .angles import contracted, opened
 from .cost import read
