@@ -1,1 +1,1 @@
-"""Expressions written out, a printer a file: text, LaTeX and MathML from one layout of signs, fractions and powers; code."""
+"""Printers of expressions, a language a file; text, LaTeX and MathML share a layout of signs, fractions and powers."""
