@@ -157,5 +157,5 @@ def test_arithmetic_and_calculus():
         atol=1e-13,
     )
     assert float(eq.expression("l")) == 1.2 and eq.M.T.shape == (3, 3)
-    with pytest.raises(ModelError, match="no entry 'rod.z'"):
+    with pytest.raises(ModelError, match=r"no entry 'rod\.z'"):
         eq.f["rod.z"]
