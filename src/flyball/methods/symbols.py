@@ -36,9 +36,9 @@ class Symbols(Model):
             As for `linearize`: what is added to laws of forces, motors and drivers, as symbols.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit. They are symbols all the same.
-        names : {"parameters", "all"}
+        names : {"parameters", "all", "none"}
             Which numbers are symbols: parameters; or every number of the description, called after its field:
-            ``"rod.mass"``.
+            ``"rod.mass"``; none: numbers stay numbers.
 
         Returns
         -------

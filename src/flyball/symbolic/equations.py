@@ -9,12 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.linear.inputs import Input, with_inputs
+from ..analysis.linear.inputs import with_inputs
 from ..analysis.motion.start import Start, begin
 from ..analysis.options import Options
 from ..analysis.untouched import refuse_contact
 from ..errors import AnalysisError, ModelError
-from ..graph.node import SYMBOL, Graph, Node, Symbol
+from ..graph.node import Graph, Node, Symbol
+from ..graph.operations import SYMBOL
 from ..model.expressions import is_number_text
 from ..model.model import Model, listing, suggest
 from ..tables.structure import Choices, structure
@@ -22,6 +23,7 @@ from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
 from .names import text
+from .numbers import Numbered
 from .quantities import Quantities
 from .state import named_state, places_at
 
@@ -62,12 +64,12 @@ class Equations:
         f has all forces but reactions, gyroscopic terms included. Rows of drivers are rows as all others.
     """
 
-    def __init__(self, model: Model, start: Start, o: SymbolicOptions, inputs: Sequence[Input]) -> None:
+    def __init__(self, model: Model, start: Start, o: SymbolicOptions, told: Mapping[str, Symbol]) -> None:
         self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
         self.graph = Graph()
         tree = start.assembly.compiled.structure.tree
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))
-        self._inputs = {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
+        self._told = told  # symbols of parameters that go by other names: inputs, numbers of fields
         self._given = self._parameters(o)
         given: Any = self._given
         x = values(s, given or None)
@@ -77,13 +79,15 @@ class Equations:
 
     def _parameters(self, o: SymbolicOptions) -> dict[str, Node]:
         """Symbols of the parameters that have values of their own; the others are expressions of these."""
-        told = self._start.assembly.compiled.values.told
+        values = self._start.assembly.compiled.values.told
         out = {}
         for name, value in self.model.parameters.items():
-            if name in self._inputs:
-                out[name] = self.graph.symbol(self._inputs[name], 0.0)
+            if name in self._told:
+                out[name] = self.graph.symbol(self._told[name], values[name])
+            elif o.names == "none":
+                continue
             elif name in (o.parameters or {}) or not isinstance(value, str) or is_number_text(value):
-                out[name] = self.graph.symbol(Symbol(name, "parameter", _latex(name)), told[name])
+                out[name] = self.graph.symbol(Symbol(name, "parameter", _latex(name)), values[name])
         return out
 
     @cached_property
@@ -99,10 +103,16 @@ class Equations:
         given = {x.data.name: x for x in self._given.values()}
         return self.formulated.named | given
 
+    @cached_property
+    def units(self) -> list[list[Node]]:
+        """Symbols of each quaternion: their squares add up to one."""
+        named, q = self.formulated.named, self.q.rows
+        return [[named[f"{n.removesuffix('.e0')}.e{k}"] for k in range(4)] for n in q if n.endswith(".e0")]
+
     @property
     def parameters(self) -> dict[str, float]:
         """Parameters that are symbols, with their own values [SI]."""
-        return {k: x.value for k, x in self._given.items() if k not in self._inputs}
+        return {x.data.name: x.value for x in self._given.values() if x.data.kind == "parameter"}
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -318,18 +328,28 @@ def _latex(name: str) -> str:
     return f"{letter}_{{{index}}}" if index.isdigit() else text(name)
 
 
-COORDINATES = ("auto", "absolute", "joint")
+NAMES = ("parameters", "all", "none")
 
 
 def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     """Equations of motion as expressions: see `Mechanism.symbolic`."""
     refuse_contact(model, "symbolic")
-    plain = model.snapshot()
-    told, inputs = with_inputs(plain, o.inputs) if o.inputs else (plain, [])
-    told = told.snapshot()
-    if o.coordinates == "auto":
-        try:
-            return Equations(told, begin(told, 0.0, o.parameters, None, "joint"), o, inputs)
-        except AnalysisError:  # friction that follows loads which joint coordinates do not know
-            return Equations(told, begin(told, 0.0, o.parameters, None, "absolute"), o, inputs)
-    return Equations(told, begin(told, 0.0, o.parameters, None, o.coordinates), o, inputs)
+    if o.names not in NAMES:
+        raise ModelError(f"names is {o.names!r}{suggest(o.names, NAMES)}; must be one of {', '.join(NAMES)}")
+    plain: Model = model.snapshot()
+    told: dict[str, Symbol] = {}
+    if o.names == "all":
+        numbered = Numbered(plain)
+        plain, told = numbered.model, numbered.symbols
+    if o.inputs:
+        plain, inputs = with_inputs(plain, o.inputs)
+        told |= {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
+    plain = plain.snapshot()
+    wish = "joint" if o.coordinates == "auto" else o.coordinates
+    try:
+        start = begin(plain, 0.0, o.parameters, None, wish)
+    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+        if o.coordinates != "auto":
+            raise
+        start = begin(plain, 0.0, o.parameters, None, "absolute")
+    return Equations(plain, start, o, told)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,11 +11,17 @@ import numpy as np
 from ..errors import ModelError
 from ..graph.derivative import jacobian, replaced
 from ..graph.function import Opaque
-from ..graph.node import SYMBOL, Node
+from ..graph.node import Node
+from ..graph.operations import SYMBOL
+from ..graph.printers import latex, text
+from ..graph.simplify.simplify import simplified
 from ..graph.values import evaluate, evaluated, reached
 
 if TYPE_CHECKING:
     from .equations import Equations
+
+READ = 400  # operations up to which expressions are simplified to be shown
+MOST = 4000  # and up to which they are shown at all
 
 
 class Expressions:
@@ -103,7 +110,7 @@ class Expressions:
     # -- others' forms
 
     def sympy(self) -> Any:
-        """As SymPy expression, or ``Matrix``; symbols have the names of the mechanism.
+        """As SymPy expression, or ``Matrix``, simplified if it is not too long; symbols have the mechanism's names.
 
         Raises
         ------
@@ -111,31 +118,42 @@ class Expressions:
             If SymPy is not installed (extra ``symbolic``).
         """
         printer = self.equations.printer
-        return printer(self.nodes if self.shape else self.nodes[()])
+        shown = self._read.nodes
+        return printer(shown if self.shape else shown[()])
+
+    def simplified(self) -> Expressions:
+        """The same in a form that is shorter to read, as far as that is found quickly; equal in value."""
+        made = simplified(self.nodes.reshape(-1), units=self.equations.units)
+        return Expressions(self.equations, made.reshape(self.shape), self.rows, self.columns, self.unit)
+
+    @cached_property
+    def _read(self) -> Expressions:
+        """What is shown: simplified if it is short enough to be read."""
+        return self.simplified() if self.operations <= READ else self
 
     def latex(self) -> str:
-        """As LaTeX."""
-        from ..graph.printers.sympy import sympy_module
+        """As LaTeX, simplified if it is not too long for that; a vector is a column."""
+        shown = self._read.nodes
+        if not self.shape:
+            return latex.latex(shown[()])
+        if not shown.size:
+            return r"\left[\;\right]"
+        return latex.matrix(shown if len(self.shape) > 1 else shown[:, None])
 
-        made, printer = self.sympy(), self.equations.printer
-        names = {symbol: node.data.latex or node.data.name for symbol, node in printer.symbols.items()}
-        return str(sympy_module().latex(made, symbol_names=names))
-
-    def _repr_latex_(self) -> str:
-        return f"$\\displaystyle {self.latex()}$"
+    def _repr_latex_(self) -> str | None:
+        return f"$\\displaystyle {self.latex()}$" if self.operations <= READ else None
 
     def __str__(self) -> str:
-        made = self.sympy()
+        if self.operations > MOST:
+            return f"{self!r}: too long to be read; .sympy(), .at(values) and entries such as [0] are there"
+        shown = self._read.nodes
         if not self.shape:
-            return str(made)
-        lines = [
-            f"{name}: {made[k, :].tolist()[0] if len(self.shape) > 1 else made[k]}" for k, name in self._labelled()
-        ]
-        return "\n".join(lines)
-
-    def _labelled(self) -> Iterable[tuple[int, str]]:
+            return text.text(shown[()])
+        if len(self.shape) > 1:
+            return text.matrix(shown) if shown.size else f"no entries: {self.shape[0]} x {self.shape[1]}"
         names = self.rows or tuple(map(str, range(self.shape[0])))
-        return enumerate(names)
+        wide = max(map(len, names), default=0)
+        return "\n".join(f"{name:{wide}}  {text.text(x)}" for name, x in zip(names, shown, strict=True)) or "none"
 
     def __repr__(self) -> str:
         what = " x ".join(map(str, self.shape)) if self.shape else "one expression"
