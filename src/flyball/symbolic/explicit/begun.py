@@ -11,17 +11,16 @@ from ...graph.node import Node
 from ...model.model import Model
 from ...tracing.model import expressed, parameters
 from ...tracing.trace import Names, Traced
-from .explicit import Start
 
 
 def asked(
     model: Model, inputs: Sequence[str], coordinates: str = "auto", names: Names | None = None
-) -> tuple[Traced, Start, dict[str, Node]]:
+) -> tuple[Traced, dict[str, float], dict[str, Node]]:
     """The same with inputs by name, as `Mechanism.linearize` has them: what is added to laws, or parameters.
 
     Returns
     -------
-    (Traced, Start, dict)
+    (Traced, dict, dict)
         The last from each input to its symbol.
 
     Raises
@@ -42,7 +41,7 @@ def asked(
 
 def begun(
     model: Model, coordinates: str = "auto", symbols: bool = True, names: Names | None = None
-) -> tuple[Traced, Start]:
+) -> tuple[Traced, dict[str, float]]:
     """Trace a model, and assemble it as drawn.
 
     Parameters
@@ -57,4 +56,5 @@ def begun(
     b = begin(model.snapshot(), 0.0, None, None, coordinates)
     c, a = b.assembly.compiled, b.assembly
     x = expressed(model, c.structure.tree, symbols, names)
-    return x, Start(0.0, a.q.tolist(), a.v.tolist(), c.z.tolist())
+    values = [0.0, *a.q.tolist(), *a.v.tolist(), *c.z.tolist()]
+    return x, {s.data.name: y for s, y in zip([x.t, *x.q, *x.v, *x.z], values, strict=True)}

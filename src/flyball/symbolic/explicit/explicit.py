@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -31,13 +31,23 @@ from .positions import Solved, solved_positions
 from .solve import Determinants, pattern, solve, solve_symmetric, times, transposed, zeros
 
 
-class Start(NamedTuple):
-    """Where a mechanism is, assembled: numbers of time, coordinates, velocities and counting states."""
+@dataclass(frozen=True)
+class More:
+    """What equations may hold besides coordinates, velocities and multipliers.
 
-    t: float
-    q: Sequence[float]
-    v: Sequence[float]
-    z: Sequence[float] = ()
+    Attributes
+    ----------
+    vdot : list of Node
+        Symbols of the accelerations.
+    places : list of (Node, Node)
+        Symbols of places on curves, and what vanishes there.
+    """
+
+    vdot: Sequence[Node] = ()
+    places: Sequence[tuple[Node, Any]] = ()
+
+
+NOTHING = More()
 
 
 @dataclass
@@ -61,7 +71,7 @@ class ExplicitEquations:
     """
 
     traced: Traced
-    start: Start
+    start: dict[str, float]
     names: tuple[str, ...]
     known: list[int]
     chosen: list[int]
@@ -87,16 +97,21 @@ class ExplicitEquations:
         return inlined(nodes, self.definitions)
 
 
-def explicit(x: Traced, start: Start, independent: Sequence[str] = ()) -> ExplicitEquations:
+def explicit(
+    x: Traced, start: Mapping[str, float], independent: Sequence[str] = (), more: More = NOTHING
+) -> ExplicitEquations:
     """Solve a mechanism's equations for the accelerations of independent coordinates.
 
     Parameters
     ----------
     x : Traced
-    start : Start
-        An assembled position: it tells the branch of every dependent coordinate.
+    start : mapping
+        An assembled position, as numbers of t, q and v by the names of their symbols: it tells the branch of every
+        dependent coordinate.
     independent : sequence of str
         Coordinates such as ``"A.angle"``; chosen by pivoting at the start if none are named.
+    more : More
+        What the equations hold besides.
 
     Raises
     ------
@@ -107,11 +122,13 @@ def explicit(x: Traced, start: Start, independent: Sequence[str] = ()) -> Explic
     """
     c = constraints(x)
     place = Place(x, c, start)
-    names = tuple(n.name for n in velocity_names(x.structure))
+    names = tuple(v.data.name.removesuffix("'") for v in x.v)
+    if x.v and not x.v[0].data.element:  # symbols that are called by their numbers
+        names = tuple(n.name for n in velocity_names(x.structure))
     chosen, rows = _chosen(x, place, names, independent)
     known, holonomic, unknown = _positions(x, place, chosen)
-    solved = solved_positions(x, place, c, (holonomic, unknown))
-    return _Reduction(x, start, names, place).equations(known, chosen, rows, solved)
+    solved = solved_positions(x, place, (holonomic, unknown), more.places)
+    return _Reduction(x, names, place, more).equations(known, chosen, rows, solved)
 
 
 def _chosen(x: Traced, place: Place, names: Sequence[str], wanted: Sequence[str]) -> tuple[list[int], list[int]]:
@@ -168,9 +185,9 @@ class _Reduction:
     """The steps from constraints to explicit equations, and the names of what must not vanish on the way."""
 
     x: Traced
-    start: Start
     names: tuple[str, ...]
     place: Place
+    more: More
     singular: dict[str, Any] = field(default_factory=dict)
 
     def equations(self, known: list[int], chosen: list[int], rows: list[int], solved: Solved) -> ExplicitEquations:
@@ -202,8 +219,9 @@ class _Reduction:
         missing = (times(x.M, vdot) - x.f)[dependent]
         lam = solve(Gw.T, missing[:, None], dets, transposed(order or []))[:, 0]
         definitions += self._multipliers(rows, lam)
+        definitions += self._each(self.more.vdot, vdot, "accelerations") if self.more.vdot else []
         return ExplicitEquations(
-            x, self.start, self.names, known, chosen, dependent, solved.definitions, definitions, M, f, Z, vdot,
+            x, self.place.values, self.names, known, chosen, dependent, solved.definitions, definitions, M, f, Z, vdot,
             self._all(rows, lam), self.singular, self._undetermined(rows), solved.notes,
         )  # fmt: skip
 

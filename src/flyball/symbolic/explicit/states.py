@@ -13,7 +13,7 @@ from ...graph.node import Node, Symbol
 from ...graph.values import evaluate
 from ...tracing.trace import Traced
 from .definition import rates, with_formulas
-from .explicit import ExplicitEquations, Start, explicit
+from .explicit import NOTHING, ExplicitEquations, More, explicit
 from .newton import Implicit
 from .partition import positions
 from .solve import Determinants, times
@@ -56,8 +56,7 @@ class StateEquations:
         self.f, self.h = np.array(found[:n], object), np.array(found[n:], object)
         implicit = with_formulas(e.definitions)
         self._implicit = [type(d)(d.symbols, (), tuple(replaced(d.residuals, new)), d.how) for d in implicit]
-        q, y = list(e.start.q), list(e.start.v)
-        self.start = np.array([*(q[k] for k in e.known), *(y[d] for d in e.chosen)], float)
+        self.start = np.array([e.start[s.data.name] for s in self.x], float)
         self._solvers: list[Implicit] | None = None
 
     @property
@@ -123,9 +122,7 @@ class StateEquations:
         return values | {self.t.data.name: float(t)}
 
     def _begun(self) -> list[Implicit]:
-        values = self._given(self.start, (0.0,) * len(self.u), self.equations.start.t, None)
-        x = self.equations.traced
-        values |= {s.data.name: float(y) for s, y in zip(x.q, self.equations.start.q, strict=True)}
+        values = self.equations.start | {s.data.name: 0.0 for s in self.u}
         out = []
         for d in self._implicit:
             out.append(Implicit(d, values))
@@ -135,25 +132,27 @@ class StateEquations:
 
 def state_equations(
     x: Traced,
-    start: Start,
+    start: Mapping[str, float],
     inputs: Mapping[str, Node] = {},
     outputs: Mapping[str, Any] = {},
     independent: Sequence[str] = (),
+    more: More = NOTHING,
 ) -> StateEquations:
     """The state space of a mechanism; see `explicit` and `StateEquations`.
 
     Parameters
     ----------
     x : Traced
-    start : Start
+    start : mapping
     inputs : mapping
         Name -> symbol: a parameter that is one.
     outputs : mapping
         Name -> expression of q, v, lam, t.
     independent : sequence of str
         Coordinates that the states are.
+    more : More
     """
-    return StateEquations(explicit(x, start, independent), inputs, outputs)
+    return StateEquations(explicit(x, start, independent, more), inputs, outputs)
 
 
 def _states(e: ExplicitEquations) -> tuple[tuple[str, ...], list[Node]]:
