@@ -51,6 +51,7 @@ class Symbols(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         """
-        from ..symbolic.equations import SymbolicOptions, symbolic
+        from ..symbolic.asked import symbolic
+        from ..symbolic.symbols import SymbolicOptions
 
         return symbolic(self, SymbolicOptions.asked(locals()))

@@ -18,7 +18,7 @@ from ..graph.simplify.simplify import simplified
 from ..graph.values import evaluate, evaluated, reached
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from .home import Home
 
 READ = 400  # operations up to which expressions are simplified to be shown
 MOST = 4000  # and up to which they are shown at all
@@ -43,13 +43,13 @@ class Expressions:
 
     def __init__(
         self,
-        equations: Equations,
+        home: Home,
         nodes: Any,
         rows: Sequence[str] = (),
         columns: Sequence[str] = (),
         unit: str = "",
     ) -> None:
-        self.equations = equations
+        self.home = home
         if isinstance(nodes, np.ndarray):
             self.nodes = nodes
         else:
@@ -97,7 +97,7 @@ class Expressions:
         ModelError
             If a name is unknown, or the value of a symbol is missing.
         """
-        known = self.equations.checked(values, self.symbols)
+        known = self.home.checked(values, self.symbols)
         if not self.shape:
             return np.asarray(evaluate(self.list(), known)[0])
         return evaluated(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
@@ -117,14 +117,14 @@ class Expressions:
         ImportError
             If SymPy is not installed (extra ``symbolic``).
         """
-        printer = self.equations.printer
+        printer = self.home.printer
         shown = self._read.nodes
         return printer(shown if self.shape else shown[()])
 
     def simplified(self) -> Expressions:
         """The same in a form that is shorter to read, as far as that is found quickly; equal in value."""
-        made = simplified(self.nodes.reshape(-1), units=self.equations.units)
-        return Expressions(self.equations, made.reshape(self.shape), self.rows, self.columns, self.unit)
+        made = simplified(self.nodes.reshape(-1), units=self.home.units)
+        return Expressions(self.home, made.reshape(self.shape), self.rows, self.columns, self.unit)
 
     @cached_property
     def _read(self) -> Expressions:
@@ -181,7 +181,7 @@ class Expressions:
         return self._new(made, self.rows, columns)
 
     def _derived(self, by: Sequence[Any]) -> np.ndarray:
-        symbols = [self.equations.symbol(x) for x in by]
+        symbols = [self.home.symbol(x) for x in by]
         try:
             return jacobian(self.list(), symbols).reshape(*self.shape, len(symbols))
         except Opaque as error:
@@ -189,8 +189,8 @@ class Expressions:
 
     def replaced(self, values: Mapping[str, Any]) -> Expressions:
         """With numbers or other expressions in place of symbols."""
-        eq = self.equations
-        new = [(eq.symbol(name), _node(x)) for name, x in values.items()]
+        home = self.home
+        new = [(home.symbol(name), _node(x)) for name, x in values.items()]
         out = np.empty(self.shape, object)
         out.ravel()[:] = replaced(self.list(), new)
         return self._new(out, self.rows, self.columns)
@@ -255,7 +255,7 @@ class Expressions:
         return (self[k] for k in range(len(self)))
 
     def _new(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
-        return Expressions(self.equations, nodes, rows, columns)
+        return Expressions(self.home, nodes, rows, columns)
 
 
 def _node(x: Any) -> Any:
