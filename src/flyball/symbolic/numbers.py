@@ -44,14 +44,14 @@ class Numbered:
         self.symbols: dict[str, Symbol] = {}
         for category in CATEGORIES:
             for e in list(getattr(self.model, category)):
-                new = self._fields(e, e.name)
+                new = self._replaced(e, e.name)
                 if isinstance(e, Body) and e.shape is not None:
                     new["shape"] = self._shapes(e)
                 if new:
                     self.model.replace(dataclasses.replace(e, **new))
         self._gravity()
 
-    def _fields(self, e: Any, owner: str) -> dict[str, Any]:
+    def _replaced(self, e: Any, owner: str) -> dict[str, Any]:
         """Fields of an element, or of a body's shape, with parameters in place of numbers."""
         out = {}
         for field, unit in fields_with(type(e), Unit).items():
@@ -103,7 +103,7 @@ class Numbered:
         shapes = []
         for k, shape in enumerate(body.shapes()):
             owner = body.name if len(body.shapes()) == 1 else f"{body.name}.shape_{k + 1}"
-            shapes.append(dataclasses.replace(shape, **self._fields(shape, owner)))
+            shapes.append(dataclasses.replace(shape, **self._replaced(shape, owner)))
         return tuple(shapes) if isinstance(body.shape, tuple) else shapes[0]
 
     def _gravity(self) -> None:
