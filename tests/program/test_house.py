@@ -52,7 +52,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
         "results",
         "special",
     },
-    "tracing": {*LIBRARY, *ELEMENTS, "graph", "numerics", "laws", "tables", "equations"},
+    "tracing": {*LIBRARY, *ELEMENTS, "graph", "laws", "tables", "equations"},
     "special": {*LIBRARY, *ELEMENTS, "graph", "numerics", "laws", "tables", "equations", "tracing"},
     "symbolic": {
         *(*LIBRARY, *ELEMENTS, "numerics", "rotations", "laws", "tables", "equations", "results", "analysis"),

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.errors import ModelError
 from tests import mechanisms
 from tests.contract import zoo
 from tests.examples.test_examples import FILES
