@@ -283,7 +283,7 @@ class Equations:
             known |= places_at(self.formulated, missing, known)
         lacking = [k for k, x in wanted.items() if x.moving and k not in known]
         if lacking:
-            raise ModelError(f"no value is given for {listing(lacking)}; eq.start has those at the start")
+            raise ModelError(f"no value is given for {', '.join(lacking)}; eq.start has those at the start")
         return known
 
     def evaluate(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:

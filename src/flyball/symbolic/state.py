@@ -15,7 +15,6 @@ from ..errors import ModelError
 from ..graph.values import evaluate
 from ..math.spline import BREAKS
 from ..math.vec import mtv, sub
-from ..model.words import listing
 from .formulated import Formulated, Place, objects
 
 POINTS = 20  # of a curve between two of its breaks that are looked at first
@@ -46,7 +45,9 @@ def places_at(x: Formulated, places: Sequence[Place], values: Mapping[str, Any])
     S, W, out = x.traced.system, x.traced.work, {}
     if any(np.ndim(v) for v in values.values()):
         names = [p.symbol.data.name for p in places]
-        raise ModelError(f"give {listing(names)} too: places on curves are found for one instant only, not for arrays")
+        raise ModelError(
+            f"give {', '.join(names)} too: places on curves are found for one instant only, not for arrays"
+        )
     for place in places:
         t = x.values.structure.terms[place.term]
         records = [c for k in (t.F, t.M) for part in load(W.FK, k)[:2] for c in part]
