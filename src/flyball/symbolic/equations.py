@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from .formulated import Formulated, Place, formulated, objects
 from .names import text
 from .quantities import Quantities
 from .state import named_state, places_at
+
+if TYPE_CHECKING:
+    from .export.code import Code
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -289,6 +293,21 @@ class Equations:
     def evaluate(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
         return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
+
+    def export(
+        self,
+        folder: str | Path | None = None,
+        *,
+        language: str = "c",
+        functions: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        name: str = "",
+    ) -> Code:
+        """Functions of these equations as code: see `Mechanism.export`."""
+        from .export.code import code_of
+
+        code = code_of(self, language, functions, outputs, name)
+        return code if folder is None else code.written(folder)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"

@@ -146,7 +146,7 @@ def _constant(name: str, items: Sequence[Any], declared: bool = False) -> str:
 def _comment(text: str) -> str:
     """A comment of some lines."""
     text = text.strip().replace("*/", "* /").replace("/*", "/ *")
-    return "/* " + "\n   ".join(text.splitlines()) + " */\n"
+    return "/* " + "\n".join(("   " + x).rstrip() for x in text.splitlines()).lstrip() + " */\n"
 
 
 def _table(t: Table) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import keyword
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -88,8 +88,8 @@ class Code:
             raise ModelError(f"there is no function {name!r}{suggest(name, self.operations)} in this code")
         return self.functions[name]
 
-    def write(self, folder: str | Path) -> tuple[Path, ...]:
-        """Write the files to a folder, which is made where it is not there; returns their paths."""
+    def written(self, folder: str | Path) -> Code:
+        """Write the files to a folder, which is made where it is not there; the same code, which names them."""
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
         for name, text in self.texts.items():
@@ -99,12 +99,12 @@ class Code:
             for name, f in self.functions.items():
                 written.append(folder / f"{self.name}_{name}.casadi")
                 f.save(str(written[-1]))
-        return tuple(written)
+        return replace(self, files=tuple(written))
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
         told = [("language", self.language)]
-        told += [(r.name, f"({', '.join(a.name for a in r.arguments)}), {self.operations[r.name]} operations")
+        told += [(r.name, f"of {', '.join(a.name for a in r.arguments)}: {self.operations[r.name]} operations")
                  for r in self.routines]  # fmt: skip
         return told
 
@@ -116,18 +116,14 @@ class Code:
             "operations": self.operations,
             "names": {k: list(x) for k, x in self.names.items()},
             "start": {k: x.tolist() for k, x in self.start.items()},
+            "files": [str(f) for f in self.files],
         }
 
 
-def export(
-    eq: Equations,
-    folder: str | Path | None = None,
-    language: str = "c",
-    functions: Sequence[str] = (),
-    outputs: Sequence[str] = (),
-    name: str = "",
+def code_of(
+    eq: Equations, language: str, functions: Sequence[str] = (), outputs: Sequence[str] = (), name: str = ""
 ) -> Code:
-    """Write a mechanism's equations as code: see `Equations.export`."""
+    """A mechanism's equations as code, with nothing written: see `Equations.export`."""
     if language not in LANGUAGES:
         raise ModelError(f"language={language!r}: must be {', '.join(LANGUAGES)}{suggest(str(language), LANGUAGES)}")
     if isinstance(functions, str) or isinstance(outputs, str):
@@ -151,9 +147,6 @@ def export(
     code = Code(language, called, texts, {r.name: r.operations for r in routines}, names, start, routines)
     if language == "casadi":
         _ = code.functions  # what cannot be written is refused now
-    if folder is None:
-        return code
-    object.__setattr__(code, "files", code.write(folder))
     return code
 
 
@@ -172,12 +165,9 @@ def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
 
 def _say_where(eq: Equations, routines: Sequence[Routine]) -> None:
     """Tell Python functions whose laws they are."""
-    s = eq.formulated.values.structure
+    laws = {id(c.native.python): c.where for c in eq.formulated.values.structure.functions}
     for _, f in opaque(routines, Names()).values():
-        for e in (*s.model.drivers, *s.model.forces):
-            given = [x for value in vars(e).values() for x in (value if isinstance(value, tuple) else (value,))]
-            if any(x is f.python or getattr(x, "python", None) is f.python for x in given):
-                f.told["of"] = e.title
+        f.told["of"] = laws.get(id(f.python), "")
 
 
 def _identifier(name: str, language: str) -> str:
