@@ -27,9 +27,9 @@ from .quantities import Quantities
 from .state import named_state, places_at
 
 if TYPE_CHECKING:
-    from .export.code import Code
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
+    from .export.code import Code
 
 
 @dataclass(frozen=True, kw_only=True)
