@@ -343,20 +343,11 @@ class Equations:
         """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
         return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
 
-    def export(
-        self,
-        folder: str | Path | None = None,
-        *,
-        language: str = "c",
-        functions: Sequence[str] = (),
-        outputs: Sequence[str] = (),
-        name: str = "",
-    ) -> Code:
-        """Functions of these equations as code: see `Mechanism.export`."""
-        from .export.code import code_of
+    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
+        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+        from .export.code import exported
 
-        code = code_of(self, language, functions, outputs, name)
-        return code if folder is None else code.written(folder)
+        return exported(self, folder, **asked)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"

@@ -120,10 +120,16 @@ class Code:
         }
 
 
-def code_of(
-    eq: Equations, language: str, functions: Sequence[str] = (), outputs: Sequence[str] = (), name: str = ""
+def exported(
+    eq: Equations,
+    folder: str | Path | None = None,
+    *,
+    language: str = "c",
+    functions: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    name: str = "",
 ) -> Code:
-    """A mechanism's equations as code, with nothing written: see `Equations.export`."""
+    """Equations as code, written to a folder if one is given: see `Mechanism.export`."""
     if language not in LANGUAGES:
         raise ModelError(f"language={language!r}: must be {', '.join(LANGUAGES)}{suggest(str(language), LANGUAGES)}")
     if isinstance(functions, str) or isinstance(outputs, str):
@@ -147,7 +153,7 @@ def code_of(
     code = Code(language, called, texts, {r.name: r.operations for r in routines}, names, start, routines)
     if language == "casadi":
         _ = code.functions  # what cannot be written is refused now
-    return code
+    return code if folder is None else code.written(folder)
 
 
 def _start(eq: Equations, made: Functions) -> dict[str, np.ndarray]:
