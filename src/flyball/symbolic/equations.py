@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from .expressions import Expressions
 from .quantities import Quantities
@@ -13,6 +14,7 @@ from .symbols import Symbols
 if TYPE_CHECKING:
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
+    from .export.code import Code
 
 
 class Equations(Symbols):
@@ -120,6 +122,12 @@ class Equations(Symbols):
         from .explicit.states import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
+
+    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
+        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+        from .export.code import exported
+
+        return exported(self, folder, **asked)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
