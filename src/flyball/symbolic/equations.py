@@ -15,13 +15,13 @@ from ..analysis.options import Options
 from ..analysis.untouched import refuse_contact
 from ..errors import AnalysisError, ModelError
 from ..graph.node import SYMBOL, Graph, Node, Symbol
+from ..graph.printers import spelling
 from ..model.expressions import is_number_text
 from ..model.model import Model, listing, suggest
 from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
-from .names import text
 from .quantities import Quantities
 from .state import named_state, places_at
 
@@ -83,7 +83,7 @@ class Equations:
             if name in self._inputs:
                 out[name] = self.graph.symbol(self._inputs[name], 0.0)
             elif name in (o.parameters or {}) or not isinstance(value, str) or is_number_text(value):
-                out[name] = self.graph.symbol(Symbol(name, "parameter", _latex(name)), told[name])
+                out[name] = self.graph.symbol(Symbol(name, "parameter", spelling.name(name)), told[name])
         return out
 
     @cached_property
@@ -308,14 +308,6 @@ class Equations:
         size = {k: getattr(self, k).operations for k in ("M", "f", "g", "G", "gamma")}
         lines.append(f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}")
         return "\n".join(lines)
-
-
-def _latex(name: str) -> str:
-    """A parameter's name: a single letter as it is, with a number behind as index; others upright."""
-    if len(name) == 1:
-        return name
-    letter, index = name[0], name[1:].lstrip("_")
-    return f"{letter}_{{{index}}}" if index.isdigit() else text(name)
 
 
 COORDINATES = ("auto", "absolute", "joint")
