@@ -10,7 +10,7 @@ from ...graph.printers.spelling import spelt
 from ...graph.simplify.shared import Definitions, shared
 from ...graph.simplify.simplify import simplified
 from ...graph.values import reached
-from ...tables.system import FREE, SPHERICAL, TREE
+from ..quaternions import quaternions
 from . import contents
 from .parted import length, shortened
 from .parts import Document, Formula, Formulas, Section, Tex
@@ -49,9 +49,9 @@ def document(eq: Equations) -> Document:
         contents.energies(eq),
     ]
     made = Document(eq.model.name, subtitle(eq), sections)
-    found, meant = shortened(made.expressions(), units(eq), candidates(eq))
+    found, meant = shortened(made.expressions(), quaternions(eq.formulated), candidates(eq))
     made.put(found)
-    summed(made, units(eq))
+    summed(made, quaternions(eq.formulated))
     tidied(made)
     count = len(made.expressions())
     found, letters = shared([*made.expressions(), *(y for _, y in meant)])
@@ -104,17 +104,6 @@ def subtitle(eq: Equations) -> str:
     count = {"coordinate": len(eq.q), "velocity": len(eq.v), "constraint": len(eq.lam)}
     many = {"velocity": "velocities"}
     return ", ".join(f"{n} {k if n == 1 else many.get(k, k + 's')}" for k, n in count.items())
-
-
-def units(eq: Equations) -> list[list[Node]]:
-    """Coordinates that are unit quaternions."""
-    T = eq.formulated.traced
-    out = []
-    for row in T.system.body_i:
-        if row[TREE] in (FREE, SPHERICAL):
-            first = int(row[2]) + (3 if row[TREE] == FREE else 0)
-            out.append(list(T.q[first : first + 4]))
-    return out
 
 
 def candidates(eq: Equations) -> list[tuple[Any, Symbol]]:
