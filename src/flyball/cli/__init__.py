@@ -12,6 +12,7 @@ from . import (  # noqa: F401  (each adds its subcommand)
     compare,
     equations,
     equilibrium,
+    export,
     inverse_dynamics,
     kinematics,
     linearize,
