@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from .expressions import Expressions
 from .quantities import Quantities
+from .shown import Shown
 from .symbols import Symbols
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from .export.code import Code
 
 
-class Equations(Symbols):
+class Equations(Shown, Symbols):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
@@ -131,19 +132,3 @@ class Equations(Symbols):
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
-
-    def __str__(self) -> str:
-        count = len(self.q), len(self.v), len(self.lam)
-        lines = [
-            f"equations of motion of {self.model.name!r}, coordinates {self.coordinates}",
-            "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma",
-            f"q ({count[0]}): {', '.join(self.q.rows)}",
-            f"v ({count[1]}): {', '.join(self.v.rows)}",
-            f"lam ({count[2]}): {', '.join(self.lam.rows) or 'none: no constraints'}",
-        ]
-        more = {"loads": self.loads.rows, "places": tuple(self.places), "inputs": self.inputs}
-        lines += [f"{k}: {', '.join(names)}" for k, names in more.items() if names]
-        lines.append(f"parameters: {', '.join(f'{k} = {x:g}' for k, x in self.parameters.items()) or 'none'}")
-        size = {k: getattr(self, k).operations for k in ("M", "f", "g", "G", "gamma")}
-        lines.append(f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}")
-        return "\n".join(lines)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 READ = 400  # operations up to which expressions are simplified to be shown
 MOST = 4000  # and up to which they are shown at all
+WIDE = 160  # letters of a line up to which a matrix is printed as such
 
 
 class Expressions:
@@ -131,6 +132,10 @@ class Expressions:
         """What is shown: simplified if it is short enough to be read."""
         return self.simplified() if self.operations <= READ else self
 
+    def texts(self) -> Any:
+        """As text, simplified if it is short enough to be read: lists of lists as deep as it has dimensions."""
+        return np.vectorize(text.text, otypes=[object])(self._read.nodes).tolist() if self.nodes.size else []
+
     def latex(self) -> str:
         """As LaTeX, simplified if it is not too long for that; a vector is a column."""
         shown = self._read.nodes
@@ -146,14 +151,21 @@ class Expressions:
     def __str__(self) -> str:
         if self.operations > MOST:
             return f"{self!r}: too long to be read; .sympy(), .at(values) and entries such as [0] are there"
-        shown = self._read.nodes
+        made = self.texts()
         if not self.shape:
-            return text.text(shown[()])
-        if len(self.shape) > 1:
-            return text.matrix(shown) if shown.size else f"no entries: {self.shape[0]} x {self.shape[1]}"
+            return str(made)
         names = self.rows or tuple(map(str, range(self.shape[0])))
-        wide = max(map(len, names), default=0)
-        return "\n".join(f"{name:{wide}}  {text.text(x)}" for name, x in zip(names, shown, strict=True)) or "none"
+        if len(self.shape) == 1:
+            wide = max(map(len, names), default=0)
+            return "\n".join(f"{name:{wide}}  {x}" for name, x in zip(names, made, strict=True)) or "none"
+        if not self.nodes.size:
+            return f"no entries: {self.shape[0]} x {self.shape[1]}"
+        told = text.matrix(self._read.nodes)
+        if max(map(len, told.split("\n"))) <= WIDE:
+            return told
+        columns = self.columns or tuple(map(str, range(self.shape[1])))
+        entries = [(a, b, x) for a, row in zip(names, made, strict=True) for b, x in zip(columns, row, strict=True)]
+        return "\n".join(f"{a}, {b}: {x}" for a, b, x in entries if x != "0")
 
     def __repr__(self) -> str:
         what = " x ".join(map(str, self.shape)) if self.shape else "one expression"

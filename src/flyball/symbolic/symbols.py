@@ -19,6 +19,7 @@ from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
 from .home import Home
+from .quaternions import quaternions
 from .state import named_state, places_at
 
 
@@ -78,8 +79,7 @@ class Symbols(Home):
     @cached_property
     def units(self) -> list[list[Node]]:
         """Symbols of each quaternion: their squares add up to one."""
-        named, q = self.formulated.named, self.q.rows
-        return [[named[f"{n.removesuffix('.e0')}.e{k}"] for k in range(4)] for n in q if n.endswith(".e0")]
+        return quaternions(self.formulated)
 
     @property
     def parameters(self) -> dict[str, float]:
