@@ -149,7 +149,7 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
 
 def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray) -> np.ndarray:
     """Rows half way through those pieces, and where else the loop stops on its way there; as far as it gets."""
-    S, W = a.compiled.values.system, a.compiled.work
+    S, W = a.compiled.system, a.compiled.work
     first = known[pieces[0]]
     times = 0.5 * (known[pieces, 0] + known[pieces + 1, 0])
     real, count, _, y, K, accounts, seen = clock

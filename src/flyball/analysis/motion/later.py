@@ -42,5 +42,5 @@ def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         np.zeros((ROWS, 0)),
     )
     W.option[LATER] = 0.0
-    motion_kernel(c.values.system, W, tableau("rk45"), clock, rows, COMPLETE)
+    motion_kernel(c.system, W, tableau("rk45"), clock, rows, COMPLETE)
     return np.ascontiguousarray(rows[:, 1 + ny : 1 + ny + s.nv]), np.ascontiguousarray(rows[:, 1 + ny + s.nv :])
