@@ -6,6 +6,12 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.contact.tables import BEFORE, FOUND, Contacts
+from flyball.numerics.cone.operator import across
+from flyball.numerics.cone.rooms import rooms, unfilled
+from flyball.stepping.record import book, book_turning
+from flyball.stepping.rows import warm
+from flyball.stepping.tables import COUNTS, REALS, TRACKS, Pace
 
 G, R, RHO, SIGMA = 9.81, 0.1, 0.002, 0.001
 
@@ -37,3 +43,62 @@ def test_a_solver_of_the_convex_form_is_refused_for_coulombs_law() -> None:
     with pytest.raises(fb.ModelError, match=r"convex problem only(?s:.*)coulomb=False"):
         fb.Impulse(solver="barzilai-borwein")
     assert fb.Impulse(solver="barzilai-borwein", coulomb=False).solver == "barzilai-borwein"
+
+
+@pytest.mark.parametrize("held", [False, True])
+@pytest.mark.parametrize("law", ["poisson", "newton", "moreau"])
+@pytest.mark.parametrize("restitution", [0.5, 1.0])
+def test_what_torques_take_in_impacts_is_frictions_too(restitution: float, law: str, held: bool) -> None:
+    """A spinning ball that bounces with rolling friction; free, or part of a mechanism by a spring that is soft."""
+    m = fb.Mechanism("ball", gravity=(0, 0, -G))
+    m.add(fb.Ground("floor", shape=fb.Plane()))
+    start = {"velocity": (1, 0, 0), "angular_velocity": (0, 3, 20)}
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=R), mass=1, position=(0, 0, R + 0.2), **start))
+    if held:  # its forces are not those of gravity alone
+        m.add(fb.SpringDamper("spring", "ground", "ball", at=((0, 0, 9), (0, 0, R + 0.2)), stiffness=1e-3))
+    m.add(fb.Contact(friction=0.5, rolling_friction=0.01, spinning_friction=0.01, restitution=restitution))
+    run = m.simulate(1, outputs=11, method=fb.Impulse(step=2e-3, restitution=law))
+    assert run.energy.friction_loss[-1] > 0.9
+    assert np.abs(run.energy.balance).max() < (1e-5 if held else 1e-12)
+    assert np.diff(run.energy.total).max() < (1e-5 if held else 1e-12)
+
+
+def test_impulses_and_torques_of_the_step_before_follow_their_contacts() -> None:
+    """Renumbered, with other tangents and with unequal friction along these, they are the same in the world."""
+    rng, n = np.random.default_rng(4), 5
+    P = unfilled(n, 0, 0, 0, 0, True)
+    X, Y = rooms(P)[0], rooms(P)[0]
+    pace, before, now = (
+        Pace(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(8, np.int64)),
+        *np.zeros((2, n, TRACKS)),
+    )
+    P.at[:] = -1
+    P.mu[:] = 1.0
+
+    def tangents() -> None:
+        for c in range(n):
+            u = rng.normal(size=3)
+            u -= (u @ normal[c]) * normal[c]
+            u /= np.linalg.norm(u)
+            P.frame[c] = np.r_[normal[c], u, 0.7 * np.cross(normal[c], u)]
+
+    def world() -> np.ndarray:
+        return np.array([[across(P, c, *x[c]) for c in range(n)] for x in (X.p, X.torque)])
+
+    normal = rng.normal(size=(n, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    tangents()
+    X.p[:], X.torque[:] = 1.0 + rng.random((n, 3)), rng.normal(size=(n, 3))
+    was = world()
+    for c in range(n):
+        book(P, X, c, (0.0, 0.0, 0.0), pace, before)
+        book_turning(P, X, Y, c, pace, before)
+    C = Contacts(np.zeros(8, np.int64), np.zeros((n, 4), np.int64), np.zeros((n, 8)))
+    C.count[FOUND], C.at[:, BEFORE] = n, (3, 0, -1, 4, 1)
+    normal = normal[C.at[:, BEFORE]]
+    tangents()
+    warm(C, P, X, now, before)
+    old = C.at[:, BEFORE] >= 0
+    assert world()[:, old] == pytest.approx(was[:, C.at[old, BEFORE]], abs=1e-14)
+    assert not X.p[~old].any()
+    assert not X.torque[~old].any()

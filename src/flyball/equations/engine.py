@@ -19,6 +19,7 @@ from ..numerics.integrators.tableaux import Tableau, tableau
 from ..tables.system import COORDINATES, System, Work
 from .dispatch import remember
 from .follow import follow
+from .made import choose_code
 from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
 from .residual import residual
@@ -45,6 +46,7 @@ def perform(S, W, R, clock, out, task):
     """One task; see `motion_kernel`. A formula, so that callees have one caller's flags and are compiled once."""
     t = clock.real[T]
     y = clock.y[0]
+    choose_code(S, W, task)
     if task == POSITION:
         nq = S.kinds[COORDINATES]
         z = y[nq + W.vel.shape[1] :]

@@ -18,12 +18,15 @@ from ..tables.system import (
     COORDINATES,
     EFFORT,
     F_APPLIED,
+    FINISH,
     G_VALUE,
     GAMMA,
     GIVEN,
     LAM,
     LATER,
     LENGTH,
+    LOADS,
+    MADE,
     NU,
     OFFSET,
     PARTED,
@@ -48,6 +51,7 @@ from ..tables.system import (
 from .dispatch import progress, remember
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .loads import efforts, forces, gather, inertial
+from .made import run
 from .partition import exchange
 from .prescribed import prepare
 from .projection import (
@@ -119,10 +123,13 @@ def accelerate(S, W, t, p, dy, factored):
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
-        inertial(S, W)
-        forces(S, W, t, work)
-        gather(S, W, W.vel[F_APPLIED])
-        efforts(S, W, t, work, W.vel[F_APPLIED])
+        if W.info[MADE + LOADS] != 0:
+            run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
+        else:
+            inertial(S, W)
+            forces(S, W, t, work)
+            gather(S, W, W.vel[F_APPLIED])
+            efforts(S, W, t, work, W.vel[F_APPLIED])
         if (
             factored == OLD
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
@@ -142,6 +149,9 @@ def accelerate(S, W, t, p, dy, factored):
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
             return W.info[STATUS]
         improve(S, W, attempt)
+    if W.info[MADE + FINISH] != 0:
+        W.info[STATUS] = 0 if run(W.info[MADE + FINISH], S, W, t, p, dy, x, W.row[LAM]) == 0.0 else NOT_FINITE
+        return W.info[STATUS]
     rates(S, p, v, dy)
     for d in range(nv):
         dy[nq + d] = x[d]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..laws.evaluation import evaluate_jet
-from ..tables.system import BODY_LAW, GIVEN, OFFSET, Q0, V0
+from ..tables.system import BODY_LAW, GIVEN, MADE, OFFSET, PREPARE, Q0, V0
+from .made import run
 from .rows import BY_TIME
 from .tree import normalise
 
@@ -12,6 +13,9 @@ from .tree import normalise
 @formula
 def prepare(S, W, t, q, v):
     """Unit quaternions; prescribed coordinates, velocities and accelerations (W.vel[GIVEN]) as their laws say."""
+    if W.info[MADE + PREPARE] != 0:
+        run(W.info[MADE + PREPARE], S, W, t, q, v, q, v)
+        return
     normalise(S, q)
     for b in range(S.body_i.shape[0]):
         law = S.body_i[b, BODY_LAW]

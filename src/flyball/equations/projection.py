@@ -6,14 +6,18 @@ from ..compiler.jit import formula
 from ..tables.system import (
     BODY_LAW,
     COORDINATES,
+    DRIFT,
     EVALUATIONS,
     F_APPLIED,
     G_VALUE,
     GUILTY,
     LENGTH,
+    MADE,
+    MOVE,
     NU,
     PARTED,
     PASS,
+    PLACE,
     PLACED,
     PROJECTIONS,
     R2,
@@ -24,6 +28,7 @@ from ..tables.system import (
 )
 from .dispatch import row_biases, row_values
 from .kinematics import motions, poses
+from .made import run
 from .rows import row_times
 from .solve import REFINEMENTS, factor, magnitude, reuse, solve
 from .tree import rates, retract, unrated
@@ -44,15 +49,21 @@ FAR = 1e3  # a state this far off is given up at once
 def place(S, W, t, q, z):
     """Poses, and the constraint rows as far as they follow from them: g, G, nu. ``z`` tells angles their turns."""
     W.info[EVALUATIONS] += 1
-    poses(S, W, q)
-    row_values(S, W, t, z)
+    if W.info[MADE + PLACE] != 0:
+        run(W.info[MADE + PLACE], S, W, t, q, z, q, z)
+    else:
+        poses(S, W, q)
+        row_values(S, W, t, z)
 
 
 @formula
 def move(S, W, t, v, z):
     """Velocities and bias accelerations at the poses in W, and what follows from them: gamma, measured rates."""
-    motions(S, W, v)
-    row_biases(S, W, t, v, z)
+    if W.info[MADE + MOVE] != 0:
+        run(W.info[MADE + MOVE], S, W, t, v, z, v, z)
+    else:
+        motions(S, W, v)
+        row_biases(S, W, t, v, z)
 
 
 @formula
@@ -82,6 +93,9 @@ def rounding(W):
 @formula
 def drift(S, W, v, out):
     """Largest |G v - nu|, the size of its largest term, and nu - G v into ``out``."""
+    if W.info[MADE + DRIFT] != 0:
+        worst = run(W.info[MADE + DRIFT], S, W, 0.0, v, out, v, out)
+        return worst, W.flat[0]
     worst = 0.0
     size = 0.0
     for k in range(out.shape[0]):

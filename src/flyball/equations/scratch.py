@@ -8,7 +8,7 @@ import numpy as np
 
 from ..laws.call import STACK_RESERVE
 from ..tables.specs import Structure
-from ..tables.system import INVERSE_JACOBIAN, System, Work
+from ..tables.system import FLAT, INVERSE_JACOBIAN, MADE, SCRATCH, System, Work
 from .kinematics import ground_frames
 
 
@@ -25,7 +25,8 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(8, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl), z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n),
-        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(11), np.zeros(8, np.int64),
+        z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(11), np.zeros(MADE + FLAT, np.int64),
+        z(system.flat[SCRATCH]),
     )  # fmt: skip
     ground_frames(system, W)
     return W

@@ -23,10 +23,12 @@ from ..tables.system import (
     EFFORT,
     EXCESS,
     EXCESS_MASS,
+    FACTOR,
     FACTORISATIONS,
     GIVEN,
     INVERSE,
     LENGTH,
+    MADE,
     MASS,
     NV,
     PARTED,
@@ -36,16 +38,21 @@ from ..tables.system import (
     PER_COMPACT,
     PER_MASS,
     R1,
+    REFINE,
     REGULARISE,
+    REUSE,
     SCHUR,
     SEMIDEFINITE,
     SOLVER,
     SOLVES,
+    STEP,
+    STEP_UNLOADED,
     V0,
     V1,
     V2,
 )
 from .articulated import articulate, articulated_solve
+from .made import run
 from .mass import mass_entries
 from .rows import row_times
 
@@ -75,6 +82,8 @@ def inverse_mass(S, b, x, at, out, to):
 def factor(S, W):
     """Factor the matrix of the solve at the kinematics and rows now in W. Returns 0 or 1 + a guilty unknown."""
     W.info[FACTORISATIONS] += 1
+    if W.info[MADE + FACTOR] != 0:
+        return int(run(W.info[MADE + FACTOR], S, W, 0.0, W.A, W.A, W.A, W.A))
     if S.kinds[SOLVER] == SCHUR:
         return factor_schur(S, W)
     if S.kinds[SOLVER] == COUPLED:
@@ -127,7 +136,10 @@ def natural_size(S, W):
 def reuse(S, W):
     """Keep the last factor for rows that have moved a little: as a preconditioner of the refinement."""
     if S.kinds[SOLVER] == SCHUR:
-        turn_rows(S, W)
+        if W.info[MADE + REUSE] != 0:
+            run(W.info[MADE + REUSE], S, W, 0.0, W.A, W.A, W.A, W.A)
+        else:
+            turn_rows(S, W)
 
 
 @formula
@@ -189,6 +201,8 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
     of its terms.
     """
     W.info[SOLVES] += 1
+    if W.info[MADE + STEP] != 0:
+        return solve_made(S, W, f, gamma, x, lam, loaded, refinements)
     for d in range(x.shape[0]):
         x[d] = W.vel[GIVEN, d] if loaded else 0.0
     for k in range(lam.shape[0]):
@@ -200,6 +214,19 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
         return solve_coupled(S, W, f, gamma, x, lam, loaded, refinements)
     articulated_solve(S, W, f, x, W.vel[EFFORT])
     return 0.0
+
+
+@formula
+def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
+    """By code made for the mechanism: one pass, then as many for what is left as it takes."""
+    worst = run(W.info[MADE + (STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
+    last = 1e300
+    for _ in range(refinements):
+        if not worst > W.option[PASS] or worst > STALLED * last:
+            break
+        last = worst
+        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
+    return worst
 
 
 @formula

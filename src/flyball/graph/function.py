@@ -101,9 +101,10 @@ def orders(data: list[float], moved: list[int], at: int) -> list[Function]:
 
         return derivative
 
-    zero = Function("zero", lambda *args: 0.0 * args[0])
+    zero = Function("zero", lambda *args: 0.0 * args[0], lambda k: zero, constant=0.0)
     for order in range(ORDERS):
         made.append(Function(f"table{at}", of(order), next_of(order), table=data, moved=moved, order=order, at=at))
+        made[order].told["value"] = made[0]
     return made
 
 

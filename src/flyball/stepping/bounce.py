@@ -19,7 +19,8 @@ from ..compiler.jit import formula
 from ..contact.surfaces import RESTITUTION
 from ..contact.tables import FOUND, GAP, MATERIAL, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
-from ..numerics.cone.operator import across, seen
+from ..math.vec import add, dot, load3, put3, scale, sub
+from ..numerics.cone.operator import across, seen, seen_turning
 from ..numerics.cone.problem import ENOUGH, MOST, NONE
 from .penalty import stiffness
 from .sequence import one_after_the_other
@@ -44,6 +45,7 @@ from .tables import (
     SLOWEST,
     STEP,
     SWEEPS,
+    TURNED_BEFORE,
     YIELDING,
 )
 
@@ -111,17 +113,23 @@ def by_velocities(C, bias, R, Z, E, X, W, O, F, pace, now):
     if power(R, bias, E, E, C, now) <= 0.0:
         copy_velocities(E, X)
         for c in range(C.count[FOUND]):
-            for i in range(3):
-                Z.p[c, i] = E.p[c, i]
+            add_impulses(Z, 0.0, E, 1.0, c)
         return
     for c in range(C.count[FOUND]):
         for i in range(3):
             R.bias[c, i] = 0.0 if i == 0 and now[c, HIT] > 0.0 else bias[c, i]
     solve_afresh(pace.door[BOUNCE], R, Z, W, O, F, pace)
     for c in range(C.count[FOUND]):
-        for i in range(3):
-            E.p[c, i] -= Z.p[c, i]
+        add_impulses(E, 1.0, Z, -1.0, c)
     expand(R, bias, Z, E, X, C, pace, now)
+
+
+@formula
+def add_impulses(Z, z, E, e, c):
+    """z times the impulse of Z, and e times that of E, into Z."""
+    put3(Z.p, c, 0, add(scale(z, load3(Z.p, c, 0)), scale(e, load3(E.p, c, 0))))
+    if Z.torque.shape[0] > 0:
+        put3(Z.torque, c, 0, add(scale(z, load3(Z.torque, c, 0)), scale(e, load3(E.torque, c, 0))))
 
 
 @formula
@@ -148,9 +156,10 @@ def hits(G, C, at, bias, R, X, L, pace, now):
         for i in range(2):  # what gives way has no impulse in no time
             R.at[c, i] = NONE if gives_way else at[c, i]
         u = seen(R, X.v, X.wide, c)
-        for i in range(3):
-            now[c, BEFORE_KICK + i] = u[i]
-            R.bias[c, i] = bias[c, i]
+        put3(now, c, BEFORE_KICK, u)
+        put3(R.bias, c, 0, load3(bias, c, 0))
+        if R.turn.shape[0] > 0:
+            put3(now, c, TURNED_BEFORE, seen_turning(R, X.v, X.wide, c))
         e = elasticity(G, C, L, c)
         now[c, HIT] = 0.0
         plain = pace.count[SEQUENTIAL] != 0 and C.x[c, GAP] <= pace.real[FLAT]
@@ -198,7 +207,16 @@ def power(R, bias, Z, X, C, now):
         for i in range(3):
             own = bias[c, i] if i > 0 else 0.0
             total += Z.p[c, i] * (0.5 * (u[i] + now[c, BEFORE_KICK + i]) + own)
+        total += power_of_turning(R, Z, X, c, now)
     return total
+
+
+@formula
+def power_of_turning(R, Z, X, c, now):
+    """The same of the torque's impulse at contact c."""
+    if R.turn.shape[0] == 0:
+        return 0.0
+    return 0.5 * dot(load3(Z.torque, c, 0), add(seen_turning(R, X.v, X.wide, c), load3(now, c, TURNED_BEFORE)))
 
 
 @formula
@@ -217,6 +235,9 @@ def expand(R, bias, Z, E, X, C, pace, now):
             own = bias[c, i] if i > 0 else 0.0
             a += E.p[c, i] * (u[i] + own)
             b += 0.5 * E.p[c, i] * (w[i] - u[i])
+        if R.turn.shape[0] > 0:
+            u, w, t = seen_turning(R, X.v, X.wide, c), seen_turning(R, E.v, E.wide, c), load3(E.torque, c, 0)
+            a, b = a + dot(t, u), b + 0.5 * dot(t, sub(w, u))
     s = 1.0
     if a + b > there and b > 0.0:
         s = (sqrt(a * a + 4.0 * b * there) - a) / (2.0 * b)
@@ -229,8 +250,7 @@ def expand(R, bias, Z, E, X, C, pace, now):
     for k in range(X.wide.shape[0]):
         X.wide[k] += s * (E.wide[k] - X.wide[k])
     for c in range(C.count[FOUND]):
-        for i in range(3):
-            Z.p[c, i] += s * E.p[c, i]
+        add_impulses(Z, 1.0, E, s, c)
 
 
 @formula
@@ -245,7 +265,6 @@ def close(R, bias, Z, X, C, pace, now):
             else:  # of a surface that moves the bias is its own motion
                 pace.real[LOST_FRICTION] -= Z.p[c, i] * (mean + bias[c, i])
                 pace.real[GIVEN] -= Z.p[c, i] * bias[c, i]
-        k = across(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])
-        for i in range(3):
-            now[c, KICK + i] += k[i]
+        pace.real[LOST_FRICTION] -= power_of_turning(R, Z, X, c, now)
+        put3(now, c, KICK, add(load3(now, c, KICK), across(R, c, Z.p[c, 0], Z.p[c, 1], Z.p[c, 2])))
     pace.count[IMPACTS] += 1

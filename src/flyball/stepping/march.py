@@ -125,7 +125,7 @@ def positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now):
         Q.bias[c, 0] = R.bias[c, 0] = gap / h
         book(P, X, c, u, pace, now)
         if P.turn.shape[0] > 0:
-            book_turning(P, X, Y, c, pace)
+            book_turning(P, X, Y, c, pace, now)
         for i in range(3):
             Y.p[c, i] = 0.0
     if pace.count[TAKEN] == 0:

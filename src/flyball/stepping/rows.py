@@ -7,8 +7,8 @@ from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
 from ..math.vec import axes_across, cross, dot, load3, load9, mv, put3, scale, sub
-from ..numerics.cone.operator import seen
-from .tables import GRAVITY, IMPULSE, SLIDES, STEP
+from ..numerics.cone.operator import along, seen
+from .tables import GRAVITY, IMPULSE, SLIDES, STEP, TORQUE
 
 
 @formula
@@ -79,16 +79,19 @@ def warm(C, P, X, now, before):
     for c in range(C.count[FOUND]):
         o = C.at[c, BEFORE]
         now[c, SLIDES] = before[o, SLIDES] if o >= 0 else -1.0
-        for r in range(3):
-            X.p[c, r] = 0.0
-            if o >= 0:
-                f = 3 * r
-                s = 0.0
-                d = 0.0
-                for k in range(3):
-                    s += P.frame[c, f + k] * before[o, IMPULSE + k]
-                    d += P.frame[c, f + k] * P.frame[c, f + k]
-                X.p[c, r] = s / d
+        put3(X.p, c, 0, again(P, c, before, o, IMPULSE))
+        if X.torque.shape[0] > 0:
+            put3(X.torque, c, 0, again(P, c, before, o, TORQUE))
+
+
+@formula
+def again(P, c, before, o, first):
+    """What `across` makes a vector in the world that is kept in row o; 0 where nothing is (-1)."""
+    if o < 0:
+        return (0.0, 0.0, 0.0)
+    x = along(P, c, load3(before, o, first))
+    n, s, t = load3(P.frame, c, 0), load3(P.frame, c, 3), load3(P.frame, c, 6)
+    return (x[0] / dot(n, n), x[1] / dot(s, s), x[2] / dot(t, t))
 
 
 @formula

@@ -17,10 +17,12 @@ ANGLE = 6  # column of Free.move, behind velocities: angle [rad] about z turned 
 # columns of Tracks.kept: impulse in the world; 1 if it slides, 0 if it sticks, -1 if it is new; whether it is hit in an
 # impact, impulse of that in the world, and its velocities before; of contacts that give way: stiffness (0: hard),
 # overlap and its rate at the start of the step, share of its end in the law, overlap of the law and gap at
-# the end, overlap that is its spring's
+# the end, overlap that is its spring's; impulse of its torque in the world; relative angular
+# velocity before an impact
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP, KEPT = range(11, 18)
-TRACKS = 18  # columns
+TORQUE, TURNED_BEFORE = 18, 21
+TRACKS = 24  # columns
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
 # none; residual [m/s] that is enough for velocities and for positions; residual over the step [m/s^2] above which a
 # solve that was cut is told

@@ -28,7 +28,7 @@ from .numbers import Numbers, numbers
 from .points import check_centred
 from .poses import Poses
 from .specs import Structure, TermSpec
-from .system import EXCESS, EXCESS_MASS, System
+from .system import EXCESS, EXCESS_MASS, FLAT, System
 
 MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
@@ -117,7 +117,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, t["angle_i"], t["load_i"],
-         t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl,
+         t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
