@@ -14,8 +14,8 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.analysis.motion import engines
+from flyball.analysis.motion.account import Account
 from flyball.cli import app
-from flyball.tables.cost import cost
 from tests.mechanisms import door, example, four_bar
 
 
@@ -38,6 +38,9 @@ class Maker:
     def plan(self, c):
         return SimpleNamespace(key=c.structure.model.name, refused=self.refused)
 
+    def ready(self):
+        return self.where == "memory"
+
     def known(self, plan):
         return self.where
 
@@ -54,7 +57,7 @@ class Maker:
 def maker(monkeypatch) -> Maker:
     found = Maker()
     monkeypatch.setattr(engines, "special", found)
-    monkeypatch.setattr(engines, "SPENT", engines.Account())
+    monkeypatch.setattr(engines, "SPENT", Account())
     return found
 
 
@@ -97,7 +100,7 @@ def test_what_cannot_be_made_is_refused_with_the_reason(maker):
     maker.refused = "it has 999 rows, and code is made for 120"
     with pytest.raises(fb.ModelError, match=r"^specialize=True: it has 999 rows, and .*; leave it out$"):
         four_bar().simulate(0.1, specialize=True)
-    assert four_bar().simulate(0.1).health.engine == f"table-driven: {maker.refused}"
+    assert four_bar().simulate(2.0).health.engine == f"table-driven: {maker.refused}"
 
 
 def test_short_motions_are_left_alone(maker):
@@ -106,41 +109,72 @@ def test_short_motions_are_left_alone(maker):
     assert r.health.engine == "table-driven: too little is computed to make code for it"
 
 
-def test_long_motions_change_over_at_a_count_of_steps(maker):
-    """What is left after 50 steps is more than making costs: the same twice, whatever the clock says."""
+def test_a_long_motion_begins_anew_with_code_that_pays(maker):
+    """What is left after 50 steps is more than making costs; whatever the clock says, and told as if it began so."""
     maker.price_of_making = 1e6
-    said = [four_bar().simulate(20.0, outputs=3).health for _ in range(2)]
+    first, again = (four_bar().simulate(20.0, outputs=3) for _ in range(2))
     assert maker.made == 2
-    assert said[0].engine == "made for this mechanism, from step 51 on: made now"
-    assert [said[1].engine, said[1].steps] == [said[0].engine, said[0].steps]
+    for r in (first, again):
+        assert r.health.engine == "made for this mechanism: made now"
+        assert np.array_equal(r.t, [0, 10, 20])
+    assert np.array_equal(first.q, again.q)
+    assert first.health.steps == again.health.steps
 
 
-def test_a_motion_is_the_same_where_it_changes_over(maker):
-    """The state is all in the clock: to the bit, as the stand-in does nothing."""
+def test_what_begins_anew_is_what_began_so(maker):
+    """To the last bit: with code from the beginning, and with the loops that stand in for it here."""
     maker.price_of_making = 1e6
-    a, b = (four_bar().simulate(5.0, specialize=x) for x in ("auto", False))
-    assert a.health.engine.startswith("made")
-    assert np.array_equal(a.q, b.q)
-    assert np.array_equal(a.reactions, b.reactions) if hasattr(a, "reactions") else True
+    a, b, c = (four_bar().simulate(5.0, specialize=x) for x in ("auto", True, False))
+    assert maker.made == 2
+    for r in (b, c):
+        assert np.array_equal(a.q, r.q)
+        assert np.array_equal(a.multipliers, r.multipliers)
+        assert (a.health.steps, a.health.evaluations) == (r.health.steps, r.health.evaluations)
+
+
+def test_code_that_is_there_is_taken_at_once(maker):
+    maker.where = "memory"
+    assert four_bar().simulate(0.01, outputs=2).health.engine == "made for this mechanism: made now"
 
 
 def test_code_on_disk_is_taken_sooner(maker):
     """A motion that is too short to make code for is long enough to load it."""
+    assert not four_bar().simulate(2.0).health.engine.startswith("made")
     maker.where = "disk"
-    assert four_bar().simulate(2.0).health.engine.startswith("made for this mechanism, from step 51 on")
+    assert four_bar().simulate(2.0).health.engine.startswith("made")
 
 
-def test_many_short_motions_pay_for_code_together(maker):
+def test_many_short_motions_pay_for_code_together(maker, monkeypatch):
+    """Of one kind: with other numbers, too, and with parameters of other values."""
+    monkeypatch.setattr(engines, "LEAST", 1e5)
+    maker.price_of_making = 2e6
     m = four_bar()
-    first = m.simulate(0.5, outputs=2)
-    each = first.health.evaluations * cost(first.values.structure)
-    maker.price_of_making = 10 * each
     runs = 0
     while not maker.made and runs < 100:
-        m.parameters  # noqa: B018
+        m = m if runs % 2 else four_bar(gravity=(0, -9.81 - 0.01 * runs))
         m.simulate(0.5, outputs=2)
         runs += 1
     assert 5 <= runs <= 60
+    assert door().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
+
+
+def test_functions_that_may_remember_are_not_begun_anew(maker):
+    m = door()
+    m.add(fb.Actuator("motor", coordinate="upper.angle", force=lambda t: np.sin(t)))
+    r = m.simulate(0.2)
+    assert r.health.engine.startswith("table-driven: a law is a Python function")
+
+
+def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypatch):
+    def interrupted(plan, c):
+        raise KeyboardInterrupt
+
+    maker.price_of_making = 1e6
+    monkeypatch.setattr(maker, "code", interrupted)
+    r = four_bar().simulate(20.0, outputs=20001)
+    assert not r.health.success
+    assert "interrupted by the user" in r.health.message
+    assert 0.0 < r.t[-1] < 20.0
 
 
 def driven() -> fb.Mechanism:
@@ -158,7 +192,7 @@ def test_kinematics_has_the_choice_too(maker):
 def test_the_command_has_both_flags(maker, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     door().save("m.toml")
-    for flags, engine in ((["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for"), ([], "table")):
+    for flags, engine in ((["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for"), ([], "made")):
         words = ["run", "m.toml", "--t-end", "0.1", "--no-plots", "--no-animation", "--quiet", *flags]
         said = CliRunner().invoke(app, words)
         assert said.exit_code == 0, said.output

@@ -20,7 +20,6 @@ from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
-from ..special.made import Made
 from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, System, Work
 from ..tables.values import Values, values
 from .uncollected import uncollected
@@ -34,7 +33,7 @@ class Compiled:
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
     system: System = field(init=False, repr=False, compare=False)  # the values' tables, or with addresses of `made`
-    made: Made | None = field(default=None, init=False, repr=False, compare=False)  # code that it runs on, if not all's
+    made: Any = field(default=None, init=False, repr=False, compare=False)  # code that it runs on, if not all's
 
     def __post_init__(self) -> None:
         self.system = self.values.system
@@ -46,10 +45,12 @@ class Compiled:
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, system=state["values"].system, made=None)
 
-    def run_on(self, made: Made) -> None:
-        """From now on code that was made for this mechanism does what it can for the engine."""
+    def run_on(self, made: Any) -> None:
+        """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
+        chosen = self.work.option
         self.made, self.system = made, made.system(self.values.system)
-        self.work = self.work._replace(flat=np.zeros(made.scratch))
+        self.work = work(self.structure, self.system)
+        self.work.option[:] = chosen
 
     @cached_property
     def work(self) -> Work:

@@ -24,9 +24,9 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
-from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Impulse
 from .motion.later import open_until_asked, solved
@@ -216,7 +216,7 @@ def run_clock(
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    What ``engine`` runs on may change on the way; without one it is table-driven.
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
     """
     c, engine = a.compiled, engine or Engine(a.compiled, False)
     s, width = c.structure, _width(a)
@@ -238,7 +238,9 @@ def run_clock(
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
-            engine.after(clock)
+            if engine.begins_anew(clock):
+                rows.clear()
+                forget(c.work.stack)
             clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, width)), True

@@ -1,19 +1,17 @@
 """Which engine steps a motion: the table-driven one, or code made for its mechanism alone (``special/``).
 
-Both do the same to the same state, which is all in `Clock` and `Work`, so that a motion goes over from one to the other
-between two calls of the compiled loop. They round differently: results agree within the tolerance, not to the last bit.
+They round differently: results agree within the tolerance, not to the last bit. A motion is computed by one of them
+from its beginning to its end, so that a result is to the last bit the one of ``specialize=True``, or of ``False``.
 
-Left to choose (``auto``), code that is there already is taken, and other code is made, where what is left of the motion,
-or what was computed of its kind in this process, takes longer than that. How long is estimated from counts
-(`tables/cost.py`), at counts of steps that are always the same: clocks have no say, so that the same call in the same
-surroundings gives the same digits.
+Left to choose (``auto``), code that this process has is taken. Other code is loaded or made where what is left of the
+motion after some steps, or what was computed of its kind in this process, takes longer than that; the motion then
+begins anew. How long is estimated from counts (`tables/cost.py`): clocks have no say, so that the same calls give the
+same digits.
 """
 
 from __future__ import annotations
 
 import math
-import threading
-from collections import OrderedDict
 from typing import Any
 
 from ... import special
@@ -22,14 +20,19 @@ from ...numerics.integrators import clock as ex
 from ...tables.cost import cost
 from ...tables.system import EVALUATIONS
 from ..compiled import Compiled
+from .account import SPENT, kind
 
 AUTO = "auto"
 FIRST, AGAIN = 50, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
+EACH, PART = 150.0, 0.6  # an evaluation on average [ns], and part of the cost of a right-hand side
+LEAST = 1e7  # the least that code costs which is not there yet [ns]
 LONGEST = 100_000  # steps in one call of the compiled loop
-MOST = 256  # kinds of mechanisms whose computing is added up
+WRITTEN = ("real", "count", "y", "K", "seen")  # what a run writes to of its clock
 TABLES, MADE = "table-driven", "made for this mechanism"
+SHORT = f"{TABLES}: too little is computed to make code for it"
+CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
 
 
 def check_specialize(value: Any) -> None:
@@ -42,29 +45,6 @@ def check_specialize(value: Any) -> None:
     """
     if not isinstance(value, bool) and value != AUTO:
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
-
-
-class Account:
-    """What was computed of each kind of mechanism in this process by the table-driven engine [ns, estimated]."""
-
-    def __init__(self) -> None:
-        self._spent: OrderedDict[str, float] = OrderedDict()
-        self._lock = threading.Lock()
-
-    def add(self, key: str, more: float) -> None:
-        """So much more."""
-        with self._lock:
-            self._spent[key] = self._spent.pop(key, 0.0) + more
-            while len(self._spent) > MOST:
-                self._spent.popitem(last=False)
-
-    def of(self, key: str) -> float:
-        """All of it."""
-        with self._lock:
-            return self._spent.get(key, 0.0)
-
-
-SPENT = Account()
 
 
 class Engine:
@@ -94,42 +74,38 @@ class Engine:
 
     def __init__(self, c: Compiled, wish: bool | str, without: str = "") -> None:
         self.c, self.told, self.due = c, f"{TABLES}: asked for", math.inf
-        self._plan: Any = None
-        self._first, self._counted = 0.0, 0
+        self._first: ex.Clock | None = None
+        self._counted = 0
         if wish is False:
             return
-        if not without:
-            self._plan = special.plan(c)
-            without = self._plan.refused
-        if without:
-            if wish is True:
-                raise ModelError(f"specialize=True: {without}; leave it out")
-            self.told = f"{TABLES}: {without}"
-        elif wish is True:
-            self._take("")
+        if wish is True:
+            self._wanted(without)
+        elif without or c.structure.functions:
+            self.told = f"{TABLES}: {without or CALLS}"
         else:
-            self.told, self.due = f"{TABLES}: too little is computed to make code for it", FIRST
+            self.told, self.due = SHORT, FIRST
+            self._kind = kind(c.structure)
+            if special.ready() or self._pays(0.0, LEAST):
+                self._choose(0.0)
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
-        self._first, self._counted = float(clock.real[ex.T]), int(self.c.work.info[EVALUATIONS])
+        if self.due < math.inf:
+            self._first = clock._replace(**{name: getattr(clock, name).copy() for name in WRITTEN})
+            self._counted = int(self.c.work.info[EVALUATIONS])
 
-    def after(self, clock: ex.Clock) -> None:
-        """A part of the motion is done: choose again, if it is time."""
+    def begins_anew(self, clock: ex.Clock) -> bool:
+        """Choose again, if it is time: whether the motion has to go back to where it began, as the clock is then."""
         steps = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
-        if steps < self.due:
-            return
+        if steps < self.due or self._first is None:
+            return False
         self.due = AGAIN * steps
-        t, end = clock.real[ex.T], clock.real[ex.T_END]
-        if not t > self._first:
-            return
-        left = self._estimate() * float((end - t) / (t - self._first))
-        known = special.known(self._plan)
-        price = special.price(self._plan, known)
-        before = 0.0 if known else SPENT.of(self._plan.key)  # many short motions pay for it as one long one does
-        if (left + before) * (1.0 - 1.0 / GAIN) > MARGIN * price:
-            self.end()
-            self._take(f", from step {steps + 1} on")
+        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first.real[ex.T]
+        if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
+            return False
+        for name in WRITTEN:
+            getattr(clock, name)[...] = getattr(self._first, name)
+        return True
 
     def limited(self, clock: ex.Clock, steps: float) -> int:
         """So many steps as a call of the compiled loop should take, or as are left until it is time to choose."""
@@ -139,14 +115,37 @@ class Engine:
     def end(self) -> None:
         """The motion is over: what was computed is added up."""
         if self.due < math.inf:
-            SPENT.add(self._plan.key, self._estimate())
-            self.due = math.inf
+            SPENT.add(self._kind, self._spent())
 
-    def _estimate(self) -> float:
+    def _spent(self) -> float:
         """What was computed since it began [ns]."""
-        return (int(self.c.work.info[EVALUATIONS]) - self._counted) * cost(self.c.structure)
+        count = int(self.c.work.info[EVALUATIONS]) - self._counted
+        return count * (EACH + PART * cost(self.c.structure))
 
-    def _take(self, when: str) -> None:
-        made, how = special.code(self._plan, self.c)
+    def _wanted(self, without: str) -> None:
+        plan = None if without else special.plan(self.c)
+        if plan is None or plan.refused:
+            raise ModelError(f"specialize=True: {without or plan.refused}; leave it out")
+        self._take(plan)
+
+    def _choose(self, left: float) -> bool:
+        """Whether made code is taken from here on; ``left``: what is still to be computed [ns]."""
+        plan = special.plan(self.c)
+        if plan.refused:
+            self.told, self.due = f"{TABLES}: {plan.refused}", math.inf
+            return False
+        known = special.known(plan)
+        price = special.price(plan, known)
+        if price > 0.0 and not self._pays(left, price):
+            return False
+        self._take(plan)
+        return True
+
+    def _pays(self, left: float, price: float) -> bool:
+        """Whether code for a price [ns] is worth it; many short motions pay for it as one long one does."""
+        return (left + SPENT.of(self._kind)) * (1.0 - 1.0 / GAIN) > MARGIN * price
+
+    def _take(self, plan: Any) -> None:
+        made, how = special.code(plan, self.c)
         self.c.run_on(made)
-        self.told, self.due = f"{MADE}{when}: {how}", math.inf
+        self.told, self.due = f"{MADE}: {how}", math.inf
