@@ -123,13 +123,7 @@ def accelerate(S, W, t, p, dy, factored):
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
-        if W.info[MADE + LOADS] != 0:
-            run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
-        else:
-            inertial(S, W)
-            forces(S, W, t, work)
-            gather(S, W, W.vel[F_APPLIED])
-            efforts(S, W, t, work, W.vel[F_APPLIED])
+        loaded(S, W, t, p, work)
         if (
             factored == OLD
             or solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS) > STALE * W.option[PASS]
@@ -149,6 +143,29 @@ def accelerate(S, W, t, p, dy, factored):
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
             return W.info[STATUS]
         improve(S, W, attempt)
+    return finish(S, W, t, p, dy)
+
+
+@formula
+def loaded(S, W, t, p, work):
+    """Generalised forces into W.vel[F_APPLIED], and what accounted ones do."""
+    if W.info[MADE + LOADS] != 0:
+        run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
+        return
+    inertial(S, W)
+    forces(S, W, t, work)
+    gather(S, W, W.vel[F_APPLIED])
+    efforts(S, W, t, work, W.vel[F_APPLIED])
+
+
+@formula
+def finish(S, W, t, p, dy):
+    """Dy at the state p from the solution in W. Returns a status."""
+    nq = S.kinds[COORDINATES]
+    nv = W.vel.shape[1]
+    x = W.vel[X_SOLVED]
+    v = p[nq : nq + nv]
+    work = dy[nq + nv :]
     if W.info[MADE + FINISH] != 0:
         W.info[STATUS] = 0 if run(W.info[MADE + FINISH], S, W, t, p, dy, x, W.row[LAM]) == 0.0 else NOT_FINITE
         return W.info[STATUS]

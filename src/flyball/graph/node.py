@@ -20,21 +20,7 @@ import numpy as np
 
 from ..math import scalar
 from .function import Function, Functions
-
-NUMBER, SYMBOL, ADD, MULTIPLY, DIVIDE, POWER, CALL = "number", "symbol", "add", "multiply", "divide", "power", "call"
-
-FUNCTIONS: dict[str, Callable[..., Any]] = {
-    f.__name__: f
-    for f in (
-        scalar.sqrt, scalar.sin, scalar.cos, scalar.tan, scalar.asin, scalar.acos, scalar.atan, scalar.exp, scalar.log,
-        scalar.sinh, scalar.cosh, scalar.tanh, scalar.atan2, scalar.absolute, scalar.sign, scalar.rounded,
-        scalar.minimum, scalar.maximum, scalar.choose,
-    )
-}  # fmt: skip
-"""Every function that a node may be of, by its name in `math/scalar.py`."""
-
-ODD = ("sin", "tan", "asin", "atan", "sinh", "tanh", "sign")
-EVEN = ("cos", "cosh", "absolute")
+from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
 
 
 class Undecided(Exception):
@@ -100,6 +86,15 @@ class Node:
     def __pos__(self) -> Node:
         return self
 
+    def __and__(self, other: Any) -> Node:
+        return self.graph.multiply(self, other)
+
+    def __or__(self, other: Any) -> Node:
+        return self.graph.function("maximum", self, other)
+
+    def __invert__(self) -> Node:
+        return self.graph.subtract(1.0, self)
+
     def __abs__(self) -> Node:
         return self.graph.function("absolute", self)
 
@@ -125,9 +120,6 @@ class Node:
 
     def __ge__(self, other: Any) -> bool:
         return self.real >= other.real
-
-    def __bool__(self) -> bool:
-        return self.real != 0.0
 
     def __float__(self) -> float:
         if self.op != NUMBER:
@@ -183,6 +175,9 @@ class Node:
         if name in FUNCTIONS:
             return lambda: self.graph.function(name, self)
         raise AttributeError(name)
+
+    def __format__(self, how: str) -> str:
+        return repr(self) if self.moving else format(self.value, how)
 
     def __repr__(self) -> str:
         if self.op == NUMBER:
@@ -376,16 +371,6 @@ class Graph:
         made = Node(self, op, args, data, len(self.nodes), moving, value)
         self.nodes.append(made)
         return made
-
-
-OPERATIONS: dict[str, Callable[..., Any]] = {
-    ADD: lambda a, b: a + b,
-    MULTIPLY: lambda a, b: a * b,
-    DIVIDE: scalar.divide,
-    POWER: scalar.power,
-    **FUNCTIONS,
-}
-"""What an operation does with numbers of any kind."""
 
 
 def _value(op: str, args: tuple[Node, ...], data: Any) -> float:

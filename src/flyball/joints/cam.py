@@ -123,6 +123,11 @@ class Cam(Joint):
 
     def curves(self, n: SimpleNamespace) -> tuple[list[float], ...]:
         """The splines x(s) and y(s)."""
+        if any(hasattr(x, "called") and not x.known for p in n.points for x in p):
+            raise ModelError(
+                f"{self.title}: points of its profile follow parameters, and a curve through symbols is not written "
+                f"out; give these parameters as numbers"
+            )
         return _splines(n.points, self.closed)
 
 

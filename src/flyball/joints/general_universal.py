@@ -10,6 +10,8 @@ import numpy as np
 from ..constraints import skew
 from ..constraints.blocks import ANGLE, SKEW_LINES, Row
 from ..errors import ModelError
+from ..math.turns import reciprocal
+from ..math.vec import dot
 from ..model.element import Angle, Directions, PointPair, element
 from ..model.geometry import triad, vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
@@ -68,8 +70,8 @@ class GeneralUniversal(Joint):
             )
         if row.kind != skew.KIND:
             return (*row.par[:6], np.dot(f, m))
-        s1, s2, k = np.linalg.solve(np.column_stack([f, m, across]), M[0] - F[0])
-        return (*row.par[:3], s1, s2, k, 0.0)
+        way = M[0] - F[0]
+        return (*row.par[:3], *(dot(way, r) for r in reciprocal((f, m, across))), 0.0)
 
 
 def _with_x(z: np.ndarray, other: np.ndarray) -> np.ndarray:

@@ -28,6 +28,12 @@ _NUMBERS = (float, int, complex)
 _ANALYTIC: dict[Function, str] = {}
 
 
+def real_parts(x: Any) -> np.ndarray:
+    """Real parts to decide by, as floats: of complex numbers, and of expressions that do not move."""
+    x = np.asarray(x)
+    return np.frompyfunc(lambda e: e.real, 1, 1)(x).astype(float) if x.dtype == object else x.real
+
+
 def _quietly(ufunc: Function, *args: Any) -> Any:
     """Value of a ufunc without warnings; a Python number for numbers."""
     with np.errstate(all="ignore"):

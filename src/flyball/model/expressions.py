@@ -261,6 +261,8 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
     if isinstance(value, Expression):
         result = value.evaluate(env)
         return float(result) if isinstance(result, Integral) else result
+    if hasattr(value, "called"):  # an expression in place of a number: see `math/scalar.py`
+        return value
     if not isinstance(value, str):
         raise ModelError(
             f"{value!r} ({type(value).__name__}) is not a number; write a number, a quantity such as '5 mm', "
@@ -338,9 +340,21 @@ def _where(condition: Any, a: Any, b: Any) -> Any:
         return a if condition else b
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
+    if hasattr(condition, "called"):  # 1 or 0
+        return scalar.choose(condition - 0.5, a, b)
     import sympy
 
     return sympy.Piecewise((a, condition), (b, True))
+
+
+def _less(a: Any, b: Any) -> Any:
+    either = next((x for x in (a, b) if hasattr(x, "called")), None)
+    return _real(a) < _real(b) if either is None else scalar.choose(b - a, 1.0, 0.0)
+
+
+def _at_most(a: Any, b: Any) -> Any:
+    either = next((x for x in (a, b) if hasattr(x, "called")), None)
+    return _real(a) <= _real(b) if either is None else 1.0 - scalar.choose(a - b, 1.0, 0.0)
 
 
 def _step(shape: Any) -> Any:
@@ -367,8 +381,8 @@ OPERATIONS = {
     "/": scalar.divide,
     "**": scalar.power,
     "neg": operator.neg,
-    "<": lambda a, b: _real(a) < _real(b),
-    "<=": lambda a, b: _real(a) <= _real(b),
+    "<": _less,
+    "<=": _at_most,
     "and": _fold(operator.and_),
     "or": _fold(operator.or_),
     "not": lambda a: not a if isinstance(a, bool) else ~a,

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.scalar import real_parts
 from ..math.turns import turn
 from ..math.vec import cross, quaternion_matrix
 from ..rotations.checks import quaternion_of, rotation_matrices, unit_quaternions
@@ -46,7 +47,7 @@ def triad(z: np.ndarray) -> np.ndarray:
             return np.eye(3)
         dx, dy, _ = z.imag
         return np.eye(3) + 1j * np.array([[0.0, 0.0, dx], [0.0, 0.0, dy], [-dx, -dy, 0.0]])
-    helper = np.eye(3)[int(np.argmin(np.abs(z.real)))]
+    helper = np.eye(3)[int(np.argmin(np.abs(real_parts(z))))]
     x = np.array(cross(helper, z))  # NumPy's own takes ten times as long
     x = x / np.sqrt((x * x).sum())
     return np.array([x, cross(z, x), z]).T

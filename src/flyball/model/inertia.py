@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.scalar import real_parts
 from .element import positive
 from .geometry import orientation_matrix, vector
 from .weighing import checked, shifted, weighed
@@ -183,14 +184,14 @@ def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
             f"(0 for a point mass), got {n.inertia}{six}"
         )
     J = np.diag(a) if a.shape == (3,) else a
-    if any(np.abs(A - A.T).max() > 1e-12 * np.abs(A).max() for A in (J.real, J.imag)):
+    if any(np.abs(A - A.T).max() > 1e-12 * np.abs(A).max() for A in (real_parts(J), J.imag)):
         raise ModelError(f"{body.title}: its inertia matrix is not symmetric: {a.tolist()}")
     return J
 
 
 def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
     """Refuse an inertia that no body of positive mass has."""
-    a, b, c = np.linalg.eigvalsh(found.inertia.real)
+    a, b, c = np.linalg.eigvalsh(real_parts(found.inertia))
     slack = TRIANGLE * max(abs(c), abs(a))
     inside = "Its holes must lie inside the other shapes" if n.inertia is None else ""
     if a < -slack:

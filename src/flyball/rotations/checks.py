@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.scalar import real_parts
 
 ORTHONORMAL = 1e-9  # largest entry of R^T R - 1 of what still counts as a rotation matrix
 SMALLEST = 1e-9  # shortest quaternion that still has a direction
@@ -28,17 +29,22 @@ def numbers(value: Any, shape: tuple[int, ...], what: str, rule: str = "") -> np
         a = np.asarray(value)
     except ValueError:
         raise ModelError(f"{what}: {value!r} is not an array: its rows differ in length") from None
-    if a.dtype.kind not in "iufc":
+    if a.dtype.kind not in "iufc" and not _expressions(a):
         raise ModelError(f"{what}: {value!r} does not consist of numbers; angles are in radians, without units")
     a = a.astype(np.result_type(a.dtype, float), copy=False)
     n = a.ndim - len(shape)
     if n < 0 or a.shape[n:] != shape:
         wanted = ", ".join(["...", *map(str, shape)])
         raise ModelError(f"{what}: the shape is {a.shape}, expected ({wanted})" + (f"; {rule}" if rule else ""))
-    finite = np.isfinite(a)
+    finite = np.isfinite(real_parts(a) if a.dtype == object else a)
     if not finite.all():
         refuse(~finite, a, what, "is not a finite number")
     return a
+
+
+def _expressions(a: np.ndarray) -> bool:
+    """Whether all that is no number stands for one: see `math/scalar.py`."""
+    return a.dtype == object and all(hasattr(x, "called") or isinstance(x, float | int) for x in a.flat)
 
 
 def refuse(bad: np.ndarray, values: np.ndarray, what: str, rule: str) -> None:
@@ -69,14 +75,15 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
         If a matrix is not orthonormal to 1e-9 or is left-handed.
     """
     R = numbers(value, (3, 3), what)
-    off = np.abs(np.swapaxes(R, -1, -2) @ R - np.eye(3)).max(axis=(-1, -2), initial=0.0)
+    known = real_parts(R) if R.dtype == object else R
+    off = np.abs(np.swapaxes(known, -1, -2) @ known - np.eye(3)).max(axis=(-1, -2), initial=0.0)
     if np.any(off > ORTHONORMAL):
         k = np.unravel_index(int(np.argmax(off)), off.shape)
         raise ModelError(
             f"{what}{place(tuple(map(int, k)))}: the matrix is not a rotation: its columns must be orthonormal, but "
             f"R^T R is off by {off[k]:.2g} (at most {ORTHONORMAL:g}); rotations.nearest gives the closest rotation"
         )
-    refuse(np.linalg.det(R.real) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
+    refuse(np.linalg.det(real_parts(R)) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
     return R
 
 
@@ -90,7 +97,7 @@ def unit_quaternions(value: Any, what: str) -> np.ndarray:
     """
     e = numbers(value, (4,), what)
     size = np.sqrt((e * e).sum(axis=-1, keepdims=True))
-    bad = ~(size.real[..., 0] > SMALLEST)
+    bad = ~(real_parts(size)[..., 0] > SMALLEST)
     refuse(bad, e, what, "has no direction; a quaternion must not be zero (no rotation is (1, 0, 0, 0))")
     return e / size
 
@@ -104,7 +111,7 @@ def unit_vectors(value: Any, what: str) -> np.ndarray:
         If one is zero.
     """
     a = numbers(value, (3,), what)
-    largest = np.abs(a.real).max(axis=-1, keepdims=True, initial=0.0)
+    largest = np.abs(real_parts(a)).max(axis=-1, keepdims=True, initial=0.0)
     refuse(largest[..., 0] == 0, a, what, "has no length; an axis must not be zero (for no rotation give the angle 0)")
     a = a / largest
     return a / np.sqrt((a * a).sum(axis=-1, keepdims=True))
@@ -144,7 +151,7 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
         j, k = (i + 1) % 3, (i + 2) % 3
         K[..., 0, 1 + i] = K[..., 1 + i, 0] = R[..., k, j] - R[..., j, k]
         K[..., 1 + i, 1 + j] = K[..., 1 + j, 1 + i] = R[..., i, j] + R[..., j, i]
-    best = np.argmax(np.diagonal(K, axis1=-2, axis2=-1).real, axis=-1)
+    best = np.argmax(real_parts(np.diagonal(K, axis1=-2, axis2=-1)), axis=-1)
     e = np.take_along_axis(K, best[..., None, None], axis=-2)[..., 0, :]
     e = e / np.sqrt((e * e).sum(axis=-1, keepdims=True))
-    return np.where(e[..., :1].real < 0, -e, e)
+    return np.where(real_parts(e[..., :1]) < 0, -e, e)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..math.scalar import real_parts
 from .afresh import Afresh
 from .poses import Poses
 from .specs import FrameSpec, Structure
@@ -82,6 +83,13 @@ def _leave_out(body_x: np.ndarray, links: np.ndarray, kinds: np.ndarray) -> None
     body_x[at, tree] = ONE.ravel()
     for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
         R = body_x[links, rotation]
-        none = ~R.imag.any(axis=1) & (np.abs(R - ONE.ravel()).max(axis=1) < 1e-15)
+        none = _never_else(R) & (np.abs(real_parts(R) - ONE.ravel()).max(axis=1) < 1e-15)
         body_x[links[none], rotation] = ONE.ravel()
-        body_x[links, turns] = ~none & (ONE.ravel() != R).any(axis=1)
+        body_x[links, turns] = (~none & (ONE.ravel() != R).any(axis=1)).astype(float)
+
+
+def _never_else(R: np.ndarray) -> np.ndarray:
+    """Whether rows are what they are for other values of the parameters too, as far as these numbers carry it."""
+    if R.dtype == object:
+        return np.array([not any(hasattr(x, "called") and not x.known for x in row) for row in R], bool)
+    return np.asarray(~R.imag.any(axis=1))

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ..math.scalar import real_parts
+from ..math.vec import cross
+
 THIN = 1e-9  # principal inertias below this part of the body's size count as none
 STAND_IN = 1e-6  # what is put in their place while factoring
 
@@ -38,16 +41,28 @@ def inverse_inertia(J: np.ndarray, size: Any, planar: bool) -> tuple[np.ndarray,
     excess : (3, 3)
         Brings principal inertias that are none up to ``STAND_IN`` times the size; else zero.
     """
-    w, V = (np.diag(J.real), np.eye(3)) if planar else np.linalg.eigh(J.real)
+    w, V = (np.diag(real_parts(J)), np.eye(3)) if planar else np.linalg.eigh(real_parts(J))
     used = np.array([not planar, not planar, True])
     weak = used & (w < THIN * size.real)
     more = np.where(weak, STAND_IN * size.real - w, 0.0)
     inverse = (V * np.where(used, 1.0 / np.where(used, w + more, 1.0), 0.0)) @ V.T
     excess = (V * more) @ V.T
+    if J.dtype == object:
+        return _of_expressions(J + excess, used), excess
     if not (np.iscomplexobj(J) or isinstance(size, complex)):
         return inverse, excess
     d_excess = _rate_of_excess(J, size, w, V, weak) if weak.any() else np.zeros((3, 3))
     return inverse - 1j * inverse @ (J.imag + d_excess) @ inverse, excess + 1j * d_excess
+
+
+def _of_expressions(J: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Inverse by cofactors, for numbers that LAPACK does not know; in the plane of the entry of z alone."""
+    if not used[0]:
+        out = np.zeros((3, 3), object)
+        out[2, 2] = 1.0 / J[2, 2]
+        return out
+    rows = [np.array(cross(J[:, (k + 1) % 3], J[:, (k + 2) % 3])) for k in range(3)]
+    return np.array(rows) / (J[:, 0] @ rows[0])
 
 
 def _rate_of_excess(J: np.ndarray, size: Any, w: np.ndarray, V: np.ndarray, weak: np.ndarray) -> np.ndarray:

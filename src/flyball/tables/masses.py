@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..math.scalar import maximum
+from ..math.scalar import maximum, real_parts
 from ..model.body import GROUND
 from .afresh import Afresh
 from .inertia import STAND_IN, THIN, inverse_inertia, usual_mass
@@ -80,10 +80,10 @@ def _reaches(s: Structure, frame_x: np.ndarray) -> np.ndarray:
     """Of every body the largest component, taken positive, of the ways from its centre of mass to its frames."""
     out = np.zeros(len(s.tables["body_i"]), frame_x.dtype)
     flat = frame_x[:, :3]
-    best = np.argmax(np.abs(flat.real), axis=1)
+    best = np.argmax(np.abs(real_parts(flat)), axis=1)
     largest = flat[np.arange(len(flat)), best]
-    largest = np.where(largest.real < 0.0, -largest, largest)
-    order = np.argsort(largest.real, kind="stable")
+    largest = np.where(real_parts(largest) < 0.0, -largest, largest)
+    order = np.argsort(real_parts(largest), kind="stable")
     order = order[s.tables["frame_i"][order] >= 0]
     out[s.tables["frame_i"][order]] = largest[order]  # the last one given is the largest
     return out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Hashable, Iterator, Mapping
+from collections.abc import Hashable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, is_dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -39,9 +39,15 @@ class Numbers:
     local: dict[Hashable, np.ndarray] = field(default_factory=dict)  # and on its body
 
     @property
-    def complex(self) -> bool:
-        """Whether some parameter is complex."""
-        return any(isinstance(x, complex) for x in self.env.values())
+    def dtype(self) -> Any:
+        """Kind of numbers that tables of these are made of: expressions, else complex numbers, else floats."""
+        return kind_of(self.env.values())
+
+
+def kind_of(values: Iterable[Any]) -> Any:
+    """Kind of numbers of an array that holds these."""
+    kinds = {object if hasattr(x, "called") else complex if isinstance(x, complex) else float for x in values}
+    return next((k for k in (object, complex) if k in kinds), float)
 
 
 def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Numbers:
@@ -54,6 +60,8 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
     """
     model = model.snapshot()
     env = _environment(model, parameters or {})
+    if kind_of(env.values()) is object:
+        return _all(model, env, object())
     key = bits(env), tuple(_state_of(path) for path in _files(model))
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
 
@@ -71,7 +79,7 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     first: Numbers | None = model.kept.known("first numbers")
     if first is None or first.key[1] != key[1]:  # type: ignore[index]
         new = _all(model, env, key)
-        if new.complex:
+        if new.dtype is not float:
             return new
         model.kept.drop("first numbers", None)  # of files as they were
         model.kept.get("first numbers", None, 1, lambda: new)

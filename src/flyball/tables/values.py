@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
+from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.coupling import Coupling
 from ..model.force import TwoPointForce
@@ -24,7 +25,7 @@ from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
 from .hinges import tree_frames
 from .masses import mass_table
-from .numbers import Numbers, numbers
+from .numbers import Numbers, kind_of, numbers
 from .points import check_centred
 from .poses import Poses
 from .specs import Structure, TermSpec
@@ -83,7 +84,7 @@ def values(
         Values of the coordinates that are held (see ``structure``).
     """
     n = numbers(s.model, parameters)
-    if n.complex or any(isinstance(x, complex) for x in (holds or {}).values()):
+    if kind_of([*n.env.values(), *(holds or {}).values()]) is not float:
         return _filled(s, n, holds or {})
     return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
 
@@ -94,14 +95,14 @@ def _filled(s: Structure, given: Numbers, holds: Mapping[str, Any]) -> Values:
         return _refilled(s, given, holds, Afresh())
     first = s.kept.known("filled first")
     x = _refilled(s, given, holds, Afresh.since(first, given, s.model))
-    if first is None and not given.complex:
+    if first is None and given.dtype is float:
         s.kept.get("filled first", None, 1, lambda: x)
     return x
 
 
 def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afresh) -> Values:
     model, env, numbers, bodies = s.model, given.env, given.of, given.bodies
-    dtype: Any = complex if given.complex or any(isinstance(x, complex) for x in holds.values()) else float
+    dtype = kind_of([*given.env.values(), *holds.values()])
     pose = Poses(s, given)
     frame_x = _frame_x(s, pose, new.table("frame_x", (len(s.frames), 12), dtype), new)
     length = _length(s, frame_x, bodies)
@@ -146,7 +147,7 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     if not len(centres):
         return 1.0
     ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
-    longest = ways[np.argmax((ways.real**2).sum(axis=1))]
+    longest = ways[np.argmax((real_parts(ways) ** 2).sum(axis=1))]
     length = np.sqrt((longest**2).sum())
     return length if length.real > 0.0 else 1.0
 
