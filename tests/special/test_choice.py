@@ -10,12 +10,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from numba import cfunc
 from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.analysis.motion import engines
 from flyball.analysis.motion.account import Account
 from flyball.cli import app
+from flyball.tables.system import FINISH
 from tests.mechanisms import door, example, four_bar
 
 
@@ -175,6 +177,46 @@ def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypa
     assert not r.health.success
     assert "interrupted by the user" in r.health.message
     assert 0.0 < r.t[-1] < 20.0
+
+
+@cfunc("float64(voidptr, voidptr, float64, voidptr, voidptr, voidptr, voidptr)")
+def stuck(S, W, t, a, b, c, d):
+    """What finishes a derivative, and always finds it not finite."""
+    return 1.0
+
+
+class Stuck(Code):
+    """Code that cannot go on."""
+
+    def system(self, S):
+        flat = np.zeros_like(S.flat)
+        flat[FINISH] = stuck.address
+        return S._replace(flat=flat)
+
+
+def test_where_made_code_gets_stuck_the_loops_go_on(maker, monkeypatch):
+    monkeypatch.setattr(maker, "code", lambda plan, c: (Stuck(), "made now"))
+    r, s = (four_bar().simulate(0.5, specialize=x) for x in (True, False))
+    assert r.health.engine.startswith("made for this mechanism: made now; table-driven from t = 0 s on")
+    np.testing.assert_allclose(r.q, s.q, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(r.vdot, s.vdot, rtol=1e-9, atol=1e-9)
+    kinematics = [driven().kinematics(21, t_end=1.0, specialize=x) for x in (True, False)]
+    np.testing.assert_allclose(*(k["A"].force for k in kinematics), atol=1e-9)
+    np.testing.assert_allclose(*(k["motor"].work for k in kinematics), atol=1e-12)
+
+
+def test_what_made_code_and_loops_both_cannot_do_is_told_as_ever(maker, monkeypatch):
+    """Reasons are told from what the engine's loops leave."""
+    monkeypatch.setattr(maker, "code", lambda plan, c: (Stuck(), "made now"))
+    said = []
+    for wish in (True, False):
+        m = four_bar()
+        m.add(fb.Actuator("bad", coordinate="A.angle", force="1/(0.2 - t)**0.5"))
+        with pytest.raises(fb.SimulationError) as caught:
+            m.simulate(1.0, specialize=wish)
+        said.append(str(caught.value))
+        assert caught.value.t == pytest.approx(0.2, abs=1e-6)
+    assert said[0] == said[1]
 
 
 def driven() -> fb.Mechanism:

@@ -52,6 +52,10 @@ class Compiled:
         self.work = work(self.structure, self.system)
         self.work.option[:] = chosen
 
+    def run_on_tables(self) -> None:
+        """From now on the engine's own loops do all."""
+        self.made, self.system = None, self.values.system
+
     @cached_property
     def work(self) -> Work:
         """Scratch of its own."""

@@ -234,7 +234,7 @@ def run_clock(
                 used = motion_kernel(c.system, c.work, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
             tell((clock.real[ex.T] - first) / span)
-            if clock.count[ex.STATUS] != ex.RUNNING:
+            if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before

@@ -6,6 +6,7 @@ import hashlib
 import threading
 from collections import OrderedDict
 
+from ...tables.cost import cost
 from ...tables.specs import Structure
 
 MOST = 256  # kinds of mechanisms that are known
@@ -16,6 +17,7 @@ class Account:
 
     def __init__(self) -> None:
         self._spent: OrderedDict[str, float] = OrderedDict()
+        self._price: dict[str, float] = {}
         self._lock = threading.Lock()
 
     def add(self, key: str, more: float) -> None:
@@ -23,21 +25,32 @@ class Account:
         with self._lock:
             self._spent[key] = self._spent.pop(key, 0.0) + more
             while len(self._spent) > MOST:
-                self._spent.popitem(last=False)
+                self._price.pop(self._spent.popitem(last=False)[0], None)
 
     def of(self, key: str) -> float:
         """All of it."""
         with self._lock:
             return self._spent.get(key, 0.0)
 
+    def price(self, key: str, known: float) -> float:
+        """What code for it costs as far as that was found out, else ``known``."""
+        return self._price.get(key, known)
+
+    def learn(self, key: str, price: float) -> None:
+        """What code for it costs."""
+        self._price[key] = price
+
 
 SPENT = Account()
 """By the table-driven engine."""
 
 
-def kind(s: Structure) -> str:
-    """The same for mechanisms that differ in numbers only."""
-    return s.kept.get("kind", None, 1, lambda: _hashed(s))
+EACH, PART = 150.0, 0.6  # an evaluation on average [ns], and part of the cost of a right-hand side
+
+
+def kind(s: Structure) -> tuple[str, float]:
+    """The same for mechanisms that differ in numbers only; what an evaluation of the table-driven engine takes [ns]."""
+    return s.kept.get("kind", None, 1, lambda: (_hashed(s), EACH + PART * cost(s)))
 
 
 def _hashed(s: Structure) -> str:

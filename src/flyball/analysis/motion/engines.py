@@ -14,10 +14,12 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
+
 from ... import special
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
-from ...tables.cost import cost
+from ...numerics.integrators.refusal import afresh
 from ...tables.system import EVALUATIONS
 from ..compiled import Compiled
 from .account import SPENT, kind
@@ -26,10 +28,9 @@ AUTO = "auto"
 FIRST, AGAIN = 50, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
-EACH, PART = 150.0, 0.6  # an evaluation on average [ns], and part of the cost of a right-hand side
 LEAST = 1e7  # the least that code costs which is not there yet [ns]
 LONGEST = 100_000  # steps in one call of the compiled loop
-WRITTEN = ("real", "count", "y", "K", "seen")  # what a run writes to of its clock
+FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
@@ -74,7 +75,7 @@ class Engine:
 
     def __init__(self, c: Compiled, wish: bool | str, without: str = "") -> None:
         self.c, self.told, self.due = c, f"{TABLES}: asked for", math.inf
-        self._first: ex.Clock | None = None
+        self._first: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # the clock as the motion begins
         self._counted = 0
         if wish is False:
             return
@@ -84,14 +85,14 @@ class Engine:
             self.told = f"{TABLES}: {without or CALLS}"
         else:
             self.told, self.due = SHORT, FIRST
-            self._kind = kind(c.structure)
-            if special.ready() or self._pays(0.0, LEAST):
+            self._kind, self._each = kind(c.structure)
+            if special.ready() or self._pays(0.0, SPENT.price(self._kind, LEAST)):
                 self._choose(0.0)
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
         if self.due < math.inf:
-            self._first = clock._replace(**{name: getattr(clock, name).copy() for name in WRITTEN})
+            self._first = clock.real.copy(), clock.count.copy(), clock.y[ex.NOW].copy()
             self._counted = int(self.c.work.info[EVALUATIONS])
 
     def begins_anew(self, clock: ex.Clock) -> bool:
@@ -100,11 +101,24 @@ class Engine:
         if steps < self.due or self._first is None:
             return False
         self.due = AGAIN * steps
-        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first.real[ex.T]
+        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first[0][ex.T]
         if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
             return False
-        for name in WRITTEN:
-            getattr(clock, name)[...] = getattr(self._first, name)
+        clock.K[:] = clock.y[:] = clock.seen[:] = 0.0
+        clock.real[:], clock.count[:], clock.y[ex.NOW] = self._first
+        return True
+
+    def hands_over(self, clock: ex.Clock) -> bool:
+        """Whether made code got stuck, and the engine for all mechanisms goes on from the last step: through, or it
+        leaves in the scratch what the reason is told from.
+        """
+        if self.c.made is None or clock.count[ex.STATUS] not in FAILED:
+            return False
+        self.told += f"; table-driven from t = {clock.real[ex.T]:.6g} s on, where it could not go on"
+        self.c.run_on_tables()
+        clock.count[ex.STATUS], clock.real[ex.GROW] = ex.RUNNING, 1.0
+        clock.real[ex.H] = max(clock.real[ex.H], clock.real[ex.WIDE])
+        afresh(clock)
         return True
 
     def limited(self, clock: ex.Clock, steps: float) -> int:
@@ -119,8 +133,7 @@ class Engine:
 
     def _spent(self) -> float:
         """What was computed since it began [ns]."""
-        count = int(self.c.work.info[EVALUATIONS]) - self._counted
-        return count * (EACH + PART * cost(self.c.structure))
+        return (int(self.c.work.info[EVALUATIONS]) - self._counted) * self._each
 
     def _wanted(self, without: str) -> None:
         plan = None if without else special.plan(self.c)
@@ -137,6 +150,7 @@ class Engine:
         known = special.known(plan)
         price = special.price(plan, known)
         if price > 0.0 and not self._pays(left, price):
+            SPENT.learn(self._kind, price)
             return False
         self._take(plan)
         return True
