@@ -60,6 +60,7 @@ def maker(monkeypatch) -> Maker:
     found = Maker()
     monkeypatch.setattr(engines, "special", found)
     monkeypatch.setattr(engines, "SPENT", Account())
+    monkeypatch.setattr(engines, "made_beside", lambda kind, c: False)
     return found
 
 
@@ -146,18 +147,36 @@ def test_code_on_disk_is_taken_sooner(maker):
     assert four_bar().simulate(2.0).health.engine.startswith("made")
 
 
-def test_many_short_motions_pay_for_code_together(maker, monkeypatch):
-    """Of one kind: with other numbers, too, and with parameters of other values."""
-    monkeypatch.setattr(engines, "LEAST", 1e5)
-    maker.price_of_making = 2e6
+def runs_until(done, asked) -> int:
+    """How many short motions of one kind, with other numbers or without, until that is so."""
     m = four_bar()
-    runs = 0
-    while not maker.made and runs < 100:
-        m = m if runs % 2 else four_bar(gravity=(0, -9.81 - 0.01 * runs))
-        m.simulate(0.5, outputs=2)
-        runs += 1
-    assert 5 <= runs <= 60
-    assert door().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
+    for k in range(200):
+        m = m if k % 2 else four_bar(gravity=(0, -9.81 - 0.01 * k))
+        asked(m.simulate(0.5, outputs=2))
+        if done():
+            return k
+    return 200
+
+
+def test_many_short_motions_pay_for_code_together(maker, monkeypatch):
+    """Another process makes it meanwhile; where there is none, this one does, after as many more."""
+    monkeypatch.setattr(engines, "LEAST", 1e5)
+    maker.price_of_making = 1e6
+    asked = []
+    monkeypatch.setattr(engines, "made_beside", lambda kind, c: not asked.append(kind))
+    engine = []
+    first = runs_until(lambda: len(asked) > 3, lambda r: engine.append(r.health.engine))
+    assert 3 <= first <= 60
+    assert len(set(asked)) == 1
+    assert maker.made == 0
+    assert set(engine) == {"table-driven: too little is computed to make code for it"}
+    maker.where = "disk"
+    assert four_bar().simulate(0.5).health.engine == "made for this mechanism: made now"
+    monkeypatch.setattr(engines, "SPENT", Account())
+    monkeypatch.setattr(engines, "made_beside", lambda kind, c: False)
+    maker.made, maker.where = 0, ""
+    alone = runs_until(lambda: maker.made == 1, lambda r: None)
+    assert 2 * first < alone < 200
 
 
 def test_functions_that_may_remember_are_not_begun_anew(maker):

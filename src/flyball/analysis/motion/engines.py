@@ -23,11 +23,13 @@ from ...numerics.integrators.refusal import afresh
 from ...tables.system import EVALUATIONS
 from ..compiled import Compiled
 from .account import SPENT, kind
+from .making import made_beside
 
 AUTO = "auto"
 FIRST, AGAIN = 50, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
+ALONE = 4.0  # times longer that motions must have computed, where this process has to make their code itself
 LEAST = 1e7  # the least that code costs which is not there yet [ns]
 LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
@@ -46,6 +48,11 @@ def check_specialize(value: Any) -> None:
     """
     if not isinstance(value, bool) and value != AUTO:
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
+
+
+def pays(computing: float, price: float) -> bool:
+    """Whether code for a price is worth it where computing takes as long without it (both [ns])."""
+    return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
 
 class Engine:
@@ -86,7 +93,7 @@ class Engine:
         else:
             self.told, self.due = SHORT, FIRST
             self._kind, self._each = kind(c.structure)
-            if special.ready() or self._pays(0.0, SPENT.price(self._kind, LEAST)):
+            if special.ready() or pays(SPENT.of(self._kind), SPENT.price(self._kind, LEAST)):
                 self._choose(0.0)
 
     def begin(self, clock: ex.Clock) -> None:
@@ -149,15 +156,16 @@ class Engine:
             return False
         known = special.known(plan)
         price = special.price(plan, known)
-        if price > 0.0 and not self._pays(left, price):
+        before = SPENT.of(self._kind)
+        if not known and not pays(left, price):  # then it is for motions to come
+            if pays(left + before, price) and made_beside(self._kind, self.c):
+                return False
+            before /= ALONE
+        if not pays(left + before, price):
             SPENT.learn(self._kind, price)
             return False
         self._take(plan)
         return True
-
-    def _pays(self, left: float, price: float) -> bool:
-        """Whether code for a price [ns] is worth it; many short motions pay for it as one long one does."""
-        return (left + SPENT.of(self._kind)) * (1.0 - 1.0 / GAIN) > MARGIN * price
 
     def _take(self, plan: Any) -> None:
         made, how = special.code(plan, self.c)
