@@ -223,7 +223,7 @@ def run_clock(
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
-    span = clock.real[ex.T_END] - first or 1.0
+    span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
     engine.begin(clock)
     try:
@@ -233,7 +233,8 @@ def run_clock(
             with interrupts_kept(s.functions):
                 used = motion_kernel(c.system, c.work, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
-            tell((clock.real[ex.T] - first) / span)
+            reached = max(reached, (clock.real[ex.T] - first) / span)
+            tell(reached)
             if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
