@@ -123,7 +123,8 @@ def test_every_force(where):
     check_all(m, refused=("angle",) if where == "space" else ())  # of the bushing, which has an orientation there
 
 
-def test_every_coupling():
+def with_couplings():
+    """Every coupling of joints that there is."""
     m = zoo.two_bodies("plane")
     m.add(fb.Body("c", mass=1.0, inertia=0.1, position=(1.0, 0.2)))
     m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "ground", "b", at=(0.5, 0), angle=0.2))
@@ -132,6 +133,11 @@ def test_every_coupling():
     m.add(fb.RackAndPinion("rack", "C", "A", radius=0.05))
     m.add(fb.Coupler("sum", ("A.angle", "B.angle", "c.x"), weights=(2.0, -1.0, 3.0), value=0.7))
     m.add(fb.Coupler("kept", ("B.angle", "C.displacement", "b.y"), weights=(2.0, -1.0, 3.0)))
+    return m
+
+
+def test_every_coupling():
+    m = with_couplings()
     assert {type(c) for c in m.couplings} == {
         c for c in Coupling.registry.values() if issubclass(c, Coupling) and c.__module__.startswith(joints.__name__)
     }

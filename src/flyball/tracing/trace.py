@@ -95,7 +95,7 @@ def traced(s: Structure, S: System, graph: Graph | None = None, names: Names | N
     names : Names, optional
         What the symbols are called.
     """
-    graph = graph or Graph()
+    graph = Graph() if graph is None else graph
     names = names or numbered(s, len(S.row_i))
     W = work(s, S, dtype=object)
     t = graph.symbol(Symbol("t", "time", "t", "s"))

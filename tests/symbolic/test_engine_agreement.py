@@ -1,0 +1,133 @@
+"""M, f, g, nu, G, gamma traced on expressions, at 100 random states, against the compiled engine: every element kind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball import forces
+from flyball.analysis.compiled import compiled
+from flyball.equations.engine import MOTION
+from flyball.graph.values import evaluated
+from flyball.model.touching import has_contact
+from flyball.tables.names import velocity_names
+from flyball.tables.spanning import spanning
+from flyball.tables.system import F_APPLIED, G_VALUE, GAMMA, LOAD, NU
+from flyball.tracing.trace import plain, traced
+from tests import mechanisms
+from tests.contract import zoo
+from tests.examples.test_examples import FILES
+from tests.identities.test_complex_values import with_couplings, with_forces
+
+STATES = 100
+CLOSE = 1e-12
+
+
+def quaternions_of(c):
+    """Places of quaternions in q."""
+    from flyball.equations.tree import quaternion_at
+
+    at = (quaternion_at(c.values.system, b)[0] for b in range(len(c.values.system.body_i)))
+    return [k for k in at if k >= 0]
+
+
+def engine_at(c, rng):
+    """A state as the engine took it, and what it made of it."""
+    s, W = c.structure, c.work
+    q = c.values.q + 0.3 * rng.normal(size=s.nq)
+    for k in quaternions_of(c):
+        q[k : k + 4] /= np.linalg.norm(q[k : k + 4])
+    z = c.z.copy()
+    t = rng.uniform(0.0, 1.0)
+    c.at(t, q, rng.normal(size=s.nv), MOTION)
+    c.z = z
+    nm = len(s.measured)
+    state = {"t": t} | {f"z[{k}]": x for k, x in enumerate(z)}
+    state |= {f"q[{k}]": x for k, x in enumerate(W.y[0, : s.nq])}
+    state |= {f"v[{k}]": x for k, x in enumerate(W.y[0, s.nq : s.nq + s.nv])}
+    state |= {f"load[{k}]": x for k, x in enumerate(W.sensed[LOAD, 2 * nm :])}
+    M = np.zeros((s.nv, s.nv))
+    for e, (i, j, _) in enumerate(c.values.system.mass_i):
+        M[i, j] = M[j, i] = W.M[e]
+    found = {"M": M if len(c.values.system.mass_i) else c.mass().toarray(), "f": W.vel[F_APPLIED], "G": c.jacobian()}
+    found |= {name: W.row[k] for name, k in (("g", G_VALUE), ("nu", NU), ("gamma", GAMMA))}
+    found["measured"] = W.sensed[:3, :nm].T
+    return state, {name: np.array(x) for name, x in found.items()}
+
+
+def sizes_of(name, b, state, nv):
+    """What rounding of an entry is compared with: the largest terms that it can be made of."""
+    largest = np.nanmax(np.abs(np.where(np.isfinite(b), b, np.nan)).reshape(len(b), -1), axis=1, initial=0.0)
+    fast = 1.0 + max(np.abs(state[f"v[{k}]"]).max() for k in range(nv))
+    return np.maximum(largest, 1.0) * (fast if name in ("f", "gamma", "measured") else 1.0)
+
+
+def agree(m, states=STATES):
+    m = m.snapshot()
+    for tree in {(), tuple(spanning(m))}:
+        c = compiled(m, tree=tree, coupled=bool(tree))
+        if c.structure.nv == 0:
+            continue
+        symbolic = traced(c.structure, plain(c.values.system))
+        rng = np.random.default_rng(7)
+        found = [engine_at(c, rng) for _ in range(states)]
+        state = {k: np.array([f[0][k] for f in found]) for k in found[0][0]}
+        for name in found[0][1]:
+            b = np.array([f[1][name] for f in found])
+            a = evaluated(getattr(symbolic, name), state).astype(float)
+            a = np.broadcast_to(a.reshape((*a.shape[: a.ndim - b.ndim + 1], *b.shape[1:])), b.shape)
+            tolerance = CLOSE * sizes_of(name, b, state, c.structure.nv).reshape(-1, *[1] * (b.ndim - 1))
+            bad = ~((np.abs(a - b) <= tolerance) | (np.isnan(a) & np.isnan(b)))
+            names = velocity_names(c.structure)
+            assert not bad.any(), (name, tree, np.argwhere(bad)[:3], a[bad][:3], b[bad][:3], names[:1])
+
+
+@pytest.mark.parametrize(("where", "name"), zoo.CASES)
+def test_every_joint(where, name):
+    agree(zoo.joined(where, name))
+
+
+@pytest.mark.parametrize("where", ["space", "plane"])
+def test_every_force(where):
+    m = with_forces(where)
+    assert {type(f) for f in m.forces} == set(forces.ALL)
+    agree(m)
+
+
+def test_every_coupling():
+    agree(with_couplings())
+
+
+def followed(t, angle):
+    return 0.3 * t + 0.1 * angle * angle
+
+
+def test_laws_that_follow_sensors_call_tables_and_functions():
+    m = fb.Mechanism("two arms", planar=True)
+    m.add(fb.Table("profile", x=(0.0, 0.4, 1.1, 2.0), y=(0.0, 0.3, -0.2, 0.5), beyond="line"))
+    m.add(
+        fb.Body("a", mass=1.0, inertia=0.1, position=(0.5, 0.0)),
+        fb.Body("b", mass=2.0, inertia=0.2, position=(1.5, 0.0)),
+    )
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
+    m.add(fb.Sensor("alpha", "A.angle"))
+    m.add(fb.Driver("drive", "B.angle", law="profile(t) + 0.2*alpha**2"))
+    m.add(fb.Motor("motor", "A", torque=followed))
+    m.add(fb.PointForce("push", "b", force=("profile(t)", "sin(alpha)")))
+    agree(m)
+
+
+def test_every_operation_of_a_law():
+    m = mechanisms.four_bar()
+    laws = (
+        "where(t < 0.5, sin(3*t), abs(t - 0.7)) + min(t, 0.3)*max(t, 0.4)**3 + step(t, 0.2, 0, 0.8, 1)",
+        "atan2(t, 0.3) + exp(-t)*cosh(t)/(1 + t**2) + sign(t - 0.5)*sqrt(t) + tanh(t)**2.5",
+    )
+    m.add(fb.PointForce("push", m.bodies[0].name, force=laws))
+    agree(m)
+
+
+@pytest.mark.parametrize("name", [f for f in FILES if not has_contact(mechanisms.example(f))])
+def test_every_example(name):
+    agree(mechanisms.example(name))
