@@ -47,10 +47,10 @@ class Compiled:
 
     def run_on(self, made: Any) -> None:
         """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
-        chosen = self.work.option
-        self.made, self.system = made, made.system(self.values.system)
-        self.work = work(self.structure, self.system)
-        self.work.option[:] = chosen
+        x, before = self.values, vars(self).pop("work", None)
+        self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
+        if before is not None:
+            self.work.option[:] = before.option
 
     def run_on_tables(self) -> None:
         """From now on the engine's own loops do all."""
