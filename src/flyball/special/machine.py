@@ -103,7 +103,7 @@ def assembled(text: str) -> bytes:
         module.triple = llvm.get_default_triple()
         module.data_layout = str(target.target_data)
         options = llvm.create_pipeline_tuning_options(speed_level=int(__import__("os").environ.get("OL", "2")))
-        options.slp_vectorization = False
+        options.slp_vectorization = __import__('os').environ.get('SLP')=='1'
         builder = llvm.create_pass_builder(target, options)
         passes = builder.getModulePassManager()
         passes.run(module, builder)
