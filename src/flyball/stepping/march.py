@@ -18,7 +18,7 @@ from .lifts import sunk
 from .motion import begin, displace, fall, halfway, rest
 from .penalty import FEW, PASSES, aim, find_yielding, linearise, put_back, settled, start_rows, store
 from .record import book, book_turning
-from .rows import fill_rows, static_where_stuck, warm
+from .rows import fill_rows, onward, static_where_stuck, warm
 from .tables import (
     CUTS,
     ENOUGH_V,
@@ -28,6 +28,7 @@ from .tables import (
     GIVEN,
     ITERATIONS,
     JOINTS,
+    LAST_STEP,
     LEFT,
     LIFTS,
     LOST_FRICTION,
@@ -193,6 +194,7 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
             fill_rows(G, M, C, P, L, pace)
             held_by_joints(A, M, C, P, X, pace, ROWS)
     lost, worn, given, stops = ledger(A, pace)
+    onward(G, M, C, D, N, P, L, pace, now)
     velocities(G, A, C, P, X, W, O, F, N, M, L, pace, now, before)
     positions(G, A, M, C, P, Q, R, X, Y, W, O, F, N, L, pace, now)
     if onto_joints(G, A, M, C, P, Q, R, Y, W, O, F, pace) != DONE:
@@ -201,6 +203,7 @@ def step(G, A, M, C, D, B, P, Q, R, X, Y, Z, E, W, O, F, N, L, pace, now, before
     displace(N, M, X, Y.v, pace)
     held_by_joints(A, M, C, P, X, pace, VELOCITIES_AFTER)
     pace.real[TIME] += pace.real[STEP]
+    pace.real[LAST_STEP] = pace.real[STEP]
     pace.count[TAKEN] += 1
     pace.count[LEFT] -= 1
     pace.count[MOST_CONTACTS] = max(pace.count[MOST_CONTACTS], C.count[FOUND])

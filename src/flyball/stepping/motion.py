@@ -62,6 +62,7 @@ def displace(N, M, X, lifts, pace):
     """
     h = pace.real[STEP]
     for k in range(N.body.shape[0]):
+        put3(N.past, k, 0, load3(M.pose, k, 0))
         for i in range(3):
             pace.real[LOST_IMPACT] += h * N.body[k, FREE_MASS] * pace.real[GRAVITY + i] * lifts[k, i]
             M.pose[k, i] += h * (X.v[k, i] + N.move[k, i] + lifts[k, i])

@@ -6,7 +6,7 @@ from ..compiler.jit import formula
 from ..math.scalar import sqrt
 from ..math.vec import dot, load3, put3
 from ..numerics.cone.operator import across, seen_turning
-from .tables import GIVEN, IMPULSE, LOST_FRICTION, LOST_IMPACT, SLIDES, TORQUE
+from .tables import GIVEN, IMPULSE, LEAD, LOST_FRICTION, LOST_IMPACT, SLIDES, TORQUE
 
 ON = 1e-9  # part of the friction cone's radius within which an impulse is on it
 
@@ -17,7 +17,7 @@ def book(P, X, c, u, pace, now):
     n, s, t = X.p[c, 0], X.p[c, 1], X.p[c, 2]
     put3(now, c, IMPULSE, across(P, c, n, s, t))
     if n > 0.0:
-        belt = P.bias[c, 1] * s + P.bias[c, 2] * t
+        belt = (P.bias[c, 1] - now[c, LEAD + 1]) * s + (P.bias[c, 2] - now[c, LEAD + 2]) * t
         pace.real[LOST_IMPACT] -= n * u[0]
         pace.real[LOST_FRICTION] -= s * u[1] + t * u[2] + belt
         pace.real[GIVEN] -= belt

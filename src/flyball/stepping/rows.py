@@ -6,9 +6,11 @@ from ..compiler.jit import formula
 from ..contact.surfaces import ACROSS, KINETIC, ROLLING, SPINNING, STATIC
 from ..contact.tables import BEFORE, FOUND, GAP, MATERIAL, MOVER, NORMAL, POINT, SHAPE_1, SHAPE_2
 from ..math.scalar import sqrt
-from ..math.vec import axes_across, cross, dot, load3, load9, mv, put3, scale, sub
+from ..math.vec import add, axes_across, cross, dot, load3, load9, mv, put3, scale, sub
 from ..numerics.cone.operator import along, seen
-from .tables import GRAVITY, IMPULSE, SLIDES, STEP, TORQUE
+from .onward import arm, carry_on, lead
+from .penalty import stiffness
+from .tables import GRAVITY, IMPULSE, LEAD, SLIDES, STEP, TORQUE, YIELDING
 
 
 @formula
@@ -17,27 +19,49 @@ def fill_rows(G, M, C, P, L, pace):
     h = pace.real[STEP]
     P.size[0] = C.count[FOUND]
     P.island[0], P.island[1] = 0, C.count[FOUND]
-    belts, turns = L.belt.shape[0] > 0, P.turn.shape[0] > 0
+    turns = P.turn.shape[0] > 0
     for c in range(C.count[FOUND]):
         i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
         a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
         P.at[c, 0], P.at[c, 1] = a, b
-        n, point = load3(C.x, c, NORMAL), load3(C.x, c, POINT)
-        put3(P.frame, c, 0, n)
-        put3(P.arm, c, 0, sub(point, load3(M.pose, a, 0)) if a >= 0 else (0.0, 0.0, 0.0))
-        put3(P.arm, c, 3, sub(point, load3(M.pose, b, 0)) if b >= 0 else (0.0, 0.0, 0.0))
+        point = load3(C.x, c, POINT)
+        put3(P.frame, c, 0, load3(C.x, c, NORMAL))
+        put3(P.arm, c, 0, arm(M, a, point))
+        put3(P.arm, c, 3, arm(M, b, point))
         law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
-        cross_frame(P.frame, c, direction(G, M, L, i, a, n), law[ACROSS])
+        tangents(G, M, C, P, L, c)
         gap = C.x[c, GAP]
         P.bias[c, 0] = gap / h if gap > 0.0 else 0.0
-        P.bias[c, 1] = P.bias[c, 2] = 0.0
         P.mu[c] = law[KINETIC]
         P.soft[c] = 0.0
         if turns:
             P.turn[c, 0], P.turn[c, 1] = law[ROLLING], law[SPINNING]
-        if belts:
-            add_belt(M, L, P, c, i, a, -1.0)
-            add_belt(M, L, P, c, j, b, 1.0)
+
+
+@formula
+def tangents(G, M, C, P, L, c):
+    """Tangents of contact c, and how its surfaces move along these by themselves."""
+    i, j = C.at[c, SHAPE_1], C.at[c, SHAPE_2]
+    a, b = G.shape_i[i, MOVER], G.shape_i[j, MOVER]
+    law = L.pair[G.shape_i[i, MATERIAL], G.shape_i[j, MATERIAL]]
+    cross_frame(P.frame, c, direction(G, M, L, i, a, load3(P.frame, c, 0)), law[ACROSS])
+    P.bias[c, 1] = P.bias[c, 2] = 0.0
+    if L.belt.shape[0] > 0:
+        add_belt(M, L, P, c, i, a, -1.0)
+        add_belt(M, L, P, c, j, b, 1.0)
+
+
+@formula
+def onward(G, M, C, D, N, P, L, pace, now):
+    """Rows from the start of the step to its middle; of what gives way they stay, as its law is of the way."""
+    for c in range(C.count[FOUND]):
+        hard = pace.count[YIELDING] == 0 or stiffness(G, C, L, c) == 0.0
+        ahead = (0.0, 0.0, 0.0)
+        if hard and carry_on(M, C, D, N, P, c, pace):
+            tangents(G, M, C, P, L, c)
+            ahead = lead(M, C, P, c)
+            put3(P.bias, c, 0, add(load3(P.bias, c, 0), ahead))
+        put3(now, c, LEAD, ahead)
 
 
 @formula

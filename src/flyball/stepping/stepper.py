@@ -114,7 +114,7 @@ def free_bodies(mass: np.ndarray, inertia: np.ndarray, turn: np.ndarray, planar:
     size = np.trace(inertia, axis1=1, axis2=2) / 3.0
     odd = np.abs(inertia - size[:, None, None] * np.eye(3)).max(axis=(1, 2), initial=0.0)
     body[:, FREE_ROUND] = odd <= 1e-12 * size
-    return Free(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)))
+    return Free(body, turn.copy(), np.zeros((n, 8)), np.zeros((n, 8)), np.zeros((n, 3)))
 
 
 def nodes(free: Free) -> np.ndarray:

@@ -18,11 +18,11 @@ ANGLE = 6  # column of Free.move, behind velocities: angle [rad] about z turned 
 # impact, impulse of that in the world, and its velocities before; of contacts that give way: stiffness (0: hard),
 # overlap and its rate at the start of the step, share of its end in the law, overlap of the law and gap at
 # the end, overlap that is its spring's; impulse of its torque in the world; relative angular
-# velocity before an impact
+# velocity before an impact; part of its bias that is for the end of the step
 IMPULSE, SLIDES, HIT, KICK, BEFORE_KICK = 0, 3, 4, 5, 8
 STIFF, OVERLAP, RATE, SHARE, TARGET, END_GAP, KEPT = range(11, 18)
-TORQUE, TURNED_BEFORE = 18, 21
-TRACKS = 24  # columns
+TORQUE, TURNED_BEFORE, LEAD = 18, 21, 24
+TRACKS = 27  # columns
 # entries of Pace.real: time, step; gravity; speed below which nothing bounces; overlap [m] that is
 # none; residual [m/s] that is enough for velocities and for positions; residual over the step [m/s^2] above which a
 # solve that was cut is told
@@ -31,6 +31,7 @@ TIME, STEP, GRAVITY, SLOWEST, FLAT, ENOUGH_V, ENOUGH_X, ROUGH = 0, 1, 2, 5, 6, 7
 # of the worst residual, overlap at the start
 LOST_FRICTION, LOST_IMPACT, GIVEN, WORST_OVERLAP, WORST_RESIDUAL, WORST_FORCE, WORST_AT, FIRST_OVERLAP = range(10, 18)
 STORED, STORED_FIRST = 18, 19  # energy in contacts that give way: now, and at the start
+LAST_STEP = 20  # the step before, 0 if there was none
 REALS = 24
 # entries of Pace.count: steps still to take, steps taken; most iterations for velocities and positions; law of
 # restitution; iterations done, solves cut off, most contacts; how many impacts, in how many of them expansion was cut;
@@ -50,6 +51,7 @@ class Free(NamedTuple):
     turn: np.ndarray  # (n, 4): unit quaternion, body axes to the world
     before: np.ndarray  # (n, 8): velocities at the start of the step
     move: np.ndarray  # (n, 8): velocities that bodies are displaced with
+    past: np.ndarray  # (n, 3): positions at the start of the step before
 
 
 class Tracks(NamedTuple):

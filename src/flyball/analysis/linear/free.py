@@ -145,19 +145,26 @@ def _compared(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
 
 
 def _basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    from scipy.linalg import qr
-
     N = _null(G, scale)
     if not N.shape[1]:
         return N, np.zeros(0, int)
     if chosen is None or len(chosen) != N.shape[1]:
-        *_, order = qr(N.T, mode="economic", pivoting=True)
-        chosen = np.sort(order[: N.shape[1]])
+        chosen = pivoted(N)
     Z = scale[:, None] * N
     Z = Z @ np.linalg.inv(Z[chosen])
     Z[np.abs(Z) <= ROUNDED * scale[:, None] / scale[chosen]] = 0.0
     Z[chosen] = np.eye(len(chosen))
     return Z, chosen
+
+
+def pivoted(N: np.ndarray) -> np.ndarray:
+    """Rows of an orthonormal basis (nv, f) that tell the others, (f,): as complete pivoting would choose them."""
+    from scipy.linalg import qr
+
+    if not N.shape[1]:
+        return np.zeros(0, int)
+    *_, order = qr(N.T, mode="economic", pivoting=True)
+    return np.sort(order[: N.shape[1]])
 
 
 def refuse_singular(e: Equations, f: Free) -> None:

@@ -1,1 +1,1 @@
-"""Printers of expressions, a language a file: what is traced or derived once is written in any of them."""
+"""Printers of expressions, a language a file; text, LaTeX and MathML share a layout of signs, fractions and powers."""

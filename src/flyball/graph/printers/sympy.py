@@ -17,7 +17,8 @@ import numpy as np
 from ...errors import ModelError
 from ...math.spline import symbolic
 from ..function import Function
-from ..node import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL, Graph, Node
+from ..node import Graph, Node
+from ..operations import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, POWER, SYMBOL
 from ..values import reached
 from .from_sympy import Back
 from .naming import Names

@@ -64,7 +64,7 @@ class JointView(View):
     def _heading(self, frame: int) -> Any:
         """In the plane: the way that a frame's x axis points in its body."""
         R = self._x.system.frame_x[frame, 3:]
-        return atan2(R[3].item(), R[0].item())
+        return atan2(*R[[3, 0]].tolist())
 
     def _found(self, name: str) -> np.ndarray:
         """A coordinate by its name, with ``_rate`` and ``_acceleration`` behind it for its derivatives."""

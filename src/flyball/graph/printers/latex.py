@@ -1,0 +1,135 @@
+r"""Expressions in LaTeX: ``m_{2} \left(l_{1}^{2} + 2 l_{1} l_{c2} \cos q_{2}\right)``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..node import Node
+from ..operations import NUMBER, SYMBOL
+from ..simplify.numbers import Known
+from .layout import Layout, Power, Term, number_text
+from .spelling import escaped, spelt
+
+OPERATORS = {
+    "sin": r"\sin", "cos": r"\cos", "tan": r"\tan", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan",
+    "exp": r"\exp", "log": r"\ln", "sinh": r"\sinh", "cosh": r"\cosh", "tanh": r"\tanh", "minimum": r"\min",
+    "maximum": r"\max", "atan2": r"\operatorname{atan2}", "sign": r"\operatorname{sgn}",
+    "rounded": r"\operatorname{round}",
+}  # fmt: skip
+
+
+def latex(x: Any, names: Mapping[int, str] | None = None) -> str:
+    """One expression, as it stands between dollars.
+
+    Parameters
+    ----------
+    x : Node or number
+    names : mapping of int to str, optional
+        Nodes that have a name of their own (`naming.named`), in LaTeX, by their index.
+    """
+    return LatexPrinter(names).expression(x)
+
+
+class LatexPrinter:
+    """Writes expressions in LaTeX."""
+
+    def __init__(self, names: Mapping[int, str] | None = None) -> None:
+        self.layout = Layout(names)
+
+    def expression(self, x: Any, top: bool = False) -> str:
+        """A sum; ``top``: written out though it has a name."""
+        return "".join(self.pieces(x, top))
+
+    def pieces(self, x: Any, top: bool = False) -> list[str]:
+        """Terms with their signs: a line may break before each."""
+        if not isinstance(x, Node):
+            return [number(float(x))]
+        out = []
+        for k, term in enumerate(self.layout.sum(x, top)):
+            sign = (" - " if term.negative else " + ") if k else ("-" if term.negative else "")
+            out.append(sign + self.term(term, top))
+        return out
+
+    def term(self, term: Term, top: bool = False) -> str:
+        """One term without its sign."""
+        up, down = _numeric(term.number)
+        above, below = [self.power(p, top) for p in term.above], [self.power(p) for p in term.below]
+        if term.below:
+            return rf"\frac{{{' '.join(up + above) or '1'}}}{{{' '.join(down + below)}}}"
+        front = [rf"\frac{{{' '.join(up) or '1'}}}{{{down[0]}}}"] if down else up
+        return " ".join(front + above) or "1"
+
+    def power(self, power: Power, top: bool = False) -> str:
+        """A factor."""
+        x, n = power
+        named = self.layout.names.get(x.index)
+        if named is not None and not (top and x.op not in (NUMBER, SYMBOL)):
+            return named if n == 1 else f"{_closed(named)}^{{{n}}}"
+        if x.op == SYMBOL:
+            return spelt(x.data) if n == 1 else f"{_closed(spelt(x.data))}^{{{n}}}"
+        if x.op in OPERATORS:
+            return self.function(OPERATORS[x.op] + (f"^{{{n}}}" if n != 1 else ""), x)
+        inner = self.factor(x)
+        return inner if n == 1 else f"{inner}^{{{n}}}"
+
+    def function(self, operator: str, x: Node) -> str:
+        """A function: of one symbol without parentheses."""
+        if len(x.args) == 1 and (x.args[0].op == SYMBOL or x.args[0].index in self.layout.names):
+            return f"{operator} {self.expression(x.args[0])}"
+        return f"{operator}{self.parentheses(', '.join(self.expression(a) for a in x.args))}"
+
+    def factor(self, x: Node) -> str:
+        """Any other factor without its exponent."""
+        if x.op == "sqrt":
+            return rf"\sqrt{{{self.expression(x.args[0])}}}"
+        if x.op == "absolute":
+            return rf"\left|{self.expression(x.args[0])}\right|"
+        if x.op == "power":
+            return f"{self.parentheses(self.expression(x.args[0]))}^{{{self.expression(x.args[1])}}}"
+        if x.op == "choose":
+            c, a, b = (self.expression(y) for y in x.args)
+            return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
+        if x.op == "call":
+            return rf"\operatorname{{{escaped(x.data.name)}}}" + self.parentheses(
+                ", ".join(self.expression(a) for a in x.args)
+            )
+        return self.parentheses(self.expression(x))
+
+    @staticmethod
+    def parentheses(inner: str) -> str:
+        """Parentheses that are as high as what they hold."""
+        high = any(mark in inner for mark in (r"\frac", r"\sqrt", r"\begin", r"\left"))
+        return rf"\left({inner}\right)" if high else f"({inner})"
+
+
+def _numeric(x: Known | float) -> tuple[list[str], list[str]]:
+    """A number above and below the line."""
+    if not isinstance(x, Known):
+        return [number(x)], []
+    up = [str(x.numerator)] if x.numerator != 1 else []
+    up += [rf"\sqrt{{{x.root}}}"] if x.root > 1 else []
+    up += [r"\pi"] if x.pi else []
+    return up, [str(x.denominator)] if x.denominator != 1 else []
+
+
+def _closed(latex: str) -> str:
+    """A name to which an exponent may be put."""
+    return f"{{{latex}}}" if "^" in latex else latex
+
+
+def number(x: float) -> str:
+    """A decimal, with a power of ten where it has one."""
+    mantissa, _, exponent = number_text(x).partition("e")
+    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+
+
+def matrix(rows: np.ndarray | Sequence[Sequence[Any]], names: Mapping[int, str] | None = None) -> str:
+    """A matrix; zeros are dots."""
+    printer = LatexPrinter(names)
+    cells = [[r"\cdot" if x == 0.0 else printer.expression(x) for x in row] for row in rows]
+    columns = max((len(row) for row in cells), default=0)
+    body = " \\\\\n".join(" & ".join(row) for row in cells)
+    return rf"\left[\begin{{array}}{{{'c' * columns}}}" + f"\n{body}\n" + r"\end{array}\right]"

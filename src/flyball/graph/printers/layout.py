@@ -1,0 +1,131 @@
+"""What every printer needs: an expression as signed terms in the order of reading, with fractions and powers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from ..node import Node
+from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL
+from ..simplify.cost import read
+from ..simplify.numbers import Known, known
+
+Power = tuple[Node, int]
+FUNCTION, SUM, OTHER = 5, 4, 3
+
+
+@dataclass(frozen=True)
+class Term:
+    """One term of a sum: a sign, a number, powers above and below the line."""
+
+    negative: bool
+    number: Known | float
+    above: tuple[Power, ...]
+    below: tuple[Power, ...]
+
+    @property
+    def one(self) -> bool:
+        """Whether the number is one, which is not written beside anything."""
+        return self.number == Known(1, 1)
+
+    @property
+    def plain(self) -> bool:
+        """Whether it is a number alone."""
+        return not self.above and not self.below
+
+
+class Layout:
+    """Expressions as terms.
+
+    Parameters
+    ----------
+    names : mapping of int to str
+        Nodes that are written by a name of their own, by their index.
+    """
+
+    def __init__(self, names: Mapping[int, str] | None = None) -> None:
+        self.names = dict(names or {})
+        self.costs: dict[int, float] = dict.fromkeys(self.names, 1.0)
+
+    def leaf(self, x: Node) -> bool:
+        """Whether it is written as it stands."""
+        return x.index in self.names or x.op in (NUMBER, SYMBOL)
+
+    def sum(self, x: Node, top: bool = False) -> list[Term]:
+        """Terms of an expression, in the order of reading; ``top``: though it may have a name."""
+        out: list[tuple[Node, bool]] = []
+        to_see = [(x, False)]
+        while to_see:
+            y, turned = to_see.pop()
+            named = y.index in self.names and not (top and y is x)
+            if y.op == ADD and not named:
+                to_see += [(a, turned) for a in reversed(y.args)]
+            elif negated(y) and not named:
+                to_see.append((y.args[1], not turned))
+            else:
+                out.append((y, turned))
+        terms = [self.turned(self.term(y, top and y is x), turned) for y, turned in sorted(out, key=self.place)]
+        first = next((i for i, t in enumerate(terms) if not t.negative), 0)
+        return [terms[first], *terms[:first], *terms[first + 1 :]]
+
+    @staticmethod
+    def turned(term: Term, turned: bool) -> Term:
+        """A term, or minus it."""
+        return replace(term, negative=not term.negative) if turned else term
+
+    def place(self, signed: tuple[Node, bool]) -> tuple:
+        """Where a term stands in a sum: numbers, then what does not move, short ones first."""
+        x, turned = signed
+        if x.op == NUMBER:
+            return (0 if (x.value > 0.0) is not turned else 3, 0.0, ())
+        term = self.term(x)
+        powers = (*term.above, *term.below)
+        length = sum(read(y, self.costs) + 0.4 * (n - 1) for y, n in powers)
+        return (1 + x.moving, math.floor(length), tuple((y.index, -n) for y, n in powers))
+
+    def term(self, x: Node, top: bool = False) -> Term:
+        """One term: its numbers multiplied, equal factors joined."""
+        c = 1.0
+        powers: dict[int, Power] = {}
+        to_see = [(x, 1)]
+        while to_see:
+            y, n = to_see.pop()
+            named = y.index in self.names and not (top and y is x)
+            if y.op == NUMBER:
+                c = c * y.value if n > 0 else c / y.value
+            elif y.op in (MULTIPLY, DIVIDE) and not named:
+                to_see += [(y.args[0], n), (y.args[1], n if y.op == MULTIPLY else -n)]
+            else:
+                powers[y.index] = (y, powers.get(y.index, (y, 0))[1] + n)
+        ordered = sorted((p for p in powers.values() if p[1]), key=self.rank)
+        found = known(abs(c))
+        return Term(
+            c < 0.0,
+            abs(c) if found is None else found,
+            tuple((y, n) for y, n in ordered if n > 0),
+            tuple((y, -n) for y, n in ordered if n < 0),
+        )
+
+    def rank(self, power: Power) -> tuple[int, int]:
+        """Place of a factor: masses, other parameters, what moves, sums, functions."""
+        x = power[0]
+        if x.index in self.names:
+            return (2 if not x.moving else OTHER, x.index)
+        if x.op == SYMBOL:
+            mass = x.data.unit == "kg" or (not x.data.unit and x.data.name.startswith("m"))
+            return ((0 if mass else 1) if x.data.kind == "parameter" else OTHER, x.index)
+        if x.op == ADD:
+            return (SUM, x.index)
+        return (2 if x.op == "sqrt" and not x.moving else FUNCTION, x.index)
+
+
+def negated(x: Node) -> bool:
+    """Whether it is minus a sum."""
+    return x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0 and x.args[1].op == ADD
+
+
+def number_text(x: float) -> str:
+    """A decimal: with as many digits as tell it apart, up to twelve."""
+    short = f"{x:.12g}"
+    return short if float(short) == x or abs(float(short) - x) <= 1e-12 * abs(x) else repr(x)

@@ -1,0 +1,112 @@
+"""Expressions as plain text: ``m2*(l1^2 + lc2^2 + 2*l1*lc2*cos(q2))``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..node import Node
+from ..operations import NUMBER, SYMBOL
+from ..simplify.numbers import Known
+from .layout import Layout, Power, Term, number_text
+
+NAMES = {"absolute": "abs", "minimum": "min", "maximum": "max", "rounded": "round"}
+
+
+def text(x: Any, names: Mapping[int, str] | None = None) -> str:
+    """One expression.
+
+    Parameters
+    ----------
+    x : Node or number
+    names : mapping of int to str, optional
+        Nodes that have a name of their own (`naming.named`), by their index.
+    """
+    return TextPrinter(names).expression(x)
+
+
+class TextPrinter:
+    """Writes expressions as text."""
+
+    def __init__(self, names: Mapping[int, str] | None = None) -> None:
+        self.layout = Layout(names)
+
+    def expression(self, x: Any, top: bool = False) -> str:
+        """A sum; ``top``: written out though it has a name."""
+        if not isinstance(x, Node):
+            return number(x)
+        out = ""
+        for k, term in enumerate(self.layout.sum(x, top)):
+            sign = (" - " if term.negative else " + ") if k else ("-" if term.negative else "")
+            out += sign + self.term(term, top)
+        return out
+
+    def lines(self, x: Any, width: int = 96) -> list[str]:
+        """A sum, broken before its terms where a line would be longer than ``width``."""
+        if not isinstance(x, Node):
+            return [number(x)]
+        out = [""]
+        for k, term in enumerate(self.layout.sum(x, True)):
+            sign = ("- " if term.negative else "+ ") if k else ("-" if term.negative else "")
+            piece = sign + self.term(term, True)
+            if k and len(out[-1]) + len(piece) + 1 > width:
+                out.append(piece)
+            else:
+                out[-1] += (" " if k else "") + piece
+        return out
+
+    def term(self, term: Term, top: bool = False) -> str:
+        """One term without its sign."""
+        above = [self.power(p, top) for p in term.above]
+        below = [self.power(p) for p in term.below]
+        x = term.number
+        if isinstance(x, Known):
+            up = [str(x.numerator)] if x.numerator != 1 else []
+            up += [f"sqrt({x.root})"] if x.root > 1 else []
+            up += ["pi"] if x.pi else []
+            above = up + above
+            below = ([str(x.denominator)] if x.denominator != 1 else []) + below
+        else:
+            above = [number_text(x), *above]
+        line = "*".join(above) or "1"
+        if not below:
+            return line
+        return f"{line}/{below[0]}" if len(below) == 1 else f"{line}/({'*'.join(below)})"
+
+    def power(self, power: Power, top: bool = False) -> str:
+        """A factor."""
+        x, n = power
+        inner = self.factor(x, top)
+        return inner if n == 1 else f"{inner}^{n}"
+
+    def factor(self, x: Node, top: bool = False) -> str:
+        """A factor without its exponent, in parentheses if it is a sum."""
+        named = self.layout.names.get(x.index)
+        if named is not None and not (top and x.op not in (NUMBER, SYMBOL)):
+            return named
+        if x.op == SYMBOL:
+            return str(x.data.name)
+        if x.op == "add":
+            return f"({self.expression(x)})"
+        if x.op == "power":
+            return f"({self.expression(x.args[0])})^({self.expression(x.args[1])})"
+        if x.op == "choose":
+            c, a, b = (self.expression(y) for y in x.args)
+            return f"({a} if {c} > 0 else {b})"
+        name = x.data.name if x.op == "call" else NAMES.get(x.op, x.op)
+        return f"{name}({', '.join(self.expression(y) for y in x.args)})"
+
+
+def number(x: Any) -> str:
+    """A number that is no node."""
+    return number_text(float(x))
+
+
+def matrix(rows: np.ndarray | Sequence[Sequence[Any]], names: Mapping[int, str] | None = None) -> str:
+    """A matrix, its columns under one another; zeros are dots."""
+    printer = TextPrinter(names)
+    cells = [["." if x == 0.0 else printer.expression(x) for x in row] for row in rows]
+    widths = [max(map(len, column)) for column in zip(*cells, strict=True)]
+    return "\n".join("[ " + "  ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)) + " ]" for row in cells)

@@ -1,0 +1,48 @@
+"""Sums of squares that are one, as of the parts of a unit quaternion: told by whoever knows."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+
+from .terms import Key, Powers, Terms, plus, powers_product, put
+
+SQUARE = 2
+
+
+def shortened(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
+    """Terms with multiples of x^2 + y^2 + ... - 1 added where fewer are left; ``units`` are indices of x, y, ..."""
+    for unit in units:
+        for _ in range(4):  # of higher order once more
+            change = _change(terms, unit)
+            if not change:
+                break
+            terms = plus(terms, change)
+    return terms
+
+
+def _change(terms: Terms, unit: tuple[int, ...]) -> Terms:
+    """What to add: for each product that a square of the unit's stands at, the multiple that leaves the fewest."""
+    members: dict[Key, list[int]] = defaultdict(list)
+    for powers, waves in terms:
+        for k, n in powers:
+            if k in unit and n >= SQUARE:
+                members[powers_product(powers, ((k, -SQUARE),)), waves].append(k)
+    change: Terms = {}
+    for (powers, waves), found in members.items():
+        if len(found) < 2:
+            continue
+        keys: list[tuple[Powers, float]] = [(powers_product(powers, ((k, SQUARE),)), 1.0) for k in unit]
+        keys.append((powers, -1.0))
+        own = [terms.get((p, waves), 0.0) for p, _ in keys]
+        if any((p, waves) in change for p, _ in keys):
+            continue
+        best, fewest = 0.0, sum(1 for c in own if c)
+        for c, (_, sign) in zip(own, keys, strict=True):
+            left = sum(1 for d, (_, s) in zip(own, keys, strict=True) if abs(d - c * sign * s) > 1e-14 * abs(c))
+            if c and left < fewest:
+                best, fewest = c * sign, left
+        if best:
+            for p, sign in keys:
+                put(change, (p, waves), -best * sign)
+    return change

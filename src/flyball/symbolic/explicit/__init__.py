@@ -1,0 +1,1 @@
+"""From equations with constraints to explicit ones: dependent coordinates solved for, state space."""

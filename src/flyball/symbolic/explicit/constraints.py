@@ -1,0 +1,54 @@
+"""All constraints of a mechanism in one list: rows, and coordinates of tree joints that drivers prescribe."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...equations.rows import BY_TIME
+from ...laws.evaluation import evaluate_jet
+from ...tables.system import BODY_LAW, OFFSET, Q0, V0
+from ...tracing.trace import Traced
+from .solve import zeros
+
+
+@dataclass(frozen=True)
+class Constraints:
+    """Equations g = 0, G v = nu, G vdot = gamma as expressions.
+
+    Attributes
+    ----------
+    elements : list of str
+        Whose each is.
+    holonomic : ndarray of bool
+        Which are constraints on positions.
+    """
+
+    elements: list[str]
+    holonomic: np.ndarray
+    g: np.ndarray
+    G: np.ndarray
+    nu: np.ndarray
+    gamma: np.ndarray
+
+
+def constraints(x: Traced) -> Constraints:
+    """Rows first, in the order of the multipliers, then prescribed coordinates in the order of the structure."""
+    s, S, W = x.structure, x.system, x.work
+    n = len(s.prescribed)
+    G, g, nu, gamma = zeros((n, s.nv)), zeros((n,)), zeros((n,)), zeros((n,))
+    for k, b in enumerate(s.prescribed.values()):
+        law = S.body_i[b, BODY_LAW]
+        value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
+        G[k, S.body_i[b, V0]] = 1.0
+        g[k] = x.q[S.body_i[b, Q0]] - (value - S.body_x[b, OFFSET])
+        nu[k], gamma[k] = rate, second
+    return Constraints(
+        [r.element.name for r in s.rows] + list(s.prescribed),
+        np.array([r.holonomic for r in s.rows] + [True] * n, bool),
+        np.concatenate([x.g, g]),
+        np.concatenate([x.G.reshape(-1, s.nv), G]),
+        np.concatenate([x.nu, nu]),
+        np.concatenate([x.gamma, gamma]),
+    )

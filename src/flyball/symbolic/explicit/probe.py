@@ -1,0 +1,102 @@
+"""Whether expressions are the same or nothing, found by their values at random places.
+
+An expression that is zero at several random places is zero (Schwartz 1980, Zippel 1979, for polynomials, which sines
+and cosines of the coordinates make of everything here); rounding is told from what cancels by sizes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...graph.node import NUMBER, Node
+from ...graph.values import evaluate, symbols
+
+PLACES = 5
+NOTHING = 1e-11  # of the largest of its kind: rounding
+PARAMETER = 1e-3  # part that parameters are changed by: what holds for their own values only does not hold
+
+
+class Probe:
+    """Random values of all symbols, near those of a start."""
+
+    def __init__(self, start: Mapping[str, float], seed: int = 0) -> None:
+        self.start = start
+        self._random = np.random.default_rng(seed)
+        self._known: dict[str, np.ndarray] = {}
+
+    def values(self, nodes: Sequence[Any]) -> np.ndarray:
+        """Values of expressions, (expressions, places)."""
+        for x in symbols(nodes):
+            if x.data.name not in self._known:
+                self._known[x.data.name] = self._of(x)
+        found = evaluate(nodes, self._known)
+        return np.array([np.broadcast_to(np.asarray(x, float), PLACES) for x in found]).reshape(len(nodes), PLACES)
+
+    def _of(self, x: Node) -> np.ndarray:
+        around = self._random.uniform(-1.0, 1.0, PLACES)
+        if not x.moving:
+            return x.value * (1.0 + PARAMETER * around) if x.value else PARAMETER * around
+        return self.start.get(x.data.name, 0.0) + around
+
+    def zero(self, x: Any, size: float = 0.0) -> bool:
+        """Whether an expression is nothing, compared with ``size`` and with what it is the sum of."""
+        if not isinstance(x, Node) or x.op == NUMBER:
+            return abs(float(x)) <= NOTHING * size
+        with np.errstate(all="ignore"):
+            value = np.abs(self.values([x])[0]).max()
+            return bool(value <= NOTHING * max(size, self._terms(x)))
+
+    def _terms(self, x: Node) -> float:
+        """The largest of the terms that a sum is made of."""
+        found, to_see = [], [x]
+        while to_see:
+            y = to_see.pop()
+            if y.op == "add":
+                to_see.extend(y.args)
+            else:
+                found.append(y)
+        return float(np.abs(self.values(found)).max()) if len(found) > 1 else 0.0
+
+    def size(self, x: Any) -> float:
+        """The largest value of an expression, at least what it is the sum of."""
+        if not isinstance(x, Node):
+            return abs(float(x))
+        with np.errstate(all="ignore"):
+            return max(float(np.abs(self.values([x])).max()), self._terms(x))
+
+    def without_nothing(self, x: Any, size: float) -> Any:
+        """The same, or a plain zero if it is nothing beside ``size``."""
+        return 0.0 if self.zero(x, size) else x
+
+    def simplest(self, x: Any) -> Any:
+        """The same, or a plain number where it is a whole one everywhere."""
+        if not isinstance(x, Node):
+            return x
+        found = self.values([x])[0]
+        whole = round(float(found[0])) if np.isfinite(found[0]) else 0
+        return float(whole) if whole and np.abs(found - whole).max() <= NOTHING * abs(whole) else x
+
+    def know(self, name: str, value: float) -> None:
+        """Another symbol's value at the start."""
+        self.start = {**self.start, name: value}
+
+    def at_start(self, x: Any) -> float:
+        """Value at the start, with the parameters' own values."""
+        return float(evaluate([x], self.start)[0])
+
+    def same(self, x: Any, y: Any, size: float = 0.0) -> bool:
+        """Whether two expressions are one."""
+        return x is y or self.zero(x - y, size)
+
+    def cleaned(self, A: np.ndarray) -> np.ndarray:
+        """The same matrix with plain zeros where entries are nothing beside the largest of their row."""
+        out = A.copy()
+        flat = [x if isinstance(x, Node) else float(x) for x in A.ravel()]
+        with np.errstate(all="ignore"):
+            size = np.abs(self.values(flat)).max(axis=1, initial=0.0).reshape(A.shape)
+        nothing = size <= NOTHING * size.max(axis=1, initial=0.0, keepdims=True) if A.size else np.zeros(A.shape, bool)
+        out[nothing] = 0.0
+        return out

@@ -1,0 +1,1 @@
+"""Linear equations as expressions: state space, transfer functions, conditions of stability."""

@@ -1,0 +1,126 @@
+"""Multipliers that balance the forces at a point, and what of the forces has to balance by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import ModelError
+from ...graph.derivative import jacobian, replaced
+from ...graph.node import SYMBOL, Node
+from ...graph.values import reached
+from .free import Free
+from .point import Point
+from .size import sizes
+from .solve import Dependent, is_zero, number, product, solved, zeros
+from .traced import Mechanics
+
+BALANCED = 1e-8  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
+
+
+def multipliers(m: Mechanics, point: Point, f: Free) -> np.ndarray:
+    """Multipliers (rows,) under which r = 0; those of rows that depend on others are 0.
+
+    Raises
+    ------
+    ModelError
+        If friction follows them: they are then no solution of linear equations.
+    """
+    lam = zeros(len(m.multipliers))
+    if not len(f.rows_v):
+        return lam
+    r, R = _forces(m, point)
+    if any(x in m.multipliers for x in reached(list(R.ravel()))):
+        names = ", ".join(repr(e.name) for e in m.model.forces if hasattr(e, "load"))
+        raise ModelError(
+            f"friction of {names} follows the reactions, which at this point are no solution of linear equations; "
+            f"linearize takes it, in numbers"
+        )
+    others = np.setdiff1d(np.arange(len(r)), np.r_[f.chosen_v, f.held])
+    lam[f.rows_v] = solved(R[np.ix_(others, f.rows_v)], -r[others, None])[:, 0]
+    return lam
+
+
+def _forces(m: Mechanics, point: Point) -> tuple[np.ndarray, np.ndarray]:
+    """R without multipliers, and its derivatives by them."""
+    by = jacobian(list(m.r), m.multipliers)
+    flat = replaced([*m.r, *by.ravel()], point.replacing(m))
+    nv = len(m.r)
+    r = zeros(nv)
+    r[:] = replaced(flat[:nv], [(s, 0.0) for s in m.multipliers])
+    R = zeros(*by.shape)
+    R.ravel()[:] = flat[nv:]
+    return r, R
+
+
+def conditions(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> list[Node]:
+    """Forces along the free coordinates, which vanish at an equilibrium; those that always do are left out."""
+    r = zeros(len(m.r), 1)
+    r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
+    return [m.graph.node(x) for x in product(f.Zv.T, r)[:, 0] if not is_zero(x)]
+
+
+def refuse_unbalanced(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> None:
+    """Refuse a point that is no equilibrium with the parameters' own values.
+
+    Raises
+    ------
+    ModelError
+        With what is left unbalanced.
+    """
+    r = zeros(len(m.r), 1)
+    r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
+    left = product(f.Zv.T, r)[:, 0]
+    size = np.array(sizes(list(r[:, 0]))) * m.scale
+    terms = sizes(list(left))
+    for d, x, own in zip(f.chosen_v, left, terms, strict=True):
+        if abs(number(x)) * m.scale[d] > BALANCED * (own * m.scale[d] + 1e-3 * size.max(initial=0.0)):
+            name = m.names[d]
+            moving = (
+                ""
+                if m.values.structure.tree or not any(map(number, point.v))
+                else ("; what moves steadily does so in joint coordinates: coordinates='joint'")
+            )
+            raise ModelError(
+                f"{m.model.name!r} is in no equilibrium there: {number(x):.6g} "
+                f"{'N' if name.unit == 'm' else 'N m'} are left along {name.name}. Give another point, for instance "
+                f"at=m.equilibrium(), or name a parameter that has the value which balances it: "
+                f"balanced_by=[...]{moving}"
+            )
+
+
+def balanced(m: Mechanics, at: Sequence[Node], names: Sequence[str]) -> list[tuple[Node, Node]]:
+    """Parameters as the conditions of equilibrium ask for: (symbol, expression of the others).
+
+    Parameters
+    ----------
+    m : Mechanics
+    at : sequence of Node
+        The conditions.
+    names : sequence of str
+        As many parameters, in which these are linear.
+
+    Raises
+    ------
+    ModelError
+        If they do not tell these parameters, or not linearly.
+    """
+    for name in names:
+        if name not in m.given:
+            raise ModelError(f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by")
+    if len(at) != len(names):
+        raise ModelError(
+            f"{len(at)} conditions of equilibrium tell {len(at)} parameters, not {len(names)} ({', '.join(names)})"
+        )
+    symbols = [m.given[k] for k in names]
+    J = jacobian(at, symbols)
+    if any(x.op == SYMBOL and x in symbols for x in reached(list(J.ravel()))):
+        raise ModelError(f"the conditions of equilibrium are not linear in {', '.join(names)}; take other parameters")
+    rest = zeros(len(at), 1)
+    rest[:, 0] = replaced(list(at), [(s, 0.0) for s in symbols])
+    try:
+        found = solved(J, -rest)[:, 0]
+    except Dependent:
+        raise ModelError(f"equilibrium does not tell {', '.join(names)}: take other parameters") from None
+    return [(s, m.graph.node(x)) for s, x in zip(symbols, found, strict=True)]

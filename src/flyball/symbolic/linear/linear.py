@@ -1,0 +1,163 @@
+"""Linear equations about a point, as expressions of the parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.linear.instant import instant
+from ...errors import ModelError
+from ...graph.derivative import replaced
+from ...model.model import Model
+from ...results.equilibrium import Equilibrium
+from ...results.result import Result
+from ...tables.spanning import spanning
+from .balance import balanced, conditions, multipliers, refuse_unbalanced
+from .derivatives import Derivatives
+from .equations import LinearEquations, told, with_balance
+from .free import free
+from .point import Point, drawn, given
+from .reduced import reduced
+from .solve import number
+from .steady import refuse_singular, refuse_unsteady
+from .traced import Mechanics, mechanics, refuse_unknown
+
+
+@dataclass(frozen=True, kw_only=True)
+class Asked:
+    """What `linear_equations` is asked; see there."""
+
+    inputs: Sequence[str] = ()
+    outputs: Sequence[str] = ()
+    at: Equilibrium | Result | Mapping[str, Any] | None = None
+    coordinates: str = "joint"
+    independent: Sequence[str] = ()
+    balanced_by: Sequence[str] = ()
+
+
+def linear_equations(
+    model: Model,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    *,
+    at: Equilibrium | Result | Mapping[str, Any] | None = None,
+    coordinates: str = "joint",
+    independent: Sequence[str] = (),
+    balanced_by: Sequence[str] = (),
+) -> LinearEquations:
+    """Linear equations x' = A x + B u, y = C x + D u with the parameters as symbols.
+
+    About an equilibrium, or a motion in which coordinates of joints turn evenly while all others stand still.
+
+    Parameters
+    ----------
+    inputs, outputs : sequence of str
+        As of `Mechanism.linearize`.
+    at : Equilibrium, Result or mapping, optional
+        Where. As drawn, if not given: then coordinates are the expressions by which the mechanism is drawn. A mapping
+        gives coordinates, and as ``"A.angle rate"`` their rates: numbers, texts with a unit, expressions of parameters;
+        what it does not give is as drawn, or moved so that loops close. Of an equilibrium, or the end of a motion, the
+        coordinates are numbers.
+    coordinates : {"joint", "absolute"}
+        Those that the equations are made in.
+    independent : sequence of str
+        Coordinates that the states are changes of; chosen by pivoting if not given.
+    balanced_by : sequence of str
+        Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+
+    Raises
+    ------
+    ModelError
+        If a name does not exist, the point cannot be closed, is singular or no equilibrium, or something moves without
+        inertia.
+    AnalysisError
+        If the linear equations change with time, or an output follows the rate of an input.
+    """
+    o = Asked(
+        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent, balanced_by=balanced_by
+    )
+    refuse_unknown(model, o.outputs)
+    m, point = _pointed(model, o)
+    curves = [m.output(name) for name in o.outputs]
+    d = Derivatives(m, [y for _, y in curves])
+    where = point.replacing(m)
+    first = d.at([*where, *((s, 0.0) for s in m.multipliers)])
+    refuse_singular(m, [m.graph.node(x) for x in _by_velocity(d)], point)
+    f = free(m, first, o.independent)
+    lam = multipliers(m, point, f)
+    at_rest = conditions(m, point, lam, f)
+    pairs = balanced(m, at_rest, o.balanced_by) if o.balanced_by else []
+    point = Point(replaced(point.q, pairs), replaced(point.v, pairs), point.z, point.t, point.found)
+    lam[:] = replaced(list(lam), pairs)
+    own = _with(m, pairs)
+    refuse_unbalanced(own, point, lam, f)
+    where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
+    p = with_balance(d.at(where), pairs) if pairs else d.at(where)
+    f = free(m, p, o.independent)
+    known = [*pairs, *zip(m.multipliers, lam, strict=True)]
+    refuse_unsteady(m, d, f, point, {s.data.name: number(x) for s, x in known})
+    r = reduced(m, p, f)
+    still = [(s, 0.0) for s in m.added]
+    out = told(m, d, p, f, r, (o.outputs, [unit for unit, _ in curves]))
+    for X in out.values():
+        if isinstance(X, np.ndarray):
+            X.ravel()[:] = replaced(list(X.ravel()), still)
+    return LinearEquations(
+        name=m.model.name,
+        parameters={k: x.value for k, x in m.given.items() if x not in m.added and k not in dict(_names(pairs))},
+        conditions=[] if pairs else at_rest,
+        balanced_by=dict(_names(pairs)),
+        found=point.found,
+        at=p,
+        free=f,
+        mechanics=m,
+        **out,
+    )
+
+
+def _names(pairs: Sequence[tuple[Any, Any]]) -> list[tuple[str, Any]]:
+    return [(s.data.name, x) for s, x in pairs]
+
+
+def _by_velocity(d: Derivatives) -> list[Any]:
+    """G, row by row."""
+    rows = slice(*d.ends[2:4])
+    columns = np.array([c[rows] for c in d.columns["v"]], object).reshape(len(d.m.x.v), -1)
+    return list(columns.T.ravel())
+
+
+def _with(m: Mechanics, pairs: Sequence[tuple[Any, Any]]) -> Mechanics:
+    """With parameters replaced in the forces."""
+    if not pairs:
+        return m
+    import dataclasses
+
+    r = m.r.copy()
+    r[:] = replaced(list(r), pairs)
+    return dataclasses.replace(m, r=r)
+
+
+def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
+    """The mechanism traced in its coordinates, and the point."""
+    if o.coordinates not in ("joint", "absolute"):
+        raise ModelError(f"unknown coordinates {o.coordinates!r}; choose one of joint, absolute")
+    if isinstance(o.at, Equilibrium | Result):
+        if isinstance(o.at, Equilibrium) and o.at.preload:
+            raise ModelError(
+                "at is an equilibrium under a preload, which is no part of the mechanism: add it to its forces"
+            )
+        x, _ = instant(model, o.at, coordinates=o.coordinates)
+        values = dict(x.c.parameters)
+        m = mechanics(model, x.c.structure.tree, o.inputs, values)
+        return m, Point(x.q.tolist(), x.v.tolist(), x.z.tolist(), x.t)
+    tree = tuple(spanning(model)) if o.coordinates == "joint" else ()
+    m = mechanics(model, tree, o.inputs, None)
+    return m, drawn_or_given(m, o.at)
+
+
+def drawn_or_given(m: Mechanics, at: Mapping[str, Any] | None) -> Point:
+    """As drawn where loops close there, else moved."""
+    return given(m, at or {}) if at or len(m.g) else drawn(m)

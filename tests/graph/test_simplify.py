@@ -1,0 +1,132 @@
+"""Expressions made short have the same value, and known ones are as short as in books."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from flyball.graph.node import Graph
+from flyball.graph.printers.text import text
+from flyball.graph.simplify.simplify import simplified
+from flyball.graph.values import evaluate
+from flyball.math import scalar
+
+NAMES = ("a", "b", "x", "y", "u", "v")
+LEAVES = st.sampled_from([*NAMES, *NAMES, 0.0, 1.0, -1.0, 2.0, 0.5, 3.0, 1.0 / 3.0, math.pi / 2.0, 0.7])
+ONE = ("sin", "cos", "sin", "cos", "sqrt", "absolute", "exp", "tan", "atan", "square", "cube")
+TWO = ("+", "+", "-", "*", "*", "*", "/", "minimum", "atan2")
+
+
+def trees(inner):
+    return st.one_of(
+        st.tuples(st.sampled_from(TWO), inner, inner),
+        st.tuples(st.sampled_from(TWO), inner, inner),
+        st.tuples(st.sampled_from(ONE), inner),
+        st.tuples(st.just("choose"), inner, inner, inner),
+    )
+
+
+def made(g, tree):
+    """The expression of a tree."""
+    if isinstance(tree, float):
+        return g.number(tree)
+    if isinstance(tree, str):
+        return g.symbol(tree, 0.4 if tree in "ab" else None)
+    op, *args = (tree[0], *[made(g, x) for x in tree[1:]])
+    if op in "+-*/":
+        return {"+": g.add, "-": g.subtract, "*": g.multiply, "/": g.divide}[op](*args)
+    if op in ("square", "cube"):
+        return g.power(args[0], 2 if op == "square" else 3)
+    return g.function(op, *args)
+
+
+def close(x, y, at):
+    """Whether two expressions agree, as far as rounding lets the first say."""
+    with np.errstate(all="ignore"):
+        first = complex(evaluate([x], at)[0])
+        if not np.isfinite(first) or abs(first) > 1e6:
+            return True
+        rng = np.random.default_rng(0)
+        near = [evaluate([x], {k: v * (1.0 + 1e-11 * rng.standard_normal()) for k, v in at.items()})[0] for _ in "abcd"]
+        second = evaluate([y], at)[0]
+        unsure = max(abs(n - first) for n in near)
+        if not np.isfinite(unsure) or unsure > 1e-6:  # at a jump
+            return True
+        return abs(second - first) <= 1e-11 * (1.0 + abs(first)) + 50.0 * unsure
+
+
+@settings(max_examples=300, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.recursive(LEAVES, trees, max_leaves=24), st.integers(0, 2**32))
+def test_values_stay(tree, seed):
+    g = Graph()
+    x = made(g, tree)
+    (y,) = simplified([x])
+    (z,) = simplified([x], most=3)
+    rng = np.random.default_rng(seed)
+    for _ in range(3):
+        at = dict(zip(NAMES, rng.uniform(-2.0, 2.0, len(NAMES)), strict=True))
+        assert close(x, y, at), (text(x), text(y), at)
+        assert close(x, z, at), (text(x), text(z), at)
+
+
+def short(make, *names):
+    g = Graph()
+    return text(simplified([make(*[g.symbol(n) for n in names])])[0])
+
+
+sin, cos, sqrt = scalar.sin, scalar.cos, scalar.sqrt
+
+
+@pytest.mark.parametrize(
+    ("make", "expected"),
+    [
+        (lambda a, b, m: m * sin(a) * sin(a) + m * cos(a) ** 2, "m"),
+        (lambda a, b, m: cos(a) * cos(b) - sin(a) * sin(b), "cos(a + b)"),
+        (lambda a, b, m: m * sin(a) * cos(b) - m * cos(a) * sin(b), "m*sin(a - b)"),
+        (lambda a, b, m: cos(a) * cos(b) * m, "m*cos(a)*cos(b)"),
+        (lambda a, b, m: m - m * cos(a) ** 2, "m*sin(a)^2"),
+        (lambda a, b, m: cos(a) ** 2 - sin(a) ** 2, "cos(2*a)"),
+        (lambda a, b, m: m * (a + b) - m * a - b * m, "0"),
+        (lambda a, b, m: (a * a + 2.0 * a * b + b * b) * m, "m*(a + b)^2"),
+        (lambda a, b, m: (a + b) ** 2 - a**2, "b*(2*a + b)"),
+        (lambda a, b, m: (a * m + b * m) / m, "a + b"),
+        (lambda a, b, m: m * sin(a) / sin(a), "m"),
+        (lambda a, b, m: sqrt(m * m * sin(a) ** 2 + m * m * cos(a) ** 2), "abs(m)"),
+        (lambda a, b, m: sqrt(a * a + b * b) ** 2, "a^2 + b^2"),
+        (lambda a, b, m: cos(a + math.pi / 2.0) + sin(b + math.pi), "-sin(a) - sin(b)"),
+        (lambda a, b, m: m * a * a / 12.0 + m * b * b * (2.0 / 3.0), "m*(a^2 + 8*b^2)/12"),
+        (lambda a, b, m: math.sqrt(2.0) / 2.0 * m * a, "sqrt(2)*a*m/2"),
+        (lambda a, b, m: (a * a - b * b) / (a - b), "(a^2 - b^2)/(a - b)"),  # a = b stays undefined
+    ],
+)
+def test_known_identities(make, expected):
+    assert short(make, "a", "b", "m") == expected
+
+
+def test_a_unit_quaternion_is_told():
+    g = Graph()
+    w, x, y, z = q = [g.symbol(n) for n in "wxyz"]
+    r = w * w + x * x - y * y - z * z
+    assert text(simplified([r], units=[q])[0]) in ("1 - 2*y^2 - 2*z^2", "1 - 2*(y^2 + z^2)", "2*(w^2 + x^2) - 1")
+    assert text(simplified([r + 2.0 * (y * y + z * z)], units=[q])[0]) == "1"
+    assert simplified([r + 2.0 * (y * y + z * z)])[0] != 1.0
+
+
+def test_what_is_kept_is_not_looked_into():
+    g = Graph()
+    a, b, m = (g.symbol(n) for n in "abm")
+    s = a + b
+    (found,) = simplified([s * s - m * s + sin(s) ** 2 + cos(s) ** 2], keep=[s])
+    assert text(found, {s.index: "s"}) == "1 + s^2 - m*s"
+
+
+def test_numbers_and_shapes_stay():
+    g = Graph()
+    x = g.symbol("x")
+    array = np.array([[x + x - 2.0 * x, 0.0], [1.0, sin(x) ** 2 + cos(x) ** 2]], object)
+    found = simplified(array)
+    assert found.shape == (2, 2)
+    assert [[found[i, j] == v for j, v in enumerate(row)] for i, row in enumerate([[0, 0], [1, 1]])] == [[True] * 2] * 2
+    assert simplified([]) == []

@@ -1,0 +1,166 @@
+"""Linear equations with expressions in them: equal to the numeric ones, and to closed forms for all parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.graph.values import evaluate
+from flyball.symbolic.linear.linear import linear_equations
+from tests.analyses.classical import bicycle, column, stand
+from tests.analyses.made import G, chain, conical_pendulum, parallelogram, rod, watt
+
+LAYERS = ("joint", "absolute")
+
+
+def cart(**changed) -> fb.Mechanism:
+    p = {"M": 2.0, "m": 0.5, "l": 0.3, "J": 0.02, "g": 9.81} | changed
+    m = fb.Mechanism("pendulum on a cart", planar=True, gravity=(0, "-g"), parameters=p)
+    m.add(fb.Body("cart", mass="M", inertia=1), fb.Body("rod", mass="m", inertia="J", position=(0, "l")))
+    m.add(fb.Prismatic("rail", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Revolute("pin", "cart", "rod", at=(0, 0)))
+    m.add(fb.PointForce("push", "cart", at=(0, 0), force=("0", "0")))
+    return m
+
+
+def same(L, N, rel=1e-10):
+    """The same states, and matrices that agree."""
+    assert L.states == N.states
+    assert L.inputs == N.inputs
+    assert L.outputs == N.outputs
+    assert (L.state_units, L.input_units, L.output_units) == (N.state_units, N.input_units, N.output_units)
+    for k, X in L.values().items():
+        assert pytest.approx(getattr(N, k), rel=rel, abs=rel * (1e-300 + np.abs(X).max(initial=0.0))) == X
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_matrices_are_those_of_linearize(layer):
+    """Forces and parameters as inputs; coordinates, velocities, accelerations and reactions as outputs."""
+    inputs, outputs = ["push.x", "g", "m"], ["pin.angle", "cart.vx", "pin.fy", "rod.ax", "energy.potential"]
+    same(
+        linear_equations(cart(), inputs, outputs, coordinates=layer),
+        cart().linearize(inputs, outputs, coordinates=layer),
+    )
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize(
+    "make", [rod, lambda: chain(4), parallelogram, lambda: parallelogram(0.0, 3), lambda: column(2, True, 0.1)]
+)
+def test_closed_chains_and_followers(make, layer):
+    """Reactions that turn with the bodies, redundant rows, forces without a potential."""
+    m = make()
+    same(linear_equations(m, coordinates=layer), m.linearize(coordinates=layer))
+
+
+def test_other_values_need_no_new_derivation():
+    L = linear_equations(cart(), ["push.x"], ["pin.angle"])
+    other = cart(M=1.0, m=0.3, l=0.8, J=0.1, g=1.62).linearize(["push.x"], ["pin.angle"], coordinates="joint")
+    found = L.values(M=1.0, m=0.3, l=0.8, J=0.1, g=1.62)
+    assert found["A"] == pytest.approx(other.A, rel=1e-12)
+    assert found["B"] == pytest.approx(other.B, rel=1e-12)
+
+
+def test_steady_motions_seen_by_their_joints():
+    """A governor with its engine, a conical pendulum, a bicycle that rolls straight."""
+    m = watt(3.0)[0]
+    same(
+        linear_equations(m, ["steam"], ["lift", "shaft.angle_rate"]),
+        m.linearize(["steam"], ["lift", "shaft.angle_rate"], coordinates="joint"),
+    )
+    for m in (conical_pendulum(), bicycle()):
+        same(linear_equations(m), m.linearize(coordinates="joint"))
+
+
+def test_about_an_equilibrium_that_was_found():
+    """The IFToMM governor: springs as stiff as rods, spinning at the speed that is kept."""
+    from pathlib import Path
+
+    m = fb.load(Path(__file__).parents[2] / "examples" / "governor.toml")
+    found = m.equilibrium(turning=["bearing.angle"])
+    L = linear_equations(m, outputs=["guide.displacement"], at=found)
+    same(L, m.linearize(outputs=["guide.displacement"], about=found, coordinates="joint"))
+    assert len(L.conditions) > 0  # other springs would rest elsewhere
+
+
+def test_a_point_that_is_given_as_an_expression():
+    """A rod on a spring: the stiffness that holds it at an angle is told by the equilibrium."""
+    p = {"m": 2.0, "l": 0.4, "k": 1.0, "g": 9.81, "alpha": 0.5}
+    m = fb.Mechanism("held rod", planar=True, gravity=(0, "-g"), parameters=p)
+    m.add(fb.Body("rod", mass="m", inertia="m*l**2/3", position=(0, "l")))
+    m.add(fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.CoordinateSpring("spring", "A.angle", stiffness="k", rest=0))
+    L = linear_equations(m, at={"A.angle": "alpha"}, balanced_by=["k"])
+    for alpha in (0.2, 0.5, 1.2):
+        k = 2.0 * G * 0.4 * np.sin(alpha) / alpha
+        assert L.balance(alpha=alpha)["k"] == pytest.approx(k, rel=1e-13)
+        w2 = (k - 2.0 * G * 0.4 * np.cos(alpha)) / (4 / 3 * 2.0 * 0.4**2)
+        assert L.values(alpha=alpha)["A"][1, 0] == pytest.approx(-w2, rel=1e-13)
+    with pytest.raises(fb.ModelError, match="'k' has the value with which"):
+        L.values(k=3.0)
+    with pytest.raises(fb.ModelError, match=r"in no equilibrium there: .* left along A\.angle"):
+        linear_equations(m, at={"A.angle": "alpha"})
+    with pytest.raises(fb.ModelError, match="not linear in alpha"):
+        linear_equations(m, at={"A.angle": "alpha"}, balanced_by=["alpha"])
+    with pytest.raises(fb.ModelError, match=r"no coordinate 'B\.angle'"):
+        linear_equations(m, at={"B.angle": 0.1})
+
+
+def test_the_rate_of_spin_may_be_a_parameter():
+    """A bead on a turning arm: x'' = (W^2 - k/m) x for every rate of spin."""
+    m = fb.Mechanism("bead", parameters={"W": 2.0, "k": 30.0, "mass": 1.5})
+    m.add(fb.Body("arm", mass=1, inertia=(1, 1, 1)), fb.Body("bead", mass="mass", inertia=(0.1, 0.1, 0.1)))
+    m.add(fb.Revolute("hub", "ground", "arm", at=(0, 0, 0), axis=(0, 0, 1)))
+    m.add(fb.Prismatic("slot", "arm", "bead", at=(0, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.CoordinateSpring("spring", "slot.displacement", stiffness="k"))
+    m.add(fb.Driver("drive", "hub.angle", "W*t"))
+    L = linear_equations(m)
+    assert L.states == ("slot.displacement", "slot.displacement rate")
+    for W in (1.0, 5.0):
+        assert L.values(W=W)["A"] == pytest.approx(np.array([[0, 1], [W**2 - 20.0, 0]]), rel=1e-14)
+
+
+def test_what_is_refused():
+    with pytest.raises(fb.ModelError, match=r"singular position there: the constraints of .*B1"):
+        linear_equations(parallelogram(np.pi / 2), coordinates="absolute")
+    with pytest.raises(fb.ModelError, match=r"singular position there: the constraints of .*B"):
+        linear_equations(parallelogram(np.pi / 2))
+    with pytest.raises(fb.ModelError, match="no input 'pull'"):
+        linear_equations(cart(), ["pull"])
+    with pytest.raises(fb.ModelError, match=r"cart.*z"):
+        linear_equations(cart(), outputs=["cart.z"])
+    with pytest.raises(fb.ModelError, match="unknown coordinates 'minimal'"):
+        linear_equations(cart(), coordinates="minimal")
+    with pytest.raises(fb.ModelError, match="do not tell the other coordinates"):
+        linear_equations(cart(), independent=["pin.angle"])
+    m = cart()
+    m.add(fb.Driver("drive", "rail.displacement", "0.0"))
+    with pytest.raises(fb.AnalysisError, match="second rate of input 'drive'"):
+        linear_equations(m, ["drive"], ["cart.ax"])
+    m = cart()
+    m.forces.clear()
+    m.add(fb.PointForce("pulse", "rod", at=(0, 0.6), force=("0", "sin(t)")))
+    with pytest.raises(fb.AnalysisError, match="laws change with time"):
+        linear_equations(m)
+
+
+def test_drivers_as_inputs():
+    """The cart is driven: the input acts through its second rate."""
+    m = cart()
+    m.add(fb.Driver("drive", "rail.displacement", "0.0"))
+    for layer in LAYERS:
+        same(
+            linear_equations(m, ["drive"], ["pin.angle", "rod.x"], coordinates=layer),
+            m.linearize(["drive"], ["pin.angle", "rod.x"], coordinates=layer),
+        )
+
+
+def test_conditions_are_told():
+    """What rests where it is drawn for one stiffness only says so."""
+    m = stand(0.2)
+    assert linear_equations(m).conditions == []
+    m.parameters["lean"] = 0.0
+    m.add(fb.PointTorque("twist", "rod", torque="lean"))
+    (condition,) = linear_equations(m).conditions
+    assert evaluate([condition], {"lean": 2.5}) == [-2.5]
