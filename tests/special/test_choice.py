@@ -6,7 +6,6 @@ The maker of code is a stand-in that makes nothing, so that only what is decided
 from __future__ import annotations
 
 from dataclasses import dataclass
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,6 +16,7 @@ import flyball as fb
 from flyball.analysis.motion import engines
 from flyball.analysis.motion.account import Account
 from flyball.cli import app
+from flyball.special import Refused
 from flyball.tables.system import FINISH
 from tests.mechanisms import door, example, four_bar
 
@@ -36,20 +36,26 @@ class Maker:
     where: str = ""
     refused: str = ""
     made: int = 0
+    Refused = Refused
 
-    def plan(self, c):
-        return SimpleNamespace(key=c.structure.model.name, refused=self.refused)
+    def plan(self, x):
+        return None
+
+    def refusal(self, plan):
+        return self.refused
 
     def ready(self):
         return self.where == "memory"
 
-    def known(self, plan):
+    def known(self, plan, x):
         return self.where
 
     def price(self, plan, known):
         return {"memory": 0.0, "disk": 1e5, "": self.price_of_making}[known]
 
-    def code(self, plan, c):
+    def code(self, plan, x):
+        if self.refused:
+            raise Refused(self.refused)
         self.made += 1
         self.where = "memory"
         return Code(), "made now"
@@ -60,7 +66,6 @@ def maker(monkeypatch) -> Maker:
     found = Maker()
     monkeypatch.setattr(engines, "special", found)
     monkeypatch.setattr(engines, "SPENT", Account())
-    monkeypatch.setattr(engines, "made_beside", lambda kind, c: False)
     return found
 
 
@@ -147,36 +152,18 @@ def test_code_on_disk_is_taken_sooner(maker):
     assert four_bar().simulate(2.0).health.engine.startswith("made")
 
 
-def runs_until(done, asked) -> int:
-    """How many short motions of one kind, with other numbers or without, until that is so."""
-    m = four_bar()
-    for k in range(200):
-        m = m if k % 2 else four_bar(gravity=(0, -9.81 - 0.01 * k))
-        asked(m.simulate(0.5, outputs=2))
-        if done():
-            return k
-    return 200
-
-
 def test_many_short_motions_pay_for_code_together(maker, monkeypatch):
-    """Another process makes it meanwhile; where there is none, this one does, after as many more."""
+    """Of one kind, with other numbers or without; a part of what they took."""
     monkeypatch.setattr(engines, "LEAST", 1e5)
     maker.price_of_making = 1e6
-    asked = []
-    monkeypatch.setattr(engines, "made_beside", lambda kind, c: not asked.append(kind))
-    engine = []
-    first = runs_until(lambda: len(asked) > 3, lambda r: engine.append(r.health.engine))
-    assert 3 <= first <= 60
-    assert len(set(asked)) == 1
-    assert maker.made == 0
-    assert set(engine) == {"table-driven: too little is computed to make code for it"}
-    maker.where = "disk"
-    assert four_bar().simulate(0.5).health.engine == "made for this mechanism: made now"
-    monkeypatch.setattr(engines, "SPENT", Account())
-    monkeypatch.setattr(engines, "made_beside", lambda kind, c: False)
-    maker.made, maker.where = 0, ""
-    alone = runs_until(lambda: maker.made == 1, lambda r: None)
-    assert 2 * first < alone < 200
+    m, runs = four_bar(), 0
+    while not maker.made and runs < 200:
+        m = m if runs % 2 else four_bar(gravity=(0, -9.81 - 0.01 * runs))
+        m.simulate(0.5, outputs=2)
+        runs += 1
+    assert 5 <= runs < 200
+    again = four_bar().simulate(0.5, specialize=False)
+    assert again.health.engine == "table-driven: asked for"
 
 
 def test_functions_that_may_remember_are_not_begun_anew(maker):
@@ -187,7 +174,7 @@ def test_functions_that_may_remember_are_not_begun_anew(maker):
 
 
 def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypatch):
-    def interrupted(plan, c):
+    def interrupted(plan, x):
         raise KeyboardInterrupt
 
     maker.price_of_making = 1e6
@@ -214,7 +201,7 @@ class Stuck(Code):
 
 
 def test_where_made_code_gets_stuck_the_loops_go_on(maker, monkeypatch):
-    monkeypatch.setattr(maker, "code", lambda plan, c: (Stuck(), "made now"))
+    monkeypatch.setattr(maker, "code", lambda plan, x: (Stuck(), "made now"))
     r, s = (four_bar().simulate(0.5, specialize=x) for x in (True, False))
     assert r.health.engine.startswith("made for this mechanism: made now; table-driven from t = 0 s on")
     np.testing.assert_allclose(r.q, s.q, rtol=1e-9, atol=1e-9)
@@ -226,7 +213,7 @@ def test_where_made_code_gets_stuck_the_loops_go_on(maker, monkeypatch):
 
 def test_what_made_code_and_loops_both_cannot_do_is_told_as_ever(maker, monkeypatch):
     """Reasons are told from what the engine's loops leave."""
-    monkeypatch.setattr(maker, "code", lambda plan, c: (Stuck(), "made now"))
+    monkeypatch.setattr(maker, "code", lambda plan, x: (Stuck(), "made now"))
     said = []
     for wish in (True, False):
         m = four_bar()

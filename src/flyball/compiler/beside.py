@@ -19,7 +19,7 @@ from typing import Any
 
 from .door import Door
 from .jit import Kernel
-from .second import cores, is_one_of_many, started
+from .second import cores, started
 
 MOST = 3  # processes beside this one
 Wanted = tuple[Any, tuple[Any, ...]]
@@ -55,7 +55,7 @@ class Beside:
 
     def __enter__(self) -> Beside:
         helpers = min(cores() - 1, MOST, len(self.cold) - 1)
-        if helpers > 0 and _kept(self.wanted[self.cold[0]][0]) and not is_one_of_many():
+        if helpers > 0 and _kept(self.wanted[self.cold[0]][0]) and not _is_one_of_many():
             self._own = _one.acquire(blocking=False)
         if self._own:
             asked = pickle.dumps([_as_told(self.behind), _as_told(self.wanted)])
@@ -127,6 +127,12 @@ def _kept(code: Door | Kernel) -> bool:
     from .cache import cache_of
 
     return bool(getattr(cache_of(code.function), "kept", False))
+
+
+def _is_one_of_many() -> bool:
+    """Whether this is a process that another one has started to share its work."""
+    sharing = sys.modules.get("multiprocessing.process")
+    return sharing is not None and sharing.parent_process() is not None
 
 
 def _expect(wanted: Sequence[Wanted]) -> None:

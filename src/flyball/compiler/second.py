@@ -30,9 +30,3 @@ def started(module: str, out: int | IO = subprocess.DEVNULL, **more: Any) -> sub
 def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def is_one_of_many() -> bool:
-    """Whether this is a process that another one has started to share its work."""
-    sharing = sys.modules.get("multiprocessing.process")
-    return sharing is not None and sharing.parent_process() is not None

@@ -23,16 +23,16 @@ from ...numerics.integrators.refusal import afresh
 from ...tables.system import EVALUATIONS
 from ..compiled import Compiled
 from .account import SPENT, kind
-from .making import made_beside
 
 AUTO = "auto"
 FIRST, AGAIN = 50, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
-ALONE = 4.0  # times longer that motions must have computed, where this process has to make their code itself
-LEAST = 1e7  # the least that code costs which is not there yet [ns]
+MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
+LEAST = 3e6  # the least that code costs which is not there yet [ns]
 LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
+MEMORY = "memory"  # where `special.known` finds what costs nothing
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
@@ -93,7 +93,7 @@ class Engine:
         else:
             self.told, self.due = SHORT, FIRST
             self._kind, self._each = kind(c.structure)
-            if special.ready() or pays(SPENT.of(self._kind), SPENT.price(self._kind, LEAST)):
+            if special.ready() or pays(SPENT.of(self._kind) / MANY, SPENT.price(self._kind, LEAST)):
                 self._choose(0.0)
 
     def begin(self, clock: ex.Clock) -> None:
@@ -143,31 +143,32 @@ class Engine:
         return (int(self.c.work.info[EVALUATIONS]) - self._counted) * self._each
 
     def _wanted(self, without: str) -> None:
-        plan = None if without else special.plan(self.c)
-        if plan is None or plan.refused:
-            raise ModelError(f"specialize=True: {without or plan.refused}; leave it out")
-        self._take(plan)
+        try:
+            if without:
+                raise special.Refused(without)
+            self._take(special.plan(self.c.values))
+        except special.Refused as error:
+            raise ModelError(f"specialize=True: {error}; leave it out") from None
 
     def _choose(self, left: float) -> bool:
         """Whether made code is taken from here on; ``left``: what is still to be computed [ns]."""
-        plan = special.plan(self.c)
-        if plan.refused:
-            self.told, self.due = f"{TABLES}: {plan.refused}", math.inf
-            return False
-        known = special.known(plan)
-        price = special.price(plan, known)
-        before = SPENT.of(self._kind)
-        if not known and not pays(left, price):  # then it is for motions to come
-            if pays(left + before, price) and made_beside(self._kind, self.c):
+        x = self.c.values
+        plan = special.plan(x)
+        try:
+            if why := special.refusal(plan):
+                raise special.Refused(why)
+            known = special.known(plan, x)
+            price = 0.0 if known == MEMORY else special.price(plan, known)
+            if price > 0.0 and not pays(left + SPENT.of(self._kind) / MANY, price):
+                SPENT.learn(self._kind, price)
                 return False
-            before /= ALONE
-        if not pays(left + before, price):
-            SPENT.learn(self._kind, price)
+            self._take(plan)
+        except special.Refused as error:
+            self.told, self.due = f"{TABLES}: {error}", math.inf
             return False
-        self._take(plan)
         return True
 
-    def _take(self, plan: Any) -> None:
-        made, how = special.code(plan, self.c)
+    def _take(self, plan: special.Plan) -> None:
+        made, how = special.code(plan, self.c.values)
         self.c.run_on(made)
         self.told, self.due = f"{MADE}: {how}", math.inf
