@@ -22,7 +22,11 @@ BEFORE: dict[str, tuple[str, ...]] = {
 """Procedures that have run, at this state, when another one does."""
 LEFT = ("W_G", "W_FK")
 """Arrays that nobody writes to but the procedures."""
-ORDER = ("PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH", "DRIFT")
+ENTRIES = (
+    "SCRATCH", "PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH",
+    "DRIFT",
+)  # fmt: skip
+"""Entries of `System.flat` by name; the first is a length, all others are addresses."""
 
 
 class Linked:
@@ -46,7 +50,7 @@ class Linked:
         before = dict(BEFORE)
         if stages.S.kinds[SOLVER] == ARTICULATED:
             before["STEP"] = before["STEP_UNLOADED"] = ("PLACE", "FACTOR")
-        for name in ORDER:
+        for name in ENTRIES:
             if name in made:
                 self._link(made[name], [made[k] for k in before.get(name, ())])
         stores: list[tuple[Place, Any]] = [(("a", k), x) for k, x in enumerate(self.hoisted)]

@@ -15,7 +15,8 @@ from ..compiler.jit import start_numba
 from ..graph.printers.llvm import Module
 from ..tables.system import System, Work
 from ..tracing.trace import TABLES
-from .linked import Linked
+from .layout import DIMENSIONS
+from .linked import ENTRIES, Linked
 
 ARGUMENTS = "ptr %S, ptr %W, double %t, ptr %a, ptr %b, ptr %c, ptr %d"
 HEAD, DATA, A_DIMENSION = 40, 32, 16
@@ -29,17 +30,10 @@ def offsets() -> dict[str, int]:
     out: dict[str, int] = {}
     for letter, of in (("S", System), ("W", Work)):
         at = 0
-        for name, dimensions in _dimensions(of):
+        for name, dimensions in DIMENSIONS[of.__name__]:
             out[f"{letter}_{name}"] = at + DATA
             at += HEAD + A_DIMENSION * dimensions
     return out
-
-
-def _dimensions(of: Any) -> list[tuple[str, int]]:
-    """Arrays of a tuple, and how many dimensions they have; those of a tuple in it where they stand."""
-    from .layout import DIMENSIONS
-
-    return DIMENSIONS[of.__name__]
 
 
 def module_of(linked: Linked) -> str:
@@ -90,7 +84,8 @@ def machine() -> str:
     import llvmlite.binding as llvm
 
     features = llvm.get_host_cpu_features().flatten()
-    return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {llvmlite.__version__} {llvm.llvm_version_info}"
+    versions = f"{llvmlite.__version__} {llvm.llvm_version_info}"
+    return f"{llvm.get_default_triple()} {llvm.get_host_cpu_name()} {features} {versions}"
 
 
 def assembled(text: str) -> bytes:
@@ -103,7 +98,7 @@ def assembled(text: str) -> bytes:
         module.triple = llvm.get_default_triple()
         module.data_layout = str(target.target_data)
         options = llvm.create_pipeline_tuning_options(speed_level=int(__import__("os").environ.get("OL", "2")))
-        options.slp_vectorization = __import__('os').environ.get('SLP')=='1'
+        options.slp_vectorization = False  # measured: slower, and longer in the making
         builder = llvm.create_pass_builder(target, options)
         passes = builder.getModulePassManager()
         passes.run(module, builder)
@@ -111,7 +106,13 @@ def assembled(text: str) -> bytes:
 
 
 class Loaded:
-    """Machine code in memory, as long as this lives."""
+    """Machine code in memory, as long as this lives.
+
+    Attributes
+    ----------
+    addresses : dict of str to int
+        Of the procedures; 0 if there is none.
+    """
 
     def __init__(self, code: bytes) -> None:
         import llvmlite.binding as llvm
@@ -120,10 +121,8 @@ class Loaded:
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             self._engine.finalize_object()
-
-    def address(self, name: str) -> int:
-        """Of a procedure; 0 if there is none."""
-        return int(self._engine.get_function_address(name))
+            names = ("CONSTANTS", *ENTRIES[1:])
+            self.addresses = {name: int(self._engine.get_function_address(name)) for name in names}
 
 
 def tables_of(S: System) -> np.ndarray:

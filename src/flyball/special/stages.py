@@ -66,7 +66,7 @@ TERMS, LOADED = 0, 1
 def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> tuple[System, dict[int, Place]]:
     """The tables with symbols in them, and where each stands; entries that are ``known`` are numbers."""
     places: dict[int, Place] = {}
-    new = {}
+    new: dict[str, Any] = {}
     told = set(known)
     for name in TABLES:
         table = getattr(S, name)
@@ -115,7 +115,9 @@ class Stages:
     # -- symbols and places
 
     def _symbols(self, name: str, n: int) -> np.ndarray:
-        return np.array([self.graph.symbol(f"{name}[{k}]") for k in range(n)] or [0.0], object)[:n]
+        out = np.zeros(n, object)
+        out[:] = [self.graph.symbol(f"{name}[{k}]") for k in range(n)]
+        return out
 
     def at(self, name: str, row: int, column: int = 0) -> Place:
         """Where an entry of an array of `Work` stands."""

@@ -7,12 +7,15 @@ given, or that stands where it is given one) and the number of the double there.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from ..node import Node
 from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, POWER
+from .llvm_spline import SPLINE
 
 Place = tuple[str, int]
 """A base and the number of the double there."""
@@ -115,6 +118,15 @@ class Module:
         self.arguments, self.based = arguments, based
         self.texts: list[str] = []
         self.bases: list[str] = []
+        self.tables: list[tuple[float, ...]] = []
+
+    def table(self, numbers: Sequence[float]) -> str:
+        """The name of a table's numbers."""
+        key = tuple(numbers)
+        if not any(np.array_equal(key, other, equal_nan=True) for other in self.tables):
+            self.tables.append(key)
+        k = next(k for k, other in enumerate(self.tables) if np.array_equal(key, other, equal_nan=True))
+        return f"@table{k}"
 
     def scope(self, base: str) -> str:
         """What tells LLVM that places of other bases are others."""
@@ -155,7 +167,12 @@ class Module:
             others = ", ".join(f"!{3 * i + 1}" for i in n if i != k)
             told += [f"!{3 * k + 1} = distinct !{{!{3 * k + 1}, !0}}", f"!{3 * k + 2} = !{{!{3 * k + 1}}}"]
             told += [f"!{3 * k + 3} = !{{{others}}}"]
-        return "\n\n".join([DECLARED, *self.texts, "\n".join(told)]) + "\n"
+        data = []
+        for k, numbers in enumerate(self.tables):
+            listed = ", ".join(f"double {constant(x)}" for x in numbers)
+            data.append(f"@table{k} = internal constant [{len(numbers)} x double] [{listed}]")
+        spline = [SPLINE] if self.tables else []
+        return "\n\n".join([DECLARED, *data, *spline, *self.texts, "\n".join(told)]) + "\n"
 
 
 class _Lines:
@@ -210,6 +227,12 @@ class _Lines:
             return self.new(f"call double @{TWO[x.op]}(double {a[0]}, double {a[1]})")
         if x.op in DECIDING:
             return DECIDING[x.op](self, *a)
+        told = getattr(x.data, "told", {})
+        if "table" in told and not told["moved"]:
+            table = self.module.table(told["table"])
+            return self.new(f"call double @spline(ptr {table}, double {a[0]}, i64 {told['order']})")
+        if "constant" in told:
+            return constant(told["constant"])
         raise Unprintable(getattr(x.data, "name", x.op))
 
     def chosen(self, condition: str, a: str, b: str) -> str:
