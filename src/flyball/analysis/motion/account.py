@@ -17,7 +17,6 @@ class Account:
 
     def __init__(self) -> None:
         self._spent: OrderedDict[str, float] = OrderedDict()
-        self._price: dict[str, float] = {}
         self._lock = threading.Lock()
 
     def add(self, key: str, more: float) -> None:
@@ -25,20 +24,12 @@ class Account:
         with self._lock:
             self._spent[key] = self._spent.pop(key, 0.0) + more
             while len(self._spent) > MOST:
-                self._price.pop(self._spent.popitem(last=False)[0], None)
+                self._spent.popitem(last=False)
 
     def of(self, key: str) -> float:
         """All of it."""
         with self._lock:
             return self._spent.get(key, 0.0)
-
-    def price(self, key: str, known: float) -> float:
-        """What code for it costs as far as that was found out, else ``known``."""
-        return self._price.get(key, known)
-
-    def learn(self, key: str, price: float) -> None:
-        """What code for it costs."""
-        self._price[key] = price
 
 
 SPENT = Account()

@@ -3,10 +3,10 @@
 They round differently: results agree within the tolerance, not to the last bit. A motion is computed by one of them
 from its beginning to its end, so that a result is to the last bit the one of ``specialize=True``, or of ``False``.
 
-Left to choose (``auto``), code that this process has is taken. Other code is loaded or made where what is left of the
-motion after some steps, or what was computed of its kind in this process, takes longer than that; the motion then
-begins anew. How long is estimated from counts (`tables/cost.py`): clocks have no say, so that the same calls give the
-same digits.
+Left to choose (``auto``), a motion begins by the tables. After some steps, code that is there already is taken, if the
+rest is worth looking for it, and other code is made where the rest, or what was computed of such mechanisms in this
+process, takes longer than that; the motion then begins anew. How long is estimated from counts (`account.py`): clocks
+have no say. So the same call gives the same digits, but for once, when code has come to be since.
 """
 
 from __future__ import annotations
@@ -25,14 +25,13 @@ from ..compiled import Compiled
 from .account import SPENT, kind
 
 AUTO = "auto"
-FIRST, AGAIN = 50, 4  # steps after which auto chooses, and how many times more until it does again
+FIRST, AGAIN = 16, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
 MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
-LEAST = 3e6  # the least that code costs which is not there yet [ns]
+THERE = 5e5  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
 LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
-MEMORY = "memory"  # where `special.known` finds what costs nothing
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
@@ -48,11 +47,6 @@ def check_specialize(value: Any) -> None:
     """
     if not isinstance(value, bool) and value != AUTO:
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
-
-
-def pays(computing: float, price: float) -> bool:
-    """Whether code for a price is worth it where computing takes as long without it (both [ns])."""
-    return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price
 
 
 class Engine:
@@ -93,8 +87,6 @@ class Engine:
         else:
             self.told, self.due = SHORT, FIRST
             self._kind, self._each = kind(c.structure)
-            if special.ready() or pays(SPENT.of(self._kind) / MANY, SPENT.price(self._kind, LEAST)):
-                self._choose(0.0)
 
     def begin(self, clock: ex.Clock) -> None:
         """The motion begins there."""
@@ -151,16 +143,15 @@ class Engine:
             raise ModelError(f"specialize=True: {error}; leave it out") from None
 
     def _choose(self, left: float) -> bool:
-        """Whether made code is taken from here on; ``left``: what is still to be computed [ns]."""
+        """Whether made code is taken; ``left``: what is still to be computed [ns]."""
         x = self.c.values
         plan = special.plan(x)
         try:
             if why := special.refusal(plan):
                 raise special.Refused(why)
-            known = special.known(plan, x)
-            price = 0.0 if known == MEMORY else special.price(plan, known)
-            if price > 0.0 and not pays(left + SPENT.of(self._kind) / MANY, price):
-                SPENT.learn(self._kind, price)
+            there = special.known(plan, x)
+            paying, price = (left, THERE) if there else (left + SPENT.of(self._kind) / MANY, special.price(plan, there))
+            if paying * (1.0 - 1.0 / GAIN) < MARGIN * price + self._spent() / GAIN:
                 return False
             self._take(plan)
         except special.Refused as error:
