@@ -130,7 +130,7 @@ def _folder() -> Path | None:
     cache = cache_of(engine.function)
     if not getattr(cache, "kept", False):
         return None
-    return Path(cache._impl.locator.get_cache_path())
+    return Path(cache.cache_path)
 
 
 def _files(p: Plan) -> list[Path]:
