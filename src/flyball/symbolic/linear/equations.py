@@ -15,8 +15,12 @@ from ...graph.values import evaluate, evaluated
 from ...model.words import listing, suggest
 from .derivatives import Derivatives, Perturbed
 from .free import Free
+from .pencil import Pencil, pencil
+from .quotient import cancelled, coefficients, scaled
 from .reduced import Reduced, improper, product
+from .routh import StabilityConditions, stability
 from .traced import Mechanics
+from .transfer import TransferFunction
 
 
 @dataclass
@@ -67,6 +71,7 @@ class LinearEquations:
     at: Perturbed = field(repr=False)
     free: Free = field(repr=False)
     mechanics: Mechanics = field(repr=False)
+    _pencil: Pencil | None = field(default=None, repr=False)
 
     def values(self, **parameters: float) -> dict[str, np.ndarray]:
         """A, B, C, D in numbers: with the parameters' own values, or others.
@@ -98,6 +103,56 @@ class LinearEquations:
         told = self.told(parameters)
         found = evaluate(list(self.balanced_by.values()), told)
         return {k: float(x) for k, x in zip(self.balanced_by, found, strict=True)}
+
+    @property
+    def pencil(self) -> Pencil:
+        """The same equations as a matrix of polynomials, constraints left in."""
+        if self._pencil is None:
+            positive = [k for k, x in self.parameters.items() if x > 0.0]
+            self._pencil = pencil(self.mechanics, self.at, self.free, positive)
+        return self._pencil
+
+    def transfer_function(self, input: str | None = None, output: str | None = None) -> TransferFunction:
+        """Transfer function with symbolic coefficients; of the only input and output if not named.
+
+        Raises
+        ------
+        ModelError
+            If there is no such input or output, or the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        i, k = self.index("input", input), self.index("output", output)
+        P = self.pencil
+        ring = P.ring
+        num, den, common = cancelled(ring, P.numerator(i, k), P.characteristic() * P.below[k])
+        num, den = scaled(ring, num, den)
+        both = [coefficients(ring, num), coefficients(ring, den)]
+        graph = self.mechanics.graph
+        nodes = tuple(ring.printer.back(x, graph) for x in both)
+        units = self.input_units[i], self.output_units[k]
+        return TransferFunction(
+            self.name, self.inputs[i], self.outputs[k], *units, ring.s, *map(tuple, both), common, self.parameters,
+            self.balanced_by, nodes,
+        )  # fmt: skip
+
+    def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
+        """When all eigenvalues have negative real parts, as inequalities in the parameters.
+
+        Parameters
+        ----------
+        positive : sequence of str, optional
+            What is greater than zero: parameters, and ``"sin(alpha)"`` or the like; all that is now, if not given.
+
+        Raises
+        ------
+        ModelError
+            If the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        P = self.pencil
+        return stability(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
 
     def index(self, what: str, name: str | None) -> int:
         """Which input or output that is; the only one if not named."""

@@ -93,7 +93,7 @@ def linear_equations(
     point = Point(replaced(point.q, pairs), replaced(point.v, pairs), point.z, point.t, point.found)
     lam[:] = replaced(list(lam), pairs)
     own = _with(m, pairs)
-    refuse_unbalanced(own, point, lam, f)
+    refuse_unbalanced(own, point, lam, f, first.by["rx"])
     where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
     p = with_balance(d.at(where), pairs) if pairs else d.at(where)
     f = free(m, p, o.independent)
