@@ -42,6 +42,10 @@ Ask where it rests, and what small motions do
     m.linearize(inputs, outputs)  -> LinearModel: A, B, C, D, Bode plots
     m.modes()                     -> Modes, animated; m.root_locus(parameter, values) -> RootLocus
 
+Ask for the equations
+    m.symbolic(inputs)            -> Equations: M, f, g, G, gamma, reactions, energies as expressions in the mechanism's
+                                  own names, for SymPy, LaTeX and numbers
+
 Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
     m.sensitivity(of, to)         -> Sensitivity: exact derivatives
@@ -120,6 +124,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.sensitivity import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
     from .results.touch import Touch as Touch
+    from .symbolic.equations import Equations as Equations
+    from .symbolic.expressions import Expressions as Expressions
 
 __version__ = "0.4.0"
 
@@ -172,6 +178,8 @@ _HOME = {
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
     "Touch": "results.touch",
+    "Equations": "symbolic.equations",
+    "Expressions": "symbolic.expressions",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)

@@ -8,10 +8,11 @@ from .methods.design import Design
 from .methods.freedom import Freedom
 from .methods.motion import Motions
 from .methods.statics import Statics
+from .methods.symbols import Symbols
 from .model.model import Model
 
 
-class Mechanism(Motions, Statics, Design, Freedom, Model):
+class Mechanism(Motions, Statics, Design, Freedom, Symbols, Model):
     """A mechanism: described once, then asked anything. See `Model` for what it takes.
 
     Nothing that an analysis finds is stored in it, so sweeps are loops.
@@ -29,7 +30,7 @@ class Mechanism(Motions, Statics, Design, Freedom, Model):
         return described(self)
 
 
-for _family in (Motions, Statics, Design, Freedom):  # so that Python's own messages name what the user called
+for _family in (Motions, Statics, Design, Freedom, Symbols):  # so that Python's own messages name what the user called
     for _name, _method in vars(_family).items():
         if not _name.startswith("_") and callable(_method):
             _method.__qualname__ = f"Mechanism.{_name}"

@@ -297,3 +297,13 @@ def test_a_preloaded_motor_is_an_input_too():
     assert held.preload["motor"] == pytest.approx(G / 2)
     L = m.linearize(["motor"], ["A.angle"], about=held)
     assert L.B[1, 0] == pytest.approx(3.0)
+
+
+def test_states_of_a_universal_joint_are_its_angles():
+    """Both count as results do: the one about the axis on ``body_j`` had the other sign in joint coordinates."""
+    m = fb.Mechanism("hook", gravity=(0, 0, -9.81))
+    m.add(fb.Body("bob", mass=1.0, inertia=(0.1, 0.2, 0.3), position=(0, 0, -1)))
+    m.add(fb.Universal("U", "ground", "bob", at=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0))))
+    model = m.linearize(outputs=["U.angle_1", "U.angle_2"], coordinates="joint")
+    assert model.states[:2] == ("U.angle_1", "U.angle_2")
+    np.testing.assert_allclose(model.C, np.eye(2, 4), atol=1e-12)

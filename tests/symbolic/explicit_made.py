@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 
 import flyball as fb
@@ -34,9 +36,15 @@ def states_of(m: fb.Mechanism, coordinates: str = "auto", **more) -> StateEquati
     return state_equations(*begun(m, coordinates), **more)
 
 
+@lru_cache(maxsize=4)
+def _nodes(s: StateEquations) -> list:
+    e, n = s.equations, s.equations.traced
+    return e.inlined([n.graph.node(y) for y in (*n.q, *n.v, *e.accelerations)])
+
+
 def engine(m: fb.Mechanism, coordinates: str, t: float, q, v) -> np.ndarray:
     """Accelerations (nv,) by the numeric engine."""
-    c = begin(m.snapshot(), t, None, None, coordinates).assembly.compiled
+    c = begin(m.snapshot(), 0.0, None, None, coordinates).assembly.compiled
     status, dy = c.at(t, np.array(q, float), np.array(v, float), MOTION)
     assert status == 0
     return dy[len(q) : len(q) + len(v)]
@@ -44,9 +52,8 @@ def engine(m: fb.Mechanism, coordinates: str, t: float, q, v) -> np.ndarray:
 
 def whole(s: StateEquations, x, t: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All coordinates, velocities and accelerations at a state."""
-    e, n = s.equations, s.equations.traced
-    nodes = [n.graph.node(y) for y in (*n.q, *n.v, *e.accelerations)]
-    found = np.array(evaluate(e.inlined(nodes), s.point(x, t=t)), float)
+    n = s.equations.traced
+    found = np.array(evaluate(_nodes(s), s.point(x, t=t)), float)
     nq, nv = len(n.q), len(n.v)
     return found[:nq], found[nq : nq + nv], found[nq + nv :]
 

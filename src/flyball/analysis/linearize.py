@@ -219,21 +219,18 @@ def _state_space(e: Equations, f: Free, r: Reduced, inputs: list[Input], outputs
     A, B, C, D = _matrices(r, _outputs(e, r, inputs, outputs), inputs, outputs)
     named = [f.names[d] for d in f.chosen]
     rates = [f.names[d] for d in f.chosen_v]
-    sign = np.array([n.sign for n in (*named, *rates)])
-    own, A = sign[: len(named)], sign[:, None] * A * sign
-    second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
     return StateSpace(
         A=A,
-        B=sign[:, None] * B,
-        C=C * sign,
+        B=B,
+        C=C,
         D=D,
         states=(*(n.name for n in named), *(f"{n.name} rate" for n in rates)),
         state_units=(*(n.unit for n in named), *(f"{n.unit}/s" for n in rates)),
-        mass=second[0],
-        damping=second[1],
-        stiffness=second[2],
-        eigenvalues=_sorted(spectrum(A, None if r.doubt is None else r.doubt.signed(sign)).values),
-        motion=r.position[:, : len(sign)] * sign,
+        mass=r.M,
+        damping=r.D,
+        stiffness=r.K,
+        eigenvalues=_sorted(spectrum(A, r.doubt).values),
+        motion=r.position[:, : len(A)],
     )
 
 

@@ -66,7 +66,6 @@ def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float) -> Modes:
     """Modes whose largest part is 1, seen from the ground."""
     names = velocity_names(x.c.structure)
     length = (x.c.values.length / x.c.sizes)[:, None]
-    sign = np.array([n.sign for n in names])[:, None]
     size = length * np.abs(shapes)
     for k in range(shapes.shape[1]):
         if size[:, k].max(initial=0.0) > 0.0:
@@ -78,7 +77,7 @@ def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float) -> Modes:
     units = tuple(n.unit for n in names)
     one = np.ones(len(w), int)
     return Modes(
-        w, sign * shapes, tuple(n.name for n in names), units, np.zeros(3), snapshot(x), fastest, False, one, one.copy()
+        w, shapes, tuple(n.name for n in names), units, np.zeros(3), snapshot(x), fastest, False, one, one.copy()
     )
 
 

@@ -173,7 +173,7 @@ def choose(x, a, b):
     if isinstance(x, _NUMBERS):
         return a if x.real > 0 else b
     if _has_array(x):
-        return np.where(np.real(x) > 0, a, b)
+        return _on_array(choose, lambda x, a, b: np.where(np.real(x) > 0, a, b), x, a, b)
     return _on_expressions("choose", x, a, b)
 
 

@@ -29,11 +29,15 @@ PIECE = 4  # numbers a piece
 def spline(data, at, x):
     """Value, first and second derivative at ``x`` of the spline at ``data[at]``.
 
-    ``x`` is a float, a complex number (its real part chooses the piece), an array, or an expression, whose
-    ``tabulated(data, at)`` says what becomes of it; ``data`` an array of floats or complex numbers (a list will do for
-    single numbers).
+    ``x`` is a float, a complex number (its real part chooses the piece), an array, or an expression (or an array of
+    these), whose ``tabulated(data, at)`` says what becomes of it; ``data`` an array of floats or complex numbers (a
+    list will do for single numbers).
     """
-    return x.tabulated(data, at) if hasattr(x, "tabulated") else on_pieces(data, at, x)
+    if hasattr(x, "tabulated"):
+        return x.tabulated(data, at)
+    if isinstance(x, np.ndarray) and x.dtype == object:
+        return np.frompyfunc(lambda e: spline(data, at, e), 1, 3)(x)
+    return on_pieces(data, at, x)
 
 
 @formula

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..math.scalar import atan2
+from ..math.scalar import atan2, rounded
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
@@ -197,7 +197,7 @@ def _with_turns(
 
 def whole_turns(near: Any, angle: Any) -> Any:
     """Whole turns [rad] that bring an angle next to another one."""
-    return 2.0 * np.pi * np.round((near - angle).real / (2.0 * np.pi))
+    return 2.0 * np.pi * rounded((near - angle) / (2.0 * np.pi))
 
 
 def _normal(x: Values, t: TreeJoint) -> float:

@@ -16,7 +16,6 @@ class Named(NamedTuple):
 
     name: str
     unit: str  # of that: "m" or "rad"
-    sign: float = 1.0  # of the named quantity, seen from the velocity
 
 
 def velocity_names(s: Structure) -> list[Named]:
@@ -32,11 +31,11 @@ def velocity_names(s: Structure) -> list[Named]:
     for t, row, step in steps(s):
         hung.add(row)
         v0, n = int(body_i[row, V0]), int(body_i[row, NV])
-        c = t.joint.coordinates.get(step.coordinate)
         for k in range(n):
-            what = step.coordinate or f"{'shift' if step.kind == 'P' else 'turn'} {AXES[k] if n > 1 else step.axis}"
+            told = step.coordinate if n == 1 else ""  # what turns about a point has three velocities
+            what = told or f"{'shift' if step.kind == 'P' else 'turn'} {AXES[k] if n > 1 else step.axis}"
             unit = "m" if step.kind == "P" else "rad"
-            out[v0 + k] = Named(f"{t.joint.name}.{what}", unit, c.sign if c is not None else 1.0)
+            out[v0 + k] = Named(f"{t.joint.name}.{what}", unit)
     own = ["x", "y", "angle"] if s.model.planar else [*AXES, *(f"turn {a}" for a in AXES)]
     for name, b in s.place.items():
         if b >= 0 and b not in hung and int(body_i[b, TREE]) <= POINT:

@@ -8,6 +8,7 @@ friction are symbols of their own; what they are when the reactions are known is
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -83,7 +84,9 @@ def plain(S: System) -> System:
     return S._replace(**new)
 
 
-def traced(s: Structure, S: System, graph: Graph | None = None, names: Names | None = None) -> Traced:
+def traced(
+    s: Structure, S: System, graph: Graph | None = None, names: Names | None = None, drawn: Sequence[Any] = ()
+) -> Traced:
     """Run the engine's loops on symbols.
 
     Parameters
@@ -94,6 +97,8 @@ def traced(s: Structure, S: System, graph: Graph | None = None, names: Names | N
         Where expressions in the tables live.
     names : Names, optional
         What the symbols are called.
+    drawn : sequence, optional
+        What the coordinates are where the engine's are zero, (nq,): the equations are then in these.
     """
     graph = Graph() if graph is None else graph
     names = names or numbered(s, len(S.row_i))
@@ -102,7 +107,8 @@ def traced(s: Structure, S: System, graph: Graph | None = None, names: Names | N
     q, v, z, lam, loads = ([graph.symbol(x) for x in names_] for names_ in names)
     work_rates = np.zeros(len(z), object)
     nv = s.nv
-    _kinematics(S, W, t, q, v, z)
+    own = [x - at for x, at in zip(q, drawn, strict=True)] if len(drawn) else q
+    _kinematics(S, W, t, own, v, z)
     nm = measured(S)
     for n, load in enumerate(loads):
         W.sensed[LOAD, 2 * nm + n] = load

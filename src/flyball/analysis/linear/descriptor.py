@@ -68,7 +68,6 @@ def _descriptor(
 
     c, s, at = e.state.c, e.state.c.structure, e.at
     names = velocity_names(s)
-    sign = sp.diags([n.sign for n in names])
     G = _all_rows(e)
     others = G.shape[0] - len(s.rows)
     holonomic = np.r_[[r.holonomic for r in s.rows], np.ones(others, bool)].astype(bool)
@@ -82,20 +81,20 @@ def _descriptor(
     by_rows = sp.hstack([C[:, 3 * nv + kept], sp.csr_matrix((len(outputs), len(rows) - len(kept)))])
     D = np.array([_direct(e, outputs, i) for i in inputs]).reshape(len(inputs), len(outputs)).T
     of = [x.element.name for x in s.rows] + list(s.prescribed) + [names[d].name for d in void(e)]
-    M, W, K = (sign @ X[at["r"]] @ sign for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    kinematic, turned = (sign @ X @ sign for X in turning)
+    M, W, K = (X[at["r"]] for X in (e.by_acceleration, e.by_velocity, e.by_position))
+    kinematic, turned = turning
     return Descriptor(
         mass=M,
         damping=W,
         stiffness=K,
-        constraints=(G[rows] @ sign).tocsr(),
+        constraints=G[rows].tocsr(),
         on_positions=holonomic[rows],
-        by_position=(V[rows] @ sign).tocsr(),
+        by_position=V[rows].tocsr(),
         kinematic=kinematic.tocsr(),
         turning=turned.tocsr(),
-        forces=sign @ r,
+        forces=r,
         gaps=gaps[rows],
-        C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] @ sign for k in range(3)), by_rows]).tocsr(),
+        C=sp.hstack([*(C[:, k * nv : (k + 1) * nv] for k in range(3)), by_rows]).tocsr(),
         D=D,
         coordinates=tuple(x.name for x in names),
         units=tuple(x.unit for x in names),

@@ -50,10 +50,6 @@ class Doubt(NamedTuple):
     by: np.ndarray
     size: np.ndarray
 
-    def signed(self, sign: np.ndarray) -> Doubt:
-        """The same of a matrix whose coordinates have other signs."""
-        return Doubt(sign[:, None] * self.by, self.size)
-
 
 def without_rounding(terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equations, f: Free) -> Doubt:
     """Set coefficients that are rounding to 0, and say what is uncertain of the others.

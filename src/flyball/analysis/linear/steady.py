@@ -95,7 +95,7 @@ def balanced(x: State, e: Equations) -> None:
     d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)))
     raise AnalysisError(
         f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
-        f"{names[d].sign * x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
+        f"{x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
         f"about=m.equilibrium()"
     )
 

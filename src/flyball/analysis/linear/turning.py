@@ -66,8 +66,7 @@ def turning(a: Assembly, described: Assembly, names: Sequence[str], parameters: 
         raise _failure(start, names)
     x = found
     c.at(x.t, x.q, x.v)
-    known = velocity_names(s)
-    speeds = {name: float(known[d].sign * x.v[d]) for name, d in zip(names, at, strict=True)}
+    speeds = {name: float(x.v[d]) for name, d in zip(names, at, strict=True)}
     return Turning(State.moving(c, x.t, x.q, x.v), speeds, unbalanced(Equations(x)))
 
 

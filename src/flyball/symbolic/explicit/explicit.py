@@ -27,7 +27,7 @@ from .constraints import constraints
 from .definition import Definition, inlined
 from .partition import free, named, positions
 from .place import Place
-from .positions import solved_positions
+from .positions import Solved, solved_positions
 from .solve import Determinants, pattern, solve, solve_symmetric, times, transposed, zeros
 
 
@@ -75,6 +75,7 @@ class ExplicitEquations:
     multipliers: np.ndarray
     determinants: dict[str, Any] = field(default_factory=dict)
     undetermined: tuple[str, ...] = ()
+    notes: list[str] = field(default_factory=list)
 
     @property
     def independent(self) -> tuple[str, ...]:
@@ -172,10 +173,10 @@ class _Reduction:
     place: Place
     singular: dict[str, Any] = field(default_factory=dict)
 
-    def equations(
-        self, known: list[int], chosen: list[int], rows: list[int], solved: list[Definition]
-    ) -> ExplicitEquations:
+    def equations(self, known: list[int], chosen: list[int], rows: list[int], solved: Solved) -> ExplicitEquations:
         x, nv = self.x, len(self.names)
+        for name, value in solved.never:
+            self.singular[f"positions of {name}"] = value
         c = self.place.c
         dependent = [d for d in range(nv) if d not in chosen]
         G = self.place.probe.cleaned(c.G[rows])
@@ -190,7 +191,7 @@ class _Reduction:
         Z[dependent], b[dependent] = -X[:, :n], X[:, n + 1]
         u = np.array([x.v[d] for d in chosen], object)
         w = X[:, n] + times(Z[dependent], u)
-        definitions = [*solved, *self._each([x.v[d] for d in dependent], w, "constraints on velocities")]
+        definitions = [*solved.definitions, *self._each([x.v[d] for d in dependent], w, "constraints on velocities")]
         M = times(Z.T, times(x.M, Z))
         f = times(Z.T, x.f - times(x.M, b))
         pivots = Determinants()
@@ -202,8 +203,8 @@ class _Reduction:
         lam = solve(Gw.T, missing[:, None], dets, transposed(order or []))[:, 0]
         definitions += self._multipliers(rows, lam)
         return ExplicitEquations(
-            x, self.start, self.names, known, chosen, dependent, solved, definitions, M, f, Z, vdot,
-            self._all(rows, lam), self.singular, self._undetermined(rows),
+            x, self.start, self.names, known, chosen, dependent, solved.definitions, definitions, M, f, Z, vdot,
+            self._all(rows, lam), self.singular, self._undetermined(rows), solved.notes,
         )  # fmt: skip
 
     def _each(self, symbols: Sequence[Node], values: Any, how: str) -> list[Definition]:

@@ -60,6 +60,33 @@ class Probe:
                 found.append(y)
         return float(np.abs(self.values(found)).max()) if len(found) > 1 else 0.0
 
+    def size(self, x: Any) -> float:
+        """The largest value of an expression, at least what it is the sum of."""
+        if not isinstance(x, Node):
+            return abs(float(x))
+        with np.errstate(all="ignore"):
+            return max(float(np.abs(self.values([x])).max()), self._terms(x))
+
+    def without_nothing(self, x: Any, size: float) -> Any:
+        """The same, or a plain zero if it is nothing beside ``size``."""
+        return 0.0 if self.zero(x, size) else x
+
+    def simplest(self, x: Any) -> Any:
+        """The same, or a plain number where it is a whole one everywhere."""
+        if not isinstance(x, Node):
+            return x
+        found = self.values([x])[0]
+        whole = round(float(found[0])) if np.isfinite(found[0]) else 0
+        return float(whole) if whole and np.abs(found - whole).max() <= NOTHING * abs(whole) else x
+
+    def know(self, name: str, value: float) -> None:
+        """Another symbol's value at the start."""
+        self.start = {**self.start, name: value}
+
+    def at_start(self, x: Any) -> float:
+        """Value at the start, with the parameters' own values."""
+        return float(evaluate([x], self.start)[0])
+
     def same(self, x: Any, y: Any, size: float = 0.0) -> bool:
         """Whether two expressions are one."""
         return x is y or self.zero(x - y, size)

@@ -99,11 +99,10 @@ def drawn(m: Mechanics) -> Point:
 
 @dataclass(frozen=True)
 class Place:
-    """Where a named coordinate or rate stands: value = sign x + offset."""
+    """Where a named coordinate or rate stands: value = x + offset."""
 
     k: int
     rate: bool
-    sign: float = 1.0
     offset: Any = 0.0
 
 
@@ -112,17 +111,16 @@ def coordinates(m: Mechanics) -> dict[str, Place]:
     s, S = m.values.structure, m.x.system
     out: dict[str, Place] = {}
     for t, row, step in steps(s):
-        c = t.joint.coordinates.get(step.coordinate)
-        if c is not None:
+        if step.coordinate in t.joint.coordinates:
             name = f"{t.joint.name}.{step.coordinate}"
-            out[name] = Place(int(S.body_i[row, Q0]), False, c.sign, S.body_x[row, OFFSET])
-            out[f"{name} rate"] = Place(int(S.body_i[row, V0]), True, c.sign)
+            out[name] = Place(int(S.body_i[row, Q0]), False, S.body_x[row, OFFSET])
+            out[f"{name} rate"] = Place(int(S.body_i[row, V0]), True)
     for d, own in enumerate(m.names):
         if own.name not in out:
             k = _plain_coordinate(m, d)
             if k >= 0:
-                out[own.name] = Place(k, False, own.sign)
-            out[f"{own.name} rate"] = Place(d, True, own.sign)
+                out[own.name] = Place(k, False)
+            out[f"{own.name} rate"] = Place(d, True)
     return out
 
 
@@ -134,9 +132,9 @@ def _plain_coordinate(m: Mechanics, d: int) -> int:
 
 def _put(q: list[Any], v: list[Any], p: Place, value: Any) -> None:
     if p.rate:
-        v[p.k] = p.sign * value
+        v[p.k] = value
     else:
-        q[p.k] = p.sign * (value - p.offset)
+        q[p.k] = value - p.offset
 
 
 def given(m: Mechanics, at: Mapping[str, Any]) -> Point:

@@ -1,0 +1,1 @@
+"""Loops that close in closed form, recognised by the form of their equations."""

@@ -1,0 +1,255 @@
+"""Expressions of a mechanism: one, a vector or a matrix; shown, differentiated, evaluated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+from ..graph.derivative import jacobian, replaced
+from ..graph.function import Opaque
+from ..graph.node import SYMBOL, Node
+from ..graph.values import evaluate, evaluated, reached
+
+if TYPE_CHECKING:
+    from .equations import Equations
+
+
+class Expressions:
+    """One expression, a vector or a matrix of a mechanism's equations.
+
+    Sums, products (``*`` by element, ``@`` of matrices) and indices give further ones; each knows the symbols by the
+    names of `Equations`.
+
+    Attributes
+    ----------
+    nodes : ndarray of object
+        The nodes of the expression graph, or numbers; of shape () for one expression.
+    rows, columns : tuple of str
+        What the entries belong to, by name, where that is known.
+    unit : str
+    """
+
+    __array_ufunc__ = None
+
+    def __init__(
+        self,
+        equations: Equations,
+        nodes: Any,
+        rows: Sequence[str] = (),
+        columns: Sequence[str] = (),
+        unit: str = "",
+    ) -> None:
+        self.equations = equations
+        if isinstance(nodes, np.ndarray):
+            self.nodes = nodes
+        else:
+            self.nodes = np.empty((), object)
+            self.nodes[()] = nodes
+        self.rows, self.columns, self.unit = tuple(rows), tuple(columns), unit
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Its sizes; () for one expression."""
+        return self.nodes.shape
+
+    @property
+    def symbols(self) -> dict[str, Node]:
+        """The symbols in it, by name, in the order in which they were made."""
+        return {x.data.name: x for x in reached(self.list()) if x.op == SYMBOL}
+
+    @property
+    def operations(self) -> int:
+        """Operations that evaluate it, each counted once."""
+        return sum(bool(x.args) for x in reached(self.list()))
+
+    def list(self) -> list[Any]:
+        """All entries, row by row."""
+        return self.nodes.ravel().tolist()  # type: ignore[no-any-return]
+
+    # -- numbers
+
+    def at(self, values: Mapping[str, Any]) -> np.ndarray:
+        """Numbers at values of the symbols.
+
+        Parameters
+        ----------
+        values : mapping
+            Symbol's name -> number, complex number or array. Parameters left out have their own value, inputs are 0,
+            and followers are at their places on curves.
+
+        Returns
+        -------
+        ndarray
+            Of the same shape; with arrays given, times come first.
+
+        Raises
+        ------
+        ModelError
+            If a name is unknown, or the value of a symbol is missing.
+        """
+        known = self.equations.checked(values, self.symbols)
+        if not self.shape:
+            return np.asarray(evaluate(self.list(), known)[0])
+        return evaluated(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
+
+    def __float__(self) -> float:
+        if self.shape:
+            raise TypeError(f"{self!r} is no single number")
+        return float(self.at({}))
+
+    # -- others' forms
+
+    def sympy(self) -> Any:
+        """As SymPy expression, or ``Matrix``; symbols have the names of the mechanism.
+
+        Raises
+        ------
+        ImportError
+            If SymPy is not installed (extra ``symbolic``).
+        """
+        printer = self.equations.printer
+        return printer(self.nodes if self.shape else self.nodes[()])
+
+    def latex(self) -> str:
+        """As LaTeX."""
+        from ..graph.printers.sympy import sympy_module
+
+        made, printer = self.sympy(), self.equations.printer
+        names = {symbol: node.data.latex or node.data.name for symbol, node in printer.symbols.items()}
+        return str(sympy_module().latex(made, symbol_names=names))
+
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
+    def __str__(self) -> str:
+        made = self.sympy()
+        if not self.shape:
+            return str(made)
+        lines = [
+            f"{name}: {made[k, :].tolist()[0] if len(self.shape) > 1 else made[k]}" for k, name in self._labelled()
+        ]
+        return "\n".join(lines)
+
+    def _labelled(self) -> Iterable[tuple[int, str]]:
+        names = self.rows or tuple(map(str, range(self.shape[0])))
+        return enumerate(names)
+
+    def __repr__(self) -> str:
+        what = " x ".join(map(str, self.shape)) if self.shape else "one expression"
+        return f"<{what}, {self.operations} operations, of {', '.join(self.symbols) or 'no symbol'}>"
+
+    # -- calculus
+
+    def diff(self, by: str | Expressions) -> Expressions:
+        """Derivative by one symbol.
+
+        Raises
+        ------
+        ModelError
+            If there is no such symbol, or a Python function whose derivative is not known stands in the way.
+        """
+        return self._new(self._derived([by])[..., 0], self.rows, self.columns)
+
+    def jacobian(self, by: Iterable[str] | Expressions) -> Expressions:
+        """Derivatives of a vector (or of one expression) by several symbols, (entries, symbols)."""
+        if len(self.shape) > 1:
+            raise ModelError("the Jacobian of a matrix is no matrix; take that of one of its columns, or diff")
+        names = list(by) if not isinstance(by, Expressions) else by.list()
+        made = self._derived(names)
+        columns = [n if isinstance(n, str) else n.data.name for n in names]
+        return self._new(made, self.rows, columns)
+
+    def _derived(self, by: Sequence[Any]) -> np.ndarray:
+        symbols = [self.equations.symbol(x) for x in by]
+        try:
+            return jacobian(self.list(), symbols).reshape(*self.shape, len(symbols))
+        except Opaque as error:
+            raise ModelError(f"{error}; give the law as a text, or its values as a table") from None
+
+    def replaced(self, values: Mapping[str, Any]) -> Expressions:
+        """With numbers or other expressions in place of symbols."""
+        eq = self.equations
+        new = [(eq.symbol(name), _node(x)) for name, x in values.items()]
+        out = np.empty(self.shape, object)
+        out.ravel()[:] = replaced(self.list(), new)
+        return self._new(out, self.rows, self.columns)
+
+    # -- arithmetic
+
+    def __add__(self, other: Any) -> Expressions:
+        return self._new(self.nodes + _node(other), self.rows, self.columns)
+
+    def __radd__(self, other: Any) -> Expressions:
+        return self._new(_node(other) + self.nodes, self.rows, self.columns)
+
+    def __sub__(self, other: Any) -> Expressions:
+        return self._new(self.nodes - _node(other), self.rows, self.columns)
+
+    def __rsub__(self, other: Any) -> Expressions:
+        return self._new(_node(other) - self.nodes, self.rows, self.columns)
+
+    def __mul__(self, other: Any) -> Expressions:
+        return self._new(self.nodes * _node(other), self.rows, self.columns)
+
+    def __rmul__(self, other: Any) -> Expressions:
+        return self._new(_node(other) * self.nodes, self.rows, self.columns)
+
+    def __truediv__(self, other: Any) -> Expressions:
+        return self._new(self.nodes / _node(other), self.rows, self.columns)
+
+    def __rtruediv__(self, other: Any) -> Expressions:
+        return self._new(_node(other) / self.nodes, self.rows, self.columns)
+
+    def __pow__(self, other: Any) -> Expressions:
+        return self._new(self.nodes ** _node(other), self.rows, self.columns)
+
+    def __neg__(self) -> Expressions:
+        return self._new(-self.nodes, self.rows, self.columns)
+
+    def __matmul__(self, other: Expressions) -> Expressions:
+        a, b = self.nodes, np.asarray(_node(other))
+        made = a @ b if a.shape[-1] else np.zeros((*a.shape[:-1], *b.shape[1:]), object)
+        return self._new(made, self.rows, other.columns if isinstance(other, Expressions) else ())
+
+    @property
+    def T(self) -> Expressions:
+        """Transposed."""
+        return self._new(self.nodes.T, self.columns or (), self.rows) if len(self.shape) > 1 else self
+
+    def __getitem__(self, k: Any) -> Expressions:
+        """An entry, a row, a slice; rows and columns by name too."""
+        key = k if isinstance(k, tuple) else (k,)
+        names = (self.rows, self.columns)
+        at = tuple(names[n].index(x) if isinstance(x, str) and x in names[n] else x for n, x in enumerate(key))
+        wrong = [x for x in at if isinstance(x, str)]
+        if wrong:
+            raise ModelError(f"there is no entry {wrong[0]!r}; there are {', '.join(self.rows + self.columns)}")
+        made = self.nodes[at]
+        return self._new(made, *_labels(self, at))
+
+    def __len__(self) -> int:
+        return len(self.nodes)
+
+    def __iter__(self) -> Iterator[Expressions]:
+        return (self[k] for k in range(len(self)))
+
+    def _new(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
+        return Expressions(self.equations, nodes, rows, columns)
+
+
+def _node(x: Any) -> Any:
+    return (x.nodes if x.shape else x.nodes[()]) if isinstance(x, Expressions) else x
+
+
+def _labels(x: Expressions, at: tuple[Any, ...]) -> list[tuple[str, ...]]:
+    """Names of what is left of rows and columns."""
+    out = []
+    for n, names in enumerate((x.rows, x.columns)):
+        if n >= len(at):
+            out.append(names)
+        elif isinstance(at[n], slice):
+            out.append(names[at[n]])
+    return out

@@ -1,0 +1,161 @@
+"""m.symbolic(): whatever a result has, as an expression that gives the same number; symbols, refusals, what is shown."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.errors import ModelError
+from flyball.graph.values import reached
+from tests import mechanisms
+from tests.contract import zoo
+from tests.examples.test_examples import FILES
+from tests.identities.test_complex_values import with_forces
+from tests.symbolic.states import random_state
+
+NO_FUNCTION = ("work", "balance")  # integrals along the motion
+
+
+def same_as_results(m, coordinates):
+    """Every quantity of every part at a random state."""
+    eq, result, values = random_state(m, coordinates)
+    checked = 0
+    for part in result.parts():
+        names = [f"{part}.{k}" for k in result[part].names if k not in NO_FUNCTION]
+        if f"{part}.e0" not in eq.named:
+            names = [n for n in names if not n.endswith(".quaternion")]
+        numbers = {n: np.asarray(result.channel(n)[1])[0] for n in names}
+        size = max([1.0, *(np.abs(x).max() for x in numbers.values())])
+        for name, number in numbers.items():
+            found = eq[name].at(values)
+            if name.endswith(".quaternion"):
+                found = found * np.sign(found @ number)
+            elif eq[name].unit == "rad" and not m.planar:
+                found = number + np.angle(np.exp(1j * (found - number)))  # in (-pi, pi]
+            np.testing.assert_allclose(found, number, rtol=1e-10, atol=1e-11 * size, err_msg=name)
+            assert eq[name].unit == result.channel(name)[0]
+            checked += 1
+    assert checked > 10
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("name", FILES)
+def test_quantities_of_examples(name, coordinates):
+    same_as_results(mechanisms.example(name), coordinates)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize(("where", "name"), zoo.CASES)
+def test_quantities_of_joints(where, name, coordinates):
+    same_as_results(zoo.joined(where, name), coordinates)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.filterwarnings("ignore:invalid value")  # nan of a bushing that has turned by more than half a turn
+@pytest.mark.parametrize("make", [lambda: with_forces("plane"), lambda: with_forces("space")])
+def test_quantities_of_forces(make, coordinates):
+    try:
+        same_as_results(make(), coordinates)
+    except fb.AnalysisError as error:  # friction that joint coordinates do not know
+        assert coordinates == "joint" and "friction" in str(error)
+
+
+def pendulum(**options):
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, "-g"), parameters={"l": 1.2, "mass": 2.0, "g": "9.81 m/s^2"})
+    m.add(fb.Body("rod", mass="mass", inertia="mass*l**2/12", com=("l/2", 0)))
+    m.add(fb.Revolute("hinge", "ground", "rod", at=(0, 0)))
+    m.add(fb.Motor("motor", "hinge", torque=0.0))
+    return m, m.symbolic(**options)
+
+
+def test_a_pendulum_reads_as_in_a_textbook():
+    """m l^2/3 phi'' = tau - m g l/2 cos phi; its hinge carries the weight and what the centre's acceleration takes."""
+    sympy = pytest.importorskip("sympy")
+    _, eq = pendulum(inputs=["motor"])
+    phi, l, mass, g, u = (eq.expression(n).sympy() for n in ("hinge.angle", "l", "mass", "g", "motor"))
+    w, a = eq.expression("hinge.angle'").sympy(), eq.expression("hinge.angle''").sympy()
+    assert sympy.simplify(eq.M[0, 0].sympy() - mass * l**2 / 3) == 0
+    assert sympy.simplify(eq.f[0].sympy() - u + mass * g * l / 2 * sympy.cos(phi)) == 0
+    assert sympy.simplify(eq["energy.kinetic"].sympy() - mass * l**2 * w**2 / 6) == 0
+    force = eq["hinge.force"].sympy()
+    x, y = l / 2 * sympy.cos(phi), l / 2 * sympy.sin(phi)
+    second = [sympy.diff(c, phi) * a + sympy.diff(c, phi, 2) * w**2 for c in (x, y)]
+    assert sympy.simplify(force[0] - mass * second[0]) == 0
+    assert sympy.simplify(force[1] - mass * (second[1] + g)) == 0
+
+
+def test_symbols_are_values_of_the_coordinates_as_users_know_them():
+    """An angle that is drawn at 0.4 is 0.4 there: offsets are in the equations, as expressions of parameters."""
+    m = fb.Mechanism("p", planar=True, gravity=(0, -9.81), parameters={"drawn": 0.4})
+    m.add(fb.Body("rod", mass=1.0, inertia=0.1, position=(0.5, 0)))
+    m.add(fb.Revolute("hinge", "ground", "rod", at=(0, 0), angle="drawn"))
+    eq = m.symbolic()
+    assert eq.start["hinge.angle"] == 0.4
+    at = eq.start | {"hinge.angle": 0.4 + 0.3}
+    np.testing.assert_allclose(eq["rod.position"].at(at), 0.5 * np.array([np.cos(0.3), np.sin(0.3)]), rtol=1e-14)
+    np.testing.assert_allclose(eq["rod.x"].at(at | {"drawn": 0.7}), 0.5, rtol=1e-14)
+
+
+def test_drivers_are_rows_in_both_coordinates():
+    m = mechanisms.example("slider_crank.toml")
+    for coordinates in ("joint", "absolute"):
+        eq = m.symbolic(coordinates=coordinates)
+        k = eq.lam.rows.index("motor.effort")
+        assert eq.g.at(eq.start | {"t": 0.0})[k] == pytest.approx(0.0, abs=1e-14)
+        driven = eq["A.rate"].at(eq.start)
+        assert eq.nu.at(eq.start)[k] == pytest.approx(driven)
+
+
+def test_angles_are_plain_in_the_plane():
+    """No arc tangent and no counting of turns, whichever coordinates the equations are in."""
+    for name in ("slider_crank.toml", "quick_return.toml", "planetary.py"):
+        for coordinates in ("joint", "absolute"):
+            eq = mechanisms.example(name).symbolic(coordinates=coordinates)
+            found = [eq.g, eq.f, eq.gamma, *(eq[f"{j.name}.{k}"] for j in eq.model.joints for k in j.measured(True))]
+            operations = {x.op for e in found for x in reached(e.list())}
+            assert not operations & {"atan2", "rounded"}
+
+
+def test_values_are_refused_by_name():
+    m, eq = pendulum()
+    with pytest.raises(ModelError, match=r"has no symbol 'hinge.angel'.*hinge\.angle"):
+        eq.M.at({"hinge.angel": 0.2})
+    with pytest.raises(ModelError, match=r"no value is given for hinge\.angle"):
+        eq.f.at({})
+    with pytest.raises(ModelError, match="no function of the state"):
+        eq["energy.balance"]
+    with pytest.raises(ModelError, match="has no input 'hinge'"):
+        m.symbolic(inputs=["hinge"])
+    with pytest.raises(ModelError, match="coordinates"):
+        m.symbolic(coordinates="polar")
+    with pytest.raises(ModelError, match="knows no contact"):
+        mechanisms.example("dominoes.py").symbolic()
+
+
+def test_a_python_function_is_a_named_function_without_a_derivative():
+    def push(t):
+        return 2.0 * t
+
+    m = fb.Mechanism("pushed", planar=True)
+    m.add(fb.Body("cart", mass=1.0, inertia=1.0), fb.PointForce("push", "cart", force=(push, 0), at=(0, 0)))
+    eq = m.symbolic()
+    assert eq.f.at(eq.start | {"t": 3.0})[0] == 6.0
+    assert "push" in str(eq.f[0])
+    with pytest.raises(ModelError, match="'push' is not known"):
+        eq.f.diff("t")
+
+
+def test_arithmetic_and_calculus():
+    _, eq = pendulum(coordinates="absolute")
+    assert eq.M["rod.angle'", "rod.angle'"].at({}) == pytest.approx(2.0 * 1.2**2 / 12)
+    rates = eq.g.jacobian(eq.q) @ eq.T
+    at = eq.start | {"rod.angle": 0.3}
+    np.testing.assert_allclose(rates.at(at), eq.G.at(at), atol=1e-15)
+    rest = eq.residual.replaced({"rod.com_x''": 1.0, "rod.com_y''": 0.0, "rod.angle''": 0.0})
+    np.testing.assert_allclose(
+        rest.at(at | {"hinge.lam_nx": 2.0, "hinge.lam_ny": 2.0 * 9.81}),
+        [0.0, 0.0, 1.2 * np.sin(0.3) * -1.0 + 1.2 * np.cos(0.3) * 9.81],
+        atol=1e-13,
+    )
+    assert float(eq.expression("l")) == 1.2 and eq.M.T.shape == (3, 3)
+    with pytest.raises(ModelError, match=r"no entry 'rod\.z'"):
+        eq.f["rod.z"]
