@@ -17,8 +17,9 @@ from ...results.result import Result
 from ...tables.spanning import spanning
 from .balance import balanced, conditions, multipliers, refuse_unbalanced
 from .derivatives import Derivatives
-from .equations import LinearEquations, told, with_balance
+from .equations import LinearEquations
 from .free import free
+from .matrices import matrices
 from .point import Point, drawn, given
 from .reduced import reduced
 from .solve import number
@@ -95,16 +96,11 @@ def linear_equations(
     own = _with(m, pairs)
     refuse_unbalanced(own, point, lam, f, first.by["rx"])
     where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
-    p = with_balance(d.at(where), pairs) if pairs else d.at(where)
+    p = d.at(where).replaced(pairs) if pairs else d.at(where)
     f = free(m, p, o.independent)
     known = [*pairs, *zip(m.multipliers, lam, strict=True)]
     refuse_unsteady(m, d, f, point, {s.data.name: number(x) for s, x in known})
-    r = reduced(m, p, f)
-    still = [(s, 0.0) for s in m.added]
-    out = told(m, d, p, f, r, (o.outputs, [unit for unit, _ in curves]))
-    for X in out.values():
-        if isinstance(X, np.ndarray):
-            X.ravel()[:] = replaced(list(X.ravel()), still)
+    out = matrices(m, p, f, reduced(m, p, f), list(zip(o.outputs, (unit for unit, _ in curves), strict=True)))
     return LinearEquations(
         name=m.model.name,
         parameters={k: x.value for k, x in m.given.items() if x not in m.added and k not in dict(_names(pairs))},
@@ -114,7 +110,7 @@ def linear_equations(
         at=p,
         free=f,
         mechanics=m,
-        **out,
+        matrices=out,
     )
 
 

@@ -94,7 +94,9 @@ def _powers(p: Perturbed, f: Free, kept: np.ndarray, m: Mechanics) -> list[np.nd
     holonomic = m.holonomic[l][:, None]
     zeroth = _less(by["nx"][l], product(by["nv"][l], p.N))
     none = zeros(len(l), len(l))
-    c0 = np.hstack([_either(holonomic, by["nv"][l], zeroth)[:, kept], none, _either(holonomic, by["gw"][l], by["nw"][l])])
+    c0 = np.hstack(
+        [_either(holonomic, by["nv"][l], zeroth)[:, kept], none, _either(holonomic, by["gw"][l], by["nw"][l])]
+    )
     c1 = np.hstack([_either(holonomic, zeros(*by["nv"][l].shape), by["nv"][l])[:, kept], none, zeros(len(l), k)])
     y = second(by["ya"], by["yv"], by["yx"], by["yl"][:, l], by["yw"])
     return [at_rest(X) for X in (*r, c0, c1, *y)]

@@ -1,4 +1,4 @@
-"""From polynomials in a ring to coefficients that people read: common factors cancelled, sines and cosines as few terms."""
+"""From polynomials in a ring to coefficients that people read: common factors cancelled, few sines and cosines."""
 
 from __future__ import annotations
 

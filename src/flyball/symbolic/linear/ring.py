@@ -1,7 +1,7 @@
 """Polynomials in s and in the parameters: expressions taken into a ring in which sums and products are exact.
 
-What is no polynomial (sines, roots, functions that are known by name) becomes a generator of its own; sines and cosines of
-sums are expanded, and squares that stand for something else (sin^2, roots) are replaced.
+What is no polynomial (sines, roots, functions that are known by name) becomes a generator of its own; sines and cosines
+of sums are expanded, and squares that stand for something else (sin^2, roots) are replaced.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Ring:
         self.matrices = []
         at = 0
         for X in matrices:
-            self.matrices.append(np.array(elements[at : at + X.size] + [None], object)[:-1].reshape(X.shape))
+            self.matrices.append(np.array([*elements[at : at + X.size], None], object)[:-1].reshape(X.shape))
             at += X.size
 
     def _tidy(self, x: Any) -> Any:

@@ -2,8 +2,8 @@
 
 Conditions are those of Lienard and Chipart (1914; Gantmacher, Theory of Matrices, vol. 2, XV, section 13): with a_0 > 0
 in a_0 s^n + ... + a_n all roots have negative real parts if and only if every second coefficient from a_n down is
-greater than zero (or a_n, and every second from a_n-1 down) and every second of Hurwitz's determinants, from the last but
-one down. The characteristic polynomial is parted into its factors first: each has to fulfil its own.
+greater than zero (or a_n, and every second from a_n-1 down) and every second of Hurwitz's determinants, from the last
+but one down. The characteristic polynomial is parted into its factors first: each has to fulfil its own.
 """
 
 from __future__ import annotations

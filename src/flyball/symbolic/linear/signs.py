@@ -63,10 +63,14 @@ class Signs:
         return signs.pop()
 
     def _within_one(self, p: Any) -> bool:
-        """Whether it is 1 + cos or 1 - cos, or the reverse."""
+        """Whether it is 1 + cos or 1 - cos, or the reverse, of an angle whose sine is not zero."""
         sp, x = self.ring.sympy, p.as_expr()
-        for c in x.atoms(sp.cos):
-            if sp.expand(x - c) in (1, -1) or sp.expand(x + c) in (1, -1):
+        angles = [c for c in x.atoms(sp.cos) if sp.expand(x - c) in (1, -1) or sp.expand(x + c) in (1, -1)]
+        gens = [g.as_expr() for g in self.ring.ring.gens[1:]]
+        for c in angles:
+            sine = sp.sin(c.args[0])
+            if sine in gens and self.known[gens.index(sine)]:
+                self.used[sine] = None
                 return True
         return False
 

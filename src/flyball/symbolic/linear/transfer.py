@@ -89,6 +89,8 @@ class TransferFunction:
 
     # -- what pictures of linear models ask
 
+    large = False
+
     @cached_property
     def inputs(self) -> tuple[str, ...]:
         """The input."""
