@@ -21,6 +21,7 @@ from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
+from .linear.face import Linear
 from .names import text
 from .quantities import Quantities
 from .state import named_state, places_at
@@ -40,7 +41,7 @@ class SymbolicOptions(Options):
     names: str
 
 
-class Equations:
+class Equations(Linear):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
@@ -68,6 +69,7 @@ class Equations:
 
     def __init__(self, model: Model, start: Start, o: SymbolicOptions, inputs: Sequence[Input]) -> None:
         self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
+        self.described = model
         self.graph = Graph()
         tree = start.assembly.compiled.structure.tree
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))
@@ -377,7 +379,12 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     refuse_contact(model, "symbolic")
     plain = model.snapshot()
     told, inputs = with_inputs(plain, o.inputs) if o.inputs else (plain, [])
-    told = told.snapshot()
+    out = _in_coordinates(told.snapshot(), o, inputs)
+    out.described = plain
+    return out
+
+
+def _in_coordinates(told: Model, o: SymbolicOptions, inputs: Sequence[Input]) -> Equations:
     if o.coordinates == "auto":
         try:
             return Equations(told, begin(told, 0.0, o.parameters, None, "joint"), o, inputs)

@@ -24,6 +24,8 @@ from .routh import StabilityConditions, stability
 from .traced import Mechanics
 from .transfer import TransferFunction, checked
 
+FACTORED = 300  # operations
+
 
 @dataclass
 class LinearEquations:
@@ -177,11 +179,12 @@ class LinearEquations:
         num, den = scaled(ring, num, den)
         both = [coefficients(ring, num), coefficients(ring, den)]
         graph = self.mechanics.graph
-        nodes = tuple(ring.printer.back(x, graph) for x in both)
+        nodes = ring.printer.back(both[0], graph), ring.printer.back(both[1], graph)
         units = self.matrices.input_units[i], self.matrices.output_units[k]
+        names = {"input": self.inputs[i], "output": self.outputs[k], "input_unit": units[0], "output_unit": units[1]}
         return TransferFunction(
-            self.name, self.inputs[i], self.outputs[k], *units, ring.s, *map(tuple, both), common, self.parameters,
-            self.balanced_by, nodes,
+            name=self.name, **names, s=ring.s, num=tuple(both[0]), den=tuple(both[1]), cancelled=common,
+            parameters=self.parameters, balanced_by=self.balanced_by, nodes=nodes,
         )  # fmt: skip
 
     def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
@@ -201,6 +204,39 @@ class LinearEquations:
         """
         P = self.pencil
         return stability(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: names, and what equilibrium asks of the parameters."""
+        x, out = self.matrices, []
+        for what, names, units in (
+            ("state", x.states, x.state_units),
+            ("input", x.inputs, x.input_units),
+            ("output", x.outputs, x.output_units),
+        ):
+            out += [(what, f"{name} [{unit}]") for name, unit in zip(names, units, strict=True)]
+        out += [("equilibrium", f"{k} = {self._short(e)}") for k, e in self.balanced_by.items()]
+        out += [("equilibrium", f"0 = {self._short(e)}") for e in self.conditions]
+        return out + [("found", f"{name} is a number, so that loops close") for name in self.found]
+
+    def _short(self, x: Node) -> Any:
+        """For people: factored, where that is cheap."""
+        made = self.printer(x)
+        return self.printer.sympy.factor(made) if made.count_ops() < FACTORED else made
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+    def latex(self) -> str:
+        """x' = A x + B u, y = C x + D u as LaTeX; x' = A x alone without inputs and outputs."""
+        out = [rf"\dot x = {self.A.latex()} x"]
+        if self.inputs:
+            out[0] += f" + {self.B.latex()} u"
+        if self.outputs:
+            out.append(f"y = {self.C.latex()} x" + (f" + {self.D.latex()} u" if self.inputs else ""))
+        return r" \\ ".join(out)
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle \begin{{gathered}} {self.latex()} \end{{gathered}}$"
 
     def index(self, what: str, name: str | None) -> int:
         """Which input or output that is; the only one if not named."""

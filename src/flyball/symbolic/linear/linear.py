@@ -37,6 +37,8 @@ class Asked:
     coordinates: str = "joint"
     independent: Sequence[str] = ()
     balanced_by: Sequence[str] = ()
+    parameters: Mapping[str, float] | None = None
+    tree: Sequence[str] | None = None  # the tree joints, where they are known
 
 
 def linear_equations(
@@ -48,6 +50,7 @@ def linear_equations(
     coordinates: str = "joint",
     independent: Sequence[str] = (),
     balanced_by: Sequence[str] = (),
+    parameters: Mapping[str, float] | None = None,
 ) -> LinearEquations:
     """Linear equations x' = A x + B u, y = C x + D u with the parameters as symbols.
 
@@ -68,6 +71,8 @@ def linear_equations(
         Coordinates that the states are changes of; chosen by pivoting if not given.
     balanced_by : sequence of str
         Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+    parameters : mapping, optional
+        Values in place of the model's own, in SI units or with a unit.
 
     Raises
     ------
@@ -77,9 +82,17 @@ def linear_equations(
     AnalysisError
         If the linear equations change with time, or an output follows the rate of an input.
     """
-    o = Asked(
-        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent, balanced_by=balanced_by
-    )
+    if coordinates not in ("joint", "absolute"):
+        raise ModelError(f"unknown coordinates {coordinates!r}; choose one of joint, absolute")
+    asked = Asked(
+        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent,
+        balanced_by=balanced_by, parameters=parameters,
+    )  # fmt: skip
+    return about(model, asked)
+
+
+def about(model: Model, o: Asked) -> LinearEquations:
+    """As `linear_equations`."""
     refuse_unknown(model, o.outputs)
     m, point = _pointed(model, o)
     curves = [m.output(name) for name in o.outputs]
@@ -138,19 +151,19 @@ def _with(m: Mechanics, pairs: Sequence[tuple[Any, Any]]) -> Mechanics:
 
 def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
     """The mechanism traced in its coordinates, and the point."""
-    if o.coordinates not in ("joint", "absolute"):
-        raise ModelError(f"unknown coordinates {o.coordinates!r}; choose one of joint, absolute")
     if isinstance(o.at, Equilibrium | Result):
         if isinstance(o.at, Equilibrium) and o.at.preload:
             raise ModelError(
                 "at is an equilibrium under a preload, which is no part of the mechanism: add it to its forces"
             )
-        x, _ = instant(model, o.at, coordinates=o.coordinates)
+        x, _ = instant(model, o.at, coordinates=o.coordinates, parameters=o.parameters)
         values = dict(x.c.parameters)
         m = mechanics(model, x.c.structure.tree, o.inputs, values)
         return m, Point(x.q.tolist(), x.v.tolist(), x.z.tolist(), x.t)
-    tree = tuple(spanning(model)) if o.coordinates == "joint" else ()
-    m = mechanics(model, tree, o.inputs, None)
+    tree = o.tree
+    if tree is None:
+        tree = spanning(model) if o.coordinates == "joint" else ()
+    m = mechanics(model, tree, o.inputs, o.parameters)
     return m, drawn_or_given(m, o.at)
 
 
