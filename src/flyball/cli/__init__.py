@@ -11,6 +11,7 @@ from . import (  # noqa: F401  (each adds its subcommand)
     check,
     compare,
     equilibrium,
+    export,
     inverse_dynamics,
     kinematics,
     linearize,

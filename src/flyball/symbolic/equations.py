@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -29,6 +30,7 @@ from .state import named_state, places_at
 if TYPE_CHECKING:
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
+    from .export.code import Code
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -342,6 +344,12 @@ class Equations(Linear):
     def evaluate(self, values: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
         return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
+
+    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
+        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+        from .export.code import exported
+
+        return exported(self, folder, **asked)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
