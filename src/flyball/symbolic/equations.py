@@ -387,15 +387,13 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     refuse_contact(model, "symbolic")
     plain = model.snapshot()
     told, inputs = with_inputs(plain, o.inputs) if o.inputs else (plain, [])
-    out = _in_coordinates(told.snapshot(), o, inputs)
+    told, auto = told.snapshot(), o.coordinates == "auto"
+    try:
+        start = begin(told, 0.0, o.parameters, None, "joint" if auto else o.coordinates)
+    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+        if not auto:
+            raise
+        start = begin(told, 0.0, o.parameters, None, "absolute")
+    out = Equations(told, start, o, inputs)
     out.described = plain
     return out
-
-
-def _in_coordinates(told: Model, o: SymbolicOptions, inputs: Sequence[Input]) -> Equations:
-    if o.coordinates == "auto":
-        try:
-            return Equations(told, begin(told, 0.0, o.parameters, None, "joint"), o, inputs)
-        except AnalysisError:  # friction that follows loads which joint coordinates do not know
-            return Equations(told, begin(told, 0.0, o.parameters, None, "absolute"), o, inputs)
-    return Equations(told, begin(told, 0.0, o.parameters, None, o.coordinates), o, inputs)
