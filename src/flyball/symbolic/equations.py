@@ -16,14 +16,15 @@ from ..analysis.options import Options
 from ..analysis.untouched import refuse_contact
 from ..errors import AnalysisError, ModelError
 from ..graph.node import SYMBOL, Graph, Node, Symbol
+from ..graph.printers import spelling
 from ..model.expressions import is_number_text
 from ..model.model import Model, listing, suggest
 from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
-from .names import text
 from .quantities import Quantities
+from .shown import Shown
 from .state import named_state, places_at
 
 if TYPE_CHECKING:
@@ -42,7 +43,7 @@ class SymbolicOptions(Options):
     names: str
 
 
-class Equations:
+class Equations(Shown):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
@@ -89,7 +90,7 @@ class Equations:
             if name in self._inputs:
                 out[name] = self.graph.symbol(self._inputs[name], 0.0)
             elif name in (o.parameters or {}) or not isinstance(value, str) or is_number_text(value):
-                out[name] = self.graph.symbol(Symbol(name, "parameter", _latex(name)), told[name])
+                out[name] = self.graph.symbol(Symbol(name, "parameter", spelling.name(name)), told[name])
         return out
 
     @cached_property
@@ -351,30 +352,6 @@ class Equations:
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
-
-    def __str__(self) -> str:
-        count = len(self.q), len(self.v), len(self.lam)
-        lines = [
-            f"equations of motion of {self.model.name!r}, coordinates {self.coordinates}",
-            "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma",
-            f"q ({count[0]}): {', '.join(self.q.rows)}",
-            f"v ({count[1]}): {', '.join(self.v.rows)}",
-            f"lam ({count[2]}): {', '.join(self.lam.rows) or 'none: no constraints'}",
-        ]
-        more = {"loads": self.loads.rows, "places": tuple(self.places), "inputs": self.inputs}
-        lines += [f"{k}: {', '.join(names)}" for k, names in more.items() if names]
-        lines.append(f"parameters: {', '.join(f'{k} = {x:g}' for k, x in self.parameters.items()) or 'none'}")
-        size = {k: getattr(self, k).operations for k in ("M", "f", "g", "G", "gamma")}
-        lines.append(f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}")
-        return "\n".join(lines)
-
-
-def _latex(name: str) -> str:
-    """A parameter's name: a single letter as it is, with a number behind as index; others upright."""
-    if len(name) == 1:
-        return name
-    letter, index = name[0], name[1:].lstrip("_")
-    return f"{letter}_{{{index}}}" if index.isdigit() else text(name)
 
 
 COORDINATES = ("auto", "absolute", "joint")
