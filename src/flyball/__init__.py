@@ -43,8 +43,9 @@ Ask where it rests, and what small motions do
     m.modes()                     -> Modes, animated; m.root_locus(parameter, values) -> RootLocus
 
 Ask for the equations
-    m.symbolic(inputs)            -> Equations: M, f, g, G, gamma, reactions, energies as expressions in the mechanism's
-                                  own names, for SymPy, LaTeX and numbers
+    eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
+    print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
+    eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
     m.export(folder, language)    -> Code: functions of the equations in C, Python, CasADi or Numba
 
 Ask what a number changes

@@ -52,6 +52,7 @@ MADE = {
     "MassReport": lambda: crank().mass_properties(),
     "Report": lambda: crank().check(),
     "Assembly": lambda: crank().assemble(),
+    "Equations": lambda: crank().symbolic(),
     "Prepared": lambda: crank().prepare(),
     "Code": lambda: rig().export(),
 }
