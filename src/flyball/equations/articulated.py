@@ -19,6 +19,7 @@ velocity d, U, D and 1 / D.
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import positive
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, put3, put9, scale, sub, symmetric
 from ..tables.system import BODY_LAW, NV, PARENT, V0
 from .mass import load6, plus, put6, rigid, root_columns
@@ -130,7 +131,7 @@ def eliminate(S, W, b, I):
         put3(W.X, d, RESPONSE + 3, f)
         W.X[d, STIFF] = D
         if S.body_i[b, BODY_LAW] < 0:
-            if not D.real > ROUNDING * least.real:
+            if not positive(D - ROUNDING * least):
                 return 1 + d, (J, H, K, lost, mass)
             r = 1.0 / D
             W.X[d, SOFT] = r

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..laws.evaluation import entire, evaluate_jet
-from ..math.scalar import atan2, cos, sin
+from ..math.scalar import atan2, cos, magnitude, sin
 from ..numerics.integrators.clock import (
     ACCEPTED,
     DONE,
@@ -32,7 +32,6 @@ from ..numerics.integrators.clock import (
 from ..tables.system import BODY_LAW, COORDINATES, LENGTH, NV, REVOLUTE, ROW_LAW, ROW_WRAP, TREE, V0
 from .motion import arrive, write_row
 from .rows import BY_TIME
-from .solve import magnitude
 from .tree import retract
 
 SHARE = GROW  # entry of the clock's: part of the way to the next output time that a step is

@@ -9,7 +9,7 @@ from __future__ import annotations
 from ..compiler.jit import formula
 from ..laws.call import STACK_RESERVE
 from ..laws.evaluation import evaluate_jet
-from ..math.scalar import atan2, cos, sin
+from ..math.scalar import atan2, cos, magnitude, sin
 from ..tables.system import (
     ALPHA,
     BETA,
@@ -72,7 +72,7 @@ from .projection import (
     violation,
 )
 from .rows import BY_TIME, row_times
-from .solve import REFINEMENTS, factor, magnitude, reuse, solve
+from .solve import REFINEMENTS, factor, reuse, solve
 from .tree import rates
 
 NOT_FINITE, JAMMED, SINGULAR = 3, 4, 5

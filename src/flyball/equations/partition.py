@@ -8,8 +8,9 @@ independent ones stay as the integrator has them.
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import magnitude
 from ..tables.system import EXCHANGES, F_APPLIED, PARTITION, R2, RESIDUAL, V3
-from .solve import REFINEMENTS, factor, magnitude, solve
+from .solve import REFINEMENTS, factor, solve
 
 MOST = 4.0  # a dependent coordinate that moves by more than this times an independent one takes its place
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import larger, magnitude
 from ..tables.system import (
     BODY_LAW,
     COORDINATES,
@@ -30,7 +31,7 @@ from .dispatch import row_biases, row_values
 from .kinematics import motions, poses
 from .made import run
 from .rows import row_times
-from .solve import REFINEMENTS, factor, magnitude, reuse, solve
+from .solve import REFINEMENTS, factor, reuse, solve
 from .tree import rates, retract, unrated
 
 NONE, BAUMGARTE, STEPS, STAGES, POSITIONS, VELOCITIES, PARTITIONING = range(7)
@@ -103,9 +104,9 @@ def drift(S, W, v, out):
         for e in range(S.row_p[k], S.row_p[k + 1]):
             p = W.G[e] * v[S.col_i[e]]
             r -= p
-            size = max(size, magnitude(p))
+            size = larger(size, magnitude(p))
         out[k] = r
-        worst = max(worst, magnitude(r))
+        worst = larger(worst, magnitude(r))
     return worst, size
 
 

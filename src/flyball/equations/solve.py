@@ -2,9 +2,8 @@
 
 Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
 quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are
-regularised by a small part of each row's natural size D, and refined against the true equations until the residual of
-G x = gamma passes or stops falling (a proximal-point iteration: redundant rows cost nothing, and of all multipliers it
-finds those with least sum of D_k lam_k^2).
+regularised by a small part of each row's natural size D, and refined until the residual of G x = gamma passes or stops
+falling (a proximal-point iteration: of all multipliers it finds those with least sum of D_k lam_k^2).
 
 The regularisation is not small beyond need. Near a singular position a row combination with singular value s answers
 a rounding error e with e / s; refinement takes the regularisation out of everything that is well determined within a
@@ -14,6 +13,7 @@ few passes, while what is left undetermined grows by no more than passes * s / d
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.scalar import choose, larger, magnitude, minimum
 from ..math.vec import load9, mv
 from ..numerics.ldl import ldl_factor, ldl_solve
 from ..tables.system import (
@@ -170,7 +170,7 @@ def factor_coupled(S, W):
     """
     nv = W.vel.shape[1]
     per = W.vel[V1]
-    lever = min(1.0, S.glob[LENGTH]) ** 2
+    lever = minimum(1.0, S.glob[LENGTH]) ** 2
     mass_entries(S, W)
     for e in range(S.mass_i.shape[0]):
         d = S.mass_i[e, 0]
@@ -186,7 +186,7 @@ def factor_coupled(S, W):
             W.A[S.pair_i[e, 3]] = W.G[e]
             if S.pair_i[e, 3] < S.ldl.Ai.shape[0]:  # prescribed velocities have no say
                 s += (W.G[e] * W.G[e] + lever) * per[S.col_i[e]]
-        s = s if s.real > 0.0 else s + 1.0
+        s = choose(s, s, s + 1.0)
         W.row[DIAGONAL, k] = s
         W.A[S.ldl.Ap[S.ldl.perm[nv + k] + 1] - 1] = -S.glob[REGULARISE] * s
     return ldl_factor(S.ldl, W.A, W.L, W.D[0], W.D[1])
@@ -243,7 +243,7 @@ def solve_schur(S, W, f, gamma, x, lam, loaded, refinements):
         if lam.shape[0] > 0:
             worst = residual(S, W, gamma, x)
         if semidefinite:
-            worst = max(worst, excess(S, W.vel[V1], rhs, x))
+            worst = larger(worst, excess(S, W.vel[V1], rhs, x))
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
@@ -282,29 +282,35 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.vel[V2]
-    z = W.D[2]
-    nv = x.shape[0]
     worst = 1.0
     last = 1e300
-    for d in range(nv):
+    for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:
         remainder(S, W, f, gamma, x, lam, rhs, loaded)
     for attempt in range(refinements):
-        for d in range(nv):
-            z[S.ldl.perm[d]] = rhs[d]
-        for k in range(lam.shape[0]):
-            z[S.ldl.perm[nv + k]] = W.row[R1, k]
-        ldl_solve(S.ldl, W.L, W.D[0], z)
-        for d in range(nv):
-            x[d] += z[S.ldl.perm[d]]
-        for k in range(lam.shape[0]):
-            lam[k] -= z[S.ldl.perm[nv + k]]
-        worst = remainder(S, W, f, gamma, x, lam, rhs, loaded)
+        worst = pass_coupled(S, W, f, gamma, x, lam, rhs, loaded)
         if not worst > W.option[PASS] or (attempt > 0 and worst > STALLED * last):
             break
         last = worst
     return worst
+
+
+@formula
+def pass_coupled(S, W, f, gamma, x, lam, rhs, loaded):
+    """Add to x and lam one solve for what is left of both lines; what is left then, and its size."""
+    z = W.D[2]
+    nv = x.shape[0]
+    for d in range(nv):
+        z[S.ldl.perm[d]] = rhs[d]
+    for k in range(lam.shape[0]):
+        z[S.ldl.perm[nv + k]] = W.row[R1, k]
+    ldl_solve(S.ldl, W.L, W.D[0], z)
+    for d in range(nv):
+        x[d] += z[S.ldl.perm[d]]
+    for k in range(lam.shape[0]):
+        lam[k] -= z[S.ldl.perm[nv + k]]
+    return remainder(S, W, f, gamma, x, lam, rhs, loaded)
 
 
 @formula
@@ -320,8 +326,8 @@ def residual(S, W, gamma, x):
             s -= p
             a += magnitude(p)
         W.row[R1, k] = s
-        worst = max(worst, magnitude(s))
-        size = max(size, a)
+        worst = larger(worst, magnitude(s))
+        size = larger(size, a)
     return worst / size
 
 
@@ -335,12 +341,12 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
     size = 1e-300
     for d in range(x.shape[0]):
         rhs[d] = f[d] if loaded else 0.0
-        size = max(size, magnitude(rhs[d]))
+        size = larger(size, magnitude(rhs[d]))
     for e in range(S.mass_i.shape[0]):
         i, j = S.mass_i[e, 0], S.mass_i[e, 1]
         p = W.M[e] * x[j]
         rhs[i] -= p
-        size = max(size, magnitude(p))
+        size = larger(size, magnitude(p))
         if i != j:
             rhs[j] -= W.M[e] * x[i]
     wide = 1e-300
@@ -352,13 +358,13 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
             d = S.col_i[e]
             p = W.G[e] * lam[k]
             rhs[d] += p
-            size = max(size, magnitude(p))
+            size = larger(size, magnitude(p))
             p = W.G[e] * x[d]
             s -= p
             a += magnitude(p)
         W.row[R1, k] = s
-        off = max(off, magnitude(s))
-        wide = max(wide, a)
+        off = larger(off, magnitude(s))
+        wide = larger(wide, a)
     for b in range(S.body_i.shape[0]):
         if S.body_i[b, BODY_LAW] >= 0:
             d = S.body_i[b, V0]
@@ -366,8 +372,8 @@ def remainder(S, W, f, gamma, x, lam, rhs, loaded):
             rhs[d] = 0.0
     worst = 0.0
     for d in range(x.shape[0]):
-        worst = max(worst, magnitude(rhs[d]))
-    return max(worst / size, off / wide)
+        worst = larger(worst, magnitude(rhs[d]))
+    return larger(worst / size, off / wide)
 
 
 @formula
@@ -380,21 +386,15 @@ def excess(S, dx, rhs, x):
         n = S.body_i[b, NV]
         if n == 3:
             rhs[v0 + 2] = S.body_x[b, EXCESS + 8] * dx[v0 + 2]
-            worst = max(worst, magnitude(rhs[v0 + 2]))
+            worst = larger(worst, magnitude(rhs[v0 + 2]))
         elif n == 6:
             t = mv(load9(S.body_x, b, EXCESS), (dx[v0 + 3], dx[v0 + 4], dx[v0 + 5]))
             rhs[v0 + 2] = S.body_x[b, EXCESS_MASS] * dx[v0 + 2]
             for i in range(3):
                 rhs[v0 + 3 + i] = t[i]
-                worst = max(worst, magnitude(t[i]))
+                worst = larger(worst, magnitude(t[i]))
         for i in range(2):
             rhs[v0 + i] = S.body_x[b, EXCESS_MASS] * dx[v0 + i]
-            worst = max(worst, magnitude(rhs[v0 + i]) * S.glob[LENGTH])
-            size = max(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
+            worst = larger(worst, magnitude(rhs[v0 + i]) * S.glob[LENGTH])
+            size = larger(size, S.body_x[b, MASS] * magnitude(x[v0 + i]) * S.glob[LENGTH])
     return worst / size
-
-
-@formula
-def magnitude(a):
-    """|Re a|: sizes decide when to stop, they carry no derivative."""
-    return a.real if a.real > 0.0 else -a.real

@@ -137,6 +137,8 @@ class Node:
         """
         if self.moving:
             raise Undecided(f"a formula decides by {self!r}, which moves; it has to use scalar.choose")
+        if self.op != NUMBER:
+            self.graph.decided.add(self.index)
         return self.value
 
     @property
@@ -148,6 +150,13 @@ class Node:
     def known(self) -> bool:
         """Whether it is a plain number."""
         return self.op == NUMBER
+
+    def granted(self, what: str) -> bool:
+        """Taken for granted, and noted in `Graph.granted`: "nonzero" of a pivot, "positive"."""
+        if not self.moving:
+            return self.value > 0.0 if what == "positive" else self.value != 0.0 and self.value == self.value
+        self.graph.granted.append((self, what))
+        return True
 
     def conjugate(self) -> Node:
         """Itself."""
@@ -196,6 +205,8 @@ class Graph:
     def __init__(self) -> None:
         self.nodes: list[Node] = []
         self.functions = Functions()
+        self.granted: list[tuple[Node, str]] = []  # what formulas could not decide
+        self.decided: set[int] = set()  # numbers of expressions in parameters that formulas have decided by
         self._found: dict[Any, Node] = {}
 
     def __len__(self) -> int:

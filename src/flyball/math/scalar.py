@@ -177,6 +177,28 @@ def choose(x, a, b):
     return _on_expressions("choose", x, a, b)
 
 
+def magnitude(x):
+    """|Re x|: sizes decide when to stop, they carry no derivative."""
+    return x.apply("absolute", x) if hasattr(x, "apply") else x.real if x.real > 0.0 else -x.real
+
+
+def larger(a, b):
+    """The larger of two sizes, for decisions: b where either is nan."""
+    if hasattr(a, "apply") or hasattr(b, "apply"):
+        return _on_expressions("choose", a - b, a, b)
+    return a if a > b else b
+
+
+def nonzero(x):
+    """Whether a pivot is not zero, and a number; of an expression that is taken for granted, and noted."""
+    return x.granted("nonzero") if hasattr(x, "granted") else not (x.real == 0.0 or x.real != x.real)
+
+
+def positive(x):
+    """Whether the real part is greater than zero; of an expression that is taken for granted, and noted."""
+    return x.granted("positive") if hasattr(x, "granted") else x.real > 0.0
+
+
 def divide(a, b):
     """A / b; inf or nan where b is zero, as in C."""
     if isinstance(b, _NUMBERS):
@@ -309,14 +331,30 @@ def _register() -> None:
             return lambda x: complex(np.floor(x.real + 0.5), 0.0)
         return lambda x: np.floor(x + 0.5)
 
+    @overload(magnitude, jit_options=options)
+    def choose_magnitude(x):
+        return lambda x: x.real if x.real > 0.0 else -x.real
+
+    @overload(larger, jit_options=options)
+    def choose_larger(a, b):
+        return lambda a, b: a if a > b else b
+
+    @overload(nonzero, jit_options=options)
+    def choose_nonzero(x):
+        return lambda x: not (x.real == 0.0 or x.real != x.real)
+
+    @overload(positive, jit_options=options)
+    def choose_positive(x):
+        return lambda x: x.real > 0.0
+
     @overload(choose, jit_options=options)
     def choose_choose(x, a, b):
         return lambda x, a, b: a if x.real > 0 else b
 
-    def smaller(a, b):
+    def least(a, b):
         return a if a.real <= b.real or a != a else b
 
-    def larger(a, b):
+    def most(a, b):
         return a if a.real >= b.real or a != a else b
 
     def quotient(a, b):
@@ -326,7 +364,7 @@ def _register() -> None:
         f = a.real / b.real
         return complex(f, (a.imag - f * b.imag) / b.real)
 
-    either(minimum, smaller, smaller)
-    either(maximum, larger, larger)
+    either(minimum, least, least)
+    either(maximum, most, most)
     either(divide, quotient, complex_quotient)
     either(power, lambda a, b: math.pow(a, b), lambda a, b: _complex_power(complex(a), complex(b)))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..compiler.jit import formula, kernel
+from ..math.scalar import nonzero
 from .dissection import minimum_degree, nested_dissection
 
 LARGE = 300  # unknowns from which on other orders than minimum degree are tried
@@ -50,7 +51,7 @@ def ldl_factor(P, A, L, D, Y):
             l = y * D[i]
             d -= l * y
             L[x] = l
-        if d.real == 0.0 or d.real != d.real:
+        if not nonzero(d):
             return 1 + k
         D[k] = 1.0 / d
     return 0

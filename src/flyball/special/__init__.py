@@ -1,1 +1,11 @@
-"""Code made for one mechanism: what the engine does for it, written out, compiled and called by address."""
+"""Code made for one mechanism: what the engine does for it, written out, compiled and called by address.
+
+``plan`` looks at a mechanism, ``code`` has its code, ``Made.system`` puts its addresses into the tables.
+"""
+
+from .keeping import code, kept, known, price, ready, refusal
+from .made import Made
+from .plan import Plan, plan
+from .trace import Refused
+
+__all__ = ["Made", "Plan", "Refused", "code", "kept", "known", "plan", "price", "ready", "refusal"]

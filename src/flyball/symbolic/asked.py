@@ -36,4 +36,6 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
         if o.coordinates != "auto":
             raise
         start = begin(plain, 0.0, o.parameters, None, "absolute")
-    return Equations(plain, start, o, told)
+    out = Equations(plain, start, o, told)
+    out.described = model.snapshot()
+    return out

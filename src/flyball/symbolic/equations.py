@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .expressions import Expressions
+from .linear.face import Linear
 from .quantities import Quantities
 from .shown import Shown
 from .symbols import Symbols
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from .export.code import Code
 
 
-class Equations(Shown, Symbols):
+class Equations(Shown, Linear, Symbols):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma

@@ -41,6 +41,7 @@ class Symbols(Home):
 
     def __init__(self, model: Model, start: Start, o: SymbolicOptions, told: Mapping[str, Symbol]) -> None:
         self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
+        self.described = model  # before its inputs and numbers were symbols
         self.graph = Graph()
         tree = start.assembly.compiled.structure.tree
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))

@@ -1,0 +1,186 @@
+"""Code that has been made: in this process, and on disk beside the engine's, for others.
+
+A file says of itself what it is: a hash of all that follows, what the code needs to know, the object code. One that is
+damaged, or of another version, is as good as none.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import json
+import os
+import tempfile
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Iterator
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..compiler.cache import cache_of
+from ..compiler.jit import start_numba
+from ..equations.engine import engine
+from ..tables.system import System
+from ..tables.values import Values
+from .machine import Loaded, assembled
+from .made import Made
+from .plan import COMPILING, LOADING, LOOKING, TRACING, Plan
+from .trace import Entry, Refused, traced
+
+MARK = b"flyball: code made for one mechanism\n"
+IN_MEMORY, ON_DISK = 64, 200
+"""How many are kept."""
+_LOCK = threading.RLock()
+_found: OrderedDict[tuple[str, str], tuple[list[Entry], Made]] = OrderedDict()
+_refused: dict[str, str] = {}
+
+
+def ready() -> bool:
+    """Whether this process has any such code."""
+    return bool(_found)
+
+
+def kept() -> bool:
+    """Whether code can be left on disk for other processes."""
+    return _folder() is not None
+
+
+def known(p: Plan, x: Values) -> str:
+    """Where code for a mechanism is: "memory", "disk", or "" (nowhere)."""
+    if _in_memory(p, x.system) is not None:
+        return "memory"
+    return "disk" if any(True for _ in _fitting(p, x.system)) else ""
+
+
+def refusal(p: Plan) -> str:
+    """Why no code is made for it, as far as that is known; empty if nothing speaks against it."""
+    return p.refused or _refused.get(p.key, "")
+
+
+def price(p: Plan, where: str) -> float:
+    """What it costs to have the code [ns], by counts: never by a clock."""
+    return {"memory": LOOKING, "disk": LOADING}.get(where, p.size * (TRACING + COMPILING))
+
+
+def code(p: Plan, x: Values) -> tuple[Made, str]:
+    """The code for a mechanism, and where it comes from, in words.
+
+    Raises
+    ------
+    Refused
+        If none is made for it.
+    """
+    if why := refusal(p):
+        raise Refused(why)
+    with _LOCK:
+        if (found := _in_memory(p, x.system)) is not None:
+            return found, "kept in this process"
+        if (found := _on_disk(p, x.system)) is not None:
+            return found, "found on disk"
+        found = _made(p, x)
+        return found, f"made now in {found.seconds:.1f} s"
+
+
+def _made(p: Plan, x: Values) -> Made:
+    start_numba()
+    begun = time.process_time()
+    try:
+        text = traced(x.structure, x.system)
+    except Refused as error:
+        _refused[p.key] = str(error)
+        raise
+    machine_code = assembled(text.text)
+    seconds = time.process_time() - begun
+    made = Made(Loaded(machine_code), text.scratch, text.constants, text.operations, seconds)
+    _remember(p, x.system, text.known, made)
+    told = {k: getattr(made, k) for k in ("scratch", "constants", "operations", "seconds")}
+    _write(p, digest(x.system, text.known), {**told, "known": text.known}, machine_code)
+    return made
+
+
+def digest(S: System, entries: list[Entry]) -> str:
+    """Hash of the values of some entries of the tables, to the last bit."""
+    values = np.array([getattr(S, name).ravel()[k] for name, k in entries], float)
+    return hashlib.sha256(repr(entries).encode() + values.tobytes()).hexdigest()[:16]
+
+
+def _in_memory(p: Plan, S: System) -> Made | None:
+    for key, (entries, made) in list(_found.items()):
+        if key[0] == p.key and key[1] == digest(S, entries):
+            return made
+    return None
+
+
+def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
+    _found[p.key, digest(S, entries)] = entries, made
+    while len(_found) > IN_MEMORY:
+        _found.popitem(last=False)
+
+
+# -- on disk
+
+
+@lru_cache(maxsize=1)
+def _folder() -> Path | None:
+    start_numba()
+    cache = cache_of(engine.function)
+    if not getattr(cache, "kept", False):
+        return None
+    return Path(cache.cache_path)
+
+
+def _files(p: Plan) -> list[Path]:
+    folder = _folder()
+    return sorted(folder.glob(f"made-{p.key}-*.bin")) if folder is not None else []
+
+
+def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], list[Entry], bytes]]:
+    """What files say that may serve a mechanism, and their code."""
+    for path in _files(p):
+        if (read := _read(path)) is not None:
+            told, machine_code = read
+            entries = [(str(name), int(k)) for name, k in told["known"]]
+            if path.stem.rpartition("-")[2] == digest(S, entries):
+                yield told, entries, machine_code
+
+
+def _on_disk(p: Plan, S: System) -> Made | None:
+    for told, entries, machine_code in _fitting(p, S):
+        with contextlib.suppress(RuntimeError):  # LLVM's, of wrong code
+            made = Made(Loaded(machine_code), *(told[k] for k in ("scratch", "constants", "operations", "seconds")))
+            _remember(p, S, entries, made)
+            return made
+    return None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], bytes] | None:
+    """What a file says, and its code; None if it is none of ours or damaged."""
+    try:
+        text = path.read_bytes()
+    except OSError:
+        return None
+    head, sum_of_rest, rest = text[: len(MARK)], text[len(MARK) : len(MARK) + 64], text[len(MARK) + 64 :]
+    if head != MARK or hashlib.sha256(rest).hexdigest().encode() != sum_of_rest:
+        return None
+    told, _, machine_code = rest.partition(b"\n")
+    return json.loads(told), machine_code
+
+
+def _write(p: Plan, of: str, told: dict[str, Any], machine_code: bytes) -> None:
+    """Leave it for others; where that cannot be, nothing is lost but time."""
+    folder = _folder()
+    if folder is None:
+        return
+    rest = json.dumps(told).encode() + b"\n" + machine_code
+    with contextlib.suppress(OSError):
+        handle, name = tempfile.mkstemp(dir=folder, prefix="made-", suffix=".part")
+        with os.fdopen(handle, "wb") as file:
+            file.write(MARK + hashlib.sha256(rest).hexdigest().encode() + rest)
+        Path(name).replace(folder / f"made-{p.key}-{of}.bin")
+        files = sorted(folder.glob("made-*.bin"), key=lambda path: path.stat().st_mtime)
+        for path in files[:-ON_DISK]:
+            path.unlink()

@@ -1,0 +1,50 @@
+"""Code made for one mechanism, in memory: the tables that have the engine call it."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..tables.system import FLAT, SCRATCH, System
+from .linked import ENTRIES
+from .machine import Loaded, tables_of
+
+_FUNCTION = ctypes.CFUNCTYPE(ctypes.c_double, *[ctypes.c_void_p] * 2, ctypes.c_double, *[ctypes.c_void_p] * 4)
+
+
+@dataclass(frozen=True)
+class Made:
+    """Code for one structure.
+
+    Attributes
+    ----------
+    loaded : Loaded
+        The machine code.
+    scratch, constants : int
+        Length of `Work.flat`; numbers that are reckoned once for a `System`.
+    operations : int
+        What has been compiled: operations of all procedures.
+    seconds : float
+        What tracing and compiling took [s of the processor].
+    """
+
+    loaded: Loaded
+    scratch: int
+    constants: int
+    operations: int
+    seconds: float
+
+    def system(self, S: System) -> System:
+        """The tables with the addresses in them; the code lives as long as the array in which they stand."""
+        memory = (ctypes.c_int64 * (FLAT + self.constants))()
+        memory.code = self.loaded  # type: ignore[attr-defined]
+        flat = np.frombuffer(memory, np.int64)  # type: ignore[call-overload]
+        flat[SCRATCH] = self.scratch
+        for k, name in enumerate(ENTRIES[1:], 1):
+            flat[k] = self.loaded.addresses[name]
+        tables = tables_of(S)
+        fill = _FUNCTION(self.loaded.addresses["CONSTANTS"])
+        fill(tables.ctypes.data, None, 0.0, flat.ctypes.data + 8 * FLAT, None, None, None)
+        return S._replace(flat=flat)
