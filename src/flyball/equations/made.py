@@ -10,9 +10,9 @@ d), four arrays among them, and returns a float:
     MOVE           a: v, b: z                   `projection.move`
     LOADS          a: state, b: rates of works  forces into W.vel[F_APPLIED]
     FACTOR, REUSE                               `solve.factor`, 0 or 1 + a guilty unknown; `solve.reuse`
-    STEP           a: f, b: gamma, c: x, d: lam  first pass of a solve; what is left, and its size
+    STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
     STEP_UNLOADED  the same with f = 0
-    REFINE         the same                     a pass for what is left
+    REFINE         the same                     a pass for what is left; what is left then, and its size
     FINISH         a: state, b: its derivative, c: x, d: lam   the derivative from the solution; 0, or it is not finite
     DRIFT          a: v, b: nu - G v            `projection.drift`: the largest; the size of its terms in W.flat[0]
 """

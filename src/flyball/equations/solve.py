@@ -219,14 +219,14 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
-    """By code made for the mechanism: one pass, then as many for what is left as it takes."""
+    """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
     worst = run(W.info[MADE + (STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = 1e300
-    for _ in range(refinements):
+    for _ in range(refinements + 1 if W.info[MADE + REFINE] != 0 else 0):
+        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
-        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
     return worst
 
 

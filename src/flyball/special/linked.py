@@ -10,7 +10,8 @@ from typing import Any
 
 from ..graph.node import Node
 from ..graph.operations import MULTIPLY, NUMBER, SYMBOL
-from ..graph.printers.llvm import Place, Procedure, operations
+from ..graph.printers.llvm import Place, Procedure
+from ..graph.printers.llvm_order import operations
 from ..tables.system import ARTICULATED, FLAT, SOLVER
 from .stages import FIRST_FREE, Stages
 

@@ -17,12 +17,13 @@ from ..equations.friction import reaction_loads
 from ..equations.motion import finish, loaded
 from ..equations.prescribed import prepare
 from ..equations.projection import drift, move, place
-from ..equations.rows import measured
+from ..equations.rows import measured, row_times
 from ..equations.scratch import work
-from ..equations.solve import excess, factor, pass_coupled, pass_schur, remainder, residual, turn_rows
+from ..equations.solve import excess, factor, inverse_mass, pass_coupled, pass_schur, remainder, residual, turn_rows
 from ..equations.within import kept, take_note
 from ..graph.node import Graph, Node, Symbol, Undecided
-from ..graph.printers.llvm import Place, Procedure, operations
+from ..graph.printers.llvm import Place, Procedure
+from ..graph.printers.llvm_order import operations
 from ..math.scalar import choose, larger
 from ..tables.specs import Structure
 from ..tables.system import (
@@ -58,6 +59,12 @@ from ..tables.system import (
 from ..tracing.trace import TABLES
 
 PLAIN = (0.0, 1.0, -1.0)  # entries of tables that the code may know
+SOLVES = (
+    "STEP",
+    "STEP_UNLOADED",
+    "REFINE",
+    "DRIFT",
+)  # best in the order in which they are made
 FIRST_FREE = 2  # of Work.flat: two entries have a meaning of their own
 TERMS, LOADED = 0, 1
 """Entries of Work.flat: the size of the terms that `DRIFT` has met; whether the solve that goes on is loaded."""
@@ -164,7 +171,9 @@ class Stages:
         """Another procedure; what formulas took for granted meanwhile makes it return a number greater than 0."""
         granted, self.graph.granted = self.graph.granted, []
         checks = [([x], what, k + 1.0) for k, (x, what) in enumerate(granted)]
-        made = Procedure(name, reads, stores, returned, checks)
+        made = Procedure(
+            name, reads, stores, returned, checks, name not in ("STEP", "STEP_UNLOADED", "REFINE", "DRIFT")
+        )
         self.procedures[name] = made
         return made
 
@@ -321,29 +330,26 @@ class Stages:
         return reads
 
     def stepped(self, name: str, is_loaded: bool, reads: dict[int, Place]) -> None:
-        """First pass of a solve; what is left then."""
+        """Begin of a solve: what there is without the rows' multipliers, and what is left of the equations."""
         S, W = self.S, self.W
         f, gamma = self._symbols("f", self.nv), self._symbols("gamma", self.nr)
         reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
         x, lam = np.array([0.0] * self.nv, object), np.array([0.0] * self.nr, object)
         W.row[R1] = gamma
-        W.vel[V2] = 0.0
+        W.vel[V2] = W.vel[EFFORT] = 0.0
         if is_loaded:
             reads |= self.fresh("vel", GIVEN, self.driven)
             x[self.driven] = W.vel[GIVEN, self.driven]
-        worst: Any = 0.0
         if S.kinds[SOLVER] == SCHUR:
-            W.vel[V2] = f if is_loaded else 0.0
-            pass_schur(S, W, W.vel[V2], x, lam, is_loaded)
-            worst = self.schur_left(gamma, x)
-        elif S.kinds[SOLVER] == COUPLED:
-            if is_loaded:
-                remainder(S, W, f, gamma, x, lam, W.vel[V2], True)
-            worst = pass_coupled(S, W, f, gamma, x, lam, W.vel[V2], is_loaded)
-        else:
+            for b in range(len(S.body_i)) if is_loaded else ():
+                inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
+            W.row[R1] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
+        elif S.kinds[SOLVER] == COUPLED and is_loaded:
+            remainder(S, W, f, gamma, x, lam, W.vel[V2], True)
+        elif S.kinds[SOLVER] == ARTICULATED:
             articulated_solve(S, W, f, x, W.vel[EFFORT])
         stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
-        self.add(name, reads, stores, worst)
+        self.add(name, reads, stores)
 
     def solution(self, x: np.ndarray, lam: np.ndarray) -> list[tuple[Place, Any]]:
         """What a pass leaves: the solution, what is left of the equations, efforts of drivers."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..graph.node import Undecided
-from ..graph.printers.llvm import Unprintable, operations
+from ..graph.printers.llvm import Unprintable
+from ..graph.printers.llvm_order import operations
 from ..graph.values import reached
 from ..tables.specs import Structure
 from ..tables.system import System
