@@ -34,6 +34,8 @@ from .trace import Entry, Refused, traced
 MARK = b"flyball: code made for one mechanism\n"
 IN_MEMORY, ON_DISK = 64, 200
 """How many are kept."""
+TOLD = ("scratch", "constants", "operations", "laws", "seconds")
+"""What a file says of its code."""
 _LOCK = threading.RLock()
 _found: OrderedDict[tuple[str, str], tuple[list[Entry], Made]] = OrderedDict()
 _refused: dict[str, str] = {}
@@ -95,9 +97,9 @@ def _made(p: Plan, x: Values) -> Made:
         raise
     machine_code = assembled(text.text)
     seconds = time.process_time() - begun
-    made = Made(Loaded(machine_code), text.scratch, text.constants, text.operations, seconds)
+    made = Made(Loaded(machine_code, text.laws), text.scratch, text.constants, text.operations, text.laws, seconds)
     _remember(p, x.system, text.known, made)
-    told = {k: getattr(made, k) for k in ("scratch", "constants", "operations", "seconds")}
+    told = {k: getattr(made, k) for k in TOLD}
     _write(p, digest(x.system, text.known), {**told, "known": text.known}, machine_code)
     return made
 
@@ -151,7 +153,7 @@ def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], list[Entry], 
 def _on_disk(p: Plan, S: System) -> Made | None:
     for told, entries, machine_code in _fitting(p, S):
         with contextlib.suppress(RuntimeError):  # LLVM's, of wrong code
-            made = Made(Loaded(machine_code), *(told[k] for k in ("scratch", "constants", "operations", "seconds")))
+            made = Made(Loaded(machine_code, told["laws"]), *(told[k] for k in TOLD))
             _remember(p, S, entries, made)
             return made
     return None

@@ -25,9 +25,9 @@ LEFT = ("W_G", "W_FK")
 """Arrays that nobody writes to but the procedures."""
 ENTRIES = (
     "SCRATCH", "PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH",
-    "DRIFT",
+    "DRIFT", "SHOW", "SAMPLED",
 )  # fmt: skip
-"""Entries of `System.flat` by name; the first is a length, all others are addresses."""
+"""Entries of `System.flat` by name; the first is a length, the last a number of an entry; all others are addresses."""
 
 
 class Linked:
@@ -51,7 +51,8 @@ class Linked:
         before = dict(BEFORE)
         if stages.S.kinds[SOLVER] == ARTICULATED:
             before["STEP"] = before["STEP_UNLOADED"] = ("PLACE", "FACTOR")
-        for name in ENTRIES:
+        self.laws = stages.laws
+        for name in (*ENTRIES, *filter(None, self.laws)):
             if name in made:
                 self._link(made[name], [made[k] for k in before.get(name, ())])
         stores: list[tuple[Place, Any]] = [(("a", k), x) for k, x in enumerate(self.hoisted)]

@@ -6,7 +6,7 @@ entries are symbols, so that the code holds for other values of parameters; entr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,14 @@ from ..equations.friction import reaction_loads
 from ..equations.motion import finish, loaded
 from ..equations.prescribed import prepare
 from ..equations.projection import drift, move, place
-from ..equations.rows import measured, row_times
+from ..equations.rows import BY_TIME, measured, row_times
 from ..equations.scratch import work
 from ..equations.solve import excess, factor, inverse_mass, pass_coupled, pass_schur, remainder, residual, turn_rows
-from ..equations.within import kept, take_note
+from ..equations.within import LAWS, kept, law_at, take_note
 from ..graph.node import Graph, Node, Symbol, Undecided
 from ..graph.printers.llvm import Place, Procedure
 from ..graph.printers.llvm_order import operations
+from ..laws.evaluation import brief, evaluate, evaluate_jet
 from ..math.scalar import choose, larger
 from ..tables.specs import Structure
 from ..tables.system import (
@@ -65,9 +66,9 @@ SOLVES = (
     "REFINE",
     "DRIFT",
 )  # best in the order in which they are made
-FIRST_FREE = 2  # of Work.flat: two entries have a meaning of their own
-TERMS, LOADED = 0, 1
-"""Entries of Work.flat: the size of the terms that `DRIFT` has met; whether the solve that goes on is loaded."""
+FIRST_FREE = 4  # of Work.flat: some entries have a meaning of their own
+TERMS, LOADED, INPUT, INPUT_RATE = range(4)
+"""The size of the terms that `DRIFT` has met; whether the solve that goes on is loaded; what a law depends on."""
 
 
 def symbols(S: System, graph: Graph, known: Sequence[tuple[str, int]] = ()) -> tuple[System, dict[int, Place]]:
@@ -111,6 +112,9 @@ class Stages:
         self.q, self.v = self._symbols("q", s.nq), self._symbols("v", s.nv)
         self.z = self._symbols("z", len(s.states))
         self.widths = {k: x.shape[1] for k, x in self.W._asdict().items() if np.ndim(x) == 2}
+        self.read_by_others = self.entries((self._advanced, self._weighed))
+        self.read_at_ends = self.entries((self._remembered, self._noted), far=True)
+        self.finishes = self._progresses()
         self.prepared()
         self.placed()
         self.moved()
@@ -118,6 +122,7 @@ class Stages:
         self.finished()
         self.solved()
         self.drifted()
+        self.sampled()
 
     # -- symbols and places
 
@@ -197,7 +202,6 @@ class Stages:
         """Poses and rows."""
         nm, nr = self.nm, self.nr
         reads = self.fresh("sensed", VALUE, range(nm, 2 * nm))  # rates, as last measured
-        self.entries()
         place(self.S, self.W, self.t, self.q, self.z)
         rows = range(nr)
         stores = [x for r in (G_VALUE, NU, NU_DOT) for x in self.stored("row", r, rows)]
@@ -207,14 +211,15 @@ class Stages:
         stores += [(self.at("FK", *e), self.W.FK[e]) for e in self.read_by_others if e[1] < 12]
         reads |= {**self.given("a", self.q), **self.given("b", self.z), **self.time}
         self.add("PLACE", reads, stores)
+        shown = [(self.at("FK", *e), self.W.FK[e]) for e in self.read_at_ends if e[1] < 12]
+        self.add("SHOW", self.given("a", self.q), shown)
 
-    def entries(self) -> None:
-        """Which entries of the frames' records others read: those that count turns, sample laws, weigh reactions."""
+    def entries(self, readers: Sequence[Callable[[Work], list[Any]]], far: bool = False) -> list[tuple[int, int]]:
+        """Entries of the frames' records that others read; all positions if they ask how ``far`` frames are."""
         S, FK, graph = self.S, self.W.FK, self.graph
         moving = range(S.kinds[GROUND_FRAMES], S.kinds[FRAMES])
-        asked = {(k, c) for k in moving for c in range(3)}  # `projection.rounding`
-        self.finishes = True
-        for reader in (self._advanced, self._remembered, self._noted, self._weighed):
+        asked = {(k, c) for k in moving for c in range(3)} if far else set()
+        for reader in readers:
             trial = FK.copy()
             names = {}
             for k in moving:
@@ -225,9 +230,16 @@ class Stages:
                 found = reader(self.W._replace(FK=trial))
             except Undecided:
                 found = list(trial[list(moving)].ravel())
-                self.finishes &= reader != self._advanced
             asked |= {names[x.index] for x in operations(found, {}) if x.index in names}
-        self.read_by_others = sorted(asked)
+        return sorted(asked)
+
+    def _progresses(self) -> bool:
+        """Whether expressions can say how places on curves go on."""
+        try:
+            self._advanced(self.W._replace(FK=self._symbols("FK?", self.W.FK.size).reshape(self.W.FK.shape)))
+        except Undecided:
+            return False
+        return True
 
     def _advanced(self, W: Work) -> list[Any]:
         """Nothing, if expressions can do it."""
@@ -261,7 +273,7 @@ class Stages:
         stores = self.stored("row", GAMMA, range(self.nr))
         stores += self.stored("sensed", RATE, range(nm)) + self.stored("sensed", BIAS, range(nm))
         stores += self.stored("sensed", VALUE, range(nm, 2 * nm))
-        stores += [(self.at("FK", *e), self.W.FK[e]) for e in self.read_by_others if e[1] >= 12]
+        stores += [(self.at("FK", *e), self.W.FK[e]) for e in (*self.read_by_others, *self.read_at_ends) if e[1] >= 12]
         self.add("MOVE", {**self.given("a", self.v), **self.given("b", self.z), **self.time}, stores)
 
     def loaded(self) -> None:
@@ -397,3 +409,25 @@ class Stages:
         worst, size = drift(self.S, self.W, self.v, out)
         stores = [(("b", k), x) for k, x in enumerate(out)] + [(("W_flat", TERMS), size)]
         self.add("DRIFT", self.given("a", self.v), stores, worst)
+
+    def sampled(self) -> None:
+        """Laws that may do much within a step, one by one."""
+        S, W = self.S, self.W
+        sensed = np.full((3, 2 * self.nm), None, object)
+        sensed[VALUE] = values = self._symbols("within", 2 * self.nm)
+        inputs = (self.t, *self._symbols("input", 2))
+        forces = LAWS * len(S.force_i)
+        self.laws: list[str] = []
+        for k in range(forces + len(S.row_i) + len(S.body_i)) if kept(S).shape[1] else ():
+            law = law_at(S, k)
+            self.laws.append("")
+            if law < 0 or not brief(S.code, law):
+                continue
+            if k < forces:
+                value = evaluate(S.code, S.const, law, W.stack, inputs, sensed)
+            else:
+                value = evaluate_jet(S.code, S.const, law, W.stack, self.t, sensed, BY_TIME)[2]
+            reads = {**self.time, **self.given("a", values)}
+            reads |= {x.index: ("W_flat", INPUT + n) for n, x in enumerate(inputs[1:])}
+            self.laws[k] = f"LAW{k}"
+            self.add(self.laws[k], reads, [], value)

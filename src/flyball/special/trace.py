@@ -31,7 +31,7 @@ class Text:
     text : str
     known : list of Entry
         Entries of the tables whose very values are in it, since a formula decides by them.
-    scratch, constants, operations : int
+    scratch, constants, operations, laws
         As in `Made`.
     """
 
@@ -40,6 +40,7 @@ class Text:
     scratch: int
     constants: int
     operations: int
+    laws: list[str]
 
 
 def traced(s: Structure, S: System) -> Text:
@@ -60,7 +61,7 @@ def traced(s: Structure, S: System) -> Text:
             known |= more
         linked = Linked(stages)
         count = sum(len(operations(p.results, p.reads)) for p in linked.procedures)
-        return Text(module_of(linked), sorted(known), linked.scratch, linked.constants, count)
+        return Text(module_of(linked), sorted(known), linked.scratch, linked.constants, count, linked.laws)
     except Undecided as error:
         raise Refused(f"a formula of it decides by where it is ({error})") from error
     except Unprintable as error:
