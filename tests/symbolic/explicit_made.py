@@ -10,8 +10,7 @@ import flyball as fb
 from flyball.analysis.motion.start import begin
 from flyball.equations.tasks import MOTION
 from flyball.graph.values import evaluate
-from flyball.symbolic.explicit.begun import begun
-from flyball.symbolic.explicit.states import StateEquations, state_equations
+from flyball.symbolic.explicit.states import StateEquations
 
 
 def pendulum() -> fb.Mechanism:
@@ -32,14 +31,15 @@ def cart_pole() -> fb.Mechanism:
     return m
 
 
-def states_of(m: fb.Mechanism, coordinates: str = "auto", **more) -> StateEquations:
-    return state_equations(*begun(m, coordinates), **more)
+def states_of(m: fb.Mechanism, coordinates: str = "auto", independent=(), inputs=(), outputs=()) -> StateEquations:
+    return m.symbolic(coordinates=coordinates, inputs=inputs).state_space(outputs, independent=independent)
 
 
 @lru_cache(maxsize=4)
 def _nodes(s: StateEquations) -> list:
-    e, n = s.equations, s.equations.traced
-    return e.inlined([n.graph.node(y) for y in (*n.q, *n.v, *e.accelerations)])
+    e, n = s.explicit.solution, s.explicit.solution.traced
+    own = [n.graph.node(y) for y in s.equations.formulated.own_q]
+    return e.inlined([*own, *n.v, *s.equations.formulated.vdot])
 
 
 def engine(m: fb.Mechanism, coordinates: str, t: float, q, v) -> np.ndarray:
@@ -51,8 +51,8 @@ def engine(m: fb.Mechanism, coordinates: str, t: float, q, v) -> np.ndarray:
 
 
 def whole(s: StateEquations, x, t: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All coordinates, velocities and accelerations at a state."""
-    n = s.equations.traced
+    """The engine's coordinates, velocities and accelerations at a state."""
+    n = s.explicit.solution.traced
     found = np.array(evaluate(_nodes(s), s.point(x, t=t)), float)
     nq, nv = len(n.q), len(n.v)
     return found[:nq], found[nq : nq + nv], found[nq + nv :]

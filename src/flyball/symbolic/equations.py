@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -24,6 +24,10 @@ from .formulated import Formulated, Place, formulated, objects
 from .names import text
 from .quantities import Quantities
 from .state import named_state, places_at
+
+if TYPE_CHECKING:
+    from .explicit.explicit import ExplicitEquations
+    from .explicit.states import StateEquations
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -250,6 +254,53 @@ class Equations:
             The body on which it acts; the second one if not given. The torque is about the joint's point on that.
         """
         return self.quantities.reaction(joint, axes, on)
+
+    # -- without constraints
+
+    def explicit(self, independent: Sequence[str] = (), *, closed: bool = False) -> ExplicitEquations:
+        """Equations of motion without constraints and multipliers, in independent coordinates.
+
+        Parameters
+        ----------
+        independent : sequence of str
+            Coordinates such as ``"A.angle"``, as many as there are freedoms; chosen by pivoting at the start if not
+            given.
+        closed : bool
+            Whether to refuse mechanisms whose loops have no closed form; else what has none is an implicit function.
+
+        Raises
+        ------
+        ModelError
+            If a name does not exist, or the coordinates named depend on one another, are too many or too few.
+        SingularityError
+            If the mechanism is drawn in a singular position.
+        """
+        from .explicit.explicit import explicit
+
+        return explicit(self, independent, closed)
+
+    def state_space(
+        self, outputs: Sequence[str] = (), *, independent: Sequence[str] = (), closed: bool = False
+    ) -> StateEquations:
+        """The nonlinear state space x' = f(x, u, t), y = h(x, u, t); the inputs u are those of `Mechanism.symbolic`.
+
+        Parameters
+        ----------
+        outputs : sequence of str
+            Anything that a result has: coordinates, sensors, reactions such as ``"A.fx"``, energies.
+        independent, closed
+            As for `explicit`.
+
+        Raises
+        ------
+        ModelError
+            As for `explicit`; if an output does not exist or is not determined.
+        SingularityError
+            If the mechanism is drawn in a singular position.
+        """
+        from .explicit.states import StateEquations
+
+        return StateEquations(self.explicit(independent, closed=closed), outputs)
 
     # -- numbers
 

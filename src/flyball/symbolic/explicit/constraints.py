@@ -34,19 +34,21 @@ class Constraints:
 
 
 def constraints(x: Traced) -> Constraints:
-    """Rows first, in the order of the multipliers, then prescribed coordinates in the order of the structure."""
+    """Rows first, in the order of the multipliers, then prescribed coordinates."""
     s, S, W = x.structure, x.system, x.work
-    n = len(s.prescribed)
+    there = len(x.g) > len(s.rows)  # prescribed coordinates are among the rows already
+    n = 0 if there else len(s.prescribed)
+    later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
     G, g, nu, gamma = zeros((n, s.nv)), zeros((n,)), zeros((n,)), zeros((n,))
-    for k, b in enumerate(s.prescribed.values()):
+    for k, b in enumerate(s.prescribed[name] for name in later[:n]):
         law = S.body_i[b, BODY_LAW]
         value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)
         G[k, S.body_i[b, V0]] = 1.0
         g[k] = x.q[S.body_i[b, Q0]] - (value - S.body_x[b, OFFSET])
         nu[k], gamma[k] = rate, second
     return Constraints(
-        [r.element.name for r in s.rows] + list(s.prescribed),
-        np.array([r.holonomic for r in s.rows] + [True] * n, bool),
+        [r.element.name for r in s.rows] + later,
+        np.array([r.holonomic for r in s.rows] + [True] * len(later), bool),
         np.concatenate([x.g, g]),
         np.concatenate([x.G.reshape(-1, s.nv), G]),
         np.concatenate([x.nu, nu]),

@@ -1,240 +1,222 @@
-"""Explicit differential equations: constraints and multipliers taken out by coordinate partitioning.
-
-    w = w(u, t),  w' = G_w^-1 (nu - G_u u'),  w'' = G_w^-1 (gamma - G_u u'')
-    Z^T M Z u'' = Z^T (f - M b),  Z = [1; -G_w^-1 G_u],  b = [0; G_w^-1 gamma]
-    G_w^T lam = (M v' - f)_w
-
-(Wehage and Haug 1982, J. Mech. Des. 104; Hahn, *Rigid Body Dynamics of Mechanisms 1*, eq. 4.84). Nothing is inverted:
-see `solve`.
-"""
+"""Explicit differential equations of a mechanism, in independent coordinates that have names."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...errors import ModelError
-from ...graph.node import Node
-from ...model.model import listing
+from ...graph.derivative import tangents
+from ...graph.node import Node, Symbol
+from ...graph.values import evaluate
+from ...model.body import Driver
+from ...model.model import suggest
 from ...numerics.rank import parts
-from ...tables.names import velocity_names
 from ...tracing.trace import Traced
-from .blocks import blocks
-from .constraints import constraints
-from .definition import Definition, inlined
-from .partition import free, named, positions
-from .place import Place
-from .positions import Solved, solved_positions
-from .solve import Determinants, pattern, solve, solve_symmetric, times, transposed, zeros
+from ..expressions import Expressions
+from .definition import with_formulas
+from .reduced import More, Reduced, reduced
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+FELT = 1e-8  # part by which something may change with multipliers that act on nothing
 
 
-class Start(NamedTuple):
-    """Where a mechanism is, assembled: numbers of time, coordinates, velocities and counting states."""
-
-    t: float
-    q: Sequence[float]
-    v: Sequence[float]
-    z: Sequence[float] = ()
-
-
-@dataclass
 class ExplicitEquations:
-    """Equations of motion in independent coordinates; see `explicit`.
+    """Equations of motion without constraints and multipliers, M a = f, by coordinate partitioning.
+
+    The independent coordinates u determine the others, w: by formulas where loops close in closed form, in the mode of
+    assembly that is drawn; else by their equations, which Newton's method solves. Velocities and accelerations of the
+    others follow from the constraints' derivatives (Wehage and Haug 1982), exactly.
+
+        M a = f,   M = Z^T M Z,   f = Z^T (f - M b),   v = Z u' + b',   v' = Z a + b
 
     Attributes
     ----------
-    names : tuple of str
-        Velocities, by the coordinates that they are rates of.
-    known : list of int
-        Which coordinates q are given: the independent ones; of quaternions all four.
-    chosen : list of int
-        Which velocities v are independent.
-    definitions : list of Definition
-        Dependent coordinates, velocities, accelerations, multipliers and loads of joints, each from what stands before.
-    M, f : ndarray of Node (n, n), (n,)
-        Reduced: M a = f, a the accelerations of the independent coordinates.
-    accelerations : ndarray of Node (nv,)
-        Symbols-free where all coordinates have formulas.
+    equations : Equations
+        Those with constraints.
+    independent : tuple of str
+        Independent coordinates.
+    dependent : tuple of str
+        Those that have a formula, in the order in which they are found: each may hold those before it.
+    implicit : tuple of str
+        Coordinates (and loads of joints with friction) that have none.
+    notes : tuple of str
+        Why they have none.
+    branches : dict
+        From each dependent coordinate to the form of its equation and the branch that is taken.
     """
 
-    traced: Traced
-    start: Start
-    names: tuple[str, ...]
-    known: list[int]
-    chosen: list[int]
-    dependent: list[int]
-    positions: list[Definition]
-    definitions: list[Definition]
-    M: np.ndarray
-    f: np.ndarray
-    Z: np.ndarray
-    accelerations: np.ndarray
-    multipliers: np.ndarray
-    determinants: dict[str, Any] = field(default_factory=dict)
-    undetermined: tuple[str, ...] = ()
-    notes: list[str] = field(default_factory=list)
+    def __init__(self, equations: Equations, solution: Reduced, inputs: dict[str, Node]) -> None:
+        self.equations, self.solution, self.inputs = equations, solution, inputs
+        self.independent = solution.independent
+        formulas = [d for d in solution.positions if d.closed]
+        self.dependent = tuple(n for d in formulas for n in d.names)
+        self.branches = {n: d.how for d in formulas for n in d.names}
+        self.implicit = tuple(n for d in with_formulas(solution.definitions) for n in d.names)
+        self.notes = tuple(solution.notes)
+
+    # -- parts
+
+    def _told(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
+        x = np.asarray(nodes, object)
+        out = np.empty(x.shape, object)
+        out.ravel()[:] = self.solution.inlined([self.equations.graph.node(y) for y in x.ravel()])
+        return Expressions(self.equations, out, rows, columns)
 
     @property
-    def independent(self) -> tuple[str, ...]:
-        """Names of the independent coordinates."""
-        return tuple(self.names[d] for d in self.chosen)
+    def M(self) -> Expressions:
+        """Reduced mass matrix, along the independent velocities."""
+        return self._told(self.solution.M, self.independent, self.independent)
 
-    def inlined(self, nodes: Sequence[Any]) -> list[Any]:
-        """Expressions of q, v, lam in terms of the independent coordinates, their rates, and what has no formula."""
-        return inlined(nodes, self.definitions)
+    @property
+    def f(self) -> Expressions:
+        """Reduced forces, along the independent velocities."""
+        return self._told(self.solution.f, self.independent)
+
+    @property
+    def Z(self) -> Expressions:
+        """What the velocities change with the independent ones: v = Z u' + what drivers do."""
+        return self._told(self.solution.Z, self.solution.names, self.independent)
+
+    @property
+    def accelerations(self) -> Expressions:
+        """Of the independent coordinates, solved for in straight-line code (L D L^T)."""
+        return self._told(self.solution.accelerations[self.solution.chosen], self.independent)
+
+    def formula(self, coordinate: str) -> Expressions:
+        """A dependent coordinate as it is found: it may hold others that are found before.
+
+        Raises
+        ------
+        ModelError
+            If it has no formula, or is independent.
+        """
+        for d in self.solution.positions:
+            if coordinate in d.names and d.closed:
+                return Expressions(self.equations, d.values[d.names.index(coordinate)], unit=self._unit(coordinate))
+        if coordinate in self.independent:
+            raise ModelError(f"{coordinate!r} is independent: it has no formula")
+        known = {*self.dependent, *self.implicit}
+        if coordinate in self.implicit:
+            raise ModelError(f"{coordinate!r} has no formula: {'; '.join(self.notes)}")
+        raise ModelError(f"there is no dependent coordinate {coordinate!r}{suggest(coordinate, known)}")
+
+    def conditions(self, coordinate: str) -> Expressions:
+        """What vanishes where an implicit coordinate is right: the equations that it shares with others.
+
+        Raises
+        ------
+        ModelError
+            If it is not implicit.
+        """
+        for d in with_formulas(self.solution.definitions):
+            if coordinate in d.names:
+                return self._told(d.residuals, d.names)
+        raise ModelError(f"{coordinate!r} is not implicit; these are: {', '.join(self.implicit) or 'none'}")
+
+    @property
+    def determinants(self) -> dict[str, Expressions]:
+        """What must not vanish, by what it determines: where it does, the partition is singular."""
+        return {k: self._told(x) for k, x in self.solution.determinants.items()}
+
+    def __getitem__(self, name: str) -> Expressions:
+        """Anything that a result has, in the independent coordinates, their rates, and what has no formula.
+
+        Raises
+        ------
+        ModelError
+            If there is nothing of that name, or redundant constraints leave it undetermined.
+        """
+        found = self.equations[name]
+        self._refuse_undetermined(name, found)
+        told = self._told(found.nodes, found.rows, found.columns)
+        return Expressions(self.equations, told.nodes, found.rows, found.columns, found.unit)
+
+    def _unit(self, name: str) -> str:
+        return str(self.equations.symbol(name).data.unit) if name in self.equations.named else "rad"
+
+    def _refuse_undetermined(self, name: str, x: Expressions) -> None:
+        s = self.solution
+        place = s.place
+        if not s.undetermined:
+            return
+        y = parts(place.G * place.scale).dependencies
+        values = place.values | {a.data.name: 0.0 for a in self.equations.formulated.vdot}
+        lam = s.traced.lam
+        slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
+        among = np.abs(y[: len(lam)].T @ slope)
+        if (among > FELT * max(1.0, float(np.abs(slope).max(initial=0.0)))).any():
+            raise ModelError(
+                f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
+                "for other quantities, or take the redundancy out: m.mobility() names it"
+            )
+
+    @staticmethod
+    def _slope(nodes: list[Any], by: Node, values: dict[str, float]) -> list[float]:
+        return [float(y) for y in evaluate(tangents(nodes, [(by, 1.0)]), values)]
+
+    def __repr__(self) -> str:
+        return (
+            f"<explicit equations of {self.equations.model.name!r} in {', '.join(self.independent) or 'nothing free'}>"
+        )
+
+    def __str__(self) -> str:
+        lines = [
+            f"explicit equations of {self.equations.model.name!r}: M a = f",
+            f"independent: {', '.join(self.independent) or 'none, drivers leave no freedom'}",
+            *(f"{name}: {how}" for name, how in self.branches.items()),
+            *self.notes,
+        ]
+        size = {k: getattr(self, k).operations for k in ("M", "f")}
+        return "\n".join([*lines, f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}"])
 
 
-def explicit(x: Traced, start: Start, independent: Sequence[str] = ()) -> ExplicitEquations:
-    """Solve a mechanism's equations for the accelerations of independent coordinates.
+def explicit(equations: Equations, independent: Sequence[str] = (), closed: bool = False) -> ExplicitEquations:
+    """Take constraints and multipliers out: see `Equations.explicit`."""
+    eq, x = equations, equations.formulated
+    traced, inputs = with_rates(eq)
+    places = [(p.symbol, p.equation) for p in x.places]
+    found = reduced(traced, eq.start, independent, More(x.vdot, places))
+    out = ExplicitEquations(eq, found, inputs)
+    if closed and out.implicit:
+        raise ModelError(
+            f"{eq.model.name!r} has no closed form: {'; '.join(found.notes)}. Leave out closed: these coordinates are "
+            "implicit functions then, with exact derivatives"
+        )
+    return out
 
-    Parameters
-    ----------
-    x : Traced
-    start : Start
-        An assembled position: it tells the branch of every dependent coordinate.
-    independent : sequence of str
-        Coordinates such as ``"A.angle"``; chosen by pivoting at the start if none are named.
+
+def with_rates(eq: Equations) -> tuple[Traced, dict[str, Node]]:
+    """Equations in which inputs that move drivers have rates, and all inputs by name.
 
     Raises
     ------
     ModelError
-        If a name does not exist, the coordinates named depend on one another, or are too many or too few.
-    SingularityError
-        If the start is singular.
+        If a parameter that is an input changes the constraints.
     """
-    c = constraints(x)
-    place = Place(x, c, start)
-    names = tuple(n.name for n in velocity_names(x.structure))
-    chosen, rows = _chosen(x, place, names, independent)
-    known, holonomic, unknown = _positions(x, place, chosen)
-    solved = solved_positions(x, place, c, (holonomic, unknown))
-    return _Reduction(x, start, names, place).equations(known, chosen, rows, solved)
+    x, g = eq.formulated.traced, eq.graph
+    given = {name: eq.symbol(name) for name in eq.inputs}
+    nu, gamma = x.nu.copy(), x.gamma.copy()
+    inputs: dict[str, Node] = {}
+    for name, u in given.items():
+        inputs[name] = u
+        part = eq.model[name] if any(name == d.name for d in eq.model.drivers) else None
+        if isinstance(part, Driver):
+            k = x.structure.slices[name].start
+            rates = [g.symbol(Symbol(f"{name}{p}", "input", "", f"{u.data.unit}/s{n}"), 0.0) for p, n in RATES]
+            nu[k], gamma[k] = nu[k] + rates[0], gamma[k] + rates[1]
+            inputs |= {r.data.name: r for r in rates}
+            eq.formulated.named.update({r.data.name: r for r in rates})
+        elif any(y != 0.0 for y in tangents([*x.g, *x.nu], [(u, 1.0)])):
+            raise ModelError(
+                f"input {name!r} changes constraints, so that its rates act too; let a driver do that, and name that"
+            )
+    return replace(x, nu=nu, gamma=gamma), inputs
 
 
-def _chosen(x: Traced, place: Place, names: Sequence[str], wanted: Sequence[str]) -> tuple[list[int], list[int]]:
-    """Independent velocities, and constraints that determine the others."""
-    model = x.structure.model.name
-    if isinstance(wanted, str):
-        wanted = [wanted]
-    at = named(names, wanted, model)
-    G = place.G
-    for name, d in zip(wanted, at, strict=True):
-        if any(G[k, d] and np.count_nonzero(G[k]) == 1 for k in range(len(G))):
-            by = [place.c.elements[k] for k in range(len(G)) if G[k, d] and np.count_nonzero(G[k]) == 1]
-            raise ModelError(f"{name!r} is not independent: {by[0]!r} gives it; name another coordinate")
-    try:
-        found = free(G, place.scale, at, only=bool(wanted))
-    except ValueError as error:
-        d = int(error.args[0])
-        others = [n for n in wanted if n != names[d]]
-        what = f"of {', '.join(others)}" if others else "at the start: nothing moves along it"
-        best = [names[k] for k in free(G, place.scale).chosen]
-        raise ModelError(
-            f"{names[d]!r} is not independent {what}; {listing(best) if best else 'drivers leave no freedom'}"
-        ) from None
-    freedoms = len(names) - len(found.rows)
-    if wanted and len(found.chosen) < freedoms:
-        best = [names[k] for k in free(G, place.scale, at).chosen if k not in at]
-        raise ModelError(
-            f"{model!r} has {freedoms} freedoms, and independent names {len(at)}; add others, such as {', '.join(best)}"
-        )
-    place.refuse_singular(found)
-    return found.chosen, found.rows
-
-
-def _positions(x: Traced, place: Place, chosen: list[int]) -> tuple[list[int], list[int], list[int]]:
-    """Coordinates that are given; constraints that determine the others; those others."""
-    which = np.flatnonzero(place.c.holonomic)
-    free_places = set(free(place.G[which], place.scale, chosen).chosen)
-    known: list[int] = []
-    unknown: list[int] = []
-    moved: list[int] = []
-    for q, v in positions(x.structure):
-        if any(d in free_places for d in v):
-            known += q
-        else:
-            unknown += q
-            moved += v
-    G = place.G[np.ix_(which, np.array(moved, int))]
-    rows = free(G, place.scale[moved]).rows
-    return known, which[rows].tolist(), unknown
-
-
-@dataclass
-class _Reduction:
-    """The steps from constraints to explicit equations, and the names of what must not vanish on the way."""
-
-    x: Traced
-    start: Start
-    names: tuple[str, ...]
-    place: Place
-    singular: dict[str, Any] = field(default_factory=dict)
-
-    def equations(self, known: list[int], chosen: list[int], rows: list[int], solved: Solved) -> ExplicitEquations:
-        x, nv = self.x, len(self.names)
-        for name, value in solved.never:
-            self.singular[f"positions of {name}"] = value
-        c = self.place.c
-        dependent = [d for d in range(nv) if d not in chosen]
-        G = self.place.probe.cleaned(c.G[rows])
-        Gw, order = G[:, dependent], blocks(pattern(G[:, dependent]))
-        right = np.concatenate([G[:, chosen], c.nu[rows][:, None], c.gamma[rows][:, None]], axis=1)
-        dets = Determinants()
-        X = solve(Gw, right, dets, order)
-        self._told("constraints for", dets, [self.names[d] for d in dependent])
-        n = len(chosen)
-        Z, b = zeros((nv, n)), zeros((nv,))
-        Z[chosen] = np.eye(n)
-        Z[dependent], b[dependent] = -X[:, :n], X[:, n + 1]
-        u = np.array([x.v[d] for d in chosen], object)
-        w = X[:, n] + times(Z[dependent], u)
-        definitions = [*solved.definitions, *self._each([x.v[d] for d in dependent], w, "constraints on velocities")]
-        M = times(Z.T, times(x.M, Z))
-        f = times(Z.T, x.f - times(x.M, b))
-        pivots = Determinants()
-        a = solve_symmetric(M, f[:, None], pivots)[:, 0] if n else zeros((0,))
-        self._told("inertia of", pivots, [self.names[d] for d in chosen])
-        vdot = times(Z, a) + b
-        dets = Determinants()
-        missing = (times(x.M, vdot) - x.f)[dependent]
-        lam = solve(Gw.T, missing[:, None], dets, transposed(order or []))[:, 0]
-        definitions += self._multipliers(rows, lam)
-        return ExplicitEquations(
-            x, self.start, self.names, known, chosen, dependent, solved.definitions, definitions, M, f, Z, vdot,
-            self._all(rows, lam), self.singular, self._undetermined(rows), solved.notes,
-        )  # fmt: skip
-
-    def _each(self, symbols: Sequence[Node], values: Any, how: str) -> list[Definition]:
-        return [Definition((s,), (y,), (), how) for s, y in zip(symbols, values, strict=True)]
-
-    def _multipliers(self, rows: list[int], lam: np.ndarray) -> list[Definition]:
-        """Multipliers of rows; those of redundant rows are declared nothing. Loads that follow from them."""
-        x = self.x
-        all_ = self._all(rows, lam)
-        out: list[Definition] = []
-        if x.loads:  # these are in f, and so in the multipliers
-            into: Mapping[int, Any] = dict(enumerate(all_))
-            found = Definition(tuple(x.lam), tuple(into[k] for k in range(len(x.lam))))
-            returned = inlined([x.graph.node(y) for y in x.returned], [found])
-            gaps = tuple(s - y for s, y in zip(x.loads, returned, strict=True))
-            out.append(Definition(tuple(x.loads), (), gaps, "loads of joints that return themselves"))
-        return out + self._each(x.lam, all_[: len(x.lam)], "reactions")
-
-    def _all(self, rows: list[int], lam: np.ndarray) -> np.ndarray:
-        out = zeros((len(self.place.c.elements),))
-        out[rows] = lam
-        return out
-
-    def _undetermined(self, rows: list[int]) -> tuple[str, ...]:
-        """Elements whose reactions redundancy leaves open."""
-        G = self.place.G * self.place.scale
-        y = parts(G).dependencies
-        open_ = np.abs(y).max(axis=1, initial=0.0) > 1e-8
-        return tuple(dict.fromkeys(e for e, yes in zip(self.place.c.elements, open_, strict=True) if yes))
-
-    def _told(self, what: str, dets: Determinants, names: Sequence[str]) -> None:
-        for columns, value in dets.found:
-            self.singular[f"{what} {', '.join(names[k] for k in columns)}"] = value
+RATES = (("'", ""), ("''", "^2"))

@@ -27,17 +27,14 @@ class Place:
     ----------
     x : Traced
     c : Constraints
-    start : (t, q, v, z)
+    start : mapping
+        Numbers of time, coordinates and velocities by the names of their symbols; others are zero.
     """
 
-    def __init__(self, x: Traced, c: Constraints, start: tuple) -> None:
+    def __init__(self, x: Traced, c: Constraints, start: Mapping[str, float]) -> None:
         self.x, self.c = x, c
-        t, q, v, z = (*start, ()) if len(start) == 3 else start
-        self.values: dict[str, float] = {x.t.data.name: float(t)}
-        z = z if len(z) else [0.0] * len(x.z)
-        for symbols, numbers in ((x.q, q), (x.v, v), (x.z, z)):
-            self.values |= {s.data.name: float(y) for s, y in zip(symbols, numbers, strict=True)}
-        self.values |= {s.data.name: 0.0 for s in (*x.lam, *x.loads)}
+        others = {s.data.name: 0.0 for s in (*x.z, *x.lam, *x.loads)}
+        self.values: dict[str, float] = others | {name: float(y) for name, y in start.items()}
         self.probe = Probe(self.values)
         length = float(getattr(x.system.glob[LENGTH], "value", x.system.glob[LENGTH]))
         units = [n.unit for n in velocity_names(x.structure)]

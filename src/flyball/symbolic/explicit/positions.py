@@ -15,7 +15,6 @@ from ...graph.values import evaluate, reached, symbols
 from ...tables.system import Q0
 from ...tracing.trace import Traced
 from .blocks import blocks
-from .constraints import Constraints
 from .definition import Definition, formulas, inlined
 from .loops.pool import LARGEST, LONGEST, Pool
 from .loops.turns import continued
@@ -48,23 +47,27 @@ class Solved:
     notes: list[str] = field(default_factory=list)
 
 
-def solved_positions(x: Traced, place: Place, c: Constraints, what: tuple[list[int], list[int]]) -> Solved:
+def solved_positions(
+    x: Traced, place: Place, what: tuple[list[int], list[int]], places: Sequence[tuple[Node, Any]] = ()
+) -> Solved:
     """Definitions of dependent coordinates.
 
     Parameters
     ----------
     x : Traced
     place : Place
-    c : Constraints
     what : (list of int, list of int)
         Constraints, and the coordinates q that they determine; what makes quaternions units is added.
+    places : sequence of (Node, Node)
+        Places on curves, and what vanishes there.
     """
-    rows, unknown = what
+    (rows, unknown), c = what, place.c
     g = [x.graph.node(y) for y in c.g[rows]]
     for q, v in positions(x.structure):
         if len(q) > len(v) and q[0] in unknown:
             g.append(x.graph.node(sum((x.q[k] * x.q[k] for k in q), -1.0)))
-    w = [x.q[k] for k in unknown]
+    w = [*(x.q[k] for k in unknown), *(s for s, _ in places)]
+    g += [x.graph.node(y) for _, y in places]
     elements = [c.elements[k] for k in rows]
     count = len(reached(g))
     if len(w) > LARGEST or count > LONGEST:

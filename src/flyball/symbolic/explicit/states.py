@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ModelError
-from ...graph.derivative import jacobian, replaced
-from ...graph.node import Node, Symbol
-from ...graph.values import evaluate
-from ...tracing.trace import Traced
+from ...errors import AnalysisError, ModelError
+from ...graph.derivative import jacobian
+from ...graph.function import Opaque
+from ...graph.node import Node
+from ...graph.values import evaluate, symbols
+from ..expressions import Expressions
 from .definition import rates, with_formulas
-from .explicit import ExplicitEquations, Start, explicit
+from .explicit import ExplicitEquations
 from .newton import Implicit
-from .partition import positions
 from .solve import Determinants, times
 
 Numbers = Sequence[float] | np.ndarray
@@ -24,77 +24,119 @@ Numbers = Sequence[float] | np.ndarray
 class StateEquations:
     """x' = f(x, u, t), y = h(x, u, t) with names.
 
-    The states are the independent coordinates (of a quaternion all four numbers), then their rates.
+    The states are the independent coordinates (of a body's orientation all four Euler parameters), then their rates. An
+    input that moves a driver is three: itself, its rate and its acceleration.
 
     Attributes
     ----------
-    equations : ExplicitEquations
+    explicit : ExplicitEquations
     states, inputs, outputs : tuple of str
     x, u : list of Node
         Symbols of states and inputs.
-    t : Node
-    f, h : ndarray of Node (nx,), (ny,)
-        In x, u, t and parameters; coordinates that have no formula are symbols (`unknown`).
+    f, h : Expressions
+        In x, u, t and parameters; what has no formula is a symbol of its own (`implicit`).
     start : ndarray (nx,)
-        The assembled start.
+        The state as described and assembled.
     """
 
-    def __init__(
-        self, equations: ExplicitEquations, inputs: Mapping[str, Node] = {}, outputs: Mapping[str, Any] = {}
-    ) -> None:
-        e, traced = equations, equations.traced
-        self.equations, self.t, self.graph = e, traced.t, traced.graph
-        self.states, self.x = _states(e)
-        self.inputs, self.outputs = tuple(inputs), tuple(outputs)
-        self.u, new = _inputs(self.graph, inputs)
-        v = np.array([*traced.v], object)
-        qdot = times(traced.T, v)[e.known]
-        nodes = [*qdot, *e.accelerations[e.chosen], *outputs.values()]
-        nodes = [self.graph.node(y) for y in nodes]
-        found = replaced(e.inlined(nodes), new)
-        n = len(self.x)
-        self.f, self.h = np.array(found[:n], object), np.array(found[n:], object)
-        implicit = with_formulas(e.definitions)
-        self._implicit = [type(d)(d.symbols, (), tuple(replaced(d.residuals, new)), d.how) for d in implicit]
-        q, y = list(e.start.q), list(e.start.v)
-        self.start = np.array([*(q[k] for k in e.known), *(y[d] for d in e.chosen)], float)
+    def __init__(self, explicit: ExplicitEquations, outputs: Sequence[str] = ()) -> None:
+        e, self.explicit, self.equations = explicit.solution, explicit, explicit.equations
+        if isinstance(outputs, str):
+            outputs = [outputs]
+        self.t, self.graph = e.traced.t, e.traced.graph
+        self.x = [*(e.traced.q[k] for k in e.known), *(e.traced.v[d] for d in e.chosen)]
+        self.u, self.inputs = list(explicit.inputs.values()), tuple(explicit.inputs)
+        self.states, self.outputs = tuple(s.data.name for s in self.x), tuple(outputs)
+        qdot = times(e.traced.T, np.array(e.traced.v, object))[e.known]
+        f = e.inlined([self.graph.node(y) for y in (*qdot, *e.accelerations[e.chosen])])
+        self.f = Expressions(self.equations, _vector(f), self.states)
+        self.h = Expressions(self.equations, _vector([_one(explicit, name) for name in outputs]), self.outputs)
+        self._implicit = with_formulas(e.definitions)
+        self.start = np.array([e.start[s.data.name] for s in self.x], float)
         self._solvers: list[Implicit] | None = None
+        self._refuse_others()
 
     @property
-    def unknown(self) -> tuple[str, ...]:
-        """Coordinates, and loads of joints, that have no formula: Newton's method finds them."""
+    def implicit(self) -> tuple[str, ...]:
+        """Coordinates, and loads of joints with friction, that have no formula: Newton's method finds them."""
         return tuple(n for d in self._implicit for n in d.names)
+
+    def _refuse_others(self) -> None:
+        """Refuse what is neither state nor input."""
+        known = {s.index for s in (*self.x, *self.u, self.t, *(w for d in self._implicit for w in d.symbols))}
+        for s in symbols([*self.f.list(), *self.h.list()]):
+            if s.moving and s.index not in known:
+                raise AnalysisError(
+                    f"the state space depends on {s.data.name!r}, which no state tells in "
+                    f"{self.equations.coordinates.partition(':')[0]} coordinates; try other coordinates"
+                )
 
     # -- derivatives
 
-    def jacobian(self, nodes: Sequence[Any], by: Sequence[Node]) -> np.ndarray:
-        """Total derivatives of expressions by states, inputs, time or parameters, (expressions, by).
+    def jacobian(self, what: Expressions, by: Sequence[str] | None = None) -> Expressions:
+        """Total derivatives by states, inputs, time or parameters, (expressions, by): A, B, C, D anywhere.
 
-        Coordinates without a formula change with these as their equations say: dw/dx = -(dr/dw)^-1 dr/dx.
-        """
-        nodes = [self.graph.node(y) for y in nodes]
-        out = jacobian(nodes, list(by))
-        chain = rates(self._implicit, list(by), Determinants())
-        held = [(w, row) for w, row in chain]
-        if held:
-            out = out + times(jacobian(nodes, [w for w, _ in held]), np.array([row for _, row in held], object))
-        return out
+        What has no formula changes with these as its equations say: dw/dx = -(dr/dw)^-1 dr/dx.
 
-    # -- numbers
-
-    def point(
-        self, x: Numbers, u: Numbers = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
-    ) -> dict[str, float]:
-        """Numbers of all symbols at a state, what has no formula found by Newton's method.
+        Parameters
+        ----------
+        what : Expressions
+            A vector, as `f` and `h`.
+        by : sequence of str, optional
+            Names of symbols; the states if not given.
 
         Raises
         ------
         ModelError
-            If there are too many numbers, or too few.
+            If a Python function whose derivative is not known stands in the way.
+        """
+        names = self.states if by is None else tuple(by)
+        seeds = [self.graph.symbol(s.data) for s in (self._symbol(n) for n in names)]
+        nodes = [self.graph.node(y) for y in what.list()]
+        try:
+            out = jacobian(nodes, seeds)
+            chain = rates(self._implicit, seeds, Determinants())
+            if chain:
+                held = jacobian(nodes, [w for w, _ in chain])
+                out = out + times(held, np.array([row for _, row in chain], object).reshape(len(chain), len(seeds)))
+        except Opaque as error:
+            raise ModelError(f"{error}; give the law as a text, or its values as a table") from None
+        return Expressions(self.equations, out, what.rows, names)
+
+    def _symbol(self, name: str) -> Node:
+        return self.explicit.inputs.get(name) or self.equations.symbol(name)
+
+    # -- numbers
+
+    def point(
+        self, x: Numbers, u: Numbers | None = None, t: float = 0.0, parameters: Mapping[str, float] | None = None
+    ) -> dict[str, float]:
+        """Numbers of all symbols at a state, for `Expressions.at`; what has no formula is found by Newton's method.
+
+        Parameters
+        ----------
+        x : sequence of float (nx,)
+        u : sequence of float (nu,), optional
+            Zeros for what is added to laws, parameters' own values, if not given.
+        t : float [s]
+        parameters : mapping, optional
+
+        Raises
+        ------
+        ModelError
+            If there are too many numbers, or too few, or a name is unknown.
         SingularityError
             If the mechanism cannot get there without passing a singular position.
         """
-        values = self._given(x, u, t, parameters)
+        u = [s.value for s in self.u] if u is None else u
+        for what, names, numbers in (("state", self.states, x), ("input", self.inputs, u)):
+            if len(numbers) != len(names):
+                raise ModelError(
+                    f"{len(names)} numbers are wanted for the {what}s ({', '.join(names)}), not {len(numbers)}"
+                )
+        values = {n: float(y) for n, y in zip((*self.states, *self.inputs), (*x, *u), strict=True)}
+        values |= {self.equations.symbol(n).data.name: float(y) for n, y in (parameters or {}).items()}
+        values[self.t.data.name] = float(t)
         if self._implicit and self._solvers is None:
             self._solvers = self._begun()
         for solver in self._solvers or []:
@@ -102,78 +144,39 @@ class StateEquations:
         return values
 
     def evaluate(
-        self, x: Numbers, u: Numbers = (), t: float = 0.0, parameters: Mapping[str, float] | None = None
+        self, x: Numbers, u: Numbers | None = None, t: float = 0.0, parameters: Mapping[str, float] | None = None
     ) -> tuple[np.ndarray, np.ndarray]:
         """Numbers x' (nx,) and y (ny,) at a state; see `point`."""
-        found = np.array(evaluate([*self.f, *self.h], self.point(x, u, t, parameters)), float)
+        found = np.array(evaluate([*self.f.list(), *self.h.list()], self.point(x, u, t, parameters)), float)
         return found[: len(self.x)], found[len(self.x) :]
 
-    def rhs(self, t: float, x: np.ndarray, *u: float) -> np.ndarray:
-        """x' as ``scipy.integrate.solve_ivp`` asks for it; further arguments are the inputs."""
-        return self.evaluate(x, u or (0.0,) * len(self.u), t)[0]
-
-    def _given(self, x: Numbers, u: Numbers, t: float, parameters: Mapping[str, float] | None) -> dict[str, float]:
-        for what, symbols_, numbers in (("state", self.x, x), ("input", self.u, u)):
-            if len(numbers) != len(symbols_):
-                names = ", ".join(self.states if what == "state" else self.inputs)
-                raise ModelError(f"{len(symbols_)} numbers are wanted for the {what}s ({names}), not {len(numbers)}")
-        values = dict(parameters or {})
-        values |= {s.data.name: float(y) for s, y in zip(self.x, x, strict=True)}
-        values |= {s.data.name: float(y) for s, y in zip(self.u, u, strict=True)}
-        return values | {self.t.data.name: float(t)}
+    def __call__(self, t: float, x: np.ndarray, *u: float) -> np.ndarray:
+        """x' as ``scipy.integrate.solve_ivp`` asks for it; further arguments are the inputs, all or none."""
+        return self.evaluate(x, u or None, t)[0]
 
     def _begun(self) -> list[Implicit]:
-        values = self._given(self.start, (0.0,) * len(self.u), self.equations.start.t, None)
-        x = self.equations.traced
-        values |= {s.data.name: float(y) for s, y in zip(x.q, self.equations.start.q, strict=True)}
+        values = self.explicit.solution.start | {s.data.name: s.value for s in self.u}
         out = []
         for d in self._implicit:
             out.append(Implicit(d, values))
             values |= out[-1](values)
         return out
 
-
-def state_equations(
-    x: Traced,
-    start: Start,
-    inputs: Mapping[str, Node] = {},
-    outputs: Mapping[str, Any] = {},
-    independent: Sequence[str] = (),
-) -> StateEquations:
-    """The state space of a mechanism; see `explicit` and `StateEquations`.
-
-    Parameters
-    ----------
-    x : Traced
-    start : Start
-    inputs : mapping
-        Name -> symbol: a parameter that is one.
-    outputs : mapping
-        Name -> expression of q, v, lam, t.
-    independent : sequence of str
-        Coordinates that the states are.
-    """
-    return StateEquations(explicit(x, start, independent), inputs, outputs)
+    def __repr__(self) -> str:
+        size = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
+        return f"<state space of {self.equations.model.name!r}: {size}>"
 
 
-def _states(e: ExplicitEquations) -> tuple[tuple[str, ...], list[Node]]:
-    """Names and symbols of the states."""
-    x = e.traced
-    names = []
-    for q, v in positions(x.structure):
-        if q[0] in e.known:
-            body = e.names[v[0]].rpartition(".")[0]
-            names += [e.names[v[0]]] if len(q) == 1 else [f"{body}.q{k}" for k in range(4)]
-    rate = [f"{e.names[d]} rate" for d in e.chosen]
-    return (*names, *rate), [*(x.q[k] for k in e.known), *(x.v[d] for d in e.chosen)]
+def _vector(nodes: Sequence[Any]) -> np.ndarray:
+    out = np.empty(len(nodes), object)
+    out[:] = nodes
+    return out
 
 
-def _inputs(graph: Any, inputs: Mapping[str, Node]) -> tuple[list[Node], list[tuple[Node, Node]]]:
-    """Symbols of inputs, and what stands for what."""
-    out, new = [], []
-    for name, given in inputs.items():
-        symbol = given if given.data.name == name else graph.symbol(Symbol(name, "input", "", given.data.unit))
-        out.append(symbol)
-        if symbol is not given:
-            new.append((given, symbol))
-    return out, new
+def _one(explicit: ExplicitEquations, name: str) -> Any:
+    found = explicit[name]
+    if found.shape:
+        raise ModelError(
+            f"output {name!r} is {found.shape[0]} numbers; name one of them: a result has {name}_x or the like"
+        )
+    return found.nodes[()]

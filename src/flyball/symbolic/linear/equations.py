@@ -132,9 +132,6 @@ def told(
             f"can; leave out one of the two, or ask for the transfer function"
         )
     here, rates = ([m.names[d] for d in of] for of in (f.chosen, f.chosen_v))
-    sign = np.array([x.sign for x in (*here, *rates)])
-    own = sign[: len(here)]
-    second = [None if X is None else own[:, None] * X * own for X in (r.M, r.D, r.K)]
     return {
         "states": (*(x.name for x in here), *(f"{x.name} rate" for x in rates)),
         "state_units": (*(x.unit for x in here), *(f"{x.unit}/s" for x in rates)),
@@ -142,13 +139,13 @@ def told(
         "input_units": tuple(i.unit for i in m.inputs),
         "outputs": tuple(names[0]),
         "output_units": tuple(names[1]),
-        "A": sign[:, None] * A * sign,
-        "B": sign[:, None] * (B + product(A, shift)),
-        "C": C * sign,
+        "A": A,
+        "B": B + product(A, shift),
+        "C": C,
         "D": D + product(C, shift),
-        "mass": second[0],
-        "damping": second[1],
-        "stiffness": second[2],
+        "mass": r.M,
+        "damping": r.D,
+        "stiffness": r.K,
     }
 
 
