@@ -283,8 +283,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.vel[V2]
-    worst = 1.0
-    last = 1e300
+    worst, last = 1.0, 1e300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:

@@ -129,10 +129,7 @@ def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
 @lru_cache(maxsize=1)
 def _folder() -> Path | None:
     start_numba()
-    cache = cache_of(engine.function)
-    if not getattr(cache, "kept", False):
-        return None
-    return Path(cache._impl.locator.get_cache_path())
+    return getattr(cache_of(engine.function), "folder", None)
 
 
 def _files(p: Plan) -> list[Path]:

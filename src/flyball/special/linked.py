@@ -13,7 +13,8 @@ from ..graph.operations import MULTIPLY, NUMBER, SYMBOL
 from ..graph.printers.llvm import Place, Procedure
 from ..graph.printers.llvm_order import operations
 from ..tables.system import ARTICULATED, FLAT, SOLVER
-from .stages import FIRST_FREE, Stages
+from .recorder import FIRST_FREE
+from .stages import Stages
 
 BEFORE: dict[str, tuple[str, ...]] = {
     "MOVE": ("PLACE",),
