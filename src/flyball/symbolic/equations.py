@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from .expressions import Expressions
 from .linear.face import Linear
@@ -125,11 +125,19 @@ class Equations(Shown, Linear, Symbols):
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
 
-    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
-        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+    def export(
+        self,
+        folder: str | Path | None = None,
+        *,
+        language: str = "c",
+        functions: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        name: str = "",
+    ) -> Code:
+        """Functions of these equations as code: see `Mechanism.export`."""
         from .export.code import exported
 
-        return exported(self, folder, **asked)
+        return exported(self, folder, language=language, functions=functions, outputs=outputs, name=name)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
