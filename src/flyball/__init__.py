@@ -43,8 +43,10 @@ Ask where it rests, and what small motions do
     m.modes()                     -> Modes, animated; m.root_locus(parameter, values) -> RootLocus
 
 Ask for the equations
-    m.symbolic(inputs)            -> Equations: M, f, g, G, gamma, reactions, energies as expressions in the mechanism's
-                                  own names, for SymPy, LaTeX and numbers
+    eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
+    print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
+    eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
+    m.export(folder, language)    -> Code: functions of the equations in C, Python, CasADi or Numba
 
 Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
@@ -125,6 +127,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.singularities import Singularities as Singularities
     from .results.touch import Touch as Touch
     from .symbolic.equations import Equations as Equations
+    from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
 
 __version__ = "0.4.0"
@@ -178,6 +181,7 @@ _HOME = {
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
     "Touch": "results.touch",
+    "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",
     "Expressions": "symbolic.expressions",
 }

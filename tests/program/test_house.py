@@ -72,6 +72,7 @@ LATER = {  # imports inside functions, beyond those: the methods that lead from 
     "mechanism": {"view"},
     "files": {"model", "results"},
     "results": {"view"},
+    "symbolic": {"view"},
     "cli": {"analysis", "compiler", "equations", "symbolic", "files", "mechanism", "model", "results", "view"},
     "__init__": {"model"},
 }

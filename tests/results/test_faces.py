@@ -15,7 +15,14 @@ import flyball as fb
 from flyball.results.numbers import clean, number, span, tuple_of
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
-OWED = {"Assembly", "MassReport", "Mobility", "Prepared", "Report"}  # tables of names and numbers: have no picture
+OWED = {
+    "Assembly",
+    "Code",
+    "MassReport",
+    "Mobility",
+    "Prepared",
+    "Report",
+}  # tables of names and numbers: have no picture
 
 
 def crank() -> fb.Mechanism:
@@ -45,7 +52,9 @@ MADE = {
     "MassReport": lambda: crank().mass_properties(),
     "Report": lambda: crank().check(),
     "Assembly": lambda: crank().assemble(),
+    "Equations": lambda: crank().symbolic(),
     "Prepared": lambda: crank().prepare(),
+    "Code": lambda: rig().export(),
 }
 
 

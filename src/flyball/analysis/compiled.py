@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..constraints.registry import KINDS
 from ..equations.engine import POSITION, evaluate
 from ..equations.projection import NONE
 from ..equations.scratch import work
@@ -20,7 +21,7 @@ from ..tables.forest import steps
 from ..tables.names import velocity_names
 from ..tables.specs import Structure
 from ..tables.structure import Choices, structure
-from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, Work
+from ..tables.system import INERTIA, INVERSE, MASS, NV, PASS, PER_MASS, Q0, STABILIZE, V0, System, Work
 from ..tables.values import Values, values
 from .uncollected import uncollected
 
@@ -32,11 +33,34 @@ class Compiled:
     values: Values
     z: np.ndarray  # turns of angles and places on curves, as last evaluated; work states are zero
     parameters: dict[str, Any] = field(default_factory=dict)  # values in place of the model's own
+    system: System = field(init=False, repr=False, compare=False)  # the values' tables, or with addresses of `made`
+    made: Any = field(default=None, init=False, repr=False, compare=False)  # code that it runs on, if not all's
+
+    def __post_init__(self) -> None:
+        self.system = self.values.system
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without scratch, and without addresses, which mean nothing in another process."""
+        return {k: x for k, x in vars(self).items() if k not in ("work", "system", "made")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state, system=state["values"].system, made=None)
+
+    def run_on(self, made: Any) -> None:
+        """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
+        x, before = self.values, vars(self).pop("work", None)
+        self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
+        if before is not None:
+            self.work.option[:] = before.option
+
+    def run_on_tables(self) -> None:
+        """From now on the engine's own loops do all."""
+        self.made, self.system = None, self.values.system
 
     @cached_property
     def work(self) -> Work:
         """Scratch of its own."""
-        w = work(self.structure, self.values.system)
+        w = work(self.structure, self.system)
         w.option[STABILIZE] = NONE
         w.option[PASS] = 1e-13
         return w
@@ -66,7 +90,7 @@ class Compiled:
         if len(q) != s.nq or len(v) != s.nv:  # compiled code would read beyond them
             raise ValueError(f"the state has {len(q)} + {len(v)} numbers; these coordinates have {s.nq} + {s.nv}")
         y = np.concatenate([q, v, self.z])
-        out = evaluate(self.values.system, self.work, float(t), y, task)
+        out = evaluate(self.system, self.work, float(t), y, task)
         z = y[len(q) + len(v) :]
         if np.isfinite(z).all():
             self.z = z
@@ -85,6 +109,18 @@ class Compiled:
             if not t.measured:
                 out[t.row] = t.formula.measure == "m"
         return out
+
+    @cached_property
+    def has_curves(self) -> bool:
+        """Whether a term leans on a place on a curve."""
+        return any(KINDS[t.formula.kind].place for t in self.structure.terms)
+
+    def find_places(self) -> None:
+        """Take for the places on curves those nearest of all at the poses last evaluated, wherever one was before."""
+        for t in self.structure.terms:
+            if KINDS[t.formula.kind].place:
+                F, M = ((x[:3], x[3:12].reshape(3, 3)) for x in self.work.FK[[t.F, t.M]])
+                self.z[t.hint] = t.element.nearest(self.values.numbers[t.element.name], F, M)[0]  # type: ignore[attr-defined]
 
     @property
     def hints(self) -> dict[str, float]:

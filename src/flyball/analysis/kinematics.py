@@ -26,6 +26,7 @@ from .compiled import compiled
 from .freedom.geometry import positions_nearby
 from .freedom.jacobian import rank_of, scaled_jacobian
 from .mobility import mobility
+from .motion.engines import Engine, check_specialize
 from .motion.options import output_times, projected
 from .motion.start import Start, begin_at
 from .options import Options
@@ -49,7 +50,12 @@ class KinematicsOptions(Options):
     t_start: float | None
     parameters: Mapping[str, float] | None
     coordinates: str
+    specialize: bool | str
     progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_specialize(self.specialize)
 
 
 def kinematics(model: Model, o: KinematicsOptions) -> Result:
@@ -61,6 +67,7 @@ def kinematics(model: Model, o: KinematicsOptions) -> Result:
     base = driven(model, begin, o.parameters)
     start = begin_at(base, o.parameters, o.coordinates)
     start.since = started
+    start.engine = Engine(start.assembly.compiled, o.specialize)
     holonomic = all(r.holonomic for r in base.compiled.structure.rows)
     with shown(o.progress, "following the drivers") as tell:
         try:

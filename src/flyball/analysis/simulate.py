@@ -25,6 +25,8 @@ from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
+from .motion.engines import AUTO as EITHER
+from .motion.engines import Engine, check_specialize
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Impulse
 from .motion.later import open_until_asked, solved
@@ -35,8 +37,12 @@ from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
 AUTO, IMPULSE, USUAL = "auto", "impulse", "dop853"  # methods beside the integrators by name; what auto is
-IDLE = {"rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None}
+IDLE = {
+    "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
+}  # fmt: skip
 """Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
+UNMADE = {"partitioning": "partitioning chooses coordinates on the way, which made code does not know"}
+"""Stabilizations that code made for a mechanism does nothing for, and why."""
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
@@ -50,7 +56,12 @@ class SimulateOptions(Integration):
     outputs: int | Sequence[float]
     parameters: Mapping[str, float] | None
     start: Result | None
+    specialize: bool | str
     progress: bool | Callable[[float], None]
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_specialize(self.specialize)
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""
@@ -74,6 +85,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
+    begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
     follow = o.stabilization == "projection" and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -132,7 +144,7 @@ def moved(
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
     later = open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
-    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task)
+    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -199,27 +211,39 @@ def _width(a: Assembly) -> int:
     return 1 + len(a.y) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
 
 
-def run_clock(a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int) -> tuple[np.ndarray, bool]:
-    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
-    s, S, W = a.compiled.structure, a.compiled.values.system, a.compiled.work
-    width = _width(a)
+def run_clock(
+    a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int, engine: Engine | None = None
+) -> tuple[np.ndarray, bool]:
+    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
+
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    """
+    c, engine = a.compiled, engine or Engine(a.compiled, False)
+    s, width = c.structure, _width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
-    span = clock.real[ex.T_END] - first or 1.0
-    forget(W.stack)
+    span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
+    forget(c.work.stack)
+    engine.begin(clock)
     try:
         while True:
             begin = time.perf_counter()
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
-                used = motion_kernel(S, W, method, clock, buffer, task)
+                used = motion_kernel(c.system, c.work, method, clock, buffer, task)
                 rows.append(buffer[:used].copy())
-            tell((clock.real[ex.T] - first) / span)
-            if clock.count[ex.STATUS] != ex.RUNNING:
+            reached = max(reached, (clock.real[ex.T] - first) / span)
+            tell(reached)
+            if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
-            clock.count[ex.QUOTA] = int(np.clip(max(done, 1) * SLICE / max(took, 1e-6), 1, 100_000))
+            if engine.begins_anew(clock):
+                rows.clear()
+                forget(c.work.stack)
+            clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, width)), True
+    finally:
+        engine.end()

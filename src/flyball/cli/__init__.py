@@ -10,7 +10,9 @@ import typer
 from . import (  # noqa: F401  (each adds its subcommand)
     check,
     compare,
+    equations,
     equilibrium,
+    export,
     inverse_dynamics,
     kinematics,
     linearize,

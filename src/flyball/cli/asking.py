@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, get_type_hints
 from .common import Changes, Json, Model, app, make_folder, print_json, reported, table
 from .compiling import announce_compiling
 from .docs import described, summary
-from .flags import Flag, options
+from .flags import Flag, Option, options
 from .loading import load_mechanism, set_parameters
 
 if TYPE_CHECKING:
@@ -104,7 +104,7 @@ def command(
             with reported(words["as_json"]):
                 mechanism = load_mechanism(words["model"])
                 set_parameters(mechanism, words["change"] or [])
-                given = {o.name: o.read(words[o.name]) for o in known if _told(words[o.name])}
+                given = {o.name: o.read(words[o.name]) for o in known if _told(words[o.name], o)}
                 if "progress" in arguments:
                     given["progress"] = not words["as_json"]
                 announce_compiling(not words["as_json"], *kernels)
@@ -124,9 +124,9 @@ def command(
     return register
 
 
-def _told(value: Any) -> bool:
+def _told(value: Any, of: Option) -> bool:
     """Whether an option was given; else the method's own default holds."""
-    return value is not None and value is not False and value != []
+    return value is not None and value != [] and (value is not False or of.parameter.default is None)
 
 
 def _extra(conclude: Conclusion) -> list[inspect.Parameter]:

@@ -90,6 +90,7 @@ KINDS: dict[str, tuple[Any, Callable[[Any, str, str], Any]]] = {  # annotation -
     "float": (float, _as_is),
     "bool": (bool, _as_is),
     "str | Impulse": (str, _as_is),
+    "bool | str": (bool, _as_is),
     "float | str": (str, quantity),
     "Sequence[str]": (list[str], _as_is),
     "Sequence[float]": (str, values),
@@ -138,7 +139,8 @@ def option(p: inspect.Parameter, told: Described, own: Flag | None) -> Option:
         )
     reads, make = KINDS.get(kind, (own.type, _as_is))
     reads, make = own.type or reads, own.read or make
-    names = own.names or (f"--{p.name.replace('_', '-')}",)
+    flag = f"--{p.name.replace('_', '-')}"
+    names = own.names or (f"{flag}/--no-{flag[2:]}" if kind == "bool | str" else flag,)
     text = own.help or _help(p, told, own, HINTS.get(kind, ""))
     if own.argument or (required and kind == "str"):
         info: Any = typer.Argument(help=text)
@@ -146,7 +148,7 @@ def option(p: inspect.Parameter, told: Described, own: Flag | None) -> Option:
     else:
         info = typer.Option(*names, help=text, show_default=False)
     default = inspect.Parameter.empty if required else own.default
-    if reads is bool:
+    if kind == "bool":
         default = False
     elif not required and default is None:
         reads = reads | None

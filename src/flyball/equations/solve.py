@@ -2,9 +2,8 @@
 
 Where M is constant and block diagonal, through the Schur complement S = G M^-1 G^T; otherwise through the
 quasi-definite matrix [M G^T; G -delta]; for a forest without rows by sweeps over articulated bodies. The first two are
-regularised by a small part of each row's natural size D, and refined against the true equations until the residual of
-G x = gamma passes or stops falling (a proximal-point iteration: redundant rows cost nothing, and of all multipliers it
-finds those with least sum of D_k lam_k^2).
+regularised by a small part of each row's natural size D, and refined until the residual of G x = gamma passes or stops
+falling (a proximal-point iteration: of all multipliers it finds those with least sum of D_k lam_k^2).
 
 The regularisation is not small beyond need. Near a singular position a row combination with singular value s answers
 a rounding error e with e / s; refinement takes the regularisation out of everything that is well determined within a

@@ -33,6 +33,7 @@ class Health:
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
+    engine: str = ""  # "table-driven: why", or "made for this mechanism: where from"
     crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
@@ -103,6 +104,7 @@ class Health:
         out = [
             ("status", self.status),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
+            *([("engine", self.engine)] if self.engine else []),
             *([("assembly", summary(self.departures))] if self.departures else []),
             ("freedoms", str(self.freedoms) + (f", and those of {self.crowd} bodies in sets" if self.crowd else "")),
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),

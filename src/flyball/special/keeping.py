@@ -129,7 +129,10 @@ def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
 @lru_cache(maxsize=1)
 def _folder() -> Path | None:
     start_numba()
-    return getattr(cache_of(engine.function), "folder", None)
+    cache = cache_of(engine.function)
+    if not getattr(cache, "kept", False):
+        return None
+    return Path(cache.cache_path)
 
 
 def _files(p: Plan) -> list[Path]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,19 +16,22 @@ from ..analysis.options import Options
 from ..analysis.untouched import refuse_contact
 from ..errors import AnalysisError, ModelError
 from ..graph.node import SYMBOL, Graph, Node, Symbol
+from ..graph.printers import spelling
 from ..model.expressions import is_number_text
 from ..model.model import Model, listing, suggest
 from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
-from .names import text
+from .linear.face import Linear
 from .quantities import Quantities
+from .shown import Shown
 from .state import named_state, places_at
 
 if TYPE_CHECKING:
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
+    from .export.code import Code
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +44,7 @@ class SymbolicOptions(Options):
     names: str
 
 
-class Equations:
+class Equations(Shown, Linear):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
@@ -68,6 +72,7 @@ class Equations:
 
     def __init__(self, model: Model, start: Start, o: SymbolicOptions, inputs: Sequence[Input]) -> None:
         self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
+        self.described = model
         self.graph = Graph()
         tree = start.assembly.compiled.structure.tree
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))
@@ -87,7 +92,7 @@ class Equations:
             if name in self._inputs:
                 out[name] = self.graph.symbol(self._inputs[name], 0.0)
             elif name in (o.parameters or {}) or not isinstance(value, str) or is_number_text(value):
-                out[name] = self.graph.symbol(Symbol(name, "parameter", _latex(name)), told[name])
+                out[name] = self.graph.symbol(Symbol(name, "parameter", spelling.name(name)), told[name])
         return out
 
     @cached_property
@@ -341,32 +346,14 @@ class Equations:
         """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
         return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
 
+    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
+        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+        from .export.code import exported
+
+        return exported(self, folder, **asked)
+
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"
-
-    def __str__(self) -> str:
-        count = len(self.q), len(self.v), len(self.lam)
-        lines = [
-            f"equations of motion of {self.model.name!r}, coordinates {self.coordinates}",
-            "qdot = T v,  M vdot = f + G^T lam,  g = 0,  G v = nu,  G vdot = gamma",
-            f"q ({count[0]}): {', '.join(self.q.rows)}",
-            f"v ({count[1]}): {', '.join(self.v.rows)}",
-            f"lam ({count[2]}): {', '.join(self.lam.rows) or 'none: no constraints'}",
-        ]
-        more = {"loads": self.loads.rows, "places": tuple(self.places), "inputs": self.inputs}
-        lines += [f"{k}: {', '.join(names)}" for k, names in more.items() if names]
-        lines.append(f"parameters: {', '.join(f'{k} = {x:g}' for k, x in self.parameters.items()) or 'none'}")
-        size = {k: getattr(self, k).operations for k in ("M", "f", "g", "G", "gamma")}
-        lines.append(f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}")
-        return "\n".join(lines)
-
-
-def _latex(name: str) -> str:
-    """A parameter's name: a single letter as it is, with a number behind as index; others upright."""
-    if len(name) == 1:
-        return name
-    letter, index = name[0], name[1:].lstrip("_")
-    return f"{letter}_{{{index}}}" if index.isdigit() else text(name)
 
 
 COORDINATES = ("auto", "absolute", "joint")
@@ -377,10 +364,13 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     refuse_contact(model, "symbolic")
     plain = model.snapshot()
     told, inputs = with_inputs(plain, o.inputs) if o.inputs else (plain, [])
-    told = told.snapshot()
-    if o.coordinates == "auto":
-        try:
-            return Equations(told, begin(told, 0.0, o.parameters, None, "joint"), o, inputs)
-        except AnalysisError:  # friction that follows loads which joint coordinates do not know
-            return Equations(told, begin(told, 0.0, o.parameters, None, "absolute"), o, inputs)
-    return Equations(told, begin(told, 0.0, o.parameters, None, o.coordinates), o, inputs)
+    told, auto = told.snapshot(), o.coordinates == "auto"
+    try:
+        start = begin(told, 0.0, o.parameters, None, "joint" if auto else o.coordinates)
+    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+        if not auto:
+            raise
+        start = begin(told, 0.0, o.parameters, None, "absolute")
+    out = Equations(told, start, o, inputs)
+    out.described = plain
+    return out

@@ -11,10 +11,19 @@ from ..errors import ModelError
 from ..graph.derivative import jacobian, replaced
 from ..graph.function import Opaque
 from ..graph.node import SYMBOL, Node
+from ..graph.printers.latex import latex
+from ..graph.printers.latex import matrix as latex_matrix
+from ..graph.printers.text import matrix as text_matrix
+from ..graph.printers.text import text
+from ..graph.simplify.simplify import simplified
 from ..graph.values import evaluate, evaluated, reached
+from .quaternions import quaternions
 
 if TYPE_CHECKING:
     from .equations import Equations
+
+
+WIDE = 160  # letters of a line up to which a matrix is printed as such
 
 
 class Expressions:
@@ -113,29 +122,38 @@ class Expressions:
         printer = self.equations.printer
         return printer(self.nodes if self.shape else self.nodes[()])
 
-    def latex(self) -> str:
-        """As LaTeX."""
-        from ..graph.printers.sympy import sympy_module
+    def simplified(self) -> Expressions:
+        """The same values in fewer symbols: see `graph/simplify`; unit quaternions are known to be such."""
+        made = simplified(self.nodes.reshape(-1), units=quaternions(self.equations.formulated))
+        return Expressions(self.equations, made.reshape(self.shape), self.rows, self.columns, self.unit)
 
-        made, printer = self.sympy(), self.equations.printer
-        names = {symbol: node.data.latex or node.data.name for symbol, node in printer.symbols.items()}
-        return str(sympy_module().latex(made, symbol_names=names))
+    def latex(self) -> str:
+        """As LaTeX, simplified; a vector as a column, zeros in matrices as dots."""
+        made = self.simplified().nodes
+        if not self.shape:
+            return latex(made[()])
+        return latex_matrix(made if len(self.shape) > 1 else made.reshape(-1, 1))
+
+    def texts(self) -> Any:
+        """As text, simplified: lists of lists as deep as it has dimensions."""
+        return np.vectorize(text, otypes=[object])(self.simplified().nodes).tolist() if self.nodes.size else []
 
     def _repr_latex_(self) -> str:
         return f"$\\displaystyle {self.latex()}$"
 
     def __str__(self) -> str:
-        made = self.sympy()
+        made = self.texts()
         if not self.shape:
             return str(made)
-        lines = [
-            f"{name}: {made[k, :].tolist()[0] if len(self.shape) > 1 else made[k]}" for k, name in self._labelled()
-        ]
-        return "\n".join(lines)
-
-    def _labelled(self) -> Iterable[tuple[int, str]]:
         names = self.rows or tuple(map(str, range(self.shape[0])))
-        return enumerate(names)
+        if len(self.shape) == 1:
+            return "\n".join(f"{name}: {x}" for name, x in zip(names, made, strict=True))
+        told = text_matrix(self.simplified().nodes)
+        if max(map(len, told.split("\n"))) <= WIDE:
+            return told
+        columns = self.columns or tuple(map(str, range(self.shape[1])))
+        entries = [(a, b, x) for a, row in zip(names, made, strict=True) for b, x in zip(columns, row, strict=True)]
+        return "\n".join(f"{a}, {b}: {x}" for a, b, x in entries if x != "0")
 
     def __repr__(self) -> str:
         what = " x ".join(map(str, self.shape)) if self.shape else "one expression"

@@ -7,10 +7,10 @@ import gzip
 import html
 import re
 from functools import cache
-from importlib.resources import files
 
 from .payload import payload
 from .recording import Recording
+from .static_files import filled, static
 
 LARGE = 4_000_000  # bytes before compression
 
@@ -91,27 +91,17 @@ def document(recording: Recording, heading: str, before: str = "", after: str = 
         Markup before and after the player.
     """
     title = html.escape(recording.name)
-    stage = _filled(_static("player.html"), {"heading": heading, "title": title})
+    stage = filled(static("player.html"), {"heading": heading, "title": title})
     parts = {
         "title": title,
-        "licences": _static("licences.txt").replace("--", "- -"),
-        "style": _static("uplot.min.css") + _static("page.css"),
+        "licences": static("licences.txt").replace("--", "- -"),
+        "style": static("uplot.min.css") + static("page.css"),
         "content": before + stage + after,
         "player": _player(),
         "recording": _packed(payload(recording)),
-        "boot": _static("boot.js"),
+        "boot": static("boot.js"),
     }
-    return _filled(_static("page.html"), parts)
-
-
-def _filled(template: str, parts: dict[str, str]) -> str:
-    """The template with its marks replaced, once: what is put in is not looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda match: parts.get(match[1], match[0]), template)
-
-
-@cache
-def _static(name: str) -> str:
-    return files(__package__).joinpath("static", name).read_text(encoding="utf-8")
+    return filled(static("page.html"), parts)
 
 
 def _packed(data: bytes) -> str:
@@ -122,9 +112,9 @@ def _packed(data: bytes) -> str:
 @cache
 def _player() -> str:
     """The libraries and the player as one gzipped script."""
-    modules = "\n".join(_scoped(name, _static(f"player/{name}.js")) for name in MODULES)
+    modules = "\n".join(_scoped(name, static(f"player/{name}.js")) for name in MODULES)
     head = '"use strict";\nconst THREE = LIB, uPlot = LIB.uPlot;\n'
-    script = f"{_static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
+    script = f"{static('libraries.min.js')}\n(() => {{\n{head}{modules}\nwindow.startPlayer = $main.start;\n}})();\n"
     return _packed(script.encode())
 
 

@@ -149,18 +149,21 @@ def _quadrature(t: np.ndarray, P: np.ndarray, m: int) -> np.ndarray:
 
 def _halfway(a: Assembly, clock: ex.Clock, known: np.ndarray, pieces: np.ndarray) -> np.ndarray:
     """Rows half way through those pieces, and where else the loop stops on its way there; as far as it gets."""
-    S, W = a.compiled.values.system, a.compiled.work
     first = known[pieces[0]]
     times = 0.5 * (known[pieces, 0] + known[pieces + 1, 0])
     real, count, _, y, K, accounts, seen = clock
-    own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
-    own.y[0] = first[1 : 1 + clock.y.shape[1]]
-    own.real[[ex.T, ex.T_END]] = first[0], times[-1]
-    own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
-    own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
     out = np.zeros((len(times) + 50, len(first)))
-    rows = []
-    while own.count[ex.STATUS] == ex.RUNNING:
-        used = motion_kernel(S, W, tableau("rk45"), own, out, FOLLOW)
-        rows.append(out[:used].copy())
+    c = a.compiled
+    for S in (c.system, c.values.system):  # the second where code made for it, if there is any, gets stuck
+        own = ex.Clock(real.copy(), count.copy(), times, y.copy(), K.copy(), accounts, seen)
+        own.y[0] = first[1 : 1 + clock.y.shape[1]]
+        own.real[[ex.T, ex.T_END]] = first[0], times[-1]
+        own.count[[ex.STARTED, ex.NEXT, ex.ACCEPTED, ex.REJECTED, ex.STATUS]] = 0
+        own.count[ex.QUOTA] = own.count[ex.LIMIT] = CALLS
+        rows = []
+        while own.count[ex.STATUS] == ex.RUNNING:
+            used = motion_kernel(S, c.work, tableau("rk45"), own, out, FOLLOW)
+            rows.append(out[:used].copy())
+        if own.count[ex.STATUS] == ex.DONE or c.made is None:
+            break
     return np.concatenate(rows)[1:]

@@ -90,6 +90,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         ),
         departures=start.base.departures,
         coordinates=start.coordinates,
+        engine=start.engine.told if start.engine else "",
     )
 
 

@@ -17,6 +17,7 @@ from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..mobility import mobility
+from .engines import Engine
 from .joined import refuse_jump
 from .layer import in_coordinates, known
 
@@ -32,6 +33,7 @@ class Start:
     y: np.ndarray
     coordinates: str  # which they are, and why
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
+    engine: Engine | None = None  # what the motion is computed by; table-driven if none
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 

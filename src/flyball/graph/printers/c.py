@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import re
 import textwrap
-from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..function import Function
 from ..values import reached
-from .lines import Language, lines
+from .lines import Language, lines, listed
 from .naming import Names
 from .routine import Argument, Routine
 from .tables import Table, refuse_opaque, tables
@@ -84,7 +85,9 @@ def literal(x: float) -> str:
     return repr(float(x)) if np.isfinite(x) else "NAN" if x != x else "INFINITY" if x > 0.0 else "-INFINITY"
 
 
-def c_sources(routines: Sequence[Routine], name: str, head: str, constants: Iterable[str] = ()) -> Sources:
+def c_sources(
+    routines: Sequence[Routine], name: str, head: str, constants: Mapping[str, Sequence[Any]] | None = None
+) -> Sources:
     """Text of a source and its header.
 
     Parameters
@@ -94,8 +97,8 @@ def c_sources(routines: Sequence[Routine], name: str, head: str, constants: Iter
         What files are called, and what all names begin with.
     head : str
         What the comments at the head of both say.
-    constants : iterable of str
-        Lines of the header: sizes.
+    constants : mapping, optional
+        Name -> numbers or texts: arrays beside the functions.
 
     Raises
     ------
@@ -114,28 +117,41 @@ def c_sources(routines: Sequence[Routine], name: str, head: str, constants: Iter
         return f"{t.name}_with({f.told['order']}, {args[0]}, (const double[]){{{', '.join(args[1:])}}})"
 
     language = Language(literal, FUNCTIONS, call)
+    told = {f"{name}_{k}": x for k, x in (constants or {}).items() if x}
     body = "\n".join(_function(r, name, language) for r in routines)
     data = "".join(_table(t) for t in known.values())
     helpers = "".join(text + "\n" for f, text in HELPERS.items() if re.search(rf"\b{f}\(", data + body))
     first = f'{_comment(head)}#include "{name}.h"\n\n#include <math.h>\n\n'
     guard = name.upper() + "_H"
     declared = "\n".join(_comment(_told(r)) + _signature(r, name) + ";\n" for r in routines)
+    arrays = "".join(_constant(k, x, declared=True) for k, x in told.items()) + "\n" * bool(told)
     header = (
-        f"{_comment(head)}#ifndef {guard}\n#define {guard}\n\n{''.join(x + chr(10) for x in constants)}\n"
-        f'#ifdef __cplusplus\nextern "C" {{\n#endif\n\n{declared}\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n'
+        f"{_comment(head)}#ifndef {guard}\n#define {guard}\n\n"
+        f'#ifdef __cplusplus\nextern "C" {{\n#endif\n\n{arrays}{declared}\n#ifdef __cplusplus\n}}\n#endif\n\n#endif\n'
     )
-    return Sources(first + helpers + data + body, header)
+    defined = "".join(_constant(k, x) + "\n" for k, x in told.items())
+    return Sources(first + defined + helpers + data + body, header)
+
+
+def _constant(name: str, items: Sequence[Any], declared: bool = False) -> str:
+    """An array of numbers or texts."""
+    texts = isinstance(items[0], str)
+    kind = f"{'extern ' * declared}const {'char *const' if texts else 'double'} {name}[{len(items)}]"
+    if declared:
+        return f"{kind};\n"
+    written = [json.dumps(x, ensure_ascii=False) if texts else literal(x) for x in items]
+    return "\n".join([f"{kind} = {{", *listed("    ", written), "};\n"])
 
 
 def _comment(text: str) -> str:
     """A comment of some lines."""
     text = text.strip().replace("*/", "* /").replace("/*", "/ *")
-    return "/* " + "\n   ".join(text.splitlines()) + " */\n"
+    return "/* " + "\n".join(("   " + x).rstrip() for x in text.splitlines()).lstrip() + " */\n"
 
 
 def _table(t: Table) -> str:
-    numbers = textwrap.fill(", ".join(literal(x) for x in t.data), 110)
-    text = f"static const double {t.name}[] = {{\n{textwrap.indent(numbers, '    ')}\n}};\n\n"
+    numbers = listed("    ", [literal(x) for x in t.data])
+    text = "\n".join([f"static const double {t.name}[] = {{", *numbers, "};\n\n"])
     if t.moved:
         put = "".join(f"    data[{k}] = moved[{n}];\n" for n, k in enumerate(t.moved))
         text += (

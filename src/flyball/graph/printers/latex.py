@@ -2,13 +2,14 @@ r"""Expressions in LaTeX: ``m_{2} \left(l_{1}^{2} + 2 l_{1} l_{c2} \cos q_{2}\ri
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..node import Node
-from ..operations import NUMBER, SYMBOL
+from ..operations import ADD, NUMBER, SYMBOL
 from ..simplify.numbers import Known
 from .layout import Layout, Power, Term, number_text
 from .spelling import escaped, spelt
@@ -21,6 +22,12 @@ OPERATORS = {
 }  # fmt: skip
 
 
+LONG = 160  # letters of LaTeX from which on a sum may be broken, though it stands in a fraction or high parentheses
+WORD = re.compile(r"\\(?:text|mathrm)\{[^}]{2}")
+BREAK = "\x1f"
+"""Where a line may be broken: before the terms of a sum that stands in no fraction, root or high parenthesis."""
+
+
 def latex(x: Any, names: Mapping[int, str] | None = None) -> str:
     """One expression, as it stands between dollars.
 
@@ -30,7 +37,7 @@ def latex(x: Any, names: Mapping[int, str] | None = None) -> str:
     names : mapping of int to str, optional
         Nodes that have a name of their own (`naming.named`), in LaTeX, by their index.
     """
-    return LatexPrinter(names).expression(x)
+    return LatexPrinter(names).expression(x).replace(BREAK, "")
 
 
 class LatexPrinter:
@@ -40,27 +47,41 @@ class LatexPrinter:
         self.layout = Layout(names)
 
     def expression(self, x: Any, top: bool = False) -> str:
-        """A sum; ``top``: written out though it has a name."""
-        return "".join(self.pieces(x, top))
+        """A sum, with marks where it may be broken; ``top``: written out though it has a name."""
+        return self.signed(self.layout.sum(x, top), top) if isinstance(x, Node) else number(float(x))
 
-    def pieces(self, x: Any, top: bool = False) -> list[str]:
-        """Terms with their signs: a line may break before each."""
-        if not isinstance(x, Node):
-            return [number(float(x))]
-        out = []
-        for k, term in enumerate(self.layout.sum(x, top)):
+    def products(self, products: Sequence[tuple[Any, Node]]) -> str:
+        """A sum of expressions times symbols, in the order given."""
+        return self.signed([self.layout.term(symbol.graph.node(c * symbol)) for c, symbol in products])
+
+    def signed(self, terms: Sequence[Term], top: bool = False) -> str:
+        """Terms with their signs."""
+        out = ""
+        for k, term in enumerate(terms):
             sign = (" - " if term.negative else " + ") if k else ("-" if term.negative else "")
-            out.append(sign + self.term(term, top))
+            out += (BREAK if k else "") + sign + self.term(term, top)
         return out
 
     def term(self, term: Term, top: bool = False) -> str:
         """One term without its sign."""
         up, down = _numeric(term.number)
-        above, below = [self.power(p, top) for p in term.above], [self.power(p) for p in term.below]
+        alone = bool(term.below)  # in a fraction a sum that is all of a side has no parentheses
+        above = [self.side(p, alone and len(term.above) == 1 and not up, top) for p in term.above]
+        below = [self.side(p, alone and len(term.below) == 1 and not down) for p in term.below]
+        if term.below and BREAK in beside(above) and len(beside(above)) > LONG:
+            above = [self.power(p, top) for p in term.above]
+            return rf"\frac{{{beside(up) or '1'}}}{{{beside(down + below)}}} {beside(above)}"
         if term.below:
-            return rf"\frac{{{' '.join(up + above) or '1'}}}{{{' '.join(down + below)}}}"
+            return rf"\frac{{{beside(up + above) or '1'}}}{{{beside(down + below)}}}".replace(BREAK, "")
         front = [rf"\frac{{{' '.join(up) or '1'}}}{{{down[0]}}}"] if down else up
-        return " ".join(front + above) or "1"
+        return beside(front + above) or "1"
+
+    def side(self, power: Power, alone: bool, top: bool = False) -> str:
+        """A factor of one side of a fraction."""
+        x, n = power
+        if alone and n == 1 and x.op == ADD and x.index not in self.layout.names:
+            return self.expression(x)
+        return self.power(power, top)
 
     def power(self, power: Power, top: bool = False) -> str:
         """A factor."""
@@ -73,13 +94,14 @@ class LatexPrinter:
         if x.op in OPERATORS:
             return self.function(OPERATORS[x.op] + (f"^{{{n}}}" if n != 1 else ""), x)
         inner = self.factor(x)
+        inner = inner if x.op == ADD else inner.replace(BREAK, "")
         return inner if n == 1 else f"{inner}^{{{n}}}"
 
     def function(self, operator: str, x: Node) -> str:
         """A function: of one symbol without parentheses."""
         if len(x.args) == 1 and (x.args[0].op == SYMBOL or x.args[0].index in self.layout.names):
             return f"{operator} {self.expression(x.args[0])}"
-        return f"{operator}{self.parentheses(', '.join(self.expression(a) for a in x.args))}"
+        return f"{operator}{self.parentheses(', '.join(self.expression(a) for a in x.args))}".replace(BREAK, "")
 
     def factor(self, x: Node) -> str:
         """Any other factor without its exponent."""
@@ -102,7 +124,11 @@ class LatexPrinter:
     def parentheses(inner: str) -> str:
         """Parentheses that are as high as what they hold."""
         high = any(mark in inner for mark in (r"\frac", r"\sqrt", r"\begin", r"\left"))
-        return rf"\left({inner}\right)" if high else f"({inner})"
+        if not high:
+            return f"({inner})"
+        if BREAK in inner and len(inner) > LONG:  # of fixed height, so that lines may be broken inside
+            return rf"\Bigl({inner}\Bigr)"
+        return rf"\left({inner}\right)".replace(BREAK, "")
 
 
 def _numeric(x: Known | float) -> tuple[list[str], list[str]]:
@@ -115,9 +141,18 @@ def _numeric(x: Known | float) -> tuple[list[str], list[str]]:
     return up, [str(x.denominator)] if x.denominator != 1 else []
 
 
+def beside(factors: Sequence[str]) -> str:
+    """Factors beside one another; words kept apart."""
+    out = ""
+    for k, factor in enumerate(factors):
+        word = WORD.match(factor) or (k and WORD.match(factors[k - 1]))
+        out += (r" \, " if word and k else " " if k else "") + factor
+    return out
+
+
 def _closed(latex: str) -> str:
     """A name to which an exponent may be put."""
-    return f"{{{latex}}}" if "^" in latex else latex
+    return f"({latex})" if "^" in latex else latex
 
 
 def number(x: float) -> str:
@@ -129,7 +164,7 @@ def number(x: float) -> str:
 def matrix(rows: np.ndarray | Sequence[Sequence[Any]], names: Mapping[int, str] | None = None) -> str:
     """A matrix; zeros are dots."""
     printer = LatexPrinter(names)
-    cells = [[r"\cdot" if x == 0.0 else printer.expression(x) for x in row] for row in rows]
+    cells = [[r"\cdot" if x == 0.0 else printer.expression(x).replace(BREAK, "") for x in row] for row in rows]
     columns = max((len(row) for row in cells), default=0)
     body = " \\\\\n".join(" & ".join(row) for row in cells)
     return rf"\left[\begin{{array}}{{{'c' * columns}}}" + f"\n{body}\n" + r"\end{array}\right]"

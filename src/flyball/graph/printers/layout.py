@@ -12,7 +12,7 @@ from ..simplify.cost import read
 from ..simplify.numbers import Known, known
 
 Power = tuple[Node, int]
-FUNCTION, SUM, OTHER = 5, 4, 3
+FUNCTION, SECOND, SUM, OTHER = 6, 5, 4, 3
 
 
 @dataclass(frozen=True)
@@ -112,9 +112,11 @@ class Layout:
         x = power[0]
         if x.index in self.names:
             return (2 if not x.moving else OTHER, x.index)
+        if x.op == SYMBOL and x.data.kind in ("acceleration", "multiplier"):
+            return (SECOND, x.index)
         if x.op == SYMBOL:
             mass = x.data.unit == "kg" or (not x.data.unit and x.data.name.startswith("m"))
-            return ((0 if mass else 1) if x.data.kind == "parameter" else OTHER, x.index)
+            return ((0 if mass else 1) if not x.moving else OTHER, x.index)
         if x.op == ADD:
             return (SUM, x.index)
         return (2 if x.op == "sqrt" and not x.moving else FUNCTION, x.index)
@@ -126,6 +128,5 @@ def negated(x: Node) -> bool:
 
 
 def number_text(x: float) -> str:
-    """A decimal: with as many digits as tell it apart, up to twelve."""
-    short = f"{x:.12g}"
-    return short if float(short) == x or abs(float(short) - x) <= 1e-12 * abs(x) else repr(x)
+    """A decimal of up to twelve digits."""
+    return f"{x:.12g}"

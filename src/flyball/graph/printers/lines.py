@@ -19,6 +19,7 @@ from .routine import negated
 
 SUM, PRODUCT, ATOM = range(3)
 WIDTH = 60  # characters of what is put in place
+LINE = 116  # characters of a line
 
 
 @dataclass(frozen=True)
@@ -128,3 +129,14 @@ def added(a: Piece, b: Piece) -> Piece:
     if a.negative:
         a, b = b, a
     return Piece(f"{a.bare(SUM)} {'-' if b.negative else '+'} {b.bare(PRODUCT)}", SUM)
+
+
+def listed(indent: str, items: Sequence[str]) -> list[str]:
+    """Items with commas behind them, in as many lines as it takes."""
+    rows: list[str] = []
+    row = indent
+    for x in items:
+        if len(row) > len(indent) and len(row) + len(x) > LINE:
+            rows, row = [*rows, row.rstrip()], indent
+        row += x + ", "
+    return [*rows, row.rstrip()]

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import keyword
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from ..function import Function
 from .lines import Language, lines
 from .naming import Names
-from .python import docstring, escaped, literal, table_data
+from .python import docstring, escaped, literal, table_data, told_constants
 from .routine import Routine
 from .tables import refuse_opaque, tables
 
@@ -60,7 +61,7 @@ def _spline_with(data, order, x, places, numbers):
 DECORATOR = '@njit(error_model="numpy")\n'
 
 
-def numba_module(routines: Sequence[Routine], head: str) -> str:
+def numba_module(routines: Sequence[Routine], head: str, constants: Mapping[str, Sequence[Any]] | None = None) -> str:
     """Text of a module of compiled functions.
 
     Raises
@@ -86,7 +87,7 @@ def numba_module(routines: Sequence[Routine], head: str) -> str:
     helpers = "".join(f"\n\n{DECORATOR}{HELPERS[f]}" for f in called)
     return (
         f'"""{escaped(head)}\n"""\n\nimport math\n\nimport numpy as np\nfrom numba import njit\n'
-        f"{table_data(known.values())}{helpers}{body}"
+        f"{told_constants(constants)}{table_data(known.values())}{helpers}{body}"
     )
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import keyword
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..function import Function
-from .lines import Language, lines
+from .lines import LINE, Language, lines, listed
 from .naming import Names
 from .routine import Argument, Routine
 from .tables import Table, opaque, tables
@@ -23,8 +23,6 @@ FUNCTIONS = {
     "rounded": "np.floor({0} + 0.5)", "minimum": "_minimum({0}, {1})", "maximum": "_maximum({0}, {1})",
     "choose": "np.where({0} > 0.0, {1}, {2})", "power": "np.power({0}, {1})",
 }  # fmt: skip
-
-LINE = 116  # characters
 
 HELPERS = {
     "_minimum": '''
@@ -102,7 +100,7 @@ def literal(x: float) -> str:
     return repr(float(x)) if np.isfinite(x) else "np.nan" if x != x else "np.inf" if x > 0.0 else "-np.inf"
 
 
-def python_module(routines: Sequence[Routine], head: str) -> str:
+def python_module(routines: Sequence[Routine], head: str, constants: Mapping[str, Sequence[Any]] | None = None) -> str:
     """Text of a module.
 
     Parameters
@@ -110,6 +108,8 @@ def python_module(routines: Sequence[Routine], head: str) -> str:
     routines : sequence of Routine
     head : str
         What the module's docstring says.
+    constants : mapping, optional
+        Name -> numbers or texts: tuples of the module.
     """
     for r in routines:
         r.check()
@@ -131,15 +131,24 @@ def python_module(routines: Sequence[Routine], head: str) -> str:
         for name, text in HELPERS.items()
         if f"{name}(" in body
     )
-    return f'"""{escaped(head)}\n"""\n\nimport numpy as np\n{table_data(known.values())}{helpers}{body}'
+    data = told_constants(constants) + table_data(known.values())
+    return f'"""{escaped(head)}\n"""\n\nimport numpy as np\n{data}{helpers}{body}'
+
+
+def told_constants(constants: Mapping[str, Sequence[Any]] | None) -> str:
+    """Tuples of numbers or texts."""
+    text = ""
+    for name, items in (constants or {}).items():
+        written = [repr(x) if isinstance(x, str) else literal(x) for x in items]
+        text += "\n".join([f"\n{name.upper()} = (", *listed("    ", written), ")"])
+    return text + "\n" if text else ""
 
 
 def table_data(known: Iterable[Table]) -> str:
     """Numbers of tables, as arrays of the module."""
     text = ""
     for t in known:
-        numbers = textwrap.fill(", ".join(literal(x) for x in t.data), 116, break_long_words=False)
-        text += f"\n{t.name} = np.array([\n{textwrap.indent(numbers, '    ')}\n])"
+        text += "\n".join([f"\n{t.name} = np.array([", *listed("    ", [literal(x) for x in t.data]), "])"])
     return text + "\n" if text else ""
 
 
@@ -163,7 +172,9 @@ def _function(r: Routine, language: Language) -> str:
     text += [f"    {n} = {e}" for n, e in temporaries]
     at = 0
     for name, array in r.arrays.items():
-        text += listed(f"    {name} = _result({states}, {array.shape!r}, [", numbers[at : at + array.size], "])")
+        begin, own = f"    {name} = _result({states}, {array.shape!r}, [", numbers[at : at + array.size]
+        short = begin + ", ".join(own) + "])"
+        text += [short] if len(short) < LINE else [begin, *listed(" " * 8, own), "    ])"]
         at += array.size
     text.append(f"return {', '.join(r.results)}")
     signature = ", ".join(n + _default(a) for n, a in zip(given, r.arguments, strict=True))
@@ -173,21 +184,6 @@ def _function(r: Routine, language: Language) -> str:
 def escaped(text: str) -> str:
     """Text inside a docstring."""
     return text.strip().replace("\\", "\\\\").replace('"""', "'''")
-
-
-def listed(begin: str, items: Sequence[str], end: str) -> list[str]:
-    """Items between two texts: in one line where they fit, else as many lines as it takes."""
-    line = begin + ", ".join(items) + end
-    if len(line) <= LINE:
-        return [line]
-    indent = " " * (len(begin) - len(begin.lstrip()) + 4)
-    rows: list[str] = []
-    row = indent
-    for x in items:
-        if len(row) > len(indent) and len(row) + len(x) > LINE:
-            rows, row = [*rows, row.rstrip()], indent
-        row += x + ", "
-    return [begin, *rows, row.rstrip(), indent[4:] + end]
 
 
 def _default(a: Argument) -> str:

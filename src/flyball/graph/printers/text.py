@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -11,6 +12,7 @@ from ..node import Node
 from ..operations import NUMBER, SYMBOL
 from ..simplify.numbers import Known
 from .layout import Layout, Power, Term, number_text
+from .wrapping import wrapped
 
 NAMES = {"absolute": "abs", "minimum": "min", "maximum": "max", "rounded": "round"}
 
@@ -37,25 +39,23 @@ class TextPrinter:
         """A sum; ``top``: written out though it has a name."""
         if not isinstance(x, Node):
             return number(x)
+        return self.signed(self.layout.sum(x, top), top)
+
+    def signed(self, terms: Sequence[Term], top: bool = False) -> str:
+        """Terms with their signs."""
         out = ""
-        for k, term in enumerate(self.layout.sum(x, top)):
+        for k, term in enumerate(terms):
             sign = (" - " if term.negative else " + ") if k else ("-" if term.negative else "")
             out += sign + self.term(term, top)
         return out
 
     def lines(self, x: Any, width: int = 96) -> list[str]:
-        """A sum, broken before its terms where a line would be longer than ``width``."""
-        if not isinstance(x, Node):
-            return [number(x)]
-        out = [""]
-        for k, term in enumerate(self.layout.sum(x, True)):
-            sign = ("- " if term.negative else "+ ") if k else ("-" if term.negative else "")
-            piece = sign + self.term(term, True)
-            if k and len(out[-1]) + len(piece) + 1 > width:
-                out.append(piece)
-            else:
-                out[-1] += (" " if k else "") + piece
-        return out
+        """A sum, broken before signs where a line would be longer than ``width``."""
+        return broken(self.expression(x, True), width)
+
+    def products(self, products: Sequence[tuple[Any, Node]]) -> str:
+        """A sum of expressions times symbols, in the order given."""
+        return self.signed([self.layout.term(symbol.graph.node(c * symbol)) for c, symbol in products])
 
     def term(self, term: Term, top: bool = False) -> str:
         """One term without its sign."""
@@ -97,6 +97,11 @@ class TextPrinter:
             return f"({a} if {c} > 0 else {b})"
         name = x.data.name if x.op == "call" else NAMES.get(x.op, x.op)
         return f"{name}({', '.join(self.expression(y) for y in x.args)})"
+
+
+def broken(line: str, width: int) -> list[str]:
+    """A line in pieces that are no longer than ``width``, where there are signs to break before."""
+    return [line.strip() for line in wrapped(re.split(r"(?= [-+=] )", line), width)]
 
 
 def number(x: Any) -> str:

@@ -5,11 +5,12 @@ cos a + cos b = 2 cos((a+b)/2) cos((a-b)/2),    1 + cos 2a = 2 cos^2 a,    and s
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from typing import Any
 
 from ..node import Graph, Node
-from .terms import COS, ONE, SIN, Angle, Powers, Terms, Wave, combined, turned
+from .terms import COS, ONE, ROUNDING, SIN, Angle, Powers, Terms, Wave, combined, turned
 
 Product = tuple[float, Powers, tuple[Wave, ...]]
 """A term with any number of waves."""
@@ -39,6 +40,43 @@ def contracted(terms: Terms) -> list[Product]:
                 del left[i], left[j]
                 left[fresh] = made
                 fresh += 1
+
+
+def phased(terms: Terms) -> Terms:
+    """Terms with a cos u + b sin u as one wave, c cos(u - p) or c sin(u - p), where p is a number that one knows."""
+    out = dict(terms)
+    for powers, waves in terms:
+        sine = (powers, ((SIN, waves[0][1]),)) if waves and waves[0][0] == COS else None
+        if sine in terms and sine is not None:
+            a, b = terms[powers, waves], terms[sine]
+            whole = math.atan2(b, a)
+            quarter = round(whole / (0.5 * math.pi))
+            phase = _known(whole - quarter * 0.5 * math.pi)
+            if phase is not None:
+                del out[powers, waves], out[sine]
+                angle = (*waves[0][1], *(((ONE, -phase),) if phase else ()))
+                kind, sign = ((COS, 1.0), (SIN, 1.0), (COS, -1.0), (SIN, -1.0))[quarter % 4]
+                out[powers, ((kind, angle),)] = sign * math.hypot(a, b)
+    return out
+
+
+def _known(phase: float) -> float | None:
+    """A part of pi or a short decimal that a phase is, but for rounding."""
+    part = round(phase * 48.0 / math.pi) * math.pi / 48.0
+    short = float(f"{phase:.5g}")
+    return next((x for x in (part, short) if abs(x - phase) < ROUNDING), None)
+
+
+def doubled(terms: Terms) -> list[Product]:
+    """Terms with 2 sin a cos a in place of sin 2a."""
+    out: list[Product] = []
+    for (powers, waves), c in sorted(terms.items()):
+        half = _halved(dict(waves[0][1])) if waves and waves[0][0] == SIN else None
+        if half is None:
+            out.append((c, powers, waves))
+        else:
+            out.append((2.0 * c * half[1], powers, ((COS, half[0]), (SIN, half[0]))))
+    return out
 
 
 def _pairs(left: dict[int, Product]) -> list[tuple[float, int, int, Product]]:
@@ -78,6 +116,8 @@ def _product(c: float, u: Wave | None, d: float, w: Wave | None) -> tuple[float,
     if half[0] is None or half[1] is None:
         return None
     (p, turn_p), (m, turn_m) = half[0], half[1]
+    if u and w and _size(((COS, p), (COS, m))) > _size((u, w)):  # cos 2a + cos 2b stays
+        return None
     same = (c > 0.0) == (d > 0.0)
     if a[0] == COS:
         kinds, factor = ((COS, COS), 2.0 * c) if same else ((SIN, SIN), -2.0 * c)

@@ -21,6 +21,7 @@ from .terms import (
     inverse,
     plus,
     powers_product,
+    put,
     scaled,
     times,
     wave,
@@ -28,6 +29,10 @@ from .terms import (
 
 if TYPE_CHECKING:
     from .simplify import Simplifier
+
+
+FEW_TERMS = 12  # that sums may have where expressions are large
+BUDGET = 60_000  # products of terms after which they are
 
 
 class Expander:
@@ -44,6 +49,7 @@ class Expander:
     def __init__(self, parent: Simplifier, most: int) -> None:
         self.parent, self.graph, self.most = parent, parent.graph, most
         self.known: dict[int, Terms] = {}
+        self.spent = 0
 
     def __call__(self, x: Node) -> Terms:
         """Terms of a node whose arguments are known, or become so."""
@@ -89,6 +95,9 @@ class Expander:
         return plus(a, b)
 
     def _product(self, a: Terms, b: Terms) -> Terms:
+        self.spent += len(a) * len(b)
+        if self.spent > BUDGET:
+            self.most = min(self.most, FEW_TERMS)
         if len(a) * len(b) > 4 * self.most:
             a, b = sorted((a, b), key=len)
             b = self.factor(b)
@@ -139,13 +148,26 @@ class Expander:
         found: dict[int, float] = {}
         for (powers, waves), c in terms.items():
             if powers == () and waves == ():
-                found[ONE] = c
-            elif len(powers) == 1 and powers[0][1] == 1 and not waves:
-                found[powers[0][0]] = c
-            else:
-                one = self.parent.short({(powers, waves): 1.0})
-                found[one.index] = found.get(one.index, 0.0) + c
-        return tuple(sorted(found.items()))
+                found[ONE] = found.get(ONE, 0.0) + c
+                continue
+            single = len(powers) == 1 and powers[0][1] == 1 and not waves
+            one = self.graph.nodes[powers[0][0]] if single else self.parent.short({(powers, waves): 1.0})
+            inner = self._wrapped(one) if c == round(c) else None
+            for k, d in inner or ((one.index, 1.0),):
+                found[k] = found.get(k, 0.0) + c * d
+        return tuple(sorted((k, c) for k, c in found.items() if c))
+
+    def _wrapped(self, x: Node) -> Angle | None:
+        """U in atan2(sin u, cos u), which differs from it by whole turns."""
+        if x.op != "atan2" or x.index in self.parent.barriers:
+            return None
+        y, z = (self(a) for a in x.args)
+        if len(y) != 1 or len(z) != 1:
+            return None
+        ((p, u), c), ((r, w), d) = next(iter(y.items())), next(iter(z.items()))
+        if p or r or d != 1.0 or not u or not w or u[0][0] != SIN or w != ((COS, u[0][1]),) or abs(c) != 1.0:
+            return None
+        return tuple((k, c * e) for k, e in u[0][1])
 
     def _wave(self, x: Node) -> Terms:
         angle = self.angle(x.args[0])
@@ -158,8 +180,7 @@ class Expander:
             del found[ONE]
             steps = (quarter + (0 if kind == SIN else 1)) % 4  # sin(x + n pi/2)
             kind, c = (SIN, COS, SIN, COS)[steps], (1.0, 1.0, -1.0, -1.0)[steps]
-        waves, sign = wave(kind, found)
-        return {((), waves): c * sign} if sign else {}
+        return turned_by(kind, found, found.pop(ONE, 0.0), c)
 
     def _root(self, x: Node) -> Terms:
         terms = self(x.args[0])
@@ -174,11 +195,34 @@ class Expander:
                 return out
         if not terms:
             return {}
-        number, inner = factors(self.parent.short(terms), self.parent.barriers)
+        number, inner = factors(self.parent.shorter(x.args[0], self.parent.short(terms)), self.parent.barriers)
         if number < 0.0 and x.op == "sqrt":
             return self.atom(self.parent.inside(x))
-        front = math.sqrt(number) if x.op == "sqrt" else abs(number)
-        return scaled(self.atom(self.graph.function(x.op, self.parent.gathered.product(1.0, inner))), front)
+        if x.op == "absolute":
+            return scaled(self.atom(self.graph.function(x.op, self.parent.gathered.product(1.0, inner))), abs(number))
+        rest = {k: n % 2 if n > 0 else -(n % 2) for k, n in inner.items()}
+        found: Terms = {PLAIN: math.sqrt(number)}
+        for k, n in inner.items():
+            half = (n - rest[k]) // 2
+            size = self.graph.nodes[k] if half % 2 == 0 else self.graph.function("absolute", self.graph.nodes[k])
+            found = times(found, {(((size.index, half),) if half else (), ()): 1.0})
+        under = {k: n for k, n in rest.items() if n}
+        if not under:
+            return found
+        return times(found, self.atom(self.graph.function("sqrt", self.parent.gathered.product(1.0, under))))
+
+
+def turned_by(kind: int, angle: dict[int, float], phase: float, c: float) -> Terms:
+    """C times cosine or sine of an angle and a number: cos(u + p) = cos p cos u - sin p sin u."""
+    out: Terms = {}
+    parts = [(kind, math.cos(phase))]
+    if phase:
+        parts.append((1 - kind, math.sin(phase) if kind == SIN else -math.sin(phase)))
+    for k, factor in parts:
+        waves, sign = wave(k, angle)
+        if sign * factor:
+            put(out, ((), waves), c * factor * sign)
+    return out
 
 
 def quarters(constant: float) -> int:

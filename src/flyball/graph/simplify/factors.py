@@ -47,7 +47,7 @@ class Gatherer:
             return self.product(*terms[0])
         powers = common([p for _, p in terms])
         c = content([c for c, _ in terms])
-        c = abs(c) if not powers else c
+        c = 1.0 if c == -1.0 and not powers else c
         rest = [(d / c, quotient(p, powers)) for d, p in terms]
         return self.graph.multiply(self.product(c, powers), self.split(rest))
 

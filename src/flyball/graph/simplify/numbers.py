@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 NEAR = 4.0 * 2.0**-52  # relative: what rounding makes of a number
 LARGEST = 100_000  # numerators above are better read as decimals
@@ -22,6 +23,7 @@ class Known:
     pi: bool = False
 
 
+@lru_cache(maxsize=65536)
 def fraction(x: float, largest: int = DENOMINATORS) -> Fraction | None:
     """The short fraction that a number is, if it is one."""
     if not math.isfinite(x) or abs(x) > LARGEST:
@@ -32,6 +34,7 @@ def fraction(x: float, largest: int = DENOMINATORS) -> Fraction | None:
     return found
 
 
+@lru_cache(maxsize=65536)
 def known(x: float) -> Known | None:
     """What a reader knows a number as; None if it is best written as a decimal."""
     found = fraction(x)
@@ -51,6 +54,7 @@ def known(x: float) -> Known | None:
     return None
 
 
+@lru_cache(maxsize=65536)
 def snapped(x: float) -> float:
     """A number without the rounding that has gathered in it, where it is plainly a short one."""
     if x == 0.0 or not math.isfinite(x):

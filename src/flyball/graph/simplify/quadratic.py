@@ -1,4 +1,7 @@
-"""Quadratic forms with numbers for factors, as squares and products of sums: a^2 + 2 a b + b^2 = (a + b)^2."""
+"""Quadratic forms with numbers for factors, as squares and products of sums: a^2 + 2 a b + b^2 = (a + b)^2.
+
+What is of lower order is one of second order by way of an atom that is one.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +9,7 @@ import math
 
 Term = tuple[float, dict[int, int]]
 NEAR = 1e-12
+ONE = -1  # an atom for what is no power of any
 
 
 def as_product(terms: list[Term]) -> tuple[list[Term], list[Term]] | None:
@@ -18,17 +22,17 @@ def as_product(terms: list[Term]) -> tuple[list[Term], list[Term]] | None:
         return None
     form: dict[tuple[int, int], float] = {}
     for c, p in terms:
-        if any(n < 0 for n in p.values()) or sum(p.values()) != 2:
+        if any(n < 0 for n in p.values()) or sum(p.values()) > 2:
             return None
-        i, j = sorted(k for k, n in p.items() for _ in range(n))
+        i, j = sorted([k for k, n in p.items() for _ in range(n)] + [ONE] * (2 - sum(p.values())))
         form[i, j] = form.get((i, j), 0.0) + c
     atoms = sorted({k for pair in form for k in pair})
     if len(atoms) > 8:
         return None
-    found = next((f for k in atoms if (f := _by(form, atoms, k)) is not None), None)
+    found = next((f for k in reversed(atoms) if (f := _by(form, atoms, k)) is not None), None)
     if found is None:
         return None
-    first, second = ([(c, {k: 1}) for k, c in s.items() if c != 0.0] for s in found)
+    first, second = ([(c, {k: 1} if k != ONE else {}) for k, c in s.items() if c != 0.0] for s in found)
     return (first, second) if len(first) > 1 or len(second) > 1 else None
 
 

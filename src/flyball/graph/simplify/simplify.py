@@ -10,15 +10,15 @@ import numpy as np
 from ..node import Graph, Node
 from ..operations import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from ..values import reached
-from .angles import contracted, opened
+from .angles import contracted, doubled, opened, phased
 from .cost import read
-from .expand import Expander
+from .expand import FEW_TERMS, Expander
 from .factors import Gatherer, Term, flat
 from .terms import Terms
 from .units import shortened
 
-TERMS = 80  # of a sum that is multiplied out
-MANY, FEW_TERMS = 2500, 12  # operations from which on only short sums are
+TERMS = 60  # of a sum that is multiplied out
+MANY = 2500  # operations from which on only short sums are
 SHORT = 6.0  # what is as short as this is not looked at in another way
 
 
@@ -102,6 +102,10 @@ class Simplifier:
             found = min(found, parts, key=self.cost)
         return found
 
+    def shorter(self, x: Node, other: Node) -> Node:
+        """The best that is known for ``x``, or the other of the same value."""
+        return min(other, self._best.get(x.index, other), key=self.cost)
+
     def inside(self, x: Node) -> Node:
         """A function of short arguments."""
         args = tuple(self._best[a.index] if a.index in self._best else self(a) for a in x.args)
@@ -112,11 +116,11 @@ class Simplifier:
         key = frozenset(terms.items())
         found = self._short.get(key)
         if found is None:
-            terms = shortened(terms, self.units)
+            terms = phased(shortened(terms, self.units))
             found = self._made([(c, p, w) for (p, w), c in sorted(terms.items())])
             if sum(1 for _, w in terms if w) > 1 or (len(terms) > 1 and any(w for _, w in terms)):
-                other = self._made(contracted(terms))
-                found = min(found, other, key=self.cost)
+                for other in (contracted(terms), doubled(terms)):
+                    found = min(found, self._made(other), key=self.cost)
             self._short[key] = found
         return found
 

@@ -1,0 +1,165 @@
+"""Which engine steps a motion: the table-driven one, or code made for its mechanism alone (``special/``).
+
+They round differently: results agree within the tolerance, not to the last bit. A motion is computed by one of them
+from its beginning to its end, so that a result is to the last bit the one of ``specialize=True``, or of ``False``.
+
+Left to choose (``auto``), a motion begins by the tables. After some steps, code that is there already is taken, if the
+rest is worth looking for it, and other code is made where the rest, or what was computed of such mechanisms in this
+process, takes longer than that; the motion then begins anew. How long is estimated from counts (`account.py`): clocks
+have no say. So the same call gives the same digits, but for once, when code has come to be since.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ... import special
+from ...errors import ModelError
+from ...numerics.integrators import clock as ex
+from ...numerics.integrators.refusal import afresh
+from ...tables.system import EVALUATIONS
+from ..compiled import Compiled
+from .account import SPENT, kind
+
+AUTO = "auto"
+FIRST, AGAIN = 16, 4  # steps after which auto chooses, and how many times more until it does again
+GAIN = 3.0  # times faster
+MARGIN = 1.5  # times what it takes to make or load code, that it must save
+MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
+THERE = 5e5  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
+LONGEST = 100_000  # steps in one call of the compiled loop
+FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
+TABLES, MADE = "table-driven", "made for this mechanism"
+SHORT = f"{TABLES}: too little is computed to make code for it"
+CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
+
+
+def check_specialize(value: Any) -> None:
+    """Refuse what is not a choice of the engine.
+
+    Raises
+    ------
+    ModelError
+        If it is none of True, False and ``"auto"``.
+    """
+    if not isinstance(value, bool) and value != AUTO:
+        raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
+
+
+class Engine:
+    """The engine of one motion.
+
+    Parameters
+    ----------
+    c : Compiled
+        In the coordinates of the motion, with the scratch that it is run on.
+    wish : bool or "auto"
+        What the user wants.
+    without : str
+        Why made code would do nothing here, if it would not.
+
+    Attributes
+    ----------
+    told : str
+        Which engine it is, and why.
+    due : float
+        Steps after which it is chosen again.
+
+    Raises
+    ------
+    ModelError
+        If code is wanted that cannot be made.
+    """
+
+    def __init__(self, c: Compiled, wish: bool | str, without: str = "") -> None:
+        self.c, self.told, self.due = c, f"{TABLES}: asked for", math.inf
+        self._first: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # the clock as the motion begins
+        self._counted = 0
+        if wish is False:
+            return
+        if wish is True:
+            self._wanted(without)
+        elif without or c.structure.functions:
+            self.told = f"{TABLES}: {without or CALLS}"
+        else:
+            self.told, self.due = SHORT, FIRST
+            self._kind, self._each = kind(c.structure)
+
+    def begin(self, clock: ex.Clock) -> None:
+        """The motion begins there."""
+        if self.due < math.inf:
+            self._first = clock.real.copy(), clock.count.copy(), clock.y[ex.NOW].copy()
+            self._counted = int(self.c.work.info[EVALUATIONS])
+
+    def begins_anew(self, clock: ex.Clock) -> bool:
+        """Choose again, if it is time: whether the motion has to go back to where it began, as the clock is then."""
+        steps = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
+        if steps < self.due or self._first is None:
+            return False
+        self.due = AGAIN * steps
+        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first[0][ex.T]
+        if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
+            return False
+        clock.K[:] = clock.y[:] = clock.seen[:] = 0.0
+        clock.real[:], clock.count[:], clock.y[ex.NOW] = self._first
+        return True
+
+    def hands_over(self, clock: ex.Clock) -> bool:
+        """Whether made code got stuck, and the engine for all mechanisms goes on from the last step: through, or it
+        leaves in the scratch what the reason is told from.
+        """
+        if self.c.made is None or clock.count[ex.STATUS] not in FAILED:
+            return False
+        self.told += f"; table-driven from t = {clock.real[ex.T]:.6g} s on, where it could not go on"
+        self.c.run_on_tables()
+        clock.count[ex.STATUS], clock.real[ex.GROW] = ex.RUNNING, 1.0
+        clock.real[ex.H] = max(clock.real[ex.H], clock.real[ex.WIDE])
+        afresh(clock)
+        return True
+
+    def limited(self, clock: ex.Clock, steps: float) -> int:
+        """So many steps as a call of the compiled loop should take, or as are left until it is time to choose."""
+        done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
+        return int(min(max(steps, 1.0), max(self.due - done, 1.0), LONGEST))
+
+    def end(self) -> None:
+        """The motion is over: what was computed is added up."""
+        if self.due < math.inf:
+            SPENT.add(self._kind, self._spent())
+
+    def _spent(self) -> float:
+        """What was computed since it began [ns]."""
+        return (int(self.c.work.info[EVALUATIONS]) - self._counted) * self._each
+
+    def _wanted(self, without: str) -> None:
+        try:
+            if without:
+                raise special.Refused(without)
+            self._take(special.plan(self.c.values))
+        except special.Refused as error:
+            raise ModelError(f"specialize=True: {error}; leave it out") from None
+
+    def _choose(self, left: float) -> bool:
+        """Whether made code is taken; ``left``: what is still to be computed [ns]."""
+        x = self.c.values
+        plan = special.plan(x)
+        try:
+            if why := special.refusal(plan):
+                raise special.Refused(why)
+            there = special.known(plan, x)
+            paying, price = (left, THERE) if there else (left + SPENT.of(self._kind) / MANY, special.price(plan, there))
+            if paying * (1.0 - 1.0 / GAIN) < MARGIN * price + self._spent() / GAIN:
+                return False
+            self._take(plan)
+        except special.Refused as error:
+            self.told, self.due = f"{TABLES}: {error}", math.inf
+            return False
+        return True
+
+    def _take(self, plan: special.Plan) -> None:
+        made, how = special.code(plan, self.c.values)
+        self.c.run_on(made)
+        self.told, self.due = f"{MADE}: {how}", math.inf

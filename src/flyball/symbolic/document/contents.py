@@ -1,0 +1,214 @@
+"""What stands in the document of a mechanism's equations, section by section; expressions as traced, not yet short."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...constraints import blocks as building
+from ...graph.node import Node
+from ...graph.printers.latex import latex
+from ...graph.printers.spelling import spelt
+from ...graph.printers.text import text
+from ...graph.simplify.simplify import simplified
+from ...model.joint import Joint
+from ...tables.system import INERTIA, MASS
+from .forces import along
+from .parts import Block, Cell, Display, Formula, Formulas, Listing, Matrix, Prose, Section, Tex
+from .words import between, meaning, moments, unit
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+ZERO = Tex("0", "0")
+LARGE = 14  # velocities from which on rows of the equations of motion are not written out each
+
+
+def bold(letter: str, plain: str = "") -> Tex:
+    """A matrix or vector."""
+    style = "boldsymbol" if letter.startswith("\\") else "mathbf"
+    return Tex(rf"\{style}{{{letter}}}", plain or letter.strip("\\"))
+
+
+def label(x: Any) -> Tex:
+    """A symbol as a label."""
+    return Tex(spelt(x.data), x.data.name)
+
+
+def value(x: Any) -> Cell:
+    """An expression in a cell."""
+    return Tex(latex(x), text(x)) if isinstance(x, Node) and not x.known else f"{float(x):.6g}"
+
+
+def mechanism(eq: Equations) -> Section:
+    """Bodies with what they weigh, joints with what they are made of, forces, drivers."""
+    m, s = eq.model, eq.formulated.values.structure
+    S = eq.formulated.traced.system
+    out: list[Block] = [Prose(f"{'Planar' if m.planar else 'Spatial'} mechanism. Coordinates: {eq.coordinates}.")]
+    names = ("J",) if m.planar else ("J_xx", "J_yy", "J_zz", "J_xy", "J_xz", "J_yz")
+    rows = []
+    for e in m.bodies:
+        b = s.place[e.name]
+        weight = [S.body_x[b, MASS], *moments(S.body_x[b, INERTIA : INERTIA + 9], m.planar)]
+        rows.append(
+            (e.name, *map(value, simplified(weight if e.name not in s.points else weight[:1] + [0.0] * len(names))))
+        )
+    used = [k for k in range(len(names) + 2) if k < 2 or any(row[k] != "0" for row in rows)]
+    head = ("body", "mass [kg]", *(f"{n} [kg m²]" for n in names))
+    out.append(Listing(tuple(head[k] for k in used), tuple(tuple(row[k] for k in used) for row in rows)))
+    joints = tuple((e.name, type(e).__name__, between(e), made_of(e)) for e in (*m.joints, *m.couplings))
+    out.append(Listing(("joint", "kind", "between", "building blocks"), joints))
+    acting = tuple((e.name, type(e).__name__, between(e)) for e in (*m.forces, *m.drivers))
+    out.append(Listing(("force or driver", "kind", "between"), acting))
+    return Section("mechanism", "Mechanism", [b for b in out if not isinstance(b, Listing) or b.rows])
+
+
+BLOCKS = {
+    "COMMON_POINT": "common point (BB1)",
+    "PARALLEL_AXES": "parallel axes (BB2)",
+    "STRAIGHT_LINE": "straight line (BB3)",
+    "SAME_AXES": "same axes (BB2, BB4)",
+    "CROSSED_AXES": "axes at right angles (BB4)",
+    "CONSTANT_DISTANCE": "constant distance (BB5)",
+}
+
+
+def made_of(e: Any) -> str:
+    """Building blocks of a joint."""
+    if not isinstance(e, Joint):
+        return "relation of coordinates"
+    rows = list(e.blocks)
+    found = []
+    for name, called in BLOCKS.items():
+        block = list(getattr(building, name))
+        at = next((k for k in range(len(rows)) if rows[k : k + len(block)] == block), None)
+        if at is not None:
+            found.append(called)
+            del rows[at : at + len(block)]
+    if rows:
+        found.append(f"{len(rows)} more row{'s' if len(rows) > 1 else ''}" if found else f"{len(rows)} rows")
+    return ", ".join(found)
+
+
+def symbols(eq: Equations, used: list[Node]) -> Section:
+    """The symbols that occur, with meaning, unit and the parameters' values."""
+    rows: dict[bool, list[tuple[Cell, ...]]] = {False: [], True: []}
+    for x in used:
+        if x.data.kind not in ("shared", "constant"):
+            value = () if x.moving else (f"{x.value:.6g}",)
+            rows[x.moving].append((label(x), x.data.name, meaning(x.data), unit(x.data.unit), *value))
+    head = ("symbol", "name", "meaning", "unit")
+    tables = [Listing((*head, "value [SI]"), tuple(rows[False])), Listing(head, tuple(rows[True]))]
+    return Section("symbols", "Symbols", [t for t in tables if t.rows])
+
+
+def coordinates(eq: Equations) -> Section:
+    """Q, v and how they go together."""
+    T = eq.formulated.traced
+    out: list[Block] = []
+    if T.q:
+        rows = tuple((Tex(str(k + 1), str(k + 1)), label(x), x.data.name) for k, x in enumerate(T.q))
+        out.append(Listing(("", "coordinate", "name"), rows))
+    same = len(T.q) == len(T.v) and all(T.T[i, j] == (1.0 if i == j else 0.0) for i, j in np.ndindex(T.T.shape))
+    out.append(
+        Display(
+            Tex(
+                r"\dot{\mathbf{q}} = \mathbf{v}" if same else r"\dot{\mathbf{q}} = \mathbf{T} \mathbf{v}",
+                "qdot = v" if same else "qdot = T v",
+            )
+        )
+    )
+    if not same:
+        out.append(Matrix(bold("T"), T.T.copy(), tuple(map(label, T.q)), tuple(map(label, T.v))))
+    return Section("coordinates", "Coordinates and velocities", out)
+
+
+def constraints(eq: Equations) -> list[Section]:
+    """Rows of each joint, driver and coupling; the Jacobian."""
+    T, s = eq.formulated.traced, eq.formulated.values.structure
+    if not T.lam:
+        return []
+    owners: dict[str, list[int]] = {}
+    for k, x in enumerate(T.lam):
+        owners.setdefault(x.data.element, []).append(k)
+    out: list[Block] = [
+        Display(
+            Tex(
+                r"\mathbf{g}(\mathbf{q}, t) = \mathbf{0}, \quad \mathbf{G} \mathbf{v} = \boldsymbol{\nu}, \quad "
+                r"\mathbf{G} \dot{\mathbf{v}} = \boldsymbol{\gamma}",
+                "g = 0, G v = nu, G vdot = gamma",
+            )
+        )
+    ]
+    for owner, rows in owners.items():
+        e = s.model[owner]
+        what = made_of(e) if isinstance(e, Joint) else type(e).__name__.lower()
+        formulas = []
+        for k in rows:
+            free = k < len(s.rows) and not s.rows[k].holonomic
+            formulas += [] if free else [Formula(_of("g", k), T.g[k])]
+        formulas += [Formula(_of(r"\nu", k), T.nu[k]) for k in rows if T.nu[k] != 0.0]
+        formulas += [Formula(_of(r"\gamma", k), T.gamma[k]) for k in rows]
+        out.append(Formulas(f"{owner} ({between(e)})", formulas, what))
+    G = Matrix(bold("G"), T.G.copy(), tuple(map(label, T.lam)), tuple(map(label, T.v)))
+    return [Section("constraints", "Constraints", out), Section("jacobian", "Jacobian of the constraints", [G])]
+
+
+def _of(letter: str, k: int) -> Tex:
+    return Tex(f"{letter}_{{{k + 1}}}", f"{letter.strip(chr(92))}[{k + 1}]")
+
+
+def masses(eq: Equations) -> Section:
+    """The mass matrix."""
+    T = eq.formulated.traced
+    names = tuple(map(label, T.v))
+    return Section("mass", "Mass matrix", [Matrix(bold("M"), T.M.copy(), names, names, symmetric=True)])
+
+
+def forces(eq: Equations) -> Section:
+    """Generalised forces: inertia, gravity, each element."""
+    T = eq.formulated.traced
+    out: list[Block] = []
+    for title, f in along(eq.formulated):
+        rows = [Formula(force(k, x), y) for k, (x, y) in enumerate(zip(T.v, f, strict=True)) if y != 0.0]
+        if rows:
+            out.append(Formulas(title, rows))
+    if not out:
+        out = [Prose("No force acts: f = 0.")]
+    return Section("forces", "Forces along the velocities", out)
+
+
+def force(k: int, x: Node) -> Tex:
+    """The force along a velocity."""
+    return Tex(rf"f_{{{k + 1}}} [{spelt(x.data)}]", f"f[{k + 1}], {x.data.name}")
+
+
+def motion(eq: Equations, acting: Section) -> Section:
+    """The equations of motion: as matrices, and row by row where these are few."""
+    x = eq.formulated
+    T = x.traced
+    closed = r" + \mathbf{G}^{\top} \boldsymbol{\lambda}" if T.lam else ""
+    told = Tex(
+        rf"\mathbf{{M}} \dot{{\mathbf{{v}}}} = \mathbf{{f}}{closed}", f"M vdot = f{' + G^T lam' if T.lam else ''}"
+    )
+    out: list[Block] = [Display(told)]
+    if len(T.v) <= LARGE:
+        by: dict[str, list[Formula]] = {}
+        given = [f for b in acting.blocks if isinstance(b, Formulas) for f in b.formulas]
+        for k, v in enumerate(T.v):
+            before = [(T.M[k, j], a) for j, a in enumerate(x.vdot) if T.M[k, j] != 0.0]
+            after = [(T.G[r, k], lam) for r, lam in enumerate(T.lam) if T.G[r, k] != 0.0]
+            parts = [f for f in given if f.left.plain == force(k, v).plain]
+            by.setdefault(v.data.element, []).append(Formula(ZERO, T.f[k], "", before, after, parts))
+        out += [Formulas(owner, rows) for owner, rows in by.items()]
+    return Section("motion", "Equations of motion", out)
+
+
+def energies(eq: Equations) -> Section:
+    """Kinetic and potential energy."""
+    rows = [
+        Formula(Tex(letter, letter), eq[f"energy.{name}"].nodes[()], "J")
+        for letter, name in (("T", "kinetic"), ("V", "potential"))
+    ]
+    return Section("energies", "Energies", [Formulas("", rows)])

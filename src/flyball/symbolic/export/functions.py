@@ -1,0 +1,264 @@
+"""What can be exported of a mechanism: each function with its arguments, results and what they mean."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ...errors import ModelError
+from ...graph.derivative import replaced
+from ...graph.node import SYMBOL, Node
+from ...graph.printers.routine import Argument, Routine
+from ...graph.values import reached
+from ...math.vec import add, cross, load3, load9, mm, mv
+from ...model.body import Frame
+from ...model.words import listing
+from .solution import Solution, solution
+
+if TYPE_CHECKING:
+    from ..equations import Equations
+
+
+class Functions:
+    """Routines of a mechanism's equations.
+
+    Parameters
+    ----------
+    equations : Equations
+    outputs : sequence of str
+        Quantities by name that the function ``outputs`` gives.
+    """
+
+    def __init__(self, equations: Equations, outputs: Sequence[str] = ()) -> None:
+        self.equations, self.traced = equations, equations.formulated.traced
+        self.outputs = tuple(outputs)
+
+    def routine(self, name: str) -> Routine:
+        """A function by name.
+
+        Raises
+        ------
+        ModelError
+            If there is no such function.
+        """
+        if name not in FUNCTIONS or (name == "outputs" and not self.outputs):
+            raise ModelError(f"there is no function {name!r} to export; {listing(self.names)}")
+        results, arguments, meaning, meanings = FUNCTIONS[name](self)
+        return Routine(name, self._arguments(arguments.split(), results), results, meaning, meanings)
+
+    @property
+    def names(self) -> list[str]:
+        """Functions that this mechanism has."""
+        return [k for k in FUNCTIONS if k != "outputs" or self.outputs]
+
+    @cached_property
+    def arguments(self) -> dict[str, Argument]:
+        """All that a function may be given, in order; what a mechanism does not have is left out."""
+        eq, x = self.equations, self.traced
+        named = eq.named
+        u = [named[k] for k in eq.inputs]
+        p = [named[k] for k in eq.parameters]
+        places = [place.symbol for place in eq.formulated.places]
+        found = {
+            "t": Argument("t", x.t, "time"),
+            "q": Argument("q", x.q, "coordinates"),
+            "v": Argument("v", x.v, "velocities"),
+            "vdot": Argument("vdot", eq.formulated.vdot, "accelerations"),
+            "lam": Argument("lam", x.lam, "multipliers"),
+            "loads": Argument("loads", x.loads, "what presses together the surfaces of joints with friction"),
+            "places": Argument("places", places, "places of followers on their curves"),
+            "u": Argument("u", u, "inputs", (0.0,) * len(u)),
+            "p": Argument("p", p, "parameters", tuple(n.value for n in p)),
+        }
+        return {k: a for k, a in found.items() if a.single or a.nodes}
+
+    def _arguments(self, usual: Sequence[str], results: dict[str, Any]) -> list[Argument]:
+        """The usual arguments of a function, and those that it takes besides for this mechanism."""
+        nodes = [x for a in results.values() for x in np.ravel(a)]
+        met = {x.index for x in reached(nodes) if x.op == SYMBOL}
+        return [a for k, a in self.arguments.items() if k in usual or any(x.index in met for x in a.nodes)]
+
+    @cached_property
+    def solution(self) -> Solution:
+        """Accelerations, multipliers and loads."""
+        return solution(self.traced)
+
+    @cached_property
+    def solved(self) -> list[tuple[Node, Any]]:
+        """What stands for the symbols of accelerations, multipliers and loads at a state."""
+        x, found = self.traced, self.solution
+        pairs = ((self.equations.formulated.vdot, found.vdot), (x.lam, found.lam), (x.loads, found.loads))
+        return [(symbol, value) for symbols, values in pairs for symbol, value in zip(symbols, values, strict=True)]
+
+    @property
+    def carried(self) -> list[str]:
+        """Names of bodies and frames whose poses are asked for."""
+        model = self.equations.model
+        return [e.name for e in (*model.bodies, *model.frames)]
+
+    def records(self) -> list[tuple[Any, ...]]:
+        """Position, axes, velocity and angular velocity of every body's reference frame and every named frame."""
+        x, found = self.equations.formulated.values, []
+        W = self.traced.work
+        for name in self.carried:
+            e = self.equations.model[name]
+            owner = e.body if isinstance(e, Frame) else name
+            b = x.structure.place.get(owner, -1)
+            p, R = (np.asarray(a, object) for a in x.poses.named(name))
+            if b < 0:
+                found.append((p, R, np.zeros(3), np.zeros(3)))
+                continue
+            body = x.bodies[owner]
+            own = np.asarray(body.R, object)
+            offset, turn = own.T @ (p - np.asarray(body.c, object)), own.T @ R
+            axes, w = load9(W.BK, b, 3), load3(W.BK, b, 12)
+            arm = mv(axes, tuple(offset))
+            at, v = add(load3(W.BK, b, 0), arm), add(load3(W.BK, b, 15), cross(w, arm))
+            found.append((at, np.array(mm(axes, tuple(turn.ravel())), object).reshape(3, 3), v, w))
+        return found
+
+    def stacked(self, k: int) -> np.ndarray:
+        """One of these of all bodies and frames."""
+        parts = [np.asarray(r[k], object) for r in self.records()]
+        made = np.empty((len(parts), *parts[0].shape), object)
+        for n, a in enumerate(parts):
+            made[n] = a
+        return self.equations.formulated.cleaned(made)
+
+
+Made = tuple[dict[str, Any], str, str, dict[str, str]]
+FUNCTIONS: dict[str, Callable[[Functions], Made]] = {}
+"""Functions by name: results, their usual arguments, what the function is, what the results are."""
+
+
+def function(make: Callable[[Functions], Made]) -> Callable[[Functions], Made]:
+    """Make a function known by its name."""
+    FUNCTIONS[make.__name__.rstrip("_")] = make
+    return make
+
+
+@function
+def kinematics(x: Functions) -> Made:
+    """Poses."""
+    told = f"of {', '.join(x.carried)}: origins [m], along the world's axes"
+    turned = "their axes, as columns"
+    results = {"positions": x.stacked(0), "rotations": x.stacked(1)}
+    return results, "t q p", "Poses of bodies' reference frames and of named frames.", {
+        "positions": told, "rotations": turned,
+    }  # fmt: skip
+
+
+@function
+def velocities(x: Functions) -> Made:
+    """Velocities of the same."""
+    results = {"velocities": x.stacked(2), "angular_velocities": x.stacked(3)}
+    return results, "t q v p", "Velocities of bodies' reference frames and of named frames.", {
+        "velocities": f"of {', '.join(x.carried)}: of origins [m/s], along the world's axes",
+        "angular_velocities": "[rad/s], along the world's axes",
+    }  # fmt: skip
+
+
+@function
+def T(x: Functions) -> Made:
+    """Rates of coordinates."""
+    return {"T": x.traced.T}, "q p", "qdot = T v.", {"T": "rates of the coordinates by the velocities"}
+
+
+@function
+def M(x: Functions) -> Made:
+    """Mass matrix."""
+    return {"M": x.traced.M}, "q p", "Mass matrix.", {"M": "symmetric [kg, kg m, kg m^2]"}
+
+
+@function
+def f(x: Functions) -> Made:
+    """Forces."""
+    what = "All forces but reactions along the velocities, gyroscopic ones included."
+    return {"f": x.traced.f}, "t q v u p", what, {"f": "[N, N m]"}
+
+
+@function
+def g(x: Functions) -> Made:
+    """Constraints."""
+    return {"g": x.traced.g}, "t q p", "Constraints, g = 0.", {"g": "[m, rad, 1]; 0 for those of velocities only"}
+
+
+@function
+def nu(x: Functions) -> Made:
+    """Right-hand side of velocities."""
+    return {"nu": x.traced.nu}, "t q p", "What constraints ask of velocities: G v = nu.", {}
+
+
+@function
+def G(x: Functions) -> Made:
+    """Jacobian."""
+    return {"G": x.traced.G}, "t q p", "Jacobian of the constraints along the velocities.", {}
+
+
+@function
+def gamma(x: Functions) -> Made:
+    """Right-hand side of accelerations."""
+    return {"gamma": x.traced.gamma}, "t q v p", "What constraints ask of accelerations: G vdot = gamma.", {}
+
+
+@function
+def residual(x: Functions) -> Made:
+    """Residual."""
+    T = x.traced
+    missed = T.M @ np.array(x.equations.formulated.vdot, object) - T.f
+    if T.lam:
+        missed = missed - T.G.T @ np.array(T.lam, object)
+    given = list(zip(T.loads, T.returned, strict=True))
+    new = np.empty(len(missed), object)
+    new[:] = replaced(list(missed), given)
+    what = "M vdot - f - G^T lam: zero along every motion."
+    return {"residual": new}, "t q v vdot lam u p", what, {"residual": "[N, N m]"}
+
+
+@function
+def right_hand_side(x: Functions) -> Made:
+    """Rates of the state, and multipliers."""
+    T, found = x.traced, x.solution
+    qdot = T.T @ np.array(T.v, object)
+    results = {"qdot": qdot, "vdot": found.vdot, "lam": found.lam}
+    meanings = {
+        "qdot": "rates of the coordinates",
+        "vdot": "accelerations",
+        "lam": "multipliers: reactions are G^T lam",
+    }
+    places = x.equations.formulated.places
+    if T.loads:
+        results["loads"] = found.loads
+        meanings["loads"] = "of joints with friction [N]"
+    if places:
+        results["placesdot"] = np.array([p.rate for p in places], object)
+        meanings["placesdot"] = "rates of the places on curves"
+    return results, "t q v u p", "Accelerations and multipliers at a state with g = 0 and G v = nu.", meanings
+
+
+@function
+def energies(x: Functions) -> Made:
+    """Kinetic and potential energy."""
+    quantity = x.equations.quantities.quantity
+    results = {k: quantity(f"energy.{k}").nodes[()] for k in ("kinetic", "potential")}
+    return results, "t q v p", "Kinetic energy, and potential energy of gravity and springs [J].", {}
+
+
+@function
+def outputs(x: Functions) -> Made:
+    """Quantities by name."""
+    found = [x.equations[name] for name in x.outputs]
+    wide = [name for name, e in zip(x.outputs, found, strict=True) if e.shape]
+    if wide:
+        raise ModelError(f"the output {wide[0]!r} is no single number: take its components, such as {wide[0] + '_x'!r}")
+    nodes: list[Any] = [e.nodes[()] for e in found]
+    met = {n.index for n in reached(nodes) if n.op == SYMBOL}
+    if any(n.index in met for symbols in (x.equations.formulated.vdot, x.traced.lam, x.traced.loads) for n in symbols):
+        nodes = replaced(nodes, x.solved)
+    units = ", ".join(f"{n} [{e.unit}]" if e.unit else n for n, e in zip(x.outputs, found, strict=True))
+    y = np.empty(len(nodes), object)
+    y[:] = nodes
+    return {"y": y}, "t q v u p", "Outputs.", {"y": units}

@@ -1,0 +1,240 @@
+"""Which engine a motion goes through: what is wanted, refused, told, and when code pays for being made.
+
+The maker of code is a stand-in that makes nothing, so that only what is decided is looked at.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numba import cfunc
+from typer.testing import CliRunner
+
+import flyball as fb
+from flyball.analysis.motion import engines
+from flyball.analysis.motion.account import Account
+from flyball.cli import app
+from flyball.special import Refused
+from flyball.tables.system import FINISH
+from tests.mechanisms import door, example, four_bar
+
+
+class Code:
+    """Code that does nothing: the engine's own loops go on."""
+
+    def system(self, S):
+        return S._replace(flat=np.zeros_like(S.flat))
+
+
+@dataclass
+class Maker:
+    """What `special` offers; ``price`` [ns] of code that is not there yet."""
+
+    price_of_making: float = 1e9
+    where: str = ""
+    refused: str = ""
+    made: int = 0
+    Refused = Refused
+
+    def plan(self, x):
+        return None
+
+    def refusal(self, plan):
+        return self.refused
+
+    def known(self, plan, x):
+        return self.where
+
+    def price(self, plan, known):
+        return {"memory": 0.0, "disk": 1e5, "": self.price_of_making}[known]
+
+    def code(self, plan, x):
+        if self.refused:
+            raise Refused(self.refused)
+        self.made += 1
+        self.where = "memory"
+        return Code(), "made now"
+
+
+@pytest.fixture
+def maker(monkeypatch) -> Maker:
+    found = Maker()
+    monkeypatch.setattr(engines, "special", found)
+    monkeypatch.setattr(engines, "SPENT", Account())
+    return found
+
+
+@pytest.mark.parametrize("wish", [1, None, "yes", "True"])
+def test_what_is_no_choice_is_refused(wish):
+    for ask in (four_bar().simulate, driven().kinematics):
+        with pytest.raises(fb.ModelError, match=r"^specialize is True, False or 'auto', not "):
+            ask(**{"t_end": 0.1, "specialize": wish})
+
+
+@pytest.mark.parametrize("wish", [True, False])
+def test_steps_by_impulses_have_no_choice(wish):
+    m = example("conveyor.toml")
+    with pytest.raises(fb.ModelError, match=rf"^specialize={wish} does nothing with steps by impulses; leave it out"):
+        m.simulate(0.1, specialize=wish)
+
+
+def test_partitioning_has_no_made_code(maker):
+    m = four_bar()
+    with pytest.raises(fb.ModelError, match=r"^specialize=True: partitioning chooses .*; leave it out$"):
+        m.simulate(0.1, coordinates="absolute", stabilization="partitioning", specialize=True)
+    r = m.simulate(0.1, coordinates="absolute", stabilization="partitioning")
+    assert r.health.engine.startswith("table-driven: partitioning")
+
+
+def test_not_wanted_is_not_looked_for(monkeypatch):
+    monkeypatch.setattr(engines, "special", None)
+    assert four_bar().simulate(0.1, specialize=False).health.engine == "table-driven: asked for"
+
+
+def test_wanted_is_made_before_the_motion_begins(maker):
+    r = four_bar().simulate(0.01, outputs=2, specialize=True)
+    assert maker.made == 1
+    assert r.health.engine == "made for this mechanism: made now"
+    assert ("engine", r.health.engine) in r.health.lines()
+    assert r.health.as_dict()["engine"] == r.health.engine
+
+
+def test_what_cannot_be_made_is_refused_with_the_reason(maker):
+    maker.refused = "it has 999 rows, and code is made for 120"
+    with pytest.raises(fb.ModelError, match=r"^specialize=True: it has 999 rows, and .*; leave it out$"):
+        four_bar().simulate(0.1, specialize=True)
+    assert four_bar().simulate(2.0).health.engine == f"table-driven: {maker.refused}"
+
+
+def test_short_motions_are_left_alone(maker):
+    r = four_bar().simulate(0.5)
+    assert maker.made == 0
+    assert r.health.engine == "table-driven: too little is computed to make code for it"
+
+
+def test_a_long_motion_begins_anew_with_code_that_pays(maker):
+    """What is left after 16 steps is more than making costs; whatever the clock says, and told as if it began so."""
+    maker.price_of_making = 1e6
+    first, again = (four_bar().simulate(20.0, outputs=3) for _ in range(2))
+    assert maker.made == 2
+    for r in (first, again):
+        assert r.health.engine == "made for this mechanism: made now"
+        assert np.array_equal(r.t, [0, 10, 20])
+    assert np.array_equal(first.q, again.q)
+    assert first.health.steps == again.health.steps
+
+
+def test_what_begins_anew_is_what_began_so(maker):
+    """To the last bit: with code from the beginning, and with the loops that stand in for it here."""
+    maker.price_of_making = 1e6
+    a, b, c = (four_bar().simulate(5.0, specialize=x) for x in ("auto", True, False))
+    assert maker.made == 2
+    for r in (b, c):
+        assert np.array_equal(a.q, r.q)
+        assert np.array_equal(a.multipliers, r.multipliers)
+        assert (a.health.steps, a.health.evaluations) == (r.health.steps, r.health.evaluations)
+
+
+@pytest.mark.parametrize("where", ["memory", "disk"])
+def test_code_that_is_there_is_taken_where_there_is_something_to_gain(maker, where):
+    """Motions that are too short to make code for; in memory as on disk, so that the next process gives the same."""
+    assert not four_bar().simulate(10.0).health.engine.startswith("made")
+    maker.where = where
+    assert four_bar().simulate(10.0).health.engine.startswith("made")
+    assert not four_bar().simulate(0.1).health.engine.startswith("made")
+
+
+def test_many_short_motions_pay_for_code_together(maker):
+    """Of one kind, with other numbers or without; a part of what they took."""
+    maker.price_of_making = 1e6
+    m, runs = four_bar(), 0
+    while not maker.made and runs < 200:
+        m = m if runs % 2 else four_bar(gravity=(0, -9.81 - 0.01 * runs))
+        m.simulate(2.0, outputs=2)
+        runs += 1
+    assert 5 <= runs < 200
+    again = four_bar().simulate(0.5, specialize=False)
+    assert again.health.engine == "table-driven: asked for"
+
+
+def test_functions_that_may_remember_are_not_begun_anew(maker):
+    m = door()
+    m.add(fb.Actuator("motor", coordinate="upper.angle", force=lambda t: np.sin(t)))
+    r = m.simulate(0.2)
+    assert r.health.engine.startswith("table-driven: a law is a Python function")
+
+
+def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypatch):
+    def interrupted(plan, x):
+        raise KeyboardInterrupt
+
+    maker.price_of_making = 1e6
+    monkeypatch.setattr(maker, "code", interrupted)
+    r = four_bar().simulate(20.0, outputs=20001)
+    assert not r.health.success
+    assert "interrupted by the user" in r.health.message
+    assert 0.0 < r.t[-1] < 20.0
+
+
+@cfunc("float64(voidptr, voidptr, float64, voidptr, voidptr, voidptr, voidptr)")
+def stuck(S, W, t, a, b, c, d):
+    """What finishes a derivative, and always finds it not finite."""
+    return 1.0
+
+
+class Stuck(Code):
+    """Code that cannot go on."""
+
+    def system(self, S):
+        flat = np.zeros_like(S.flat)
+        flat[FINISH] = stuck.address
+        return S._replace(flat=flat)
+
+
+def test_where_made_code_gets_stuck_the_loops_go_on(maker, monkeypatch):
+    monkeypatch.setattr(maker, "code", lambda plan, x: (Stuck(), "made now"))
+    r, s = (four_bar().simulate(0.5, specialize=x) for x in (True, False))
+    assert r.health.engine.startswith("made for this mechanism: made now; table-driven from t = 0 s on")
+    np.testing.assert_allclose(r.q, s.q, rtol=1e-9, atol=1e-9)
+    np.testing.assert_allclose(r.vdot, s.vdot, rtol=1e-9, atol=1e-9)
+    kinematics = [driven().kinematics(21, t_end=1.0, specialize=x) for x in (True, False)]
+    np.testing.assert_allclose(*(k["A"].force for k in kinematics), atol=1e-9)
+    np.testing.assert_allclose(*(k["motor"].work for k in kinematics), atol=1e-12)
+
+
+def test_what_made_code_and_loops_both_cannot_do_is_told_as_ever(maker, monkeypatch):
+    """Reasons are told from what the engine's loops leave."""
+    monkeypatch.setattr(maker, "code", lambda plan, x: (Stuck(), "made now"))
+    said = []
+    for wish in (True, False):
+        m = four_bar()
+        m.add(fb.Actuator("bad", coordinate="A.angle", force="1/(0.2 - t)**0.5"))
+        with pytest.raises(fb.SimulationError) as caught:
+            m.simulate(1.0, specialize=wish)
+        said.append(str(caught.value))
+        assert caught.value.t == pytest.approx(0.2, abs=1e-6)
+    assert said[0] == said[1]
+
+
+def driven() -> fb.Mechanism:
+    m = four_bar()
+    m.add(fb.Driver("motor", "A.angle", "6*t"))
+    return m
+
+
+def test_kinematics_has_the_choice_too(maker):
+    r = driven().kinematics(11, t_end=0.5, specialize=True)
+    assert r.health.engine == "made for this mechanism: made now"
+    assert driven().simulate(0.5, specialize=True).health.engine == r.health.engine
+
+
+def test_the_command_has_both_flags(maker, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    door().save("m.toml")
+    for flags, engine in ((["--specialize"], "made"), (["--no-specialize"], "table-driven: asked for"), ([], "table")):
+        words = ["run", "m.toml", "--t-end", "0.1", "--no-plots", "--no-animation", "--quiet", *flags]
+        said = CliRunner().invoke(app, words)
+        assert said.exit_code == 0, said.output
+        assert fb.load_result("m-result/result.nc").health.engine.startswith(engine)

@@ -1,0 +1,91 @@
+"""Code made for a mechanism belongs to a process: what threads share, what is pickled, what others find on disk."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+from flyball.analysis.motion.engines import Engine
+from flyball.analysis.motion.start import begin
+from tests.mechanisms import four_bar
+
+WISH = {"specialize": True, "progress": False, "outputs": 21}
+
+
+def test_threads_share_it():
+    """Each with scratch of its own: the same digits as one after the other."""
+    m = four_bar()
+    ends = [0.2 + 0.1 * k for k in range(8)]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda t: m.simulate(t, **WISH), ends))
+    for t, r in zip(ends, together, strict=True):
+        alone = m.simulate(t, **WISH)
+        assert np.array_equal(alone.q, r.q)
+        assert np.array_equal(alone.vdot, r.vdot)
+
+
+def test_results_are_pickled_without_it():
+    r = four_bar().simulate(0.3, **WISH)
+    again = pickle.loads(pickle.dumps(r))
+    assert again.health.engine == r.health.engine
+    assert np.array_equal(again.vdot, r.vdot)
+    assert not again.values.system.flat.any()
+    assert not r.values.system.flat.any()
+    on = again.model.simulate(0.4, start=again, **WISH)
+    assert on.health.success
+
+
+def test_what_a_motion_runs_on_is_pickled_without_it():
+    c = begin(four_bar().snapshot(), 0.0, None, None, "auto").assembly.compiled
+    Engine(c, True)
+    assert c.system.flat.any()
+    again = pickle.loads(pickle.dumps(c))
+    assert not again.system.flat.any()
+    assert again.made is None
+    assert not c.values.system.flat.any()
+
+
+CODE = """
+import sys
+sys.path[:] = {path!r}
+from flyball.analysis.motion.engines import Engine
+from flyball.analysis.motion.start import begin
+from tests.mechanisms import four_bar
+r = four_bar().simulate(0.3, specialize=True, progress=False, outputs=21)
+print(r.health.engine)
+print(repr(r.q[-1].tolist()))
+"""
+
+
+def test_other_processes_find_it_on_disk():
+    r = four_bar().simulate(0.3, **WISH)
+    said = subprocess.run(
+        [sys.executable, "-c", CODE.format(path=sys.path)], capture_output=True, text=True, timeout=120
+    )
+    engine, q = said.stdout.splitlines()
+    assert engine == "made for this mechanism: found on disk"
+    assert q == repr(r.q[-1].tolist())
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no fork")
+def test_a_fork_goes_on_with_it():
+    m = four_bar()
+    r = m.simulate(0.3, **WISH)
+    read, write = os.pipe()
+    child = os.fork()
+    if child == 0:
+        try:
+            os.write(write, pickle.dumps(m.simulate(0.3, **WISH).q[-1]))
+        finally:
+            os._exit(0)
+    os.close(write)
+    with os.fdopen(read, "rb") as pipe:
+        q = pickle.loads(pipe.read())
+    os.waitpid(child, 0)
+    assert np.array_equal(q, r.q[-1])
