@@ -39,6 +39,7 @@ TOLD = ("scratch", "constants", "operations", "laws", "seconds")
 _LOCK = threading.RLock()
 _found: OrderedDict[tuple[str, str], tuple[list[Entry], Made]] = OrderedDict()
 _refused: dict[str, str] = {}
+_nowhere: dict[str, int] = {}  # of what was not on disk, when the folder had last been changed
 
 
 def ready() -> bool:
@@ -55,7 +56,13 @@ def known(p: Plan, x: Values) -> str:
     """Where code for a mechanism is: "memory", "disk", or "" (nowhere)."""
     if _in_memory(p, x.system) is not None:
         return "memory"
-    return "disk" if any(True for _ in _fitting(p, x.system)) else ""
+    folder = _folder()
+    if folder is None or _nowhere.get(p.key) == (changed := folder.stat().st_mtime_ns):
+        return ""
+    if any(True for _ in _fitting(p, x.system)):
+        return "disk"
+    _nowhere[p.key] = changed
+    return ""
 
 
 def refusal(p: Plan) -> str:
@@ -129,10 +136,7 @@ def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
 @lru_cache(maxsize=1)
 def _folder() -> Path | None:
     start_numba()
-    cache = cache_of(engine.function)
-    if not getattr(cache, "kept", False):
-        return None
-    return Path(cache.cache_path)
+    return getattr(cache_of(engine.function), "folder", None)
 
 
 def _files(p: Plan) -> list[Path]:

@@ -78,6 +78,7 @@ def _target() -> Any:
     )
 
 
+@lru_cache(maxsize=1)
 def machine() -> str:
     """What the code is for: processor, its features, versions."""
     start_numba()
