@@ -25,6 +25,7 @@ PROMISED = {
     "bricard.toml",
     "cam.py",
     "car_axis.toml",
+    "cart_pole_swing_up.py",
     "chaplygin_sleigh.toml",
     "double_wishbone.toml",
     "governor.toml",

@@ -23,6 +23,7 @@ from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
+from .linear.face import Linear
 from .quantities import Quantities
 from .shown import Shown
 from .state import named_state, places_at
@@ -43,7 +44,7 @@ class SymbolicOptions(Options):
     names: str
 
 
-class Equations(Shown):
+class Equations(Shown, Linear):
     """Equations of motion of a mechanism in one kind of coordinates.
 
         qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
@@ -71,6 +72,7 @@ class Equations(Shown):
 
     def __init__(self, model: Model, start: Start, o: SymbolicOptions, inputs: Sequence[Input]) -> None:
         self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
+        self.described = model
         self.graph = Graph()
         tree = start.assembly.compiled.structure.tree
         s = structure(model, Choices(tree=tree, coupled=bool(tree)))
@@ -362,10 +364,13 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     refuse_contact(model, "symbolic")
     plain = model.snapshot()
     told, inputs = with_inputs(plain, o.inputs) if o.inputs else (plain, [])
-    told = told.snapshot()
-    if o.coordinates == "auto":
-        try:
-            return Equations(told, begin(told, 0.0, o.parameters, None, "joint"), o, inputs)
-        except AnalysisError:  # friction that follows loads which joint coordinates do not know
-            return Equations(told, begin(told, 0.0, o.parameters, None, "absolute"), o, inputs)
-    return Equations(told, begin(told, 0.0, o.parameters, None, o.coordinates), o, inputs)
+    told, auto = told.snapshot(), o.coordinates == "auto"
+    try:
+        start = begin(told, 0.0, o.parameters, None, "joint" if auto else o.coordinates)
+    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+        if not auto:
+            raise
+        start = begin(told, 0.0, o.parameters, None, "absolute")
+    out = Equations(told, start, o, inputs)
+    out.described = plain
+    return out

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from ...graph.derivative import jacobian, replaced
+from ...graph.derivative import jacobian
 from ...graph.node import Node
 from .solve import Determinants, solve, times
 
@@ -44,32 +44,50 @@ class Definition:
         return tuple(x.data.name for x in self.symbols)
 
 
-def inlined(nodes: Sequence[Any], definitions: Sequence[Definition]) -> list[Any]:
-    """Expressions with every formula put in; symbols without one stay."""
-    return replaced(nodes, formulas(definitions))
+class Formulas:
+    """Expressions with formulas put in for symbols that have some; each expression of the graph is seen once.
+
+    Parameters
+    ----------
+    definitions : sequence of Definition
+        Each stands on those before.
+
+    Attributes
+    ----------
+    implicit : list of Definition
+        Those without formulas, their equations with all formulas put in.
+    """
+
+    def __init__(self, definitions: Sequence[Definition]) -> None:
+        self._known: dict[int, Node] = {}
+        self.implicit: list[Definition] = []
+        for d in definitions:
+            if d.closed:
+                found = self([d.symbols[0].graph.node(y) for y in d.values])
+                self._known |= {s.index: y for s, y in zip(d.symbols, found, strict=True)}
+            else:
+                gaps = self([d.symbols[0].graph.node(y) for y in d.residuals])
+                self.implicit.append(Definition(d.symbols, (), tuple(gaps), d.how))
+
+    def __call__(self, nodes: Sequence[Any]) -> list[Any]:
+        """Expressions in which no symbol with a formula is left."""
+        for x in unseen(nodes, self._known):
+            args = tuple(self._known[a.index] for a in x.args)
+            same = all(a is b for a, b in zip(args, x.args, strict=True))
+            self._known[x.index] = x if same else x.graph.rebuilt(x, args)
+        return [self._known[x.index] if isinstance(x, Node) else x for x in nodes]
 
 
-def formulas(definitions: Sequence[Definition]) -> list[tuple[Node, Any]]:
-    """Symbols that have formulas, with formulas that hold no other of them."""
-    known: list[tuple[Node, Any]] = []
-    for d in definitions:
-        if d.closed:
-            known += zip(d.symbols, replaced([_node(d, y) for y in d.values], known), strict=True)
-    return known
-
-
-def _node(d: Definition, x: Any) -> Node:
-    return d.symbols[0].graph.node(x)
-
-
-def with_formulas(definitions: Sequence[Definition]) -> list[Definition]:
-    """Those without formulas, their equations with all formulas put in."""
-    known = formulas(definitions)
-    return [
-        Definition(d.symbols, (), tuple(replaced([_node(d, y) for y in d.residuals], known)), d.how)
-        for d in definitions
-        if not d.closed
-    ]
+def unseen(nodes: Sequence[Any], known: Mapping[int, Any]) -> list[Node]:
+    """What expressions are made of and is not known, in an order of evaluation."""
+    found: dict[int, Node] = {}
+    to_see = [x for x in nodes if isinstance(x, Node)]
+    while to_see:
+        x = to_see.pop()
+        if x.index not in found and x.index not in known:
+            found[x.index] = x
+            to_see.extend(x.args)
+    return [found[k] for k in sorted(found)]
 
 
 def rates(definitions: Sequence[Definition], by: Sequence[Node], dets: Determinants) -> list[tuple[Node, list[Any]]]:
@@ -78,7 +96,7 @@ def rates(definitions: Sequence[Definition], by: Sequence[Node], dets: Determina
     Parameters
     ----------
     definitions : sequence of Definition
-        All without formulas: see `with_formulas`.
+        All without formulas: see `Formulas`.
     by : sequence of Node
         Symbols.
 

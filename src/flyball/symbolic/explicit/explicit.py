@@ -17,7 +17,7 @@ from ...model.model import suggest
 from ...numerics.rank import parts
 from ...tracing.trace import Traced
 from ..expressions import Expressions
-from .definition import with_formulas
+from ..state import places_at
 from .reduced import More, Reduced, reduced
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class ExplicitEquations:
         formulas = [d for d in solution.positions if d.closed]
         self.dependent = tuple(n for d in formulas for n in d.names)
         self.branches = {n: d.how for d in formulas for n in d.names}
-        self.implicit = tuple(n for d in with_formulas(solution.definitions) for n in d.names)
+        self.implicit = tuple(n for d in solution.formulas.implicit for n in d.names)
         self.notes = tuple(solution.notes)
 
     # -- parts
@@ -114,7 +114,7 @@ class ExplicitEquations:
         ModelError
             If it is not implicit.
         """
-        for d in with_formulas(self.solution.definitions):
+        for d in self.solution.formulas.implicit:
             if coordinate in d.names:
                 return self._told(d.residuals, d.names)
         raise ModelError(f"{coordinate!r} is not implicit; these are: {', '.join(self.implicit) or 'none'}")
@@ -181,7 +181,8 @@ def explicit(equations: Equations, independent: Sequence[str] = (), closed: bool
     eq, x = equations, equations.formulated
     traced, inputs = with_rates(eq)
     places = [(p.symbol, p.equation) for p in x.places]
-    found = reduced(traced, eq.start, independent, More(x.vdot, places))
+    start = eq.start | (places_at(x, x.places, eq.start) if places else {})
+    found = reduced(traced, start, independent, More(x.vdot, places))
     out = ExplicitEquations(eq, found, inputs)
     if closed and out.implicit:
         raise ModelError(

@@ -15,7 +15,7 @@ from ...graph.values import evaluate, reached, symbols
 from ...tables.system import Q0
 from ...tracing.trace import Traced
 from .blocks import blocks
-from .definition import Definition, formulas, inlined
+from .definition import Definition, Formulas
 from .loops.pool import LARGEST, LONGEST, Pool
 from .loops.turns import continued
 from .partition import positions
@@ -124,13 +124,12 @@ def _drawn(d: Definition, probe: Probe) -> Definition | None:
 
 def _agree(g: Sequence[Node], definitions: Sequence[Definition], place: Place) -> bool:
     """Whether formulas fulfil the equations at random positions near the drawn one."""
-    known = formulas(definitions)
-    if not known:
-        return True
     others = {w.data.name for d in definitions if not d.closed for w in d.symbols}
     if others:  # where equations are left, these are tested by themselves
         return True
-    nodes = inlined(g, definitions)
+    if not definitions:
+        return True
+    nodes = Formulas(definitions)(g)
     rng = np.random.default_rng(1)
     values: dict[str, Any] = dict(place.values)
     for s in symbols(nodes):

@@ -11,8 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from ...graph.node import NUMBER, Node
-from ...graph.values import evaluate, symbols
+from ...graph.node import Node
+from ...graph.operations import CALL, NUMBER, OPERATIONS, SYMBOL
+from ...graph.values import evaluate
+from .definition import unseen
 
 PLACES = 5
 NOTHING = 1e-11  # of the largest of its kind: rounding
@@ -25,14 +27,20 @@ class Probe:
     def __init__(self, start: Mapping[str, float], seed: int = 0) -> None:
         self.start = start
         self._random = np.random.default_rng(seed)
-        self._known: dict[str, np.ndarray] = {}
+        self._known: dict[int, Any] = {}
 
     def values(self, nodes: Sequence[Any]) -> np.ndarray:
         """Values of expressions, (expressions, places)."""
-        for x in symbols(nodes):
-            if x.data.name not in self._known:
-                self._known[x.data.name] = self._of(x)
-        found = evaluate(nodes, self._known)
+        known = self._known
+        for x in unseen(nodes, known):
+            if x.op == NUMBER:
+                known[x.index] = x.value
+            elif x.op == SYMBOL:
+                known[x.index] = self._of(x)
+            else:
+                args = [known[a.index] for a in x.args]
+                known[x.index] = x.data(*args) if x.op == CALL else OPERATIONS[x.op](*args)
+        found = [known[x.index] if isinstance(x, Node) else x for x in nodes]
         return np.array([np.broadcast_to(np.asarray(x, float), PLACES) for x in found]).reshape(len(nodes), PLACES)
 
     def _of(self, x: Node) -> np.ndarray:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,7 @@ from ...tables.names import velocity_names
 from ...tracing.trace import Traced
 from .blocks import blocks
 from .constraints import constraints
-from .definition import Definition, inlined
+from .definition import Definition, Formulas
 from .partition import free, named, positions
 from .place import Place
 from .positions import Solved, solved_positions
@@ -93,9 +94,14 @@ class Reduced:
         """Names of the independent coordinates."""
         return tuple(self.names[d] for d in self.chosen)
 
+    @cached_property
+    def formulas(self) -> Formulas:
+        """Puts in all formulas."""
+        return Formulas(self.definitions)
+
     def inlined(self, nodes: Sequence[Any]) -> list[Any]:
         """Expressions of q, v, lam in terms of the independent coordinates, their rates, and what has no formula."""
-        return inlined(nodes, self.definitions)
+        return self.formulas(nodes)
 
 
 def reduced(x: Traced, start: Mapping[str, float], independent: Sequence[str] = (), more: More = NOTHING) -> Reduced:
@@ -235,7 +241,7 @@ class _Reduction:
         if x.loads:  # these are in f, and so in the multipliers
             into: Mapping[int, Any] = dict(enumerate(all_))
             found = Definition(tuple(x.lam), tuple(into[k] for k in range(len(x.lam))))
-            returned = inlined([x.graph.node(y) for y in x.returned], [found])
+            returned = Formulas([found])([x.graph.node(y) for y in x.returned])
             gaps = tuple(s - y for s, y in zip(x.loads, returned, strict=True))
             out.append(Definition(tuple(x.loads), (), gaps, "loads of joints that return themselves"))
         return out + self._each(x.lam, all_[: len(x.lam)], "reactions")

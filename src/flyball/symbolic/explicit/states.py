@@ -13,7 +13,7 @@ from ...graph.function import Opaque
 from ...graph.node import Node
 from ...graph.values import evaluate, symbols
 from ..expressions import Expressions
-from .definition import rates, with_formulas
+from .definition import rates
 from .explicit import ExplicitEquations
 from .newton import Implicit
 from .solve import Determinants, times
@@ -51,7 +51,7 @@ class StateEquations:
         f = e.inlined([self.graph.node(y) for y in (*qdot, *e.accelerations[e.chosen])])
         self.f = Expressions(self.equations, _vector(f), self.states)
         self.h = Expressions(self.equations, _vector([_one(explicit, name) for name in outputs]), self.outputs)
-        self._implicit = with_formulas(e.definitions)
+        self._implicit = e.formulas.implicit
         self.start = np.array([e.start[s.data.name] for s in self.x], float)
         self._solvers: list[Implicit] | None = None
         self._refuse_others()

@@ -12,11 +12,12 @@ from ...graph.node import SYMBOL, Node
 from ...graph.values import reached
 from .free import Free
 from .point import Point
-from .size import sizes
-from .solve import Dependent, is_zero, number, product, solved, zeros
+from .size import sizes, vanishing
+from .solve import Dependent, number, numbers, product, solved, zeros
 from .traced import Mechanics
 
 BALANCED = 1e-8  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
+NEAR = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
 
 
 def multipliers(m: Mechanics, point: Point, f: Free) -> np.ndarray:
@@ -58,11 +59,12 @@ def conditions(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> list[Nod
     """Forces along the free coordinates, which vanish at an equilibrium; those that always do are left out."""
     r = zeros(len(m.r), 1)
     r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
-    return [m.graph.node(x) for x in product(f.Zv.T, r)[:, 0] if not is_zero(x)]
+    found = replaced(list(product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
+    return [m.graph.node(x) for x, none in zip(found, vanishing(found), strict=True) if not none]
 
 
-def refuse_unbalanced(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> None:
-    """Refuse a point that is no equilibrium with the parameters' own values.
+def refuse_unbalanced(m: Mechanics, point: Point, lam: np.ndarray, f: Free, stiffness: np.ndarray) -> None:
+    """Refuse a point that is no equilibrium with the parameters' own values; ``stiffness``: dr/dx there.
 
     Raises
     ------
@@ -72,10 +74,12 @@ def refuse_unbalanced(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> N
     r = zeros(len(m.r), 1)
     r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
     left = product(f.Zv.T, r)[:, 0]
-    size = np.array(sizes(list(r[:, 0]))) * m.scale
-    terms = sizes(list(left))
+    size = np.array([size for _, size in sizes(list(r[:, 0]))]) * m.scale
+    terms = [size for _, size in sizes(list(left))]
+    near = np.abs(numbers(stiffness) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
     for d, x, own in zip(f.chosen_v, left, terms, strict=True):
-        if abs(number(x)) * m.scale[d] > BALANCED * (own * m.scale[d] + 1e-3 * size.max(initial=0.0)):
+        may = BALANCED * (own * m.scale[d] + 1e-3 * size.max(initial=0.0)) + NEAR * near[d]
+        if abs(number(x)) * m.scale[d] > may:
             name = m.names[d]
             moving = (
                 ""

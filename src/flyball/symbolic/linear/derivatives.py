@@ -46,6 +46,17 @@ class Perturbed:
     N: np.ndarray
     T: np.ndarray
 
+    def replaced(self, pairs: Sequence[tuple[Node, Node]]) -> Perturbed:
+        """With other expressions in place of parameters."""
+
+        def new(X: np.ndarray) -> np.ndarray:
+            out = X.copy()
+            out.ravel()[:] = replaced(list(X.ravel()), pairs)
+            return out
+
+        value, by = ({k: new(X) for k, X in of.items()} for of in (self.value, self.by))
+        return Perturbed(value, by, new(self.N), new(self.T))
+
 
 class Derivatives:
     """Everything once, as expressions of the state.

@@ -4,19 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...errors import AnalysisError, ModelError
-from ...graph.derivative import replaced
 from ...graph.node import Node
-from ...graph.values import evaluate, evaluated
+from ...graph.printers.sympy import SympyPrinter
+from ...graph.values import evaluate
 from ...model.words import listing, suggest
-from .derivatives import Derivatives, Perturbed
+from ..expressions import Expressions
+from .derivatives import Perturbed
 from .free import Free
-from .reduced import Reduced, improper, product
+from .matrices import Matrices
+from .pencil import Pencil, pencil
+from .quotient import cancelled, coefficients, scaled
+from .routh import StabilityConditions, stability
 from .traced import Mechanics
+from .transfer import TransferFunction, checked
+
+FACTORED = 300  # operations
 
 
 @dataclass
@@ -29,14 +37,10 @@ class LinearEquations:
     Attributes
     ----------
     name : str
-    states, inputs, outputs : tuple of str
-    state_units, input_units, output_units : tuple of str
     parameters : dict
         Name -> value of the parameters that have one of their own.
-    A, B, C, D : ndarray of objects
-        Nodes (see `Graph`) or numbers.
-    mass, damping, stiffness : ndarray of objects or None
-        M a'' + D a' + K a = 0 in the first half of the states; None with constraints on velocities only.
+    matrices : Matrices
+        What the properties tell, as arrays of nodes.
     conditions : list of Node
         What has to vanish for the point to be an equilibrium, where it does not by itself: the equations hold for
         parameters with which it does.
@@ -47,26 +51,90 @@ class LinearEquations:
     """
 
     name: str
-    states: tuple[str, ...]
-    state_units: tuple[str, ...]
-    inputs: tuple[str, ...]
-    input_units: tuple[str, ...]
-    outputs: tuple[str, ...]
-    output_units: tuple[str, ...]
     parameters: dict[str, float]
-    A: np.ndarray
-    B: np.ndarray
-    C: np.ndarray
-    D: np.ndarray
-    mass: np.ndarray | None
-    damping: np.ndarray | None
-    stiffness: np.ndarray | None
+    matrices: Matrices
     conditions: list[Node]
     balanced_by: dict[str, Node]
     found: tuple[str, ...]
     at: Perturbed = field(repr=False)
     free: Free = field(repr=False)
     mechanics: Mechanics = field(repr=False)
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """Names of the states x."""
+        return self.matrices.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the inputs u."""
+        return self.matrices.inputs
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the outputs y."""
+        return self.matrices.outputs
+
+    @property
+    def A(self) -> Expressions:
+        """In x' = A x + B u, (n, n)."""
+        return self._told(self.matrices.A, self.states, self.states)
+
+    @property
+    def B(self) -> Expressions:
+        """In x' = A x + B u, (n, inputs); errors as `C`."""
+        return self._proper(self.matrices.B, self.states, self.inputs)
+
+    @property
+    def C(self) -> Expressions:
+        """In y = C x + D u, (outputs, n).
+
+        Raises
+        ------
+        AnalysisError
+            If an output follows the rate of an input.
+        """
+        return self._proper(self.matrices.C, self.outputs, self.states)
+
+    @property
+    def D(self) -> Expressions:
+        """In y = C x + D u, (outputs, inputs); errors as `C`."""
+        return self._proper(self.matrices.D, self.outputs, self.inputs)
+
+    @property
+    def mass(self) -> Expressions | None:
+        """M of M a'' + D a' + K a = 0 in the first f states, (f, f); None with constraints on velocities only."""
+        return self._second(self.matrices.mass)
+
+    @property
+    def damping(self) -> Expressions | None:
+        """D of the same."""
+        return self._second(self.matrices.damping)
+
+    @property
+    def stiffness(self) -> Expressions | None:
+        """K of the same."""
+        return self._second(self.matrices.stiffness)
+
+    def _second(self, X: np.ndarray | None) -> Expressions | None:
+        return None if X is None else self._told(X, self.states[: len(X)], self.states[: len(X)])
+
+    def _proper(self, X: np.ndarray, rows: tuple[str, ...], columns: tuple[str, ...]) -> Expressions:
+        if self.matrices.improper:
+            raise AnalysisError(self.matrices.improper)
+        return self._told(X, rows, columns)
+
+    def _told(self, X: np.ndarray, rows: tuple[str, ...], columns: tuple[str, ...]) -> Expressions:
+        return Expressions(self, X, rows, columns)  # type: ignore[arg-type]
+
+    @cached_property
+    def printer(self) -> Any:
+        """The one that makes SymPy expressions."""
+        return SympyPrinter()
+
+    def checked(self, values: Mapping[str, Any], wanted: Mapping[str, Node]) -> dict[str, float]:
+        """Values by the names of symbols; refuses those that there are not. What `Expressions` ask."""
+        return checked(self, values)
 
     def values(self, **parameters: float) -> dict[str, np.ndarray]:
         """A, B, C, D in numbers: with the parameters' own values, or others.
@@ -76,28 +144,99 @@ class LinearEquations:
         ModelError
             If there is no such parameter, or equilibrium says what it is.
         """
-        told = self.told(parameters)
-        return {k: evaluated(getattr(self, k), told).astype(float) for k in "ABCD"}
-
-    def told(self, parameters: Mapping[str, float]) -> dict[str, float]:
-        """Values by the names of symbols; refuses those that there are not."""
-        for name in parameters:
-            if name in self.balanced_by:
-                raise ModelError(f"{name!r} has the value with which the mechanism is in equilibrium")
-            if name not in self.parameters:
-                known = list(self.parameters)
-                raise ModelError(f"{self.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
-        return {k: float(x) for k, x in parameters.items()}
+        return {k: getattr(self, k).at(parameters).astype(float) for k in "ABCD"}
 
     def eigenvalues(self, **parameters: float) -> np.ndarray:
         """Of A in numbers, (n,) complex [1/s]."""
-        return np.linalg.eigvals(self.values(**parameters)["A"])
+        return np.linalg.eigvals(self.A.at(parameters).astype(float))
 
     def balance(self, **parameters: float) -> dict[str, float]:
         """Values of the parameters that balance, for values of the others."""
-        told = self.told(parameters)
+        told = checked(self, parameters)
         found = evaluate(list(self.balanced_by.values()), told)
         return {k: float(x) for k, x in zip(self.balanced_by, found, strict=True)}
+
+    @cached_property
+    def pencil(self) -> Pencil:
+        """The same equations as a matrix of polynomials, constraints left in."""
+        positive = [k for k, x in self.parameters.items() if x > 0.0]
+        return pencil(self.mechanics, self.at, self.free, positive)
+
+    def transfer_function(self, input: str | None = None, output: str | None = None) -> TransferFunction:
+        """Transfer function with symbolic coefficients; of the only input and output if not named.
+
+        Raises
+        ------
+        ModelError
+            If there is no such input or output, or the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        i, k = self.index("input", input), self.index("output", output)
+        P = self.pencil
+        ring = P.ring
+        num, den, common = cancelled(ring, P.numerator(i, k), P.characteristic() * P.below[k])
+        num, den = scaled(ring, num, den)
+        both = [coefficients(ring, num), coefficients(ring, den)]
+        graph = self.mechanics.graph
+        nodes = ring.printer.back(both[0], graph), ring.printer.back(both[1], graph)
+        units = self.matrices.input_units[i], self.matrices.output_units[k]
+        names = {"input": self.inputs[i], "output": self.outputs[k], "input_unit": units[0], "output_unit": units[1]}
+        return TransferFunction(
+            name=self.name, **names, s=ring.s, num=tuple(both[0]), den=tuple(both[1]), cancelled=common,
+            parameters=self.parameters, balanced_by=self.balanced_by, nodes=nodes,
+        )  # fmt: skip
+
+    def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
+        """When all eigenvalues have negative real parts, as inequalities in the parameters.
+
+        Parameters
+        ----------
+        positive : sequence of str, optional
+            What is greater than zero: parameters, and ``"sin(alpha)"`` or the like; all that is now, if not given.
+
+        Raises
+        ------
+        ModelError
+            If the mechanism is too large, with the size met.
+        ImportError
+            If the package ``sympy`` is not installed.
+        """
+        P = self.pencil
+        return stability(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
+
+    def lines(self) -> list[tuple[str, str]]:
+        """Labels and texts for people: names, and what equilibrium asks of the parameters."""
+        x, out = self.matrices, []
+        for what, names, units in (
+            ("state", x.states, x.state_units),
+            ("input", x.inputs, x.input_units),
+            ("output", x.outputs, x.output_units),
+        ):
+            out += [(what, f"{name} [{unit}]") for name, unit in zip(names, units, strict=True)]
+        out += [("equilibrium", f"{k} = {self._short(e)}") for k, e in self.balanced_by.items()]
+        out += [("equilibrium", f"0 = {self._short(e)}") for e in self.conditions]
+        return out + [("found", f"{name} is a number, so that loops close") for name in self.found]
+
+    def _short(self, x: Node) -> Any:
+        """For people: factored, where that is cheap."""
+        made = self.printer(x)
+        return self.printer.sympy.factor(made) if made.count_ops() < FACTORED else made
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+    def latex(self) -> str:
+        """x' = A x + B u, y = C x + D u as LaTeX; x' = A x alone without inputs and outputs."""
+        out = [rf"\dot x = {self.A.latex()} x"]
+        if self.inputs:
+            out[0] += f" + {self.B.latex()} u"
+        if self.outputs:
+            out.append(f"y = {self.C.latex()} x" + (f" + {self.D.latex()} u" if self.inputs else ""))
+        return r" \\ ".join(out)
+
+    def _repr_latex_(self) -> str:
+        return rf"$\displaystyle \begin{{gathered}} {self.latex()} \end{{gathered}}$"
 
     def index(self, what: str, name: str | None) -> int:
         """Which input or output that is; the only one if not named."""
@@ -109,65 +248,3 @@ class LinearEquations:
             there = listing(list(names)) if names else f"the equations were made without any: {what}s=[...]"
             raise ModelError(f"{given}; {there}")
         return names.index(name)
-
-
-def told(
-    m: Mechanics,
-    d: Derivatives,
-    p: Perturbed,
-    f: Free,
-    r: Reduced,
-    names: tuple[Sequence[str], Sequence[str]],
-) -> dict[str, Any]:
-    """Matrices and names of states, inputs and outputs; ``names``: of outputs, and their units."""
-    k, n = len(m.inputs), len(r.rate)
-    y = _outputs(p, r, n, k)
-    A, (B, B1, B2) = r.rate[:, :n], _parts(r.rate, n, k)
-    C, (D, D1, D2) = y[:, :n], _parts(y, n, k)
-    shift = B1 + product(A, B2)
-    if bad := improper((D, D1 + product(C, B2), D2)):
-        output, i, rate = bad
-        raise AnalysisError(
-            f"output {names[0][output]!r} follows the {rate} of input {m.inputs[i].name!r}, which no state-space model "
-            f"can; leave out one of the two, or ask for the transfer function"
-        )
-    here, rates = ([m.names[d] for d in of] for of in (f.chosen, f.chosen_v))
-    return {
-        "states": (*(x.name for x in here), *(f"{x.name} rate" for x in rates)),
-        "state_units": (*(x.unit for x in here), *(f"{x.unit}/s" for x in rates)),
-        "inputs": tuple(i.name for i in m.inputs),
-        "input_units": tuple(i.unit for i in m.inputs),
-        "outputs": tuple(names[0]),
-        "output_units": tuple(names[1]),
-        "A": A,
-        "B": B + product(A, shift),
-        "C": C,
-        "D": D + product(C, shift),
-        "mass": r.M,
-        "damping": r.D,
-        "stiffness": r.K,
-    }
-
-
-def _parts(x: np.ndarray, n: int, k: int) -> list[np.ndarray]:
-    """Columns of the inputs, of their first and of their second rates."""
-    return [x[:, n + i * k : n + (i + 1) * k] for i in range(3)]
-
-
-def _outputs(p: Perturbed, r: Reduced, n: int, k: int) -> np.ndarray:
-    """Outputs by the states, the inputs and their rates, (outputs, n + 3 k)."""
-    y = product(p.by["yx"], r.position) + product(p.by["yv"], r.velocity)
-    y = y + product(p.by["ya"], r.acceleration) + product(p.by["yl"], r.multipliers)
-    y[:, n : n + k] = y[:, n : n + k] + p.by["yw"]
-    return y
-
-
-def with_balance(p: Perturbed, pairs: Sequence[tuple[Node, Node]]) -> Perturbed:
-    """With other expressions in place of parameters."""
-
-    def new(X: np.ndarray) -> np.ndarray:
-        out = X.copy()
-        out.ravel()[:] = replaced(list(X.ravel()), pairs)
-        return out
-
-    return Perturbed({k: new(X) for k, X in p.value.items()}, {k: new(X) for k, X in p.by.items()}, new(p.N), new(p.T))

@@ -17,8 +17,9 @@ from ...results.result import Result
 from ...tables.spanning import spanning
 from .balance import balanced, conditions, multipliers, refuse_unbalanced
 from .derivatives import Derivatives
-from .equations import LinearEquations, told, with_balance
+from .equations import LinearEquations
 from .free import free
+from .matrices import matrices
 from .point import Point, drawn, given
 from .reduced import reduced
 from .solve import number
@@ -36,6 +37,8 @@ class Asked:
     coordinates: str = "joint"
     independent: Sequence[str] = ()
     balanced_by: Sequence[str] = ()
+    parameters: Mapping[str, float] | None = None
+    tree: Sequence[str] | None = None  # the tree joints, where they are known
 
 
 def linear_equations(
@@ -47,6 +50,7 @@ def linear_equations(
     coordinates: str = "joint",
     independent: Sequence[str] = (),
     balanced_by: Sequence[str] = (),
+    parameters: Mapping[str, float] | None = None,
 ) -> LinearEquations:
     """Linear equations x' = A x + B u, y = C x + D u with the parameters as symbols.
 
@@ -67,6 +71,8 @@ def linear_equations(
         Coordinates that the states are changes of; chosen by pivoting if not given.
     balanced_by : sequence of str
         Parameters that take the values with which the point is an equilibrium, as many as there are conditions.
+    parameters : mapping, optional
+        Values in place of the model's own, in SI units or with a unit.
 
     Raises
     ------
@@ -76,9 +82,17 @@ def linear_equations(
     AnalysisError
         If the linear equations change with time, or an output follows the rate of an input.
     """
-    o = Asked(
-        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent, balanced_by=balanced_by
-    )
+    if coordinates not in ("joint", "absolute"):
+        raise ModelError(f"unknown coordinates {coordinates!r}; choose one of joint, absolute")
+    asked = Asked(
+        inputs=inputs, outputs=outputs, at=at, coordinates=coordinates, independent=independent,
+        balanced_by=balanced_by, parameters=parameters,
+    )  # fmt: skip
+    return about(model, asked)
+
+
+def about(model: Model, o: Asked) -> LinearEquations:
+    """As `linear_equations`."""
     refuse_unknown(model, o.outputs)
     m, point = _pointed(model, o)
     curves = [m.output(name) for name in o.outputs]
@@ -93,18 +107,13 @@ def linear_equations(
     point = Point(replaced(point.q, pairs), replaced(point.v, pairs), point.z, point.t, point.found)
     lam[:] = replaced(list(lam), pairs)
     own = _with(m, pairs)
-    refuse_unbalanced(own, point, lam, f)
+    refuse_unbalanced(own, point, lam, f, first.by["rx"])
     where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
-    p = with_balance(d.at(where), pairs) if pairs else d.at(where)
+    p = d.at(where).replaced(pairs) if pairs else d.at(where)
     f = free(m, p, o.independent)
     known = [*pairs, *zip(m.multipliers, lam, strict=True)]
     refuse_unsteady(m, d, f, point, {s.data.name: number(x) for s, x in known})
-    r = reduced(m, p, f)
-    still = [(s, 0.0) for s in m.added]
-    out = told(m, d, p, f, r, (o.outputs, [unit for unit, _ in curves]))
-    for X in out.values():
-        if isinstance(X, np.ndarray):
-            X.ravel()[:] = replaced(list(X.ravel()), still)
+    out = matrices(m, p, f, reduced(m, p, f), list(zip(o.outputs, (unit for unit, _ in curves), strict=True)))
     return LinearEquations(
         name=m.model.name,
         parameters={k: x.value for k, x in m.given.items() if x not in m.added and k not in dict(_names(pairs))},
@@ -114,7 +123,7 @@ def linear_equations(
         at=p,
         free=f,
         mechanics=m,
-        **out,
+        matrices=out,
     )
 
 
@@ -142,19 +151,19 @@ def _with(m: Mechanics, pairs: Sequence[tuple[Any, Any]]) -> Mechanics:
 
 def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
     """The mechanism traced in its coordinates, and the point."""
-    if o.coordinates not in ("joint", "absolute"):
-        raise ModelError(f"unknown coordinates {o.coordinates!r}; choose one of joint, absolute")
     if isinstance(o.at, Equilibrium | Result):
         if isinstance(o.at, Equilibrium) and o.at.preload:
             raise ModelError(
                 "at is an equilibrium under a preload, which is no part of the mechanism: add it to its forces"
             )
-        x, _ = instant(model, o.at, coordinates=o.coordinates)
+        x, _ = instant(model, o.at, coordinates=o.coordinates, parameters=o.parameters)
         values = dict(x.c.parameters)
         m = mechanics(model, x.c.structure.tree, o.inputs, values)
         return m, Point(x.q.tolist(), x.v.tolist(), x.z.tolist(), x.t)
-    tree = tuple(spanning(model)) if o.coordinates == "joint" else ()
-    m = mechanics(model, tree, o.inputs, None)
+    tree = o.tree
+    if tree is None:
+        tree = spanning(model) if o.coordinates == "joint" else ()
+    m = mechanics(model, tree, o.inputs, o.parameters)
     return m, drawn_or_given(m, o.at)
 
 

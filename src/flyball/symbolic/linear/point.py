@@ -27,6 +27,7 @@ from .velocities import completed, velocities
 
 CLOSED = 1e-9  # of the mechanism's length: gaps of a position that is closed
 PASSES = 30
+QUARTER = 0.5 * np.pi
 NEW = 1e-10  # of the mechanism's length: coordinates found by Newton's method
 
 
@@ -63,7 +64,19 @@ class Point:
         pairs = [(m.x.t, self.t)]
         for symbols, values in ((m.x.q, self.q), (m.x.v, self.v), (m.x.z, self.z)):
             pairs += zip(symbols, values, strict=True)
+        pairs += self._quarters(m)
         return pairs + [(s, 0.0) for s in m.vdot]
+
+    def _quarters(self, m: Mechanics) -> list[tuple[Node, Any]]:
+        """Sines and cosines of whole quarters of a turn, which are no rounded numbers."""
+        out: list[tuple[Node, Any]] = []
+        for s, x in zip(m.x.q, self.q, strict=True):
+            if isinstance(x, int | float) or x.known:
+                k = round(number(x) / QUARTER)
+                if k and abs(number(x) - k * QUARTER) < 1e-14 * abs(k):
+                    g = m.graph
+                    out += [(g.function("sin", s), (0, 1, 0, -1)[k % 4]), (g.function("cos", s), (1, 0, -1, 0)[k % 4])]
+        return out
 
 
 def drawn(m: Mechanics) -> Point:

@@ -11,6 +11,7 @@ e(w) = (cos w, sin w), N, P, L turn and stretch (or turn over): their columns ar
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -19,14 +20,14 @@ from ....graph.derivative import tangents
 from ....graph.node import Node
 from ....math.scalar import atan2, cos, sin
 from ..probe import Probe
-from .circle import NotOfThisForm, affine, depends, holds, without
+from .circle import NotOfThisForm, affine, depends, without
 from .single import Solution, of_harmonic, of_quadratic
 
 Pair = tuple[Node, Node]
 Matrix = np.ndarray
 
 
-def slide(x: Pair, s: Node, probe: Probe) -> tuple[Any, Solution]:
+def slide(x: Pair, d: Sequence[Any], s: Node) -> tuple[Any, Solution]:
     """Of two equations p + d s = 0, in which d holds nothing unknown: the one without s, and s.
 
     Returns
@@ -34,9 +35,7 @@ def slide(x: Pair, s: Node, probe: Probe) -> tuple[Any, Solution]:
     (Node, Solution)
         d_2 p_1 - d_1 p_2 = 0; s = -(d . p) / (d . d).
     """
-    d = [probe.simplest(tangents([e], [(s, 1.0)])[0]) for e in x]
     p = [without(e, s) for e in x]
-    d = [without(y, s) if holds(y, s) else y for y in d]
     square = d[0] * d[0] + d[1] * d[1]
     return d[1] * p[0] - d[0] * p[1], Solution(
         -(d[0] * p[0] + d[1] * p[1]) / square, "along a direction", [square] if isinstance(square, Node) else []

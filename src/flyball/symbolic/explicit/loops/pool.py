@@ -21,9 +21,10 @@ from ..definition import Definition
 from ..probe import Probe
 from .circle import NotOfThisForm, depends, holds
 from .pairs import dyad, slide, sliding
-from .single import Solution, linear, single
+from .single import Solution, divided, single
 
 LARGEST = 60  # unknowns up to which formulas are looked for
+ROUNDS = 4  # rules for each unknown: more lead nowhere
 LONGEST = 20000  # expressions that the equations may be made of
 
 
@@ -44,16 +45,41 @@ class Pool:
         self.found: list[Definition] = []
         self.later: list[Definition] = []
         self.never: list[tuple[str, Any]] = []
+        self._changes: dict[tuple[int, int], bool] = {}
+        self._bent: dict[tuple[int, int, int], tuple[Any, bool]] = {}
+        self._counted_before: set[str] = set()  # what is counted from where once is not counted back again
+        self._slopes: dict[tuple[int, int], Any] = {}
 
     def run(self) -> None:
         """Apply rules until none fits."""
         rules = (self._one, self._linear_in_two, self._linear, self._follow, self._pair)
-        while self.unknowns and any(rule() for rule in rules):
-            pass
+        self._plain()
+        for _ in range(ROUNDS * len(self.unknowns)):
+            if not any(rule() for rule in rules):
+                break
+            self._plain()
 
     def held(self, x: Node) -> list[Node]:
         """Unknowns that an equation changes with."""
-        return [w for w in self.unknowns if depends(x, w, self.probe)]
+        return [w for w in self.unknowns if self._depends(x, w)]
+
+    def _depends(self, x: Node, w: Node) -> bool:
+        key = x.index, w.index
+        if key not in self._changes:
+            self._changes[key] = depends(x, w, self.probe)
+        return self._changes[key]
+
+    def _plain(self) -> None:
+        """Take unknowns out of equations that do not change with them."""
+        for k, x in enumerate(self.equations):
+            none = [w for w in self.unknowns if holds(x, w) and not self._depends(x, w)]
+            if none:
+                self.equations[k] = x.graph.node(replaced([x], [(w, 0.0) for w in none])[0])
+
+    def _slope(self, x: Node, w: Node) -> Any:
+        """What stands before an unknown that stands linearly."""
+        slope = self.probe.simplest(tangents([x], [(w, 1.0)])[0])
+        return replaced([slope], [(y, 0.0) for y in self.unknowns])[0] if isinstance(slope, Node) else slope
 
     # -- rules: each says whether it did something
 
@@ -71,13 +97,13 @@ class Pool:
     def _linear_in_two(self) -> bool:
         """A slide along a direction that is known but moves: each of two equations alone may fail to tell it."""
         for w in self.unknowns:
-            holding = [x for x in self.equations if depends(x, w, self.probe)]
+            holding = [x for x in self.equations if self._depends(x, w)]
             if len(holding) != 2 or not all(self._linearly(x, w) for x in holding):
                 continue
-            slopes = [self.probe.simplest(tangents([x], [(w, 1.0)])[0]) for x in holding]
+            slopes = [self._slope(x, w) for x in holding]
             if any(not getattr(d, "moving", False) for d in slopes):
                 continue
-            new, solution = slide((holding[0], holding[1]), w, self.probe)
+            new, solution = slide((holding[0], holding[1]), slopes, w)
             self._put_off(w, solution)
             self.equations = [x for x in self.equations if x not in holding] + [w.graph.node(new)]
             return True
@@ -87,9 +113,9 @@ class Pool:
         """An unknown that stands linearly, with a factor that does not move rather than with one that does."""
         for moving in (False, True):
             for w, x in itertools.product(self.unknowns, self.equations):
-                if not depends(x, w, self.probe) or not self._linearly(x, w):
+                if not self._depends(x, w) or not self._linearly(x, w):
                     continue
-                solution = linear(x, w, self.probe)
+                solution = divided(x, self._slope(x, w), w)
                 if moving or not any(getattr(y, "moving", False) for y in solution.never):
                     self.equations.remove(x)
                     self._put_off(w, solution)
@@ -100,32 +126,44 @@ class Pool:
     def _linearly(self, x: Node, w: Node) -> bool:
         """Whether w stands linearly, with a factor that nothing unknown changes."""
         slope = tangents([x], [(w, 1.0)])[0]
-        return not isinstance(slope, Node) or not any(depends(slope, y, self.probe) for y in self.unknowns)
+        return not isinstance(slope, Node) or not any(self._depends(slope, y) for y in self.unknowns)
 
     def _follow(self) -> bool:
         """Angles that follow one another: E_vw = E_ww says that E knows w only in v + w."""
         for v, w in itertools.permutations(self.unknowns, 2):
-            both = [x for x in self.equations if holds(x, v) and holds(x, w)]
-            bent = [self._bends(x, v, w) for x in both]
-            if not any(cross for _, cross, _ in bent):
+            both = [x for x in self.equations if self._depends(x, v) and self._depends(x, w)]
+            if not any(self._bends(x, v, w)[1] for x in both):
                 continue
             for sign in (1.0, -1.0):
-                if all(self.probe.zero(vw - sign * ww, size) for size, _, (vw, ww) in bent):
+                if self._name(v, w, sign) not in self._counted_before and all(self._sums(x, v, w, sign) for x in both):
                     self._counted(v, w, sign)
                     return True
         return False
 
-    def _bends(self, x: Node, v: Node, w: Node) -> tuple[float, bool, tuple[Any, Any]]:
-        (by_w,) = tangents([x], [(w, 1.0)])
-        vw, ww = (tangents([by_w], [(y, 1.0)])[0] for y in (v, w))
-        size = self.probe.size(x)
-        return size, not self.probe.zero(vw, size), (vw, ww)
+    def _bends(self, x: Node, v: Node, w: Node) -> tuple[Any, bool]:
+        """Second derivative of an equation by two unknowns, and whether it is something."""
+        a, b = (v, w) if v.index < w.index else (w, v)
+        key = x.index, a.index, b.index
+        if key not in self._bent:
+            if (x.index, a.index) not in self._slopes:
+                self._slopes[x.index, a.index] = tangents([x], [(a, 1.0)])[0]
+            bend = tangents([self._slopes[x.index, a.index]], [(b, 1.0)])[0]
+            self._bent[key] = bend, not self.probe.zero(bend, self.probe.size(x))
+        return self._bent[key]
+
+    def _sums(self, x: Node, v: Node, w: Node, sign: float) -> bool:
+        return self.probe.zero(self._bends(x, v, w)[0] - sign * self._bends(x, w, w)[0], self.probe.size(x))
+
+    @staticmethod
+    def _name(v: Node, w: Node, sign: float) -> str:
+        return f"({v.data.name} + {w.data.name})" if sign > 0 else f"({w.data.name} - {v.data.name})"
 
     def _counted(self, v: Node, w: Node, sign: float) -> None:
         """Put v + w (or w - v) in place of w."""
         g = w.graph
-        name = f"{v.data.name} + {w.data.name}" if sign > 0 else f"{w.data.name} - {v.data.name}"
-        both = g.symbol(Symbol(f"({name})", "dependent", f"({name})", "rad"))
+        name = self._name(v, w, sign)
+        self._counted_before.add(name)
+        both = g.symbol(Symbol(name, "dependent", name, "rad"))
         start = self.probe.start
         self.probe.know(both.data.name, start[w.data.name] + sign * start[v.data.name])
         self.unknowns[self.unknowns.index(w)] = both

@@ -51,9 +51,12 @@ def linear(x: Node, w: Node, probe: Probe) -> Solution:
     slope = tangents([x], [(w, 1.0)])[0]
     if probe.zero(slope, probe.size(x)) or depends(slope, w, probe):
         raise NotOfThisForm
-    slope = probe.simplest(without(slope, w) if holds(slope, w) else slope)
-    rest = without(x, w)
-    return Solution(-rest / slope, "linear", [] if not isinstance(slope, Node) else [slope])
+    return divided(x, probe.simplest(without(slope, w) if holds(slope, w) else slope), w)
+
+
+def divided(x: Node, slope: Any, w: Node) -> Solution:
+    """The same with a in hand."""
+    return Solution(-without(x, w) / slope, "linear", [slope] if isinstance(slope, Node) else [])
 
 
 def harmonic(x: Node, w: Node, probe: Probe) -> Solution:
