@@ -19,6 +19,7 @@ from .units import shortened
 
 TERMS = 60  # of a sum that is multiplied out
 MANY = 2500  # operations from which on only short sums are
+HUGE = 3000.0  # symbols from which on nobody reads an expression: it stays as it is shared
 INNER = 16  # terms up to which a part of an expression is gathered by itself
 SHORT = 6.0  # what is as short as this is not looked at in another way
 
@@ -103,6 +104,8 @@ class Simplifier:
             if x.op == ADD:
                 other = self.gathered(joined(flat(parts, self.barriers)))
                 parts = min(other, parts, key=self.cost)
+            if min(self.cost(found), self.cost(parts)) > HUGE:
+                return parts
             found = min(found, parts, key=self.cost)
         return found
 
@@ -124,6 +127,7 @@ class Simplifier:
         key = frozenset(terms.items())
         found = self._short.get(key)
         if found is None:
+            self.expander.spend(len(terms) ** 2 // 4)
             terms = phased(shortened(terms, self.units))
             found = self._made([(c, p, w) for (p, w), c in sorted(terms.items())])
             if sum(1 for _, w in terms if w) > 1 or (len(terms) > 1 and any(w for _, w in terms)):

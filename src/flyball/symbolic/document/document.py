@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 from ...graph.node import Node, Symbol
 from ...graph.operations import SYMBOL
 from ...graph.printers.spelling import spelt
+from ...graph.simplify.cost import length
 from ...graph.simplify.shared import Definitions, shared
 from ...graph.simplify.simplify import simplified
 from ...graph.values import reached
 from ..quaternions import quaternions
 from . import contents
-from .parted import length, shortened
+from .parted import shortened
 from .parts import Document, Formula, Formulas, Section, Tex
 
 if TYPE_CHECKING:
