@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
     from .export.code import Code
+    from .lagrange import Lagrange
 
 
 class Equations(Shown, Linear, Symbols):
@@ -124,6 +125,12 @@ class Equations(Shown, Linear, Symbols):
         from .explicit.states import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
+
+    def lagrange(self) -> Lagrange:
+        """The same equations from the energies, by Lagrange's formalism, in quasi-velocities where bodies turn in space."""
+        from .lagrange import Lagrange
+
+        return Lagrange(self)
 
     def export(
         self,
