@@ -127,7 +127,7 @@ class Equations(Shown, Linear, Symbols):
         return StateEquations(self.explicit(independent, closed=closed), outputs)
 
     def lagrange(self) -> Lagrange:
-        """The same equations from the energies, by Lagrange's formalism, in quasi-velocities where bodies turn in space."""
+        """The same equations from the energies, by Lagrange's formalism; in quasi-velocities where bodies turn."""
         from .lagrange import Lagrange
 
         return Lagrange(self)
