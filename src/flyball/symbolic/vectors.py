@@ -47,4 +47,4 @@ VECTORS = {
     ),
     spin.KIND: Vector("n_M @ (w_M - w_F)", "(A^{RM} n^M)^T (w_M - w_F) = 0", "", True),
 }
-"""Kind of row -> its vector form; kinds that are not here are no constraints by vectors alone: angles, curves, wheels."""
+"""Kind of row -> its vector form; angles, curves and wheels, which are not here, have none that is short."""
