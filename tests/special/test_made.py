@@ -137,6 +137,15 @@ def test_joints(where, name):
     same(joined(where, name), "absolute")
 
 
+def test_a_moment_on_a_body_without_inertia():
+    """Where something stands in for a missing mass, refinement gives it back of all that has moved."""
+    m = fb.Mechanism("point mass", planar=True)
+    m.add(fb.Body("a", mass=1.0, inertia=0.0, position=(1.0, -0.2)))
+    m.add(fb.Revolute("hinge", "ground", "a", at=(0.2, 0.0)))
+    m.add(fb.SpringDamper("spring", "ground", "a", at=((0.5, 1.0), (0.9, 0.1)), stiffness=40.0, length=0.3))
+    same(m, "absolute")
+
+
 def test_other_values_run_the_same_code():
     m = example("andrews.toml")
     made, _ = same(m, "joint")
