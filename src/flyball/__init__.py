@@ -46,7 +46,7 @@ Ask for the equations
     eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
     print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
-    m.export(folder, language)    -> Code: functions of the equations in C, Python, CasADi or Numba
+    m.export(folder, language)    -> Code: functions of the equations: language "c", "python", "casadi", "numba"
 
 Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
