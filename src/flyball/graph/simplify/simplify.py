@@ -144,11 +144,11 @@ class Simplifier:
                 k = opened(self.graph, w).index
                 found[k] = found.get(k, 0) + 1
             terms.append((c, {k: n for k, n in found.items() if n}))
-        found = self.gathered(joined(terms))
+        made = self.gathered(joined(terms))
         if len(terms) < 4:
-            return found
-        again = self.gathered(joined(flat(found, self.barriers)))  # sums that several terms have got for a factor
-        return min(found, again, key=self.cost)
+            return made
+        again = self.gathered(joined(flat(made, self.barriers)))  # sums that several terms have got for a factor
+        return min(made, again, key=self.cost)
 
 
 def joined(terms: list[Term]) -> list[Term]:
