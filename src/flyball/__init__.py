@@ -45,6 +45,8 @@ Ask where it rests, and what small motions do
 Ask for the equations
     eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
     print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
+    L = eq.linear(outputs)        -> LinearEquations: A, B, C, D in the parameters; L.transfer_function() ->
+                                  TransferFunction, L.routh() -> StabilityConditions
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
     m.export(folder, language)    -> Code: functions of the equations: language "c", "python", "casadi", "numba"
 
@@ -129,6 +131,9 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .symbolic.equations import Equations as Equations
     from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
+    from .symbolic.linear.equations import LinearEquations as LinearEquations
+    from .symbolic.linear.routh import StabilityConditions as StabilityConditions
+    from .symbolic.linear.transfer import TransferFunction as TransferFunction
 
 __version__ = "0.4.0"
 
@@ -184,6 +189,9 @@ _HOME = {
     "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",
     "Expressions": "symbolic.expressions",
+    "LinearEquations": "symbolic.linear.equations",
+    "StabilityConditions": "symbolic.linear.routh",
+    "TransferFunction": "symbolic.linear.transfer",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)
