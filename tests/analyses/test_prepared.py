@@ -169,6 +169,18 @@ def test_what_is_not_finite_is_refused(layer):
         p.mass_matrix(p.q * np.nan)
 
 
+@pytest.mark.parametrize("layer", ["joint", "absolute"])
+def test_cams_far_from_the_start(layer):
+    """The follower is where the profile is nearest there, not where Newton's method leads from the start."""
+    m = mechanisms.example("cam.py")
+    run = m.simulate(0.2, outputs=9, coordinates=layer)
+    p = m.prepare(coordinates=layer)
+    for k in range(1, 9):
+        np.testing.assert_allclose(p.constraint(run.t[k], run.q[k]), 0.0, atol=1e-9)
+        found = p.acceleration(run.t[k], run.q[k], run.v[k])
+        np.testing.assert_allclose(found, run.vdot[k], rtol=1e-6, atol=1e-6)
+
+
 def test_pickled_and_copied():
     p = double_pendulum().prepare()
     wanted = p.acceleration(0.0, p.q, p.v)

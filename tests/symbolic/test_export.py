@@ -231,3 +231,15 @@ def test_the_command_writes_and_tells(tmp_path):
     told = json.loads(out.stdout)
     assert told["names"]["u"] == ["push.x"] and told["operations"]["M"] == 0
     assert (tmp_path / "made" / "cart.py").is_file() and told["files"] == [str(tmp_path / "made" / "cart.py")]
+
+
+def test_what_is_too_large_is_refused_before_it_is_made():
+    m = fb.Mechanism("chain", planar=True, gravity=(0, -9.81))
+    for k in range(75):
+        m.add(fb.Body(f"b{k}", mass=1.0, inertia=0.1, position=(k + 0.5, 0.0)))
+        m.add(fb.Revolute(f"J{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(k, 0)))
+    with pytest.raises(
+        fb.ModelError, match=r"^the solution takes \d{6} operations, and .* up to 200000: try the other"
+    ):
+        m.export(coordinates="joint", functions=["right_hand_side"])
+    assert m.export(coordinates="absolute", functions=["right_hand_side"]).operations["right_hand_side"] < 50_000

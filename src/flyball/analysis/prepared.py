@@ -30,7 +30,7 @@ class Prepared:
     """A mechanism in one kind of coordinates, at one set of values of its parameters. It does not change.
 
     Threads may share it. Answers depend on nothing but the arguments: turned angles that are no coordinates are those
-    within half a turn of the start's.
+    within half a turn of the start's, followers of cams are where the profile is nearest.
 
     Attributes
     ----------
@@ -240,6 +240,9 @@ class Prepared:
         q, v = self._state(q, v)
         if not (isinstance(t, numbers.Real) and np.isfinite(t)):
             raise ModelError(f"t is a finite number of seconds, not {t!r}")
+        if c.has_curves:
+            c.at(float(t), q, v)
+            c.find_places()
         c.at(float(t), q, v) if task is None else c.at(float(t), q, v, task)
         return c
 

@@ -346,11 +346,19 @@ class Equations(Shown, Linear):
         """M, f, g, nu, G, gamma and T at values of the symbols; see `Expressions.at`."""
         return {k: getattr(self, k).at(values) for k in ("T", "M", "f", "g", "nu", "G", "gamma")}
 
-    def export(self, folder: str | Path | None = None, **asked: Any) -> Code:
-        """Functions as code: ``language``, ``functions``, ``outputs``, ``name`` as in `Mechanism.export`."""
+    def export(
+        self,
+        folder: str | Path | None = None,
+        *,
+        language: str = "c",
+        functions: Sequence[str] = (),
+        outputs: Sequence[str] = (),
+        name: str = "",
+    ) -> Code:
+        """Functions of these equations as code: see `Mechanism.export`."""
         from .export.code import exported
 
-        return exported(self, folder, **asked)
+        return exported(self, folder, language=language, functions=functions, outputs=outputs, name=name)
 
     def __repr__(self) -> str:
         return f"<equations of {self.model.name!r} in {self.coordinates.partition(':')[0]} coordinates>"

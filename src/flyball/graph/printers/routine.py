@@ -106,12 +106,23 @@ class Routine:
         foreign = [x.data.name for x in reached(self.nodes) if x.op == SYMBOL and x.index not in given]
         if foreign:
             raise ModelError(f"{self.name} depends on {', '.join(foreign[:5])}, which is no argument of it")
-        if self.operations > MANY:
-            raise ModelError(
-                f"{self.name} takes {self.operations} operations, and straight-line code is written up to {MANY}: "
-                "export functions that need less (M, f, G and gamma rather than the solution), use coordinates in "
-                "which the mechanism has fewer rows, or simulate it here, where loops over its elements are compiled"
-            )
+        refuse_long(self.name, self.operations)
+
+
+def refuse_long(name: str, operations: int) -> None:
+    """Refuse code that is too long.
+
+    Raises
+    ------
+    ModelError
+        With how long it would be.
+    """
+    if operations > MANY:
+        raise ModelError(
+            f"{name} takes {operations} operations, and straight-line code is written up to {MANY}: try the other "
+            "coordinates (absolute ones make long chains short), export functions that need less (M, f, G and gamma "
+            "rather than right_hand_side), or simulate it here, where loops over its elements are compiled"
+        )
 
 
 def count(nodes: Iterable[Any]) -> int:

@@ -21,6 +21,7 @@ import numpy as np
 from ...equations.solve import ROUNDING, inverse_mass, natural_size, turn_rows
 from ...errors import ModelError
 from ...graph.derivative import jacobian, replaced
+from ...graph.printers.routine import refuse_long
 from ...graph.values import symbols
 from ...numerics.ldl import Pattern, analyse, ldl_solve
 from ...tables.system import DIAGONAL, LENGTH, REGULARISE, SEMIDEFINITE, V0
@@ -148,8 +149,15 @@ def touched(row: np.ndarray) -> list[int]:
 
 
 def factored(P: Pattern, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L and the inverse diagonal: `numerics.ldl.ldl_factor`, without a look at pivots, whose size nobody knows here."""
-    n = len(P.perm)
+    """L and the inverse diagonal: `numerics.ldl.ldl_factor`, without a look at pivots, whose size nobody knows here.
+
+    Raises
+    ------
+    ModelError
+        If it takes more operations than straight-line code is written of.
+    """
+    n, columns = len(P.perm), np.diff(P.Lp)
+    refuse_long("the solution", int(2 * (columns * (columns + 3)).sum()))
     L, D, Y = _zeros(len(P.Li)), _zeros(n), _zeros(n)
     for k in range(n):
         last = P.Ap[k + 1] - 1
