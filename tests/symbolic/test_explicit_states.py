@@ -50,7 +50,9 @@ def test_branch_ends():
 
 
 def test_what_stands_still_is_not_independent():
-    with pytest.raises(fb.ModelError, match=r"'lower pivot.angle' is not independent at the start: nothing moves along"):
+    with pytest.raises(
+        fb.ModelError, match=r"'lower pivot.angle' is not independent at the start: nothing moves along"
+    ):
         example("double_wishbone.toml").symbolic(coordinates="joint").explicit(["lower pivot.angle"])
 
 
