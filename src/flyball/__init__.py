@@ -46,7 +46,9 @@ Ask for the equations
     eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
     print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
-    m.export(folder, language)    -> Code: functions of the equations in C, Python, CasADi or Numba
+    eq.explicit(independent)      -> ExplicitEquations: without constraints, closed forms where loops have some
+    eq.state_space(outputs)       -> StateEquations: x' = f(x, u, t), y = h(x, u, t)
+    m.export(folder, language)    -> Code: functions of the equations (c, python, casadi, numba)
 
 Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
@@ -127,6 +129,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.singularities import Singularities as Singularities
     from .results.touch import Touch as Touch
     from .symbolic.equations import Equations as Equations
+    from .symbolic.explicit.explicit import ExplicitEquations as ExplicitEquations
+    from .symbolic.explicit.states import StateEquations as StateEquations
     from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
 
@@ -183,7 +187,9 @@ _HOME = {
     "Touch": "results.touch",
     "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",
+    "ExplicitEquations": "symbolic.explicit.explicit",
     "Expressions": "symbolic.expressions",
+    "StateEquations": "symbolic.explicit.states",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)
