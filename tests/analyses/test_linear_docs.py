@@ -22,7 +22,7 @@ def test_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[str] = []
     failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
     assert failed == 0, "".join(said)
-    written = ["bode.png", "eigenvalues.png", "locus.png", "modes.html", "over_k.png"]
+    written = ["bode.png", "eigenvalues.png", "locus.png", "modes.html", "over_k.png", "pendulum.png"]
     assert sorted(p.name for p in tmp_path.iterdir()) == written
 
 

@@ -29,6 +29,7 @@ PROMISED = {
     "chaplygin_sleigh.toml",
     "double_wishbone.toml",
     "governor.toml",
+    "governor_criterion.py",
     "heavy_top.toml",
     "n_four_bar.py",
     "peaucellier.toml",

@@ -105,7 +105,7 @@ def test_what_cannot_be_made_is_refused_with_the_reason(maker):
     maker.refused = "it has 999 rows, and code is made for 120"
     with pytest.raises(fb.ModelError, match=r"^specialize=True: it has 999 rows, and .*; leave it out$"):
         four_bar().simulate(0.1, specialize=True)
-    assert four_bar().simulate(2.0).health.engine == f"table-driven: {maker.refused}"
+    assert four_bar().simulate(10.0).health.engine == f"table-driven: {maker.refused}"
 
 
 def test_short_motions_are_left_alone(maker):
@@ -148,11 +148,11 @@ def test_code_that_is_there_is_taken_where_there_is_something_to_gain(maker, whe
 
 def test_many_short_motions_pay_for_code_together(maker):
     """Of one kind, with other numbers or without; a part of what they took."""
-    maker.price_of_making = 1e6
+    maker.price_of_making = 4e7
     m, runs = four_bar(), 0
     while not maker.made and runs < 200:
         m = m if runs % 2 else four_bar(gravity=(0, -9.81 - 0.01 * runs))
-        m.simulate(2.0, outputs=2)
+        m.simulate(10.0, outputs=2)
         runs += 1
     assert 5 <= runs < 200
     again = four_bar().simulate(0.5, specialize=False)

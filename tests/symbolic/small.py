@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import flyball as fb
+from tests.mechanisms import example
 
 
 def cart(**changed) -> fb.Mechanism:
@@ -54,28 +55,5 @@ def ball_on_beam(**changed) -> fb.Mechanism:
 
 
 def watt(**changed) -> fb.Mechanism:
-    """Watt's governor on an engine: balls on arms that lift a sleeve by links, which throttles the steam.
-
-    Drawn in steady motion: arms at ``alpha`` from the vertical, all turning with ``W``; ``k`` is by how much the torque
-    falls where the sleeve rises by a metre, ``b`` a damper on the sleeve, ``J`` the engine's inertia, ``I`` that of a
-    ball about its own centre.
-    """
-    p = {
-        "m": 1.0, "I": 0.01, "sleeve": 0.4, "l": 0.3, "alpha": 0.7, "J": 2.0, "k": 5.0, "b": 20.0, "W": 9.0, "g": 9.81,
-    } | changed  # fmt: skip
-    m = fb.Mechanism("Watt's governor", gravity=(0, 0, "-g"), parameters=p)
-    foot, turning = (0, 0, "-2*l*cos(alpha)"), {"angular_velocity": (0, 0, "W")}
-    m.add(fb.Body("engine", mass=1, inertia=("J", "J", "J"), **turning))
-    m.add(fb.Body("sleeve", mass="sleeve", inertia=(0, 0, 0), position=foot, **turning))
-    m.add(fb.Revolute("shaft", "ground", "engine", at=(0, 0, 0), axis=(0, 0, 1)))
-    m.add(fb.Prismatic("guide", "engine", "sleeve", at=foot, axis=(0, 0, 1)))
-    for side, name in ((1, "right"), (-1, "left")):
-        at = (f"{side}*l*sin(alpha)", 0, "-l*cos(alpha)")
-        moving = {"velocity": (0, f"{side}*W*l*sin(alpha)", 0), **turning}
-        m.add(fb.Body(name, mass="m", inertia=("I", "I", "I"), position=at, **moving))
-        m.add(fb.Revolute(f"{name} hinge", "engine", name, at=(0, 0, 0), axis=(0, -side, 0)))
-        m.add(fb.Distance(f"{name} link", name, "sleeve", at=(at, foot)))
-    m.add(fb.CoordinateSpring("dashpot", "guide.displacement", damping="b"))
-    m.add(fb.Sensor("rise", "guide.displacement"))
-    m.add(fb.Motor("steam", joint="shaft", torque="-k*rise"))
-    return m
+    """Watt's governor on its engine: see the example."""
+    return example("governor_criterion.py", **changed)

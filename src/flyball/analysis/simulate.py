@@ -226,6 +226,7 @@ def run_clock(
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
     engine.begin(clock)
+    clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
     try:
         while True:
             begin = time.perf_counter()

@@ -84,11 +84,16 @@ def _cache_class() -> Any:
         @property
         def kept(self) -> bool:
             """Whether what is compiled can be written to where other processes look for it."""
+            return self.folder is not None
+
+        @property
+        def folder(self) -> Path | None:
+            """Where it is kept; None if it cannot be written there."""
             try:
                 self._impl.locator.ensure_cache_path()
             except OSError:
-                return False
-            return True
+                return None
+            return Path(self._impl.locator.get_cache_path())
 
         @property
         def empty(self) -> bool:

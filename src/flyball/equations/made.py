@@ -10,10 +10,13 @@ d), four arrays among them, and returns a float:
     MOVE           a: v, b: z                   `projection.move`
     LOADS          a: state, b: rates of works  forces into W.vel[F_APPLIED]
     FACTOR, REUSE                               `solve.factor`, 0 or 1 + a guilty unknown; `solve.reuse`
-    STEP           a: f, b: gamma, c: x, d: lam  first pass of a solve; what is left, and its size
+    STEP           a: f, b: gamma, c: x, d: lam  begin of a solve; without rows all of it
     STEP_UNLOADED  the same with f = 0
-    REFINE         the same                     a pass for what is left
+    REFINE         the same                     a pass for what is left; what is left then, and its size
     FINISH         a: state, b: its derivative, c: x, d: lam   the derivative from the solution; 0, or it is not finite
+    SHOW           a: q                         poses of frames that only ends of steps look at
+    SAMPLED        no address: where those of the laws that `within.sample` asks for begin in `System.flat`, in the
+                   order of `within.law_at`; t and a: sensors, inputs of a force in W.flat[2:4]
     DRIFT          a: v, b: nu - G v            `projection.drift`: the largest; the size of its terms in W.flat[0]
 """
 

@@ -69,6 +69,7 @@ from .projection import (
     place,
     rounding,
     settle,
+    show_frames,
     violation,
 )
 from .rows import BY_TIME, row_times
@@ -247,12 +248,13 @@ def arrive(t, y, dy, S, W):
         if status != 0:
             W.info[STATUS] = status
             return status, found
-        found = max(0.0, found - rounding(W) / S.glob[LENGTH])
+        found = max(0.0, found - rounding(S, W, q) / S.glob[LENGTH])
         if W.option[PARTED] > 0.0:
             exchange(S, W)
     else:
         place(S, W, t, q, z)
         move(S, W, t, v, z)
+        show_frames(S, W, q)
     remember(S, W, z)
     if W.option[PLACED] > 0.0:
         return 0, max(found, astray_by)

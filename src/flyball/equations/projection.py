@@ -23,6 +23,7 @@ from ..tables.system import (
     PROJECTIONS,
     R2,
     RESIDUAL,
+    SHOW,
     STABILIZE,
     V0,
     V3,
@@ -82,8 +83,16 @@ def violation(W, out):
 
 
 @formula
-def rounding(W):
+def show_frames(S, W, q):
+    """Poses of frames as far as others look at them, where code made for the mechanism has not needed them."""
+    if W.info[MADE + SHOW] != 0:
+        run(W.info[MADE + SHOW], S, W, 0.0, q, q, q, q)
+
+
+@formula
+def rounding(S, W, q):
     """What rounding leaves of the largest violation: the last digit of the frames' distances from the origin."""
+    show_frames(S, W, q)
     far = 0.0
     for f in range(W.FK.shape[0]):
         for i in range(3):
@@ -165,7 +174,7 @@ def close(S, W, t, q, z, tol_g):
     for _ in range(PASSES):
         if worst <= tol_g:
             break
-        if worst > 0.7 * last and (worst <= CLOSED or worst <= rounding(W)):
+        if worst > 0.7 * last and (worst <= CLOSED or worst <= rounding(S, W, q)):
             break
         if not worst <= FAR:
             return NOT_CLOSED, found, OLD
@@ -186,7 +195,7 @@ def close(S, W, t, q, z, tol_g):
         place(S, W, t, q, z)
         worst = violation(W, r)
         W.info[PROJECTIONS] += 1
-    if not worst <= CLOSED and not worst <= tol_g and not worst <= rounding(W):
+    if not worst <= CLOSED and not worst <= tol_g and not worst <= rounding(S, W, q):
         return NOT_CLOSED, found, OLD
     return 0, found, factored
 

@@ -218,14 +218,14 @@ def solve(S, W, f, gamma, x, lam, loaded, refinements):
 
 @formula
 def solve_made(S, W, f, gamma, x, lam, loaded, refinements):
-    """By code made for the mechanism: one pass, then as many for what is left as it takes."""
+    """By code made for the mechanism: passes for what is left, until that passes or stops falling."""
     worst = run(W.info[MADE + (STEP if loaded else STEP_UNLOADED)], S, W, 0.0, f, gamma, x, lam)
     last = 1e300
-    for _ in range(refinements):
+    for _ in range(refinements + 1 if W.info[MADE + REFINE] != 0 else 0):
+        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
         if not worst > W.option[PASS] or worst > STALLED * last:
             break
         last = worst
-        worst = run(W.info[MADE + REFINE], S, W, 0.0, f, gamma, x, lam)
     return worst
 
 
@@ -282,8 +282,7 @@ def pass_schur(S, W, rhs, x, lam, loaded):
 def solve_coupled(S, W, f, gamma, x, lam, loaded, refinements):
     """With the matrix [M G^T; G -delta]: passes for what is left until both lines are fulfilled or stop improving."""
     rhs = W.vel[V2]
-    worst = 1.0
-    last = 1e300
+    worst, last = 1.0, 1e300
     for d in range(x.shape[0]):
         rhs[d] = 0.0
     if loaded:

@@ -21,12 +21,15 @@ from ..tables.system import (
     FORCE_KIND,
     FORCE_LAW,
     FORCE_M,
+    MADE,
     RATE,
     ROW_LAW,
+    SAMPLED,
     VALUE,
 )
 from .dispatch import inputs
 from .loads import wide
+from .made import run
 from .records import load
 from .rows import BY_TIME, measured
 
@@ -183,9 +186,15 @@ def sample(S, W, k, law, t, h, x, seen):
     s = t + x * h
     for m in range(nm):
         seen[WITHIN, m], seen[WITHIN, nm + m] = between(seen, m, x, h)
+    made = W.info[MADE + SAMPLED]
     if k >= LAWS * S.force_i.shape[0]:
+        if made != 0:
+            return run(S.flat[made + k], S, W, s, seen[WITHIN], seen[WITHIN], seen[WITHIN], seen[WITHIN])
         return evaluate_jet(S.code, S.const, law, W.stack, s, seen, BY_TIME)[2]
     a, b = between(seen, nm + k // LAWS, x, h)
+    if made != 0:
+        W.flat[2], W.flat[3] = a, b
+        return run(S.flat[made + k], S, W, s, seen[WITHIN], seen[WITHIN], seen[WITHIN], seen[WITHIN])
     return evaluate(S.code, S.const, law, W.stack, (s, a, b), seen)
 
 

@@ -34,9 +34,12 @@ from .trace import Entry, Refused, traced
 MARK = b"flyball: code made for one mechanism\n"
 IN_MEMORY, ON_DISK = 64, 200
 """How many are kept."""
+TOLD = ("scratch", "constants", "operations", "laws", "seconds")
+"""What a file says of its code."""
 _LOCK = threading.RLock()
 _found: OrderedDict[tuple[str, str], tuple[list[Entry], Made]] = OrderedDict()
 _refused: dict[str, str] = {}
+_nowhere: dict[str, int] = {}  # of what was not on disk, when the folder had last been changed
 
 
 def ready() -> bool:
@@ -53,7 +56,13 @@ def known(p: Plan, x: Values) -> str:
     """Where code for a mechanism is: "memory", "disk", or "" (nowhere)."""
     if _in_memory(p, x.system) is not None:
         return "memory"
-    return "disk" if any(True for _ in _fitting(p, x.system)) else ""
+    folder = _folder()
+    if folder is None or _nowhere.get(p.key) == (changed := folder.stat().st_mtime_ns):
+        return ""
+    if any(True for _ in _fitting(p, x.system)):
+        return "disk"
+    _nowhere[p.key] = changed
+    return ""
 
 
 def refusal(p: Plan) -> str:
@@ -95,9 +104,9 @@ def _made(p: Plan, x: Values) -> Made:
         raise
     machine_code = assembled(text.text)
     seconds = time.process_time() - begun
-    made = Made(Loaded(machine_code), text.scratch, text.constants, text.operations, seconds)
+    made = Made(Loaded(machine_code, text.laws), text.scratch, text.constants, text.operations, text.laws, seconds)
     _remember(p, x.system, text.known, made)
-    told = {k: getattr(made, k) for k in ("scratch", "constants", "operations", "seconds")}
+    told = {k: getattr(made, k) for k in TOLD}
     _write(p, digest(x.system, text.known), {**told, "known": text.known}, machine_code)
     return made
 
@@ -127,10 +136,7 @@ def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
 @lru_cache(maxsize=1)
 def _folder() -> Path | None:
     start_numba()
-    cache = cache_of(engine.function)
-    if not getattr(cache, "kept", False):
-        return None
-    return Path(cache.cache_path)
+    return getattr(cache_of(engine.function), "folder", None)
 
 
 def _files(p: Plan) -> list[Path]:
@@ -151,7 +157,7 @@ def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], list[Entry], 
 def _on_disk(p: Plan, S: System) -> Made | None:
     for told, entries, machine_code in _fitting(p, S):
         with contextlib.suppress(RuntimeError):  # LLVM's, of wrong code
-            made = Made(Loaded(machine_code), *(told[k] for k in ("scratch", "constants", "operations", "seconds")))
+            made = Made(Loaded(machine_code, told["laws"]), *(told[k] for k in TOLD))
             _remember(p, S, entries, made)
             return made
     return None

@@ -10,9 +10,11 @@ from typing import Any
 
 from ..graph.node import Node
 from ..graph.operations import MULTIPLY, NUMBER, SYMBOL
-from ..graph.printers.llvm import Place, Procedure, operations
+from ..graph.printers.llvm import Place, Procedure
+from ..graph.printers.llvm_order import operations
 from ..tables.system import ARTICULATED, FLAT, SOLVER
-from .stages import FIRST_FREE, Stages
+from .recorder import FIRST_FREE
+from .stages import Stages
 
 BEFORE: dict[str, tuple[str, ...]] = {
     "MOVE": ("PLACE",),
@@ -24,9 +26,9 @@ LEFT = ("W_G", "W_FK")
 """Arrays that nobody writes to but the procedures."""
 ENTRIES = (
     "SCRATCH", "PREPARE", "PLACE", "MOVE", "LOADS", "FACTOR", "REUSE", "STEP", "STEP_UNLOADED", "REFINE", "FINISH",
-    "DRIFT",
+    "DRIFT", "SHOW", "SAMPLED",
 )  # fmt: skip
-"""Entries of `System.flat` by name; the first is a length, all others are addresses."""
+"""Entries of `System.flat` by name; the first is a length, the last a number of an entry; all others are addresses."""
 
 
 class Linked:
@@ -50,7 +52,8 @@ class Linked:
         before = dict(BEFORE)
         if stages.S.kinds[SOLVER] == ARTICULATED:
             before["STEP"] = before["STEP_UNLOADED"] = ("PLACE", "FACTOR")
-        for name in ENTRIES:
+        self.laws = stages.laws
+        for name in (*ENTRIES, *filter(None, self.laws)):
             if name in made:
                 self._link(made[name], [made[k] for k in before.get(name, ())])
         stores: list[tuple[Place, Any]] = [(("a", k), x) for k, x in enumerate(self.hoisted)]

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import Any
 
@@ -77,6 +78,7 @@ def _target() -> Any:
     )
 
 
+@lru_cache(maxsize=1)
 def machine() -> str:
     """What the code is for: processor, its features, versions."""
     start_numba()
@@ -114,14 +116,14 @@ class Loaded:
         Of the procedures; 0 if there is none.
     """
 
-    def __init__(self, code: bytes) -> None:
+    def __init__(self, code: bytes, laws: Sequence[str] = ()) -> None:
         import llvmlite.binding as llvm
 
         with _LOCK:
             self._engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), _target())
             self._engine.add_object_file(llvm.ObjectFileRef.from_data(code))
             self._engine.finalize_object()
-            names = ("CONSTANTS", *ENTRIES[1:])
+            names = ("CONSTANTS", *ENTRIES[1:-1], *filter(None, laws))
             self.addresses = {name: int(self._engine.get_function_address(name)) for name in names}
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..tables.system import FLAT, SCRATCH, System
+from ..tables.system import FLAT, SAMPLED, SCRATCH, System
 from .linked import ENTRIES
 from .machine import Loaded, tables_of
 
@@ -26,6 +26,8 @@ class Made:
         Length of `Work.flat`; numbers that are reckoned once for a `System`.
     operations : int
         What has been compiled: operations of all procedures.
+    laws : list of str
+        Procedures of the laws that may do much within a step, in the order of `within.law_at`; "" for the others.
     seconds : float
         What tracing and compiling took [s of the processor].
     """
@@ -34,16 +36,21 @@ class Made:
     scratch: int
     constants: int
     operations: int
+    laws: list[str]
     seconds: float
 
     def system(self, S: System) -> System:
         """The tables with the addresses in them; the code lives as long as the array in which they stand."""
-        memory = (ctypes.c_int64 * (FLAT + self.constants))()
+        first = FLAT + self.constants
+        memory = (ctypes.c_int64 * (first + len(self.laws)))()
         memory.code = self.loaded  # type: ignore[attr-defined]
         flat = np.frombuffer(memory, np.int64)  # type: ignore[call-overload]
         flat[SCRATCH] = self.scratch
-        for k, name in enumerate(ENTRIES[1:], 1):
+        for k, name in enumerate(ENTRIES[1:-1], 1):
             flat[k] = self.loaded.addresses[name]
+        if self.laws:
+            flat[SAMPLED] = first
+            flat[first:] = [self.loaded.addresses[name] if name else 0 for name in self.laws]
         tables = tables_of(S)
         fill = _FUNCTION(self.loaded.addresses["CONSTANTS"])
         fill(tables.ctypes.data, None, 0.0, flat.ctypes.data + 8 * FLAT, None, None, None)

@@ -15,7 +15,7 @@ from ..tables.system import System
 from ..tables.values import Values
 from ..tracing.trace import TABLES
 from .machine import machine
-from .stages import PLAIN
+from .recorder import PLAIN
 
 MOST = 40_000
 """Operations, as estimated, up to which code is made: compiling takes seconds there, and grows faster than they."""

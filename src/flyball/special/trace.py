@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..graph.node import Undecided
-from ..graph.printers.llvm import Unprintable, operations
+from ..graph.printers.llvm import Unprintable
+from ..graph.printers.llvm_order import operations
 from ..graph.values import reached
 from ..tables.specs import Structure
 from ..tables.system import System
@@ -30,7 +31,7 @@ class Text:
     text : str
     known : list of Entry
         Entries of the tables whose very values are in it, since a formula decides by them.
-    scratch, constants, operations : int
+    scratch, constants, operations, laws
         As in `Made`.
     """
 
@@ -39,6 +40,7 @@ class Text:
     scratch: int
     constants: int
     operations: int
+    laws: list[str]
 
 
 def traced(s: Structure, S: System) -> Text:
@@ -59,7 +61,7 @@ def traced(s: Structure, S: System) -> Text:
             known |= more
         linked = Linked(stages)
         count = sum(len(operations(p.results, p.reads)) for p in linked.procedures)
-        return Text(module_of(linked), sorted(known), linked.scratch, linked.constants, count)
+        return Text(module_of(linked), sorted(known), linked.scratch, linked.constants, count, linked.laws)
     except Undecided as error:
         raise Refused(f"a formula of it decides by where it is ({error})") from error
     except Unprintable as error:

@@ -50,7 +50,9 @@ STATUS, GUILTY, EVALUATIONS, FACTORISATIONS, SOLVES, PROJECTIONS, LEARNT, EXCHAN
 # from there on, while code made for the mechanism is in use, its addresses; 0: the loops over the tables do it
 MADE = 8
 # entries of System.flat: the length of Work.flat, then addresses; what each does is said in `equations/made.py`
-SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE, FINISH, DRIFT, FLAT = range(13)
+SCRATCH, PREPARE, PLACE, MOVE, LOADS, FACTOR, REUSE, STEP, STEP_UNLOADED, REFINE, FINISH, DRIFT, SHOW, SAMPLED, FLAT = (
+    range(15)
+)
 
 # entries of System.kinds from its end, and what may stand in the first: how the equations are solved
 SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
@@ -89,7 +91,7 @@ class System(NamedTuple):
     pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
     block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row
     ldl: Pattern  # the sparse factor
-    flat: np.ndarray  # (13,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
+    flat: np.ndarray  # (15,): code made for this mechanism: length of its scratch, addresses; all 0: there is none
 
 
 class Work(NamedTuple):
@@ -114,7 +116,7 @@ class Work(NamedTuple):
     stack: np.ndarray  # law evaluation
     y: np.ndarray  # (3, ny): states in the making
     option: np.ndarray  # (11,): choices of the analysis, largest violations reported, what is solved for
-    info: np.ndarray  # (21,): status, guilty row, counters, how many loads' slopes are known, one more; addresses
+    info: np.ndarray  # (23,): status, guilty row, counters, how many loads' slopes are known, one more; addresses
     flat: np.ndarray  # scratch of code made for the mechanism
 
 

@@ -29,7 +29,7 @@ FIRST, AGAIN = 16, 4  # steps after which auto chooses, and how many times more 
 GAIN = 3.0  # times faster
 MARGIN = 1.5  # times what it takes to make or load code, that it must save
 MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
-THERE = 5e5  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
+THERE = 2e6  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
 LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"
@@ -144,20 +144,25 @@ class Engine:
 
     def _choose(self, left: float) -> bool:
         """Whether made code is taken; ``left``: what is still to be computed [ns]."""
+        if not self._pays(left, THERE):
+            return False
         x = self.c.values
         plan = special.plan(x)
         try:
             if why := special.refusal(plan):
                 raise special.Refused(why)
             there = special.known(plan, x)
-            paying, price = (left, THERE) if there else (left + SPENT.of(self._kind) / MANY, special.price(plan, there))
-            if paying * (1.0 - 1.0 / GAIN) < MARGIN * price + self._spent() / GAIN:
+            if not there and not self._pays(left + SPENT.of(self._kind) / MANY, special.price(plan, there)):
                 return False
             self._take(plan)
         except special.Refused as error:
             self.told, self.due = f"{TABLES}: {error}", math.inf
             return False
         return True
+
+    def _pays(self, computing: float, price: float) -> bool:
+        """Whether code is worth a price, and the begin of the motion once more (all [ns])."""
+        return computing * (1.0 - 1.0 / GAIN) >= MARGIN * price + self._spent() / GAIN
 
     def _take(self, plan: special.Plan) -> None:
         made, how = special.code(plan, self.c.values)

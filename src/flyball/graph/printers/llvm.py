@@ -7,7 +7,7 @@ given, or that stands where it is given one) and the number of the double there.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from ..node import Node
 from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, POWER
+from .llvm_order import chains, depth_first, operations
 from .llvm_spline import SPLINE
 
 Place = tuple[str, int]
@@ -62,6 +63,8 @@ class Procedure:
     returned : node or number
     checks : list of (expressions, what, number)
         Where one of these is not "positive", "nonzero" or "finite" the function returns that number, the first such.
+    deep : bool
+        Whether what goes into a store stands next to it, or in the order in which it was made.
     """
 
     name: str
@@ -69,38 +72,12 @@ class Procedure:
     stores: list[tuple[Place, Any]]
     returned: Any = 0.0
     checks: list[tuple[list[Any], str, float]] = field(default_factory=list)
+    deep: bool = True
 
     @property
     def results(self) -> list[Any]:
         """All that is asked for."""
         return [x for _, x in self.stores] + [self.returned] + [x for nodes, _, _ in self.checks for x in nodes]
-
-
-def operations(nodes: Iterable[Any], reads: Mapping[int, Place]) -> list[Node]:
-    """What has to be reckoned, or read, for these expressions, in an order of evaluation."""
-    found: dict[int, Node] = {}
-    to_see = [x for x in nodes if isinstance(x, Node)]
-    while to_see:
-        x = to_see.pop()
-        if x.index not in found:
-            found[x.index] = x
-            if x.index not in reads:
-                to_see.extend(x.args)
-    return [found[k] for k in sorted(found)]
-
-
-def compared(x: Node) -> tuple[Node, Node] | None:
-    """The two of which ``choose(a - b, a, b)`` is the larger; None if x is something else."""
-    by, a, b = x.args
-    if by.op != ADD:
-        return None
-    for first, second in (by.args, by.args[::-1]):
-        less = second.op == MULTIPLY and second.args[0].op == NUMBER and second.args[0].value == -1.0
-        if first is a and (
-            (less and second.args[1] is b) or (b.op == NUMBER == second.op and second.value == -b.value)
-        ):
-            return a, b
-    return None
 
 
 class Module:
@@ -138,7 +115,8 @@ class Module:
     def add(self, p: Procedure) -> None:
         """Print a procedure."""
         out = _Lines(self, p.reads)
-        order = operations(p.results, p.reads)
+        order = depth_first(p.results, p.reads) if p.deep else operations(p.results, p.reads)
+        out.chains = chains(order, p.reads)
         overwritten = {place for place, _ in p.stores}
         for x in order:  # what is overwritten is read first
             if p.reads.get(x.index) in overwritten:
@@ -183,6 +161,7 @@ class _Lines:
         self.lines: list[str] = []
         self.names: dict[int, str] = {}
         self.used: set[str] = set()
+        self.chains: Mapping[int, tuple[Node | None, Sequence[Node]]] = {}
 
     def new(self, text: str) -> str:
         name = f"%x{len(self.lines)}"
@@ -213,9 +192,8 @@ class _Lines:
         return self.names[x.index]
 
     def operation(self, x: Node) -> str:
-        if x.op == "choose" and (sizes := compared(x)):
-            first, second = (self.name(y) for y in sizes)
-            return self.chosen(self.new(f"fcmp ogt double {first}, {second}"), first, second)
+        if x.index in self.chains:
+            return self.largest(*self.chains[x.index])
         a = [self.name(y) for y in x.args]
         if x.op == MULTIPLY and x.args[0].op == NUMBER and x.args[0].value == -1.0:
             return self.new(f"fneg double {a[1]}")
@@ -234,6 +212,14 @@ class _Lines:
         if "constant" in told:
             return constant(told["constant"])
         raise Unprintable(getattr(x.data, "name", x.op))
+
+    def largest(self, begun: Node | None, others: Sequence[Node]) -> str:
+        """The largest of some, one of which may be the largest of others already."""
+        names = [self.name(y) for y in (*((begun,) if begun is not None else ()), *others)]
+        while len(names) > 1:
+            a, b = names.pop(0), names.pop(0)
+            names.append(self.chosen(self.new(f"fcmp ogt double {a}, {b}"), a, b))
+        return names[0]
 
     def chosen(self, condition: str, a: str, b: str) -> str:
         return self.new(f"select i1 {condition}, double {a}, double {b}")

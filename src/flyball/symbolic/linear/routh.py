@@ -143,7 +143,7 @@ def stability(
     return StabilityConditions(
         name,
         tuple(relations),
-        tuple(signs.used),
+        tuple(sorted(signs.used, key=str)),
         tuple(map(tuple, told)),
         zeros,
         *parameters,

@@ -1,0 +1,125 @@
+"""The engine's factors and solves on expressions; what they work on is read from where the engine has it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..equations.articulated import articulated_solve
+from ..equations.projection import drift
+from ..equations.rows import row_times
+from ..equations.solve import excess, factor, inverse_mass, pass_coupled, pass_schur, remainder, residual, turn_rows
+from ..graph.printers.llvm import Place
+from ..math.scalar import choose, larger
+from ..tables.system import (
+    ARTICULATED,
+    COUPLED,
+    DIAGONAL,
+    EFFORT,
+    GIVEN,
+    R1,
+    SCHUR,
+    SEMIDEFINITE,
+    SOLVER,
+    V0,
+    V1,
+    V2,
+)
+from .recorder import LOADED, TERMS, Recorder
+
+
+class Solves(Recorder):
+    """Factor, solves, and what is missing of the velocities' constraints."""
+
+    def solved(self) -> None:
+        """Factor and solves."""
+        solver = self.S.kinds[SOLVER]
+        S, W = self.S, self.W
+        if solver == SCHUR:
+            turn_rows(S, W)
+            self.add("REUSE", {}, self.kept("H"))
+        factor(S, W)
+        stores = {SCHUR: self.kept("H"), COUPLED: self.kept("M"), ARTICULATED: []}[solver]
+        if solver != ARTICULATED:
+            stores += self.kept("L") + self.stored("D", 0, range(len(W.D[0])))
+        if len(S.load_i):
+            stores += self.stored("row", DIAGONAL, range(self.nr))
+        self.add("FACTOR", {}, stores)
+        reads: dict[int, Place] = {}
+        if solver != ARTICULATED:
+            reads |= self.again("H" if solver == SCHUR else "M") | self.again("L")
+            reads |= self.fresh("D", 0, range(len(W.D[0])))
+        for name, is_loaded in (("STEP", True), ("STEP_UNLOADED", False)):
+            self.stepped(name, is_loaded, reads)
+        if solver != ARTICULATED:
+            self.refined(reads)
+
+    def stepped(self, name: str, is_loaded: bool, reads: dict[int, Place]) -> None:
+        """Begin of a solve: what there is without the rows' multipliers, and what is left of the equations."""
+        S, W = self.S, self.W
+        f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
+        reads = {**reads, **self.given("a", f), **self.given("b", gamma)}
+        x, lam = np.array([0.0] * self.nv, object), np.array([0.0] * self.nr, object)
+        W.row[R1] = gamma
+        W.vel[V2] = W.vel[EFFORT] = 0.0
+        if is_loaded:
+            reads |= self.fresh("vel", GIVEN, self.driven)
+            x[self.driven] = W.vel[GIVEN, self.driven]
+        if S.kinds[SOLVER] == SCHUR:
+            for b in range(len(S.body_i)) if is_loaded else ():
+                inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
+            W.row[R1] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]
+        elif S.kinds[SOLVER] == COUPLED and is_loaded:
+            remainder(S, W, f, gamma, x, lam, W.vel[V2], True)
+        elif S.kinds[SOLVER] == ARTICULATED:
+            articulated_solve(S, W, f, x, W.vel[EFFORT])
+        stores = [*self.solution(x, lam), (("W_flat", LOADED), 1.0 if is_loaded else 0.0)]
+        self.add(name, reads, stores)
+
+    def solution(self, x: np.ndarray, lam: np.ndarray) -> list[tuple[Place, Any]]:
+        """What a pass leaves: the solution, what is left of the equations, efforts of drivers."""
+        out: list[tuple[Place, Any]] = [(("c", k), y) for k, y in enumerate(x)] + [
+            (("d", k), y) for k, y in enumerate(lam)
+        ]
+        if self.S.kinds[SOLVER] == SCHUR:
+            left = self.stored("vel", V2, range(self.nv)) if self.semidefinite else []
+        else:
+            left = self.stored("vel", V2, range(self.nv)) + self.stored("vel", EFFORT, self.driven)
+        return out + left + self.stored("row", R1, range(self.nr))
+
+    @property
+    def semidefinite(self) -> bool:
+        """Whether something stands in for missing masses."""
+        return bool(self.S.glob[SEMIDEFINITE] > 0.0)
+
+    def schur_left(self, gamma: np.ndarray, x: np.ndarray) -> Any:
+        """What is left after a pass, and its size."""
+        S, W = self.S, self.W
+        worst = residual(S, W, gamma, x) if self.nr else 0.0
+        return larger(worst, excess(S, W.vel[V1], W.vel[V2], x)) if self.semidefinite else worst
+
+    def refined(self, reads: dict[int, Place]) -> None:
+        """A pass for what is left."""
+        S, W = self.S, self.W
+        f, gamma = self.numbered("f", self.nv), self.numbered("gamma", self.nr)
+        x, lam = self.numbered("x", self.nv), self.numbered("lam", self.nr)
+        reads = {**reads, **self.given("a", f), **self.given("b", gamma), **self.given("c", x), **self.given("d", lam)}
+        reads |= self.fresh("row", R1, range(self.nr)) | self.fresh("vel", V2, range(self.nv))
+        x, lam = x.copy(), lam.copy()
+        if S.kinds[SOLVER] == SCHUR:
+            pass_schur(S, W, W.vel[V2], x, lam, self.semidefinite)
+            worst = self.schur_left(gamma, x)
+        else:
+            is_loaded = self.graph.symbol("loaded")
+            reads[is_loaded.index] = ("W_flat", LOADED)
+            f = np.array([choose(is_loaded, y, 0.0) for y in f] or [0.0], object)[: self.nv]
+            worst = pass_coupled(S, W, f, gamma, x, lam, W.vel[V2], True)
+        self.add("REFINE", reads, self.solution(x, lam), worst)
+
+    def drifted(self) -> None:
+        """What is missing of the velocities' constraints."""
+        out = np.array([0.0] * self.nr, object)
+        worst, size = drift(self.S, self.W, self.v, out)
+        stores = [(("b", k), x) for k, x in enumerate(out)] + [(("W_flat", TERMS), size)]
+        self.add("DRIFT", self.given("a", self.v), stores, worst)
