@@ -48,7 +48,7 @@ Ask for the equations
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
     eq.explicit(independent)      -> ExplicitEquations: without constraints, closed forms where loops have some
     eq.state_space(outputs)       -> StateEquations: x' = f(x, u, t), y = h(x, u, t)
-    m.export(folder, language)    -> Code: functions of the equations (c, python, casadi, numba)
+    m.export(folder, language)    -> Code: functions of the equations: language "c", "python", "casadi", "numba"
 
 Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``

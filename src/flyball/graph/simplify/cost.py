@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any
+
 from ..node import Node
 from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, SYMBOL
 from .numbers import known
@@ -24,6 +27,12 @@ def read(x: Node, costs: dict[int, float]) -> float:
         costs[y.index] = min(_own(y, [costs[a.index] for a in y.args]), UNBOUNDED)
         to_see.pop()
     return costs[x.index]
+
+
+def length(nodes: Iterable[Any]) -> float:
+    """Symbols that a reader meets in all of them."""
+    costs: dict[int, float] = {}
+    return sum(read(x, costs) for x in nodes if isinstance(x, Node))
 
 
 def _own(y: Node, args: list[float]) -> float:

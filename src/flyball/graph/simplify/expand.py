@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 FEW_TERMS = 12  # that sums may have where expressions are large
-BUDGET = 60_000  # products of terms after which they are
+BUDGET = 100_000  # products of terms, or their like, after which they are
 
 
 class Expander:
@@ -75,6 +75,12 @@ class Expander:
             return self._root(x)
         return self.atom(self.parent.inside(x))
 
+    def spend(self, work: int) -> None:
+        """Count work; from a certain amount on sums are kept shorter."""
+        self.spent += work
+        if self.spent > BUDGET:
+            self.most = min(self.most, FEW_TERMS)
+
     def atom(self, x: Node) -> Terms:
         """A node as it stands."""
         return {(((x.index, 1),), ()): 1.0}
@@ -95,9 +101,7 @@ class Expander:
         return plus(a, b)
 
     def _product(self, a: Terms, b: Terms) -> Terms:
-        self.spent += len(a) * len(b)
-        if self.spent > BUDGET:
-            self.most = min(self.most, FEW_TERMS)
+        self.spend(len(a) * len(b))
         if len(a) * len(b) > 4 * self.most:
             a, b = sorted((a, b), key=len)
             b = self.factor(b)

@@ -19,6 +19,8 @@ from .units import shortened
 
 TERMS = 60  # of a sum that is multiplied out
 MANY = 2500  # operations from which on only short sums are
+HUGE = 3000.0  # symbols from which on nobody reads an expression: it stays as it is shared
+INNER = 16  # terms up to which a part of an expression is gathered by itself
 SHORT = 6.0  # what is as short as this is not looked at in another way
 
 
@@ -77,14 +79,17 @@ class Simplifier:
         self.expander = Expander(self, most or (TERMS if size < MANY else FEW_TERMS))
         self.gathered = Gatherer(graph, self.costs)
         self._short: dict[Any, Node] = {}
-        self._best: dict[int, Node] = {}
+        self._best: dict[int, Node] = {}  # of parts
+        self._whole: dict[int, Node] = {}  # of what was asked for
 
     def __call__(self, x: Node) -> Node:
         """The shortest expression found."""
         for y in reached([x]):
             if y.index not in self._best:
-                self._best[y.index] = self._shortest(y)
-        return self._best[x.index]
+                self._best[y.index] = self._shortest(y) if len(self.expander(y)) <= INNER else self._parts(y)
+        if x.index not in self._whole:
+            self._whole[x.index] = self._shortest(x)
+        return self._whole[x.index]
 
     def cost(self, x: Node) -> float:
         """How long it is to read."""
@@ -95,12 +100,18 @@ class Simplifier:
             return x
         found = self.short(self.expander(x))
         if x.op in (ADD, MULTIPLY, DIVIDE) and self.cost(found) > SHORT:
-            parts = self.graph.rebuilt(x, tuple(self._best[a.index] for a in x.args))
+            parts = self._parts(x)
             if x.op == ADD:
                 other = self.gathered(joined(flat(parts, self.barriers)))
                 parts = min(other, parts, key=self.cost)
+            if min(self.cost(found), self.cost(parts)) > HUGE:
+                return parts
             found = min(found, parts, key=self.cost)
         return found
+
+    def _parts(self, x: Node) -> Node:
+        """The same operation on the best of its arguments."""
+        return self.graph.rebuilt(x, tuple(self._best[a.index] for a in x.args))
 
     def shorter(self, x: Node, other: Node) -> Node:
         """The best that is known for ``x``, or the other of the same value."""
@@ -116,6 +127,7 @@ class Simplifier:
         key = frozenset(terms.items())
         found = self._short.get(key)
         if found is None:
+            self.expander.spend(len(terms) ** 2 // 4)
             terms = phased(shortened(terms, self.units))
             found = self._made([(c, p, w) for (p, w), c in sorted(terms.items())])
             if sum(1 for _, w in terms if w) > 1 or (len(terms) > 1 and any(w for _, w in terms)):

@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING, Any
 from ...graph.node import Node, Symbol
 from ...graph.operations import SYMBOL
 from ...graph.printers.spelling import spelt
+from ...graph.simplify.cost import length
 from ...graph.simplify.shared import Definitions, shared
 from ...graph.simplify.simplify import simplified
 from ...graph.values import reached
 from ..quaternions import quaternions
 from . import contents
-from .parted import length, shortened
+from .parted import shortened
 from .parts import Document, Formula, Formulas, Section, Tex
 
 if TYPE_CHECKING:
     from ..equations import Equations
 
+LONG = 400.0  # symbols in parts that are added up once more
 PARTS = (  # of the record of a body: place, letter, name, what
     (3, 9, "R", "R"),
     (0, 3, "p", "p"),
@@ -71,12 +73,11 @@ def document(eq: Equations) -> Document:
 
 def summed(made: Document, units: list[list[Node]]) -> None:
     """Right sides that are sums of others, by these, where that is shorter: each by itself has cancelled more."""
-    for section in made.sections:
-        for block in section.blocks:
-            for f in block.formulas if isinstance(block, Formulas) else ():
-                if f.parts:
-                    (other,) = simplified([sum((p.right for p in f.parts), 0.0)], units=units)
-                    f.right = other if length([other]) < length([f.right]) else f.right
+    blocks = [b for s in made.sections for b in s.blocks if isinstance(b, Formulas)]
+    sums = [f for b in blocks for f in b.formulas if f.parts and length([p.right for p in f.parts]) <= LONG]
+    others = simplified([sum((p.right for p in f.parts), 0.0) for f in sums], units=units)
+    for f, other in zip(sums, others, strict=True):
+        f.right = other if length([other]) < length([f.right]) else f.right
 
 
 def tidied(made: Document) -> None:

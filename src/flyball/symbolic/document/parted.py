@@ -7,7 +7,7 @@ from typing import Any
 
 from ...graph.node import Node, Symbol
 from ...graph.operations import MULTIPLY, NUMBER, SYMBOL
-from ...graph.simplify.cost import read
+from ...graph.simplify.cost import length
 from ...graph.simplify.shared import Definitions
 from ...graph.simplify.simplify import simplified
 from ...graph.values import reached
@@ -68,9 +68,3 @@ def shortened(
     if found is not None and len(reached(found)) < len(reached([*other, *defined])):
         return found, []
     return other, [(x, y) for (x, _), y in zip(meant, defined, strict=True)]
-
-
-def length(nodes: Sequence[Any]) -> float:
-    """Symbols that a reader meets in all of them."""
-    lengths: dict[int, float] = {}
-    return sum(read(x, lengths) for x in nodes if isinstance(x, Node))
