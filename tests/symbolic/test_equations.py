@@ -1,5 +1,8 @@
 """m.symbolic(): whatever a result has, as an expression that gives the same number; symbols, refusals, what is shown."""
 
+import dataclasses
+import sys
+
 import numpy as np
 import pytest
 
@@ -159,3 +162,43 @@ def test_arithmetic_and_calculus():
     assert float(eq.expression("l")) == 1.2 and eq.M.T.shape == (3, 3)
     with pytest.raises(ModelError, match=r"no entry 'rod\.z'"):
         eq.f["rod.z"]
+
+
+def test_every_number_may_be_a_symbol_or_none():
+    """Called after its field; the equations are the same, and masses then are where they belong."""
+    m = mechanisms.example("slider_crank.toml")
+    every, some, none = (m.symbolic(names=names) for names in ("all", "parameters", "none"))
+    assert {"crank.mass", "rod.mass", "slider.mass", "spring.stiffness", "g"} < set(every.parameters)
+    assert not none.parameters and set(some.parameters) == set(m.parameters)
+    at = {k: x + 0.1 for k, x in some.start.items()}
+    for name in ("M", "f", "g", "G", "gamma"):
+        told = getattr(some, name).at(at)
+        np.testing.assert_allclose(getattr(every, name).at(at), told, rtol=1e-12, atol=1e-12)
+        np.testing.assert_allclose(getattr(none, name).at(at), told, rtol=1e-12, atol=1e-12)
+    rod = dataclasses.replace(m["rod"], mass=2.5)
+    heavier = m.copy()
+    heavier.replace(rod)
+    told = heavier.symbolic().M.at(at)
+    np.testing.assert_allclose(every.M.at(at | {"rod.mass": 2.5}), told, rtol=1e-12, atol=1e-12)
+    with pytest.raises(ModelError, match="must be one of parameters, all, none"):
+        m.symbolic(names="some")
+
+
+def test_what_is_shown():
+    _, eq = pendulum()
+    assert str(eq.M) == "[ mass*l^2/3 ]"
+    assert r"\frac{1}{3}" in eq.M[0, 0].latex() and "l^{2}" in eq.M[0, 0].latex()
+    lines = dict(eq.lines())
+    assert lines["q"] == "hinge.angle" and lines["lam"] == "none: no constraints"
+    assert lines["parameters"] == "l = 1.2, mass = 2, g = 9.81"
+    assert repr(eq) == "<equations of 'pendulum' in joint coordinates>"
+    assert "too long" in str(mechanisms.example("stewart.py").symbolic().f)
+
+
+def test_without_sympy(monkeypatch):
+    """Everything but SymPy's own expressions goes on; these say in one line what to install."""
+    monkeypatch.setitem(sys.modules, "sympy", None)
+    _, eq = pendulum()
+    assert str(eq.f) and eq.M.latex() and eq.M.at(eq.start).shape == (1, 1)
+    with pytest.raises(ImportError, match=r"pip install 'flyball\[symbolic\]'"):
+        eq.M.sympy()

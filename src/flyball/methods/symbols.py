@@ -39,9 +39,9 @@ class Symbols(Model):
             As for `linearize`: what is added to laws of forces, motors and drivers, as symbols.
         parameters : mapping, optional
             Values of parameters in place of the model's, in SI units or with a unit. They are symbols all the same.
-        names : {"parameters", "all"}
+        names : {"parameters", "all", "none"}
             Which numbers are symbols: parameters; or every number of the description, called after its field:
-            ``"rod.mass"``.
+            ``"rod.mass"``; none: numbers stay numbers.
 
         Returns
         -------
@@ -54,7 +54,8 @@ class Symbols(Model):
         AssemblyError
             If the mechanism cannot be assembled.
         """
-        from ..symbolic.equations import SymbolicOptions, symbolic
+        from ..symbolic.asked import symbolic
+        from ..symbolic.symbols import SymbolicOptions
 
         return symbolic(self, SymbolicOptions.asked(locals()))
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
-from ..math.scalar import real_parts
+from ..math.scalar import real_parts, sqrt
 
 ORTHONORMAL = 1e-9  # largest entry of R^T R - 1 of what still counts as a rotation matrix
 SMALLEST = 1e-9  # shortest quaternion that still has a direction
@@ -153,5 +153,5 @@ def quaternion_of(R: np.ndarray) -> np.ndarray:
         K[..., 1 + i, 1 + j] = K[..., 1 + j, 1 + i] = R[..., i, j] + R[..., j, i]
     best = np.argmax(real_parts(np.diagonal(K, axis1=-2, axis2=-1)), axis=-1)
     e = np.take_along_axis(K, best[..., None, None], axis=-2)[..., 0, :]
-    e = e / np.sqrt((e * e).sum(axis=-1, keepdims=True))
+    e = e / sqrt((e * e).sum(axis=-1, keepdims=True))
     return np.where(real_parts(e[..., :1]) < 0, -e, e)

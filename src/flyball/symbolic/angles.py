@@ -16,7 +16,8 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..equations.tree import column
-from ..graph.node import ADD, MULTIPLY, NUMBER, Graph, Node
+from ..graph.node import Graph, Node
+from ..graph.operations import ADD, MULTIPLY, NUMBER
 from ..graph.values import reached
 from ..math.scalar import atan2
 from ..model.body import Body, Frame

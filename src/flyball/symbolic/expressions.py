@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -10,19 +11,17 @@ import numpy as np
 from ..errors import ModelError
 from ..graph.derivative import jacobian, replaced
 from ..graph.function import Opaque
-from ..graph.node import SYMBOL, Node
-from ..graph.printers.latex import latex
-from ..graph.printers.latex import matrix as latex_matrix
-from ..graph.printers.text import matrix as text_matrix
-from ..graph.printers.text import text
+from ..graph.node import Node
+from ..graph.operations import SYMBOL
+from ..graph.printers import latex, text
 from ..graph.simplify.simplify import simplified
 from ..graph.values import evaluate, evaluated, reached
-from .quaternions import quaternions
 
 if TYPE_CHECKING:
-    from .equations import Equations
+    from .home import Home
 
-
+READ = 400  # operations up to which expressions are simplified to be shown
+MOST = 4000  # and up to which they are shown at all
 WIDE = 160  # letters of a line up to which a matrix is printed as such
 
 
@@ -45,13 +44,13 @@ class Expressions:
 
     def __init__(
         self,
-        equations: Equations,
+        home: Home,
         nodes: Any,
         rows: Sequence[str] = (),
         columns: Sequence[str] = (),
         unit: str = "",
     ) -> None:
-        self.equations = equations
+        self.home = home
         if isinstance(nodes, np.ndarray):
             self.nodes = nodes
         else:
@@ -99,7 +98,7 @@ class Expressions:
         ModelError
             If a name is unknown, or the value of a symbol is missing.
         """
-        known = self.equations.checked(values, self.symbols)
+        known = self.home.checked(values, self.symbols)
         if not self.shape:
             return np.asarray(evaluate(self.list(), known)[0])
         return evaluated(self.nodes, known) if self.nodes.size else np.zeros(self.shape)
@@ -112,43 +111,56 @@ class Expressions:
     # -- others' forms
 
     def sympy(self) -> Any:
-        """As SymPy expression, or ``Matrix``; symbols have the names of the mechanism.
+        """As SymPy expression, or ``Matrix``, simplified if it is not too long; symbols have the mechanism's names.
 
         Raises
         ------
         ImportError
             If SymPy is not installed (extra ``symbolic``).
         """
-        printer = self.equations.printer
-        return printer(self.nodes if self.shape else self.nodes[()])
+        printer = self.home.printer
+        shown = self._read.nodes
+        return printer(shown if self.shape else shown[()])
 
     def simplified(self) -> Expressions:
-        """The same values in fewer symbols: see `graph/simplify`; unit quaternions are known to be such."""
-        made = simplified(self.nodes.reshape(-1), units=quaternions(self.equations.formulated))
-        return Expressions(self.equations, made.reshape(self.shape), self.rows, self.columns, self.unit)
+        """The same in a form that is shorter to read, as far as that is found quickly; equal in value."""
+        made = simplified(self.nodes.reshape(-1), units=self.home.units)
+        return Expressions(self.home, made.reshape(self.shape), self.rows, self.columns, self.unit)
 
-    def latex(self) -> str:
-        """As LaTeX, simplified; a vector as a column, zeros in matrices as dots."""
-        made = self.simplified().nodes
-        if not self.shape:
-            return latex(made[()])
-        return latex_matrix(made if len(self.shape) > 1 else made.reshape(-1, 1))
+    @cached_property
+    def _read(self) -> Expressions:
+        """What is shown: simplified if it is short enough to be read."""
+        return self.simplified() if self.operations <= READ else self
 
     def texts(self) -> Any:
-        """As text, simplified: lists of lists as deep as it has dimensions."""
-        return np.vectorize(text, otypes=[object])(self.simplified().nodes).tolist() if self.nodes.size else []
+        """As text, simplified if it is short enough to be read: lists of lists as deep as it has dimensions."""
+        return np.vectorize(text.text, otypes=[object])(self._read.nodes).tolist() if self.nodes.size else []
 
-    def _repr_latex_(self) -> str:
-        return f"$\\displaystyle {self.latex()}$"
+    def latex(self) -> str:
+        """As LaTeX, simplified if it is not too long for that; a vector is a column."""
+        shown = self._read.nodes
+        if not self.shape:
+            return latex.latex(shown[()])
+        if not shown.size:
+            return r"\left[\;\right]"
+        return latex.matrix(shown if len(self.shape) > 1 else shown[:, None])
+
+    def _repr_latex_(self) -> str | None:
+        return f"$\\displaystyle {self.latex()}$" if self.operations <= READ else None
 
     def __str__(self) -> str:
+        if self.operations > MOST:
+            return f"{self!r}: too long to be read; .sympy(), .at(values) and entries such as [0] are there"
         made = self.texts()
         if not self.shape:
             return str(made)
         names = self.rows or tuple(map(str, range(self.shape[0])))
         if len(self.shape) == 1:
-            return "\n".join(f"{name}: {x}" for name, x in zip(names, made, strict=True))
-        told = text_matrix(self.simplified().nodes)
+            wide = max(map(len, names), default=0)
+            return "\n".join(f"{name:{wide}}  {x}" for name, x in zip(names, made, strict=True)) or "none"
+        if not self.nodes.size:
+            return f"no entries: {self.shape[0]} x {self.shape[1]}"
+        told = text.matrix(self._read.nodes)
         if max(map(len, told.split("\n"))) <= WIDE:
             return told
         columns = self.columns or tuple(map(str, range(self.shape[1])))
@@ -181,7 +193,7 @@ class Expressions:
         return self._new(made, self.rows, columns)
 
     def _derived(self, by: Sequence[Any]) -> np.ndarray:
-        symbols = [self.equations.symbol(x) for x in by]
+        symbols = [self.home.symbol(x) for x in by]
         try:
             return jacobian(self.list(), symbols).reshape(*self.shape, len(symbols))
         except Opaque as error:
@@ -189,8 +201,8 @@ class Expressions:
 
     def replaced(self, values: Mapping[str, Any]) -> Expressions:
         """With numbers or other expressions in place of symbols."""
-        eq = self.equations
-        new = [(eq.symbol(name), _node(x)) for name, x in values.items()]
+        home = self.home
+        new = [(home.symbol(name), _node(x)) for name, x in values.items()]
         out = np.empty(self.shape, object)
         out.ravel()[:] = replaced(self.list(), new)
         return self._new(out, self.rows, self.columns)
@@ -255,7 +267,7 @@ class Expressions:
         return (self[k] for k in range(len(self)))
 
     def _new(self, nodes: Any, rows: Sequence[str] = (), columns: Sequence[str] = ()) -> Expressions:
-        return Expressions(self.equations, nodes, rows, columns)
+        return Expressions(self.home, nodes, rows, columns)
 
 
 def _node(x: Any) -> Any:

@@ -125,7 +125,11 @@ def _row_name(e: Element, label: str) -> str:
 
 def _multiplier(s: Structure, name: str, e: Element) -> Symbol:
     what = name.removeprefix(f"{e.name}.")
-    letter, index = (r"\tau", "") if what == "effort" else (r"\lambda", what.removeprefix("lam").removeprefix("_"))
+    letter, index = (
+        (r"\tau", "")
+        if what == "effort"
+        else (r"\lambda", what.removeprefix("lam").removeprefix("_").removeprefix("n"))
+    )
     unit = ("N*m" if s.model.unit(e.coordinate, e) == "rad" else "N") if isinstance(e, Driver) else ""
     return Symbol(name, "multiplier", _indexed(letter, (index + "," if index else "") + text(e.name)), unit, e.name)
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from ...analysis.options import Options
 from ...errors import ModelError
 from ...model.model import Model
-from ..equations import SymbolicOptions, symbolic
+from ..asked import symbolic
+from ..symbols import SymbolicOptions
 from .code import Code
 
 
