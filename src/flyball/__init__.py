@@ -45,6 +45,8 @@ Ask where it rests, and what small motions do
 Ask for the equations
     eq = m.symbolic(inputs)       -> Equations: M, f, g, G, gamma, reactions, energies, in the mechanism's own names
     print(eq), print(eq.M)        all of it, one of them: Expressions, simplified; eq.M.sympy(), .latex(), .at(values)
+    L = eq.linear(outputs)        -> LinearEquations: A, B, C, D in the parameters; L.transfer_function() ->
+                                  TransferFunction, L.routh() -> StabilityConditions
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
     eq.explicit(independent)      -> ExplicitEquations: without constraints, closed forms where loops have some
     eq.state_space(outputs)       -> StateEquations: x' = f(x, u, t), y = h(x, u, t)
@@ -133,6 +135,9 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .symbolic.explicit.states import StateEquations as StateEquations
     from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
+    from .symbolic.linear.equations import LinearEquations as LinearEquations
+    from .symbolic.linear.routh import StabilityConditions as StabilityConditions
+    from .symbolic.linear.transfer import TransferFunction as TransferFunction
 
 __version__ = "0.4.0"
 
@@ -189,7 +194,10 @@ _HOME = {
     "Equations": "symbolic.equations",
     "ExplicitEquations": "symbolic.explicit.explicit",
     "Expressions": "symbolic.expressions",
+    "LinearEquations": "symbolic.linear.equations",
+    "StabilityConditions": "symbolic.linear.routh",
     "StateEquations": "symbolic.explicit.states",
+    "TransferFunction": "symbolic.linear.transfer",
 }
 _ROOMS = ("model.shapes", "joints", "forces")
 _MODULES = ("rotations",)

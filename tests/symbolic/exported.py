@@ -48,7 +48,7 @@ def states(p, count=4, seed=3):
     rng = np.random.default_rng(seed)
     redundant = len(p.rows) and np.linalg.matrix_rank(p.jacobian(0.0, p.q), tol=1e-9) < len(p.rows)
     if redundant or c.structure.prescribed:
-        r = p.simulate(0.03)
+        r = p.simulate(0.01)
         return [(float(r.t[k]), r.q[k], r.v[k]) for k in np.linspace(0, len(r.t) - 1, count).astype(int)]
     v = [p.v + 0.5 * rng.normal(size=len(p.v)) for _ in range(count)]
     return [(0.01 * k, p.step(p.q, 0.02 * rng.normal(size=len(p.v))), v[k]) for k in range(count)]

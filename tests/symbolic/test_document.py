@@ -4,6 +4,7 @@ import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -217,3 +218,10 @@ def test_text_and_notebook():
     assert eq.M._repr_latex_().startswith("$")
     assert "\\dot{\\varphi}_{\\text{pivot}}^{2}" in eq.f[0].latex()
     assert isinstance(eq.M.simplified().nodes[0, 0], Node)
+
+
+def test_the_page_of_the_documentation_runs(capsys):
+    text = (Path(__file__).parents[2] / "docs" / "equations.md").read_text(encoding="utf-8")
+    exec(re.search(r"```python\n(.*?)```", text, re.S)[1], {})
+    told = re.search(r"```text\n(.*?)```", text, re.S)[1]
+    assert re.sub(" +", " ", told) in re.sub(" +", " ", capsys.readouterr().out)

@@ -159,3 +159,32 @@ def test_conditions_are_told():
     m.add(fb.PointTorque("twist", "rod", torque="lean"))
     (condition,) = linear_equations(m).conditions
     assert evaluate([condition], {"lean": 2.5}) == [-2.5]
+
+
+def test_no_motion_is_mistaken_for_rest():
+    """What is told of coordinates that the equations are not in, and what turns by velocities that do not stay."""
+    m = fb.Mechanism("spin", gravity=(0, 0, -G))
+    m.add(fb.Body("arm", mass=1, inertia=(1, 1, 1), position=(0.3, 0, 0)))
+    m.add(fb.Revolute("hub", "ground", "arm", at=(0, 0, 0), axis=(0, 0, 1)), fb.Initial("hub.angle", rate=3.0))
+    with pytest.raises(fb.ModelError, match=r"initial condition of 'hub\.angle' is of no coordinate"):
+        linear_equations(m, coordinates="absolute")
+    same(linear_equations(m), m.linearize(coordinates="joint"))
+    with pytest.raises(fb.AnalysisError, match="does not stay there as it is"):
+        linear_equations(watt(3.0)[0], coordinates="absolute")
+    slider = fb.Mechanism("driven", planar=True)
+    slider.add(fb.Body("crank", mass=1, inertia=1, position=(0.5, 0)))
+    slider.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Driver("drive", "A.angle", "2"))
+    assert linear_equations(slider).states == ()
+
+
+def test_rounding_is_no_force():
+    """Posts that gravity leaves 1e-16 N m on, and a closed chain that nothing acts on."""
+    from tests.examples.test_examples import mechanism
+
+    for name, layer in (("n_four_bar.py", "absolute"), ("spatial_four_bar.toml", "joint")):
+        m = mechanism(name)
+        L = linear_equations(m, at=m.equilibrium(), coordinates=layer)
+        assert L.conditions == []
+        assert pytest.approx(m.linearize(about=m.equilibrium(), coordinates=layer).A, rel=1e-9, abs=1e-9) == L.A.at(
+            {}
+        ).astype(float)

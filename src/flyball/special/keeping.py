@@ -28,7 +28,7 @@ from ..tables.system import System
 from ..tables.values import Values
 from .machine import Loaded, assembled
 from .made import Made
-from .plan import COMPILING, LOADING, LOOKING, TRACING, Plan
+from .plan import GROWING, LOADING, LOOKING, MAKING, Plan
 from .trace import Entry, Refused, traced
 
 MARK = b"flyball: code made for one mechanism\n"
@@ -72,7 +72,7 @@ def refusal(p: Plan) -> str:
 
 def price(p: Plan, where: str) -> float:
     """What it costs to have the code [ns], by counts: never by a clock."""
-    return {"memory": LOOKING, "disk": LOADING}.get(where, p.size * (TRACING + COMPILING))
+    return {"memory": LOOKING, "disk": LOADING}.get(where, p.size * (MAKING + GROWING * p.size))
 
 
 def code(p: Plan, x: Values) -> tuple[Made, str]:

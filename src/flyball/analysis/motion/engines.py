@@ -27,7 +27,7 @@ from .account import SPENT, kind
 AUTO = "auto"
 FIRST, AGAIN = 16, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
-MARGIN = 1.5  # times what it takes to make or load code, that it must save
+MARGIN = 1.25  # times what it takes to make or load code, that it must save
 MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
 THERE = 2e6  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
 LONGEST = 100_000  # steps in one call of the compiled loop

@@ -119,13 +119,17 @@ def factors(x: Node, barriers: Container[int] = ()) -> Term:
 def flat(x: Node, barriers: Container[int] = ()) -> list[Term]:
     """Terms of a sum as they stand."""
     out: list[Term] = []
-    to_see = [x]
+    to_see = [(x, 1.0)]
     while to_see:
-        y = to_see.pop()
-        if y.op == ADD and y.index not in barriers:
-            to_see += y.args
+        y, sign = to_see.pop()
+        minus = y.op == MULTIPLY and y.args[0].op == NUMBER and y.args[0].value == -1.0 and y.args[1].op == ADD
+        if y.index in barriers or not (y.op == ADD or minus):
+            c, powers = factors(y, barriers)
+            out.append((sign * c, powers))
+        elif minus:
+            to_see.append((y.args[1], -sign))
         else:
-            out.append(factors(y, barriers))
+            to_see += [(a, sign) for a in y.args]
     return out
 
 

@@ -144,7 +144,11 @@ class Simplifier:
                 k = opened(self.graph, w).index
                 found[k] = found.get(k, 0) + 1
             terms.append((c, {k: n for k, n in found.items() if n}))
-        return self.gathered(joined(terms))
+        made = self.gathered(joined(terms))
+        if len(terms) < 4:
+            return made
+        again = self.gathered(joined(flat(made, self.barriers)))  # sums that several terms have got for a factor
+        return min(made, again, key=self.cost)
 
 
 def joined(terms: list[Term]) -> list[Term]:

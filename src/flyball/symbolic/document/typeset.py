@@ -6,9 +6,9 @@ from ...graph.printers.spelling import escaped
 from .lines import aligned, cells, entries, fits
 from .parts import Block, Cell, Display, Document, Formula, Listing, Matrix, Prose, Tex
 
-WIDTH = 88  # letters in a line of a formula
+WIDTH = 84  # letters in a line of a formula
 MATRIX = 84
-HEAD = r"""\documentclass[10pt,a4paper]{article}
+HEAD = r"""\documentclass[10pt,a4paper,fleqn]{article}
 \usepackage[utf8]{inputenc}
 \usepackage{amsmath,amssymb}
 \usepackage[margin=18mm]{geometry}

@@ -6,17 +6,17 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...errors import ModelError
+from ...errors import AnalysisError, ModelError
 from ...graph.derivative import jacobian, replaced
 from ...graph.node import SYMBOL, Node
 from ...graph.values import reached
 from .free import Free
 from .point import Point
 from .size import sizes, vanishing
-from .solve import Dependent, number, numbers, product, solved, zeros
+from .solve import Dependent, numbers, product, solved, zeros
 from .traced import Mechanics
 
-BALANCED = 1e-8  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
+BALANCED = 1e-6  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium
 NEAR = 1e-9  # step in radians, or parts of the mechanism's length, that an equilibrium may be off
 
 
@@ -60,38 +60,57 @@ def conditions(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> list[Nod
     r = zeros(len(m.r), 1)
     r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
     found = replaced(list(product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
-    return [m.graph.node(x) for x, none in zip(found, vanishing(found), strict=True) if not none]
+    told = [m.graph.node(x) for x, none in zip(found, vanishing(found), strict=True) if not none]
+    return [x for x in told if not x.known]  # what is a number is rounding, or refused
 
 
-def refuse_unbalanced(m: Mechanics, point: Point, lam: np.ndarray, f: Free, stiffness: np.ndarray) -> None:
-    """Refuse a point that is no equilibrium with the parameters' own values; ``stiffness``: dr/dx there.
+def refuse_unbalanced(m: Mechanics, f: Free, stiffness: np.ndarray, at: dict[str, float]) -> None:
+    """Refuse a point that is no equilibrium with the parameters' own values.
+
+    Parameters
+    ----------
+    m : Mechanics
+    f : Free
+    stiffness : ndarray
+        Derivatives of r by positions there.
+    at : dict
+        Values of all symbols there that are no parameters with their own values.
 
     Raises
     ------
+    AnalysisError
+        If the velocities do not stay what they are.
     ModelError
         With what is left unbalanced.
     """
-    r = zeros(len(m.r), 1)
-    r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
-    left = product(f.Zv.T, r)[:, 0]
-    size = np.array([size for _, size in sizes(list(r[:, 0]))]) * m.scale
-    terms = [size for _, size in sizes(list(left))]
+    moving = any(at[s.data.name] for s in m.x.v)
+    if moving and m.x.lam:
+        terms = np.array(sizes(list(m.x.gamma), at))
+        if (np.abs(terms[:, 0]) > BALANCED * (terms[:, 1] + terms[:, 1].max())).any():
+            raise unsteady(m)
+    r = np.array(sizes(list(m.r), at)) * m.scale[:, None]
+    Z = numbers(f.Zv) / m.scale[:, None] * m.scale[f.chosen_v]
+    left, terms = Z.T @ r[:, 0], np.abs(Z).T @ r[:, 1]
     near = np.abs(numbers(stiffness) * m.scale * m.scale[:, None]).sum(axis=1) * m.values.length
     for d, x, own in zip(f.chosen_v, left, terms, strict=True):
-        may = BALANCED * (own * m.scale[d] + 1e-3 * size.max(initial=0.0)) + NEAR * near[d]
-        if abs(number(x)) * m.scale[d] > may:
+        if abs(x) > BALANCED * (own + 1e-3 * r[:, 1].max()) + NEAR * near[d]:
             name = m.names[d]
-            moving = (
-                ""
-                if m.values.structure.tree or not any(map(number, point.v))
-                else ("; what moves steadily does so in joint coordinates: coordinates='joint'")
-            )
+            others = "; other steady motions than of joints' coordinates linearize takes, in numbers" if moving else ""
             raise ModelError(
-                f"{m.model.name!r} is in no equilibrium there: {number(x):.6g} "
+                f"{m.model.name!r} is in no equilibrium there: {x / m.scale[d]:.6g} "
                 f"{'N' if name.unit == 'm' else 'N m'} are left along {name.name}. Give another point, for instance "
                 f"at=m.equilibrium(), or name a parameter that has the value which balances it: "
-                f"balanced_by=[...]{moving}"
+                f"balanced_by=[...]{others}"
             )
+
+
+def unsteady(m: Mechanics) -> AnalysisError:
+    """The error for a motion that does not stay what it is."""
+    return AnalysisError(
+        f"{m.model.name!r} does not stay there as it is: its velocities change, or its linear equations do. Symbolic "
+        f"ones are about equilibria, and about motions in which coordinates of joints turn or slide evenly while all "
+        f"others stand still (coordinates='joint'); linearize takes other steady motions, in numbers"
+    )
 
 
 def balanced(m: Mechanics, at: Sequence[Node], names: Sequence[str]) -> list[tuple[Node, Node]]:

@@ -29,7 +29,7 @@ FACTORED = 300  # operations
 
 @dataclass
 class LinearEquations:
-    """x' = A x + B u, y = C x + D u, whose entries are expressions of the mechanism's parameters.
+    """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the mechanism's parameters.
 
     The states are changes of as many coordinates as there are freedoms, then changes of their rates, as those of
     `LinearModel`.

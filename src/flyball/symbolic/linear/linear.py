@@ -26,6 +26,8 @@ from .solve import number
 from .steady import refuse_singular, refuse_unsteady
 from .traced import Mechanics, mechanics, refuse_unknown
 
+STILL = 1e-12  # [1/s]: slower is rounding
+
 
 @dataclass(frozen=True, kw_only=True)
 class Asked:
@@ -106,13 +108,12 @@ def about(model: Model, o: Asked) -> LinearEquations:
     pairs = balanced(m, at_rest, o.balanced_by) if o.balanced_by else []
     point = Point(replaced(point.q, pairs), replaced(point.v, pairs), point.z, point.t, point.found)
     lam[:] = replaced(list(lam), pairs)
-    own = _with(m, pairs)
-    refuse_unbalanced(own, point, lam, f, first.by["rx"])
+    known = {s.data.name: number(x) for s, x in [*pairs, *zip(m.multipliers, lam, strict=True)]}
+    refuse_unbalanced(m, f, first.by["rx"], point.numbers(m) | _at_rest(m) | known)
     where = [*point.replacing(m), *zip(m.multipliers, lam, strict=True)]
     p = d.at(where).replaced(pairs) if pairs else d.at(where)
     f = free(m, p, o.independent)
-    known = [*pairs, *zip(m.multipliers, lam, strict=True)]
-    refuse_unsteady(m, d, f, point, {s.data.name: number(x) for s, x in known})
+    refuse_unsteady(m, d, f, point, known)
     out = matrices(m, p, f, reduced(m, p, f), list(zip(o.outputs, (unit for unit, _ in curves), strict=True)))
     return LinearEquations(
         name=m.model.name,
@@ -138,15 +139,9 @@ def _by_velocity(d: Derivatives) -> list[Any]:
     return list(columns.T.ravel())
 
 
-def _with(m: Mechanics, pairs: Sequence[tuple[Any, Any]]) -> Mechanics:
-    """With parameters replaced in the forces."""
-    if not pairs:
-        return m
-    import dataclasses
-
-    r = m.r.copy()
-    r[:] = replaced(list(r), pairs)
-    return dataclasses.replace(m, r=r)
+def _at_rest(m: Mechanics) -> dict[str, float]:
+    """Loads of joints with friction, which are no unknowns any more."""
+    return {s.data.name: 0.0 for s in m.x.loads}
 
 
 def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
@@ -159,7 +154,8 @@ def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
         x, _ = instant(model, o.at, coordinates=o.coordinates, parameters=o.parameters)
         values = dict(x.c.parameters)
         m = mechanics(model, x.c.structure.tree, o.inputs, values)
-        return m, Point(x.q.tolist(), x.v.tolist(), x.z.tolist(), x.t)
+        v = x.v if np.abs(x.v / x.c.sizes).max(initial=0.0) > STILL else 0.0 * x.v
+        return m, Point(x.q.tolist(), v.tolist(), x.z.tolist(), x.t)
     tree = o.tree
     if tree is None:
         tree = spanning(model) if o.coordinates == "joint" else ()

@@ -90,7 +90,12 @@ def drawn(m: Mechanics) -> Point:
     for e in m.model.initial:
         told = x.numbers[e.name]
         for name, value in ((e.name, told.value), (f"{e.name} rate", told.rate)):
-            if value is not None and name in at:
+            if value is not None and name not in at:
+                raise ModelError(
+                    f"the initial condition of {e.name!r} is of no coordinate that these equations are in; say where "
+                    f"the mechanism is: at={{...}}, or at=m.equilibrium()"
+                )
+            if value is not None:
                 _put(q, v, at[name], value)
     for k, d, law, rate in m.laws:
         q[k], v[d] = replaced([law, rate], [(m.x.t, 0.0)])

@@ -44,5 +44,5 @@ def vanishing(nodes: Sequence[Any]) -> list[bool]:
     out = np.ones(len(nodes), bool)
     for _ in range(DRAWS):
         told = {s.data.name: (s.value or 0.1) * float(rng.uniform(0.7, 1.3)) for s in symbols(nodes)}
-        out &= [abs(x) <= ROUNDED * size for x, size in sizes(nodes, told)]
+        out &= np.array([abs(x) <= ROUNDED * size for x, size in sizes(nodes, told)], bool)
     return [bool(x) for x in out]

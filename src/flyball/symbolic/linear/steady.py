@@ -8,6 +8,7 @@ from ...errors import AnalysisError, ModelError
 from ...graph.node import Node
 from ...graph.values import evaluate
 from ...numerics.rank import null_space, parts, rank
+from .balance import unsteady
 from .derivatives import Derivatives
 from .free import Free, based, compared
 from .point import Point
@@ -43,11 +44,11 @@ def refuse_unsteady(m: Mechanics, d: Derivatives, f: Free, point: Point, known: 
         later[m.x.t.data.name] += 1.0 / np.sqrt(np.abs(_matrix(m, d, f, here)).max(initial=0.0) or 1.0)
     now, then = (_matrix(m, d, f, at) for at in (here, later))
     if np.abs(then - now).max(initial=0.0) > SAME * np.abs(now).max(initial=0.0):
-        what = "it does not look the same a moment later" if size > 0.0 else "laws change with time"
+        if size > 0.0:
+            raise unsteady(m)
         raise AnalysisError(
-            f"the linear equations of {m.model.name!r} at this point change with time: {what}. Symbolic ones are about "
-            f"equilibria, and about motions in which coordinates of joints turn or slide evenly while all others stand "
-            f"still (coordinates='joint'); linearize takes other steady motions, in numbers"
+            f"the linear equations of {m.model.name!r} at this point change with time: laws change with time; "
+            f"linearize takes this very instant with frozen=True, in numbers"
         )
 
 

@@ -1,0 +1,41 @@
+"""Random mechanisms of every family: made code and the engine's loops compute the same motion, or fail alike."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.robust.families import FAMILIES, made
+
+SMALL = 1e-3  # [m, rad, m/s, rad/s] below which nothing is asked of last digits
+SEED = 20
+SHORT = 0.1  # [s]: small differences grow
+
+
+def ran(m: fb.Mechanism, t_end: float, wish: bool, **options):
+    try:
+        return m.simulate(t_end, outputs=5, specialize=wish, progress=False, **options), ""
+    except fb.SimulationError as error:
+        return error.result, re.sub(r"[\d.e+-]+", "", str(error))[:40]
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("family", [f for f in FAMILIES if f != "crowds"])
+def test_they_are_the_same(family):
+    case = made(family, SEED + list(FAMILIES).index(family))  # in the plane and in space, by turns
+    t_end = min(case.t_end, SHORT)
+    try:
+        b, why_not = ran(case.mechanism, t_end, False, **case.options)
+    except fb.AnalysisError:
+        pytest.skip("it cannot be assembled")
+    a, why = ran(case.mechanism, t_end, True, **case.options)
+    assert why == why_not
+    if why:
+        return
+    assert a.health.engine.startswith("made")
+    for x, y in ((a.q, b.q), (a.v, b.v), (a.states, b.states)):
+        if y.size:
+            assert np.abs(x - y).max() <= 1e-5 * max(np.abs(y).max(), SMALL)
