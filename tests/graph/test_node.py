@@ -72,3 +72,18 @@ def test_a_name_stands_for_one_thing():
     g.symbol(Symbol("a", "coordinate"))
     with pytest.raises(ValueError, match="'a' is a symbol for something else"):
         g.symbol(Symbol("a", "velocity"))
+
+
+def test_tables_keep_their_names_and_derivatives_have_primes():
+    from flyball.graph.derivative import tangents
+    from flyball.graph.printers.latex import latex
+    from flyball.graph.printers.text import text
+    from flyball.model.table import Table
+
+    g = Graph()
+    x = g.symbol("x")
+    g.functions.names[0] = "lift"
+    value, slope, bend = g.table(Table("lift", x=(0.0, 1.0, 2.0, 3.0), y=(0.0, 2.0, 1.0, 0.5)).data(), 0, x)
+    assert [text(value), text(slope), text(bend)] == ["lift(x)", "lift'(x)", "lift''(x)"]
+    assert latex(slope) == r"\operatorname{lift}'(x)"
+    assert tangents([value, slope], [(x, 1.0)]) == [slope, bend]

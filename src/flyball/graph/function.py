@@ -36,6 +36,11 @@ class Function:
             return np.frompyfunc(self.python, len(args), 1)(*args).astype(float)
         return self.python(*args)
 
+    @property
+    def shown(self) -> str:
+        """Its name as it is printed: of derivatives of a table with primes."""
+        return self.name + "'" * self.told.get("order", 0)
+
     def derivative(self, k: int) -> Function:
         """By the k-th argument."""
         if self._derivatives is None:
@@ -52,6 +57,7 @@ class Functions:
 
     def __init__(self) -> None:
         self._found: dict[Any, Any] = {}
+        self.names: dict[int, str] = {}  # of tables, by where they begin
         self._kept: list[Any] = []  # what keys stand for lives as long
 
     def opaque(self, python: Callable[..., Any]) -> Function:
@@ -76,11 +82,11 @@ class Functions:
         key = (at, np.array(plain).tobytes(), *[numbers[k] for k in moved])
         found = self._found.get(key)
         if found is None:
-            found = self._found[key] = orders(plain, moved, at)
+            found = self._found[key] = orders(plain, moved, at, self.names.get(at, f"table{at}"))
         return found, [numbers[k] for k in moved]
 
 
-def orders(data: list[float], moved: list[int], at: int) -> list[Function]:
+def orders(data: list[float], moved: list[int], at: int, name: str) -> list[Function]:
     """Value and derivatives of a spline whose numbers ``moved`` are given anew with each call."""
 
     def of(order: int) -> Callable[..., Any]:
@@ -103,7 +109,7 @@ def orders(data: list[float], moved: list[int], at: int) -> list[Function]:
 
     zero = Function("zero", lambda *args: 0.0 * args[0], lambda k: zero, constant=0.0)
     for order in range(ORDERS):
-        made.append(Function(f"table{at}", of(order), next_of(order), table=data, moved=moved, order=order, at=at))
+        made.append(Function(name, of(order), next_of(order), table=data, moved=moved, order=order, at=at))
         made[order].told["value"] = made[0]
     return made
 

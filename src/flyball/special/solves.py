@@ -66,7 +66,9 @@ class Solves(Recorder):
         if is_loaded:
             reads |= self.fresh("vel", GIVEN, self.driven)
             x[self.driven] = W.vel[GIVEN, self.driven]
-        if S.kinds[SOLVER] == SCHUR:
+        if S.kinds[SOLVER] == SCHUR and self.semidefinite:  # what a pass gives back of E is of all that it has moved
+            W.vel[V2] = f if is_loaded else 0.0
+        elif S.kinds[SOLVER] == SCHUR:
             for b in range(len(S.body_i)) if is_loaded else ():
                 inverse_mass(S, b, f, S.body_i[b, V0], x, S.body_i[b, V0])
             W.row[R1] = [gamma[k] - row_times(S, W, k, x) for k in range(self.nr)]

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..constraints.registry import KINDS
 from ..equations.dispatch import row_biases, row_values
 from ..equations.friction import reaction_loads
 from ..equations.kinematics import motions, poses
@@ -102,6 +103,7 @@ def traced(
     """
     graph = Graph() if graph is None else graph
     names = names or numbered(s, len(S.row_i))
+    graph.functions.names.update(tables_by_name(s, S))
     W = work(s, S, dtype=object)
     t = graph.symbol(Symbol("t", "time", "t", "s"))
     q, v, z, lam, loads = ([graph.symbol(x) for x in names_] for names_ in names)
@@ -128,6 +130,15 @@ def traced(
         W.row[GAMMA].copy(), W.sensed[VALUE : VALUE + 3, :nm].T.copy(), gradients, work_rates,
         W.sensed[RETURNED, 2 * nm :].copy(),
     )  # fmt: skip
+
+
+def tables_by_name(s: Structure, S: System) -> dict[int, str]:
+    """What tables are called, by where they begin in the table of constants; curves of joints are x and y of these."""
+    found = {at: name for name, at in s.table_at.items()}
+    for k, t in enumerate(s.terms):
+        if KINDS[t.formula.kind].place:
+            found |= {int(S.term_x[k, 1].real): f"{t.element.name}.x", int(S.term_x[k, 2].real): f"{t.element.name}.y"}
+    return found
 
 
 Names = tuple[list[Symbol], list[Symbol], list[Symbol], list[Symbol], list[Symbol]]

@@ -115,7 +115,8 @@ class LatexPrinter:
             c, a, b = (self.expression(y) for y in x.args)
             return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
         if x.op == "call":
-            return rf"\operatorname{{{escaped(x.data.name)}}}" + self.parentheses(
+            primes = "'" * x.data.told.get("order", 0)
+            return rf"\operatorname{{{escaped(x.data.name)}}}{primes}" + self.parentheses(
                 ", ".join(self.expression(a) for a in x.args)
             )
         return self.parentheses(self.expression(x))

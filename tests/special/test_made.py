@@ -1,0 +1,191 @@
+"""Code made for a mechanism fills the engine's arrays with the same numbers as the loops over its tables."""
+
+from __future__ import annotations
+
+import runpy
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball import special
+from flyball.analysis.motion.start import begin
+from flyball.equations.engine import motion_kernel
+from flyball.equations.projection import STAGES
+from flyball.equations.scratch import work
+from flyball.equations.tasks import COMPLETE
+from flyball.equations.within import ROWS
+from flyball.numerics.integrators import clock as ex
+from flyball.numerics.integrators.tableaux import tableau
+from flyball.special import keeping
+from flyball.tables.system import (
+    EFFORT,
+    F_APPLIED,
+    G_VALUE,
+    GAMMA,
+    LAM,
+    NU,
+    PASS,
+    RATE,
+    STABILIZE,
+    TOL_G,
+    TOL_V,
+    VALUE,
+    X_SOLVED,
+)
+from tests.contract.zoo import PLANAR, SPATIAL, joined
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+MECHANISMS = ("andrews.toml", "bricard.toml", "spatial_four_bar.toml", "double_wishbone.toml", "stewart.py")
+OTHERS = ("governor.toml", "toggle_press.toml", "car_axis.toml", "rolling_disk.toml", "point_mass_pendulum.toml")
+STATES = 8
+
+
+@lru_cache(maxsize=1)
+def rk():
+    return tableau("rk45")
+
+
+def values_of(model, coordinates="joint", parameters=None):
+    start = begin(model.snapshot(), 0.0, parameters, None, coordinates)
+    return start.assembly.compiled.values, start.y
+
+
+def states(x, y, seed=0):
+    """States near the start, some velocities in all that moves: rows (t, y, ...) of output."""
+    s, rng = x.structure, np.random.default_rng(seed)
+    nv, nr = s.nv, len(x.system.row_i)
+    rows = np.zeros((STATES, 1 + len(y) + nv + nr + nv))
+    rows[:, 0] = rng.uniform(0.0, 0.3, STATES)
+    rows[:, 1 : 1 + len(y)] = y + np.r_[0.02 * np.ones(s.nq), np.ones(nv), np.zeros(len(s.states))] * rng.normal(
+        size=(STATES, len(y))
+    )
+    return rows
+
+
+def solved(x, S, rows):
+    """Every state projected, its accelerations and multipliers; and the scratch after the last."""
+    W, rows = work(x.structure, S), rows.copy()
+    W.option[[STABILIZE, PASS, TOL_G, TOL_V]] = STAGES, 1e-13, 1e-12 * x.length, 1e-12
+    ny = W.y.shape[1]
+    clock = ex.Clock(
+        np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64), np.zeros(0), np.zeros((ex.STATES, ny)), np.zeros((1, ny)),
+        np.zeros(0, np.int64), np.zeros((ROWS, 0)),
+    )  # fmt: skip
+    status = motion_kernel(S, W, rk(), clock, rows, COMPLETE)
+    return status, rows, W
+
+
+def arrays(W, x):
+    """What the engine leaves, by name."""
+    nm = len(x.structure.measured)
+    return {
+        "G": W.G, "g": W.row[G_VALUE], "nu": W.row[NU], "gamma": W.row[GAMMA], "f": W.vel[F_APPLIED],
+        "measured": W.sensed[VALUE, :nm], "rates": W.sensed[RATE, :nm], "x": W.vel[X_SOLVED], "M": W.M,
+        "effort": W.vel[EFFORT], "lam": W.row[LAM],
+    }  # fmt: skip
+
+
+def same(model, coordinates, parameters=None, of=None):
+    """Compare made code with the loops; ``of``: whose code it is, if not the mechanism's own."""
+    x, y = values_of(model, coordinates, parameters)
+    plan = special.plan(x)
+    made, how = special.code(plan, x) if of is None else (of, "")
+    rows = solved(x, x.system, states(x, y))[1]  # closed by the loops: where rows are redundant rounding leads the way
+    rows = rows[np.isfinite(rows).all(axis=1)]
+    assert len(rows)
+    tables, ours = solved(x, x.system, rows), solved(x, made.system(x.system), rows)
+    assert tables[0] == ours[0]
+    ny, nv = len(y), x.structure.nv
+    state, vdot = slice(1, 1 + ny), slice(1 + ny, 1 + ny + nv)
+    for part in (state, vdot):
+        a, b = tables[1][:, part], ours[1][:, part]
+        assert np.abs(a - b).max(initial=0.0) <= 1e-9 * (1.0 + np.abs(a).max(initial=0.0))
+    theirs = arrays(tables[2], x)
+    for name, b in arrays(ours[2], x).items():
+        size = 1.0 + np.abs(theirs[name]).max(initial=0.0)
+        near = 1e-6 if name == "lam" else 1e-9 if name in ("x", "effort") else 1e-10
+        assert np.abs(theirs[name] - b).max(initial=0.0) <= near * size, name
+    return made, how
+
+
+def example(name):
+    if name.endswith(".py"):
+        return runpy.run_path(str(EXAMPLES / name))["mechanism"]()
+    return fb.load(EXAMPLES / name)
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("name", MECHANISMS[:4] + OTHERS)
+def test_examples(name, coordinates):
+    same(example(name), coordinates)
+
+
+def test_stewart():
+    same(example("stewart.py"), "joint")
+    x, _ = values_of(example("stewart.py"), "absolute")
+    plan = special.plan(x)
+    assert str(plan.size) in plan.refused
+    with pytest.raises(special.Refused, match="operations"):
+        special.code(plan, x)
+
+
+@pytest.mark.parametrize(("where", "name"), [("space", n) for n in SPATIAL] + [("plane", n) for n in PLANAR])
+def test_joints(where, name):
+    same(joined(where, name), "absolute")
+
+
+def test_a_moment_on_a_body_without_inertia():
+    """Where something stands in for a missing mass, refinement gives it back of all that has moved."""
+    m = fb.Mechanism("point mass", planar=True)
+    m.add(fb.Body("a", mass=1.0, inertia=0.0, position=(1.0, -0.2)))
+    m.add(fb.Revolute("hinge", "ground", "a", at=(0.2, 0.0)))
+    m.add(fb.SpringDamper("spring", "ground", "a", at=((0.5, 1.0), (0.9, 0.1)), stiffness=40.0, length=0.3))
+    same(m, "absolute")
+
+
+def test_other_values_run_the_same_code():
+    m = example("andrews.toml")
+    made, _ = same(m, "joint")
+    more = {"stiffness": 9000.0, "torque": 0.05}
+    x, _ = values_of(m)
+    other, _ = values_of(m, parameters=more)
+    assert special.plan(other).key == special.plan(x).key
+    assert special.code(special.plan(other), other) == (made, "kept in this process")
+    same(m, "joint", more, made)
+
+
+def test_a_zero_is_other_code():
+    m = example("andrews.toml")
+    x, _ = values_of(m)
+    other, _ = values_of(m, parameters={"stiffness": 0.0})
+    assert special.plan(other).key != special.plan(x).key
+
+
+def test_files_on_disk(tmp_path, monkeypatch):
+    m = example("governor.toml")
+    x, _ = values_of(m)
+    plan = special.plan(x)
+    monkeypatch.setattr(keeping, "_folder", lambda: tmp_path)
+
+    def forget():
+        for key in [k for k in keeping._found if k[0] == plan.key]:
+            del keeping._found[key]
+
+    forget()
+    assert special.known(plan, x) == ""
+    assert special.code(plan, x)[1].startswith("made now")
+    (file,) = tmp_path.glob("*.bin")
+    forget()
+    assert special.known(plan, x) == "disk"
+    assert special.code(plan, x)[1] == "found on disk"
+    same(m, "joint")
+    text = file.read_bytes()
+    for damaged in (text[:-1], text[:1000] + bytes([text[1000] ^ 1]) + text[1001:], b"", b"something else"):
+        file.write_bytes(damaged)
+        forget()
+        assert special.known(plan, x) == ""
+        assert special.code(plan, x)[1].startswith("made now")
+        assert file.read_bytes()[: len(keeping.MARK)] == keeping.MARK
