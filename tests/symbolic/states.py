@@ -14,9 +14,9 @@ def random_state(m, coordinates, seed=3, spread=0.1):
     Accelerations and multipliers are any: no equation of motion is fulfilled.
     """
     eq = m.symbolic(coordinates=coordinates)
-    c = eq._start.assembly.compiled
+    c = eq.assembly.compiled
     s, rng = c.structure, np.random.default_rng(seed)
-    q = eq._start.assembly.q + spread * rng.normal(size=s.nq)
+    q = eq.assembly.q + spread * rng.normal(size=s.nq)
     for k in quaternions_of(c):
         q[k : k + 4] /= np.linalg.norm(q[k : k + 4])
     t, v, vdot = 0.3, rng.normal(size=s.nv), rng.normal(size=s.nv)

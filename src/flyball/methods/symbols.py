@@ -51,8 +51,6 @@ class Symbols(Model):
         ------
         ModelError
             If the mechanism has contacts, or a name does not exist.
-        AssemblyError
-            If the mechanism cannot be assembled.
         """
         from ..symbolic.asked import symbolic
         from ..symbolic.symbols import SymbolicOptions

@@ -1,13 +1,13 @@
-"""What `Mechanism.symbolic` does: the model with symbols in its numbers, assembled, in some coordinates."""
+"""What `Mechanism.symbolic` does: the model with symbols in its numbers, in some coordinates."""
 
 from __future__ import annotations
 
 from ..analysis.linear.inputs import with_inputs
-from ..analysis.motion.start import begin
 from ..analysis.untouched import refuse_contact
-from ..errors import AnalysisError, ModelError
+from ..errors import ModelError
 from ..graph.node import Symbol
 from ..model.model import Model, suggest
+from .coordinates import chosen
 from .equations import Equations
 from .numbers import Numbered
 from .symbols import SymbolicOptions
@@ -29,13 +29,6 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
         plain, inputs = with_inputs(plain, o.inputs)
         told |= {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
     plain = plain.snapshot()
-    wish = "joint" if o.coordinates == "auto" else o.coordinates
-    try:
-        start = begin(plain, 0.0, o.parameters, None, wish)
-    except AnalysisError:  # friction that follows loads which joint coordinates do not know
-        if o.coordinates != "auto":
-            raise
-        start = begin(plain, 0.0, o.parameters, None, "absolute")
-    out = Equations(plain, start, o, told)
+    out = Equations(plain, chosen(plain, o.parameters, o.coordinates), o, told)
     out.described = model.snapshot()
     return out

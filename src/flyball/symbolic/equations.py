@@ -138,7 +138,7 @@ class Equations(Shown, Linear, Symbols):
         """
         from .textbook import textbook
 
-        return textbook(self._start.assembly.compiled.values, name, orientation)
+        return textbook(self.model, self._given.items(), name, orientation)
 
     def lagrange(self) -> Lagrange:
         """The same equations from the energies, by Lagrange's formalism; in quasi-velocities where bodies turn."""

@@ -156,6 +156,8 @@ class Expressions:
             return str(made)
         names = self.rows or tuple(map(str, range(self.shape[0])))
         if len(self.shape) == 1:
+            if made == list(names):  # symbols are their own names
+                return "\n".join(names) or "none"
             wide = max(map(len, names), default=0)
             return "\n".join(f"{name:{wide}}  {x}" for name, x in zip(names, made, strict=True)) or "none"
         if not self.nodes.size:

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.motion.start import Start
+from ..analysis.assembly.start import Assembly
 from ..analysis.options import Options
 from ..graph.node import Graph, Node, Symbol
 from ..model.expressions import is_number_text
 from ..model.model import Model
 from ..tables.structure import Choices, structure
 from ..tables.values import values
+from .coordinates import Chosen, started
 from .expressions import Expressions
 from .formulated import Formulated, Place, formulated, objects
 from .home import Home
@@ -39,12 +40,12 @@ class Symbols(Home):
     qdot = T v,   M vdot = f + G^T lam,   g = 0,   G v = nu,   G vdot = gamma
     """
 
-    def __init__(self, model: Model, start: Start, o: SymbolicOptions, told: Mapping[str, Symbol]) -> None:
-        self.model, self.coordinates, self._start, self._asked = model, start.coordinates, start, o
+    def __init__(self, model: Model, chosen: Chosen, o: SymbolicOptions, told: Mapping[str, Symbol]) -> None:
+        self.model, self._asked = model, o
+        self.tree, self.coordinates = chosen  # names of the tree joints; which coordinates these are, and why
         self.described = model  # before its inputs and numbers were symbols
         self.graph = Graph()
-        tree = start.assembly.compiled.structure.tree
-        s = structure(model, Choices(tree=tree, coupled=bool(tree)))
+        s = structure(model, Choices(tree=self.tree, coupled=bool(self.tree)))
         self._told = told  # symbols of parameters that go by other names: inputs, numbers of fields
         self._given = self._parameters(o)
         given: Any = self._given
@@ -60,7 +61,7 @@ class Symbols(Home):
 
     def _parameters(self, o: SymbolicOptions) -> dict[str, Node]:
         """Symbols of the parameters that have values of their own; the others are expressions of these."""
-        values = self._start.assembly.compiled.values.told
+        values = self.model.environment(o.parameters)
         out = {}
         for name, value in self.model.parameters.items():
             if name in self._told:
@@ -185,9 +186,20 @@ class Symbols(Home):
     # -- numbers
 
     @cached_property
+    def assembly(self) -> Assembly:
+        """Where the mechanism starts, in these coordinates."""
+        return started(self.model, self._asked.parameters, self.tree)
+
+    @cached_property
     def start(self) -> dict[str, float]:
-        """Time and state as described and assembled, by the names of the symbols."""
-        a = self._start.assembly
+        """Time and state as described and assembled, by the names of the symbols: found by the engine when asked for.
+
+        Raises
+        ------
+        AssemblyError
+            If the mechanism cannot be assembled.
+        """
+        a = self.assembly
         return self.state(a.t, a.q, a.v)
 
     def state(self, t: float, q: np.ndarray, v: np.ndarray) -> dict[str, Any]:

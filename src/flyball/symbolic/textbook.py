@@ -9,7 +9,7 @@ the other), with w = H(b) bdot. M likewise.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,9 +17,13 @@ import numpy as np
 from ..constraints.registry import KINDS
 from ..errors import ModelError
 from ..graph.node import Graph, Node, Symbol
+from ..graph.values import symbols
 from ..math.scalar import cos, sin
 from ..math.vec import mm, neg, quaternion_matrix
 from ..model.joint import Joint
+from ..model.model import Model
+from ..tables.structure import structure
+from ..tables.values import values
 from .angles import Cleaned
 from .expressions import Expressions
 from .formulated import objects
@@ -55,17 +59,20 @@ class Textbook(Home):
         The vector form of every row: as text, in Hahn's order of indices, and its building block.
     """
 
-    def __init__(self, joint: Joint, rows: Sequence[tuple[Any, list[Term], Any]], orientation: str) -> None:
+    def __init__(
+        self, joint: Joint, graph: Graph, rows: Sequence[tuple[Any, list[Term], Any]], orientation: str
+    ) -> None:
         if orientation not in ORIENTATIONS:
             raise ModelError(f"orientation is {orientation!r}; must be one of {', '.join(ORIENTATIONS)}")
         self.joint, self.orientation = joint, orientation
-        self.graph = Graph()
+        self.graph = graph
         self._symbols: dict[str, Node] = {}
         self.terms = [terms for _, terms, _ in rows]  # kind, parameters and weight of each term of a row
         self.F, self.M = self._frame("F"), self._frame("M")
         self.labels = tuple(("n" if row.world else "") + row.axes or "distance" for row, _, _ in rows)
         self.vectors: list[Vector | None] = [VECTORS.get(row.kind) for row, _, _ in rows]
         self._made = [self._sum(terms, data) for _, terms, data in rows]
+        self._symbols |= {x.data.name: x for x in symbols([y for m in self._made for y in m[:1]])}
 
     @property
     def title(self) -> str:
@@ -212,16 +219,18 @@ def about(axis: int, angle: Any) -> tuple:
     return tuple(R)
 
 
-def textbook(x: Any, name: str, orientation: str) -> Textbook:
-    """A joint of a mechanism: ``x`` are its values."""
-    s = x.structure
-    joint = s.model[name]
+def textbook(model: Model, parameters: Iterable[tuple[str, Node]], name: str, orientation: str) -> Textbook:
+    """A joint of a mechanism, with ``parameters`` of that as symbols."""
+    joint = model[name]
     if not isinstance(joint, Joint):
-        raise ModelError(f"{joint.title} is no joint; joints are {', '.join(j.name for j in s.model.joints)}")
+        raise ModelError(f"{joint.title} is no joint; joints are {', '.join(j.name for j in model.joints)}")
+    graph = Graph()
+    given: Any = {k: graph.symbol(x.data, x.value) for k, x in parameters}
+    x = values(structure(model), given or None)
     n, ends = x.numbers[name], x.poses.ends(joint)
     rows = []
-    for row in joint.rows(s.model.planar):
-        par = [float(c.real) for c in joint.constants(n, row, *ends)]
+    for row in joint.rows(model.planar):
+        par = [_shown(c) for c in joint.constants(n, row, *ends)]
         data: list[Any] = []
         if KINDS[row.kind].place:
             curves = joint.curves(n)
@@ -232,7 +241,12 @@ def textbook(x: Any, name: str, orientation: str) -> Textbook:
             c = joint.coordinates[what]
             if c.frames != "FM":
                 raise ModelError(f"{joint.title}: its row of {what!r} is from M to F and has no textbook form")
-            weight = c.sign * c.row.par[7] * float(joint.weight(n, what, *ends).real)
+            weight = c.sign * c.row.par[7] * _shown(joint.weight(n, what, *ends))
             terms.append(Term(c.row.kind, (*c.row.par[:6], 0.0, 1.0), weight, c.turn_F, c.turn_M))
         rows.append((row, terms, np.array(data, object)))
-    return Textbook(joint, rows, orientation)
+    return Textbook(joint, graph, rows, orientation)
+
+
+def _shown(x: Any) -> Any:
+    """An expression of parameters, or a number."""
+    return x if isinstance(x, Node) else float(x.real)
