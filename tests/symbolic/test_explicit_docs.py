@@ -1,4 +1,4 @@
-"""The examples of docs/explicit.md run and give what they say; every example's accelerations are the engine's."""
+"""The examples of docs/explicit.md and docs/symbolic.md run and give what they say; every example's accelerations are the engine's."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from flyball.model.touching import has_contact
 from tests.mechanisms import EXAMPLES, example
 from tests.symbolic.explicit_made import engine, whole
 
-PAGE = (Path(__file__).parents[2] / "docs" / "explicit.md").read_text(encoding="utf-8")
+DOCS = Path(__file__).parents[2] / "docs"
 NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
 
 
-def test_page() -> None:
-    code = re.sub(r"^```\w*$", "", PAGE, flags=re.M)
+@pytest.mark.parametrize(("page", "least"), [("explicit.md", 16), ("symbolic.md", 16)])
+def test_page(page, least) -> None:
+    code = re.sub(r"^```\w*$", "", (DOCS / page).read_text(encoding="utf-8"), flags=re.M)
     code = re.sub(r"^>>> (\w+\.add\()", r">>> _ = \1", code, flags=re.M)  # it returns the last element
-    test = doctest.DocTestParser().get_doctest(code, {}, "explicit.md", None, 0)
-    assert len(test.examples) > 15
+    test = doctest.DocTestParser().get_doctest(code, {}, page, None, 0)
+    assert len(test.examples) >= least
     said: list[str] = []
     failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
     assert failed == 0, "".join(said)

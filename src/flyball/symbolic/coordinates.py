@@ -62,7 +62,7 @@ def _told(model: Model, wish: str, tree: Sequence[str]) -> str:
     cut = [j.name for j in model.joints if j.name not in tree]
     more = f"; rows remain for {', '.join(cut[:8])}" if cut else ""
     more += f" and {len(cut) - 8} more" if len(cut) > 8 else ""
-    return f"joint: {'as asked for' if wish == 'joint' else 'fewest equations'}{more}"
+    return f"joint: {'as asked for' if wish == 'joint' else 'these make the fewest equations'}{more}"
 
 
 def _clear(c: Compiled, wish: str) -> bool:
@@ -108,10 +108,10 @@ def _engine_s(model: Model, parameters: Mapping[str, float] | None, wish: str) -
     announce()
     try:
         start = begin(model, 0.0, parameters, None, "joint" if wish == "auto" else wish)
-    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+    except AnalysisError as error:  # friction that follows loads which joint coordinates do not know
         if wish != "auto":
             raise
-        start = begin(model, 0.0, parameters, None, "absolute")
+        return Chosen((), f"absolute: {str(error).partition(': ')[2]}")
     tree = tuple(start.assembly.compiled.structure.tree)
     return Chosen(tree, start.coordinates if not tree or wish == "joint" else _told(model, wish, tree))
 

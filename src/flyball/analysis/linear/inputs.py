@@ -60,8 +60,16 @@ def with_inputs(model: Model, names: Sequence[str]) -> tuple[Model, list[Input]]
             parameter += "_"
         out.parameters[parameter] = 0.0
         _replace(out, e, field, at, of, parameter)
-        inputs.append(Input(name, parameter, of.dimension or "SI", e.name if isinstance(e, Driver) else ""))
+        inputs.append(Input(name, parameter, _unit(model, e, of), e.name if isinstance(e, Driver) else ""))
     return out, inputs
+
+
+def _unit(model: Model, e: Driver | Force, of: LawOf) -> str:
+    """Of what is added; the effort along a coordinate is a force or a torque."""
+    if of.dimension:
+        return of.dimension
+    along = getattr(e, "coordinate", None)
+    return "SI" if along is None else {"m": "N", "rad": "N*m"}.get(model.unit(along, e), "SI")
 
 
 def possible(model: Model) -> dict[str, tuple[Any, str, int, LawOf]]:
