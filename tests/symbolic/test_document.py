@@ -228,7 +228,7 @@ def test_the_page_of_the_documentation_runs(capsys):
 
 
 def test_matrices_stand_in_brackets_and_have_a_head():
-    made = example("slider_crank").symbolic(coordinates="absolute").html()
+    made = example("slider_crank.toml").symbolic(coordinates="absolute").html()
     body = made[made.index('id="mass"') :]
     body = body[: body.index("</section>")]
     assert body.count('class="bracket opens"') == body.count('class="bracket closes"') == body.count("<tr>") - 1 > 0
