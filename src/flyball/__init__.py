@@ -48,6 +48,8 @@ Ask for the equations
     L = eq.linear(outputs)        -> LinearEquations: A, B, C, D in the parameters; L.transfer_function() ->
                                   TransferFunction, L.routh() -> StabilityConditions
     eq.to_html(path)              an offline page; eq.to_latex(path) a file for pdflatex
+    eq.explicit(independent)      -> ExplicitEquations: without constraints, closed forms where loops have some
+    eq.state_space(outputs)       -> StateEquations: x' = f(x, u, t), y = h(x, u, t)
     m.export(folder, language)    -> Code: functions of the equations: language "c", "python", "casadi", "numba"
 
 Ask what a number changes
@@ -129,6 +131,8 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.singularities import Singularities as Singularities
     from .results.touch import Touch as Touch
     from .symbolic.equations import Equations as Equations
+    from .symbolic.explicit.explicit import ExplicitEquations as ExplicitEquations
+    from .symbolic.explicit.states import StateEquations as StateEquations
     from .symbolic.export.code import Code as Code
     from .symbolic.expressions import Expressions as Expressions
     from .symbolic.linear.equations import LinearEquations as LinearEquations
@@ -188,9 +192,11 @@ _HOME = {
     "Touch": "results.touch",
     "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",
+    "ExplicitEquations": "symbolic.explicit.explicit",
     "Expressions": "symbolic.expressions",
     "LinearEquations": "symbolic.linear.equations",
     "StabilityConditions": "symbolic.linear.routh",
+    "StateEquations": "symbolic.explicit.states",
     "TransferFunction": "symbolic.linear.transfer",
 }
 _ROOMS = ("model.shapes", "joints", "forces")

@@ -81,7 +81,7 @@ def jellett(r: Result) -> np.ndarray:
 @pytest.fixture(scope="module")
 def tops() -> list[Result]:
     m = mechanism("tippe_top.py")
-    return [m.simulate(t, outputs=51, method=fb.Impulse(step=h)) for t, h in ((0.3, 4e-4), (0.3, 2e-4), (3.0, 5e-4))]
+    return [m.simulate(t, outputs=51, method=fb.Impulse(step=h)) for t, h in ((0.3, 4e-4), (0.3, 2e-4), (3.0, 2e-4))]
 
 
 def test_a_tippe_top_keeps_jelletts_quantity(tops):
@@ -91,9 +91,11 @@ def test_a_tippe_top_keeps_jelletts_quantity(tops):
 
 
 def test_a_tippe_top_turns_over(tops):
+    """As its six equations do, written by hand and integrated by SciPy's LSODA with friction that slides below 1e-4 m/s."""
     r = tops[2]
-    assert r["top"].rotation[0, 2, 2] > 0.99
-    assert r["top"].rotation[-1, 2, 2] < -0.99
+    at = r["top"].rotation[[0, 5, 10, 15, 20], 2, 2]
+    np.testing.assert_allclose(at, [0.9950, 0.8659, 0.4782, -0.3964, -0.8769], atol=0.08)
+    assert r["top"].rotation[-1, 2, 2] < -0.95
     rise = 0.02 * 2 * 0.006 * G  # its mass centre is higher by twice its depth
     np.testing.assert_allclose(np.ptp(r.energy.potential), rise, rtol=0.02)
     losing(r)

@@ -42,9 +42,11 @@ def _nodes(s: StateEquations) -> list:
     return e.inlined([*own, *n.v, *s.equations.formulated.vdot])
 
 
-def engine(m: fb.Mechanism, coordinates: str, t: float, q, v) -> np.ndarray:
-    """Accelerations (nv,) by the numeric engine."""
+def engine(m: fb.Mechanism, coordinates: str, t: float, q, v, values=None) -> np.ndarray:
+    """Accelerations (nv,) by the numeric engine; followers are where ``values`` say."""
     c = begin(m.snapshot(), 0.0, None, None, coordinates).assembly.compiled
+    for name, at in c.structure.state_at.items():
+        c.z[at] = (values or {}).get(name, c.z[at])
     status, dy = c.at(t, np.array(q, float), np.array(v, float), MOTION)
     assert status == 0
     return dy[len(q) : len(q) + len(v)]

@@ -161,6 +161,17 @@ def test_conditions_are_told():
     assert evaluate([condition], {"lean": 2.5}) == [-2.5]
 
 
+def test_matrices_are_shown():
+    """As text, LaTeX and SymPy expressions, as those of the equations that they come from."""
+    m = fb.Mechanism("hang", planar=True, gravity=(0, "-g"), parameters={"g": 10.0, "m": 2.0, "k": 100.0})
+    m.add(fb.Body("b", mass="m", inertia=1.0, position=(0, -0.5)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(0, -0.5), axis=(0, 1)))
+    m.add(fb.SpringDamper("s", "ground", "b", at=((0, 0), (0, -0.5)), stiffness="k", length="0.5 - m*g/k"))
+    A = m.symbolic().linear(["b.y"]).A
+    assert "k/m" in str(A) and r"\frac{k}{m}" in A.latex()
+    assert "k/m" in str(A.sympy()) and A.simplified().shape == (2, 2)
+
+
 def test_no_motion_is_mistaken_for_rest():
     """What is told of coordinates that the equations are not in, and what turns by velocities that do not stay."""
     m = fb.Mechanism("spin", gravity=(0, 0, -G))

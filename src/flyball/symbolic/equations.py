@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from .explicit.explicit import ExplicitEquations
     from .explicit.states import StateEquations
     from .export.code import Code
+    from .lagrange import Lagrange
+    from .textbook import Textbook
 
 
 class Equations(Shown, Linear, Symbols):
@@ -124,6 +126,25 @@ class Equations(Shown, Linear, Symbols):
         from .explicit.states import StateEquations
 
         return StateEquations(self.explicit(independent, closed=closed), outputs)
+
+    def joint(self, name: str, *, orientation: str = "quaternion") -> Textbook:
+        """A joint's own equations between two free frames, with the building blocks that they come from.
+
+        Parameters
+        ----------
+        name : str
+        orientation : {"quaternion", "bryant"}
+            How the symbols say in which way the frames are turned.
+        """
+        from .textbook import textbook
+
+        return textbook(self._start.assembly.compiled.values, name, orientation)
+
+    def lagrange(self) -> Lagrange:
+        """The same equations from the energies, by Lagrange's formalism; in quasi-velocities where bodies turn."""
+        from .lagrange import Lagrange
+
+        return Lagrange(self)
 
     def export(
         self,

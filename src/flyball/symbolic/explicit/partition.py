@@ -70,9 +70,10 @@ def free(G: np.ndarray, scale: np.ndarray, wanted: Sequence[int] = (), only: boo
     f = N.shape[1]
     chosen: list[int] = []
     left = N.copy()
+    largest = float(np.sqrt((N * N).sum(axis=1)).max(initial=0.0))
     for d in wanted:
         along = left[d]
-        if len(chosen) == f or np.linalg.norm(along) <= DEPENDENT * float(np.linalg.norm(N[d])):
+        if len(chosen) == f or np.linalg.norm(along) <= DEPENDENT * largest:
             raise ValueError(d)
         e = along / np.linalg.norm(along)
         left = left - np.outer(left @ e, e)

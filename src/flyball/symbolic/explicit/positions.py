@@ -74,7 +74,7 @@ def solved_positions(
         note = f"{len(w)} dependent coordinates in equations of {count} expressions: too many to look for formulas"
         note += f" (up to {LARGEST} in {LONGEST})"
         return Solved(_implicit(g, w, place.probe), [], [note] if w else [])
-    pool = Pool(g, w, Probe(place.values))
+    pool = Pool(g, w, [s for k, s in enumerate(x.q) if k not in unknown], Probe(place.values))
     pool.run()
     left = _implicit(pool.equations, pool.unknowns, pool.probe)
     order = [*pool.found, *left, *reversed(pool.later)]

@@ -22,7 +22,7 @@ Numbers = Sequence[float] | np.ndarray
 
 
 class StateEquations:
-    """x' = f(x, u, t), y = h(x, u, t) with names.
+    """State space of a mechanism, with names: x' = f(x, u, t), y = h(x, u, t).
 
     The states are the independent coordinates (of a body's orientation all four Euler parameters), then their rates. An
     input that moves a driver is three: itself, its rate and its acceleration.

@@ -11,10 +11,10 @@ import numpy as np
 
 from ...errors import AnalysisError, ModelError
 from ...graph.node import Node
-from ...graph.printers.sympy import SympyPrinter
-from ...graph.values import evaluate
+from ...graph.values import evaluate, symbols
 from ...model.words import listing, suggest
 from ..expressions import Expressions
+from ..home import Home
 from .derivatives import Perturbed
 from .free import Free
 from .matrices import Matrices
@@ -28,7 +28,7 @@ FACTORED = 300  # operations
 
 
 @dataclass
-class LinearEquations:
+class LinearEquations(Home):
     """Linear equations x' = A x + B u, y = C x + D u whose entries are expressions of the mechanism's parameters.
 
     The states are changes of as many coordinates as there are freedoms, then changes of their rates, as those of
@@ -125,12 +125,18 @@ class LinearEquations:
         return self._told(X, rows, columns)
 
     def _told(self, X: np.ndarray, rows: tuple[str, ...], columns: tuple[str, ...]) -> Expressions:
-        return Expressions(self, X, rows, columns)  # type: ignore[arg-type]
+        return Expressions(self, X, rows, columns)
 
-    @cached_property
-    def printer(self) -> Any:
-        """The one that makes SymPy expressions."""
-        return SympyPrinter()
+    @property
+    def title(self) -> str:
+        """The mechanism's name."""
+        return repr(self.name)
+
+    @property
+    def named(self) -> dict[str, Node]:
+        """Symbols in the matrices, by name."""
+        m = self.matrices
+        return {x.data.name: x for x in symbols([n for X in (m.A, m.B, m.C, m.D) for n in X.ravel().tolist()])}
 
     def checked(self, values: Mapping[str, Any], wanted: Mapping[str, Node]) -> dict[str, float]:
         """Values by the names of symbols; refuses those that there are not. What `Expressions` ask."""

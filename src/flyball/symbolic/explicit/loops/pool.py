@@ -12,7 +12,7 @@ Nothing asks which mechanism it is.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 from ....graph.derivative import replaced, tangents
@@ -33,15 +33,18 @@ class Pool:
 
     Attributes
     ----------
-    equations, unknowns : list of Node
+    equations, unknowns, known : list of Node
     found : list of Definition
         In an order in which each stands on those before.
     later : list of Definition
         Found from the others; in an order in which each stands on those behind.
     """
 
-    def __init__(self, equations: Sequence[Node], unknowns: Sequence[Node], probe: Probe) -> None:
+    def __init__(
+        self, equations: Sequence[Node], unknowns: Sequence[Node], known: Sequence[Node], probe: Probe
+    ) -> None:
         self.equations, self.unknowns, self.probe = list(equations), list(unknowns), probe
+        self.known = list(known)
         self.found: list[Definition] = []
         self.later: list[Definition] = []
         self.never: list[tuple[str, Any]] = []
@@ -52,7 +55,7 @@ class Pool:
 
     def run(self) -> None:
         """Apply rules until none fits."""
-        rules = (self._one, self._linear_in_two, self._linear, self._follow, self._pair)
+        rules = (self._follow_known, self._one, self._linear_in_two, self._linear, self._follow, self._pair)
         self._plain()
         for _ in range(ROUNDS * len(self.unknowns)):
             if not any(rule() for rule in rules):
@@ -130,7 +133,14 @@ class Pool:
 
     def _follow(self) -> bool:
         """Angles that follow one another: E_vw = E_ww says that E knows w only in v + w."""
-        for v, w in itertools.permutations(self.unknowns, 2):
+        return self._follows(itertools.permutations(self.unknowns, 2))
+
+    def _follow_known(self) -> bool:
+        """The same after a known angle: the sum is an angle from ground, which has the shorter formula."""
+        return self._follows(itertools.product(reversed(self.known), self.unknowns))
+
+    def _follows(self, pairs: Iterable[tuple[Node, Node]]) -> bool:
+        for v, w in pairs:
             both = [x for x in self.equations if self._depends(x, v) and self._depends(x, w)]
             if not any(self._bends(x, v, w)[1] for x in both):
                 continue
@@ -194,6 +204,7 @@ class Pool:
             self.never += [(w.data.name, y) for y in solution.never]
         self.equations = [x for x in self.equations if not any(x is y for y in equations)]
         self.unknowns = [w for w in self.unknowns if not any(w is y for y in unknowns)]
+        self.known += unknowns
 
     def _put_off(self, w: Node, solution: Solution) -> None:
         self.later.append(Definition((w,), (solution.value,), (), solution.how))

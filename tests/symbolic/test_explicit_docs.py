@@ -1,0 +1,46 @@
+"""The examples of docs/explicit.md run and give what they say; every example's accelerations are the engine's."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flyball.model.touching import has_contact
+from tests.mechanisms import EXAMPLES, example
+from tests.symbolic.explicit_made import engine, whole
+
+PAGE = (Path(__file__).parents[2] / "docs" / "explicit.md").read_text(encoding="utf-8")
+NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
+
+
+def test_page() -> None:
+    code = re.sub(r"^```\w*$", "", PAGE, flags=re.M)
+    code = re.sub(r"^>>> (\w+\.add\()", r">>> _ = \1", code, flags=re.M)  # it returns the last element
+    test = doctest.DocTestParser().get_doctest(code, {}, "explicit.md", None, 0)
+    assert len(test.examples) > 15
+    said: list[str] = []
+    failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
+    assert failed == 0, "".join(said)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_example(name):
+    """At states about the start, and at other times where drivers move all; implicit coordinates included."""
+    m = example(name)
+    if has_contact(m):
+        pytest.skip("contact is refused by m.symbolic")
+    s = m.symbolic().state_space()
+    coordinates = s.equations.coordinates.partition(":")[0]
+    rng = np.random.default_rng(0)
+    for t in (0.0, 0.02, 0.05):
+        x = s.start + rng.uniform(-0.1, 0.1, len(s.start)) * (np.abs(s.start) + 0.3)
+        for k, state in enumerate(s.states):
+            if state.endswith(".e0"):
+                x[k : k + 4] /= np.linalg.norm(x[k : k + 4])
+        q, v, a = whole(s, x, t)
+        exact = engine(m, coordinates, t, q, v, s.point(x, t=t))
+        assert np.abs(a - exact).max() <= 1e-12 * np.abs(exact).max() + 1e-11  # the engine's rounding where all rests
