@@ -150,7 +150,7 @@ class ExplicitEquations:
         lam = s.traced.lam
         slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
         among = np.abs(y[: len(lam)].T @ slope)
-        if (among > FELT * max(1.0, float(np.abs(slope).max(initial=0.0)))).any():
+        if (among > FELT * np.abs(slope).max(initial=0.0)).any():
             raise ModelError(
                 f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
                 "for other quantities, or take the redundancy out: m.mobility() names it"
