@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.graph.node import Node
 from flyball.graph.values import evaluate, symbols
 from flyball.symbolic.document.parts import Formulas, Matrix
-from tests.mechanisms import example
+from tests.mechanisms import example, four_bar
 
 
 def arm(n=2):
@@ -225,3 +225,11 @@ def test_the_page_of_the_documentation_runs(capsys):
     exec(re.search(r"```python\n(.*?)```", text, re.S)[1], {})
     told = re.search(r"```text\n(.*?)```", text, re.S)[1]
     assert re.sub(" +", " ", told) in re.sub(" +", " ", capsys.readouterr().out)
+
+
+def test_matrices_stand_in_brackets_and_have_a_head():
+    made = four_bar().symbolic().html()
+    body = made[made.index('id="mass"') :]
+    body = body[: body.index("</section>")]
+    assert body.count('class="bracket opens"') == body.count('class="bracket closes"') == body.count("<tr>") - 1 > 0
+    assert "<th></th>" not in body  # tables with empty heads have none

@@ -216,3 +216,9 @@ def test_angles_that_are_measured_against_their_coordinate(coordinates):
     r = p.simulate(0.5, outputs=4)
     for t, q, v in zip(r.t[1:], r.q[1:], r.v[1:], strict=True):
         np.testing.assert_allclose(eq.f.at(eq.state(float(t), q, v)), p.forces(float(t), q, v), rtol=0, atol=1e-12)
+
+
+def test_why_these_coordinates_is_told():
+    m = mechanisms.four_bar()
+    assert m.symbolic().coordinates.startswith("joint: these make the fewest equations")
+    assert m.symbolic(coordinates="joint").coordinates.startswith("joint: as asked for")

@@ -13,6 +13,8 @@ from ..simplify.numbers import Known, known
 
 Power = tuple[Node, int]
 FUNCTION, SECOND, SUM, OTHER = 6, 5, 4, 3
+KNOWN = 10  # digits below which a decimal is taken for exact
+ROUNDED = 1e-14  # of a number: what rounding makes of it
 
 
 @dataclass(frozen=True)
@@ -47,10 +49,6 @@ class Layout:
     def __init__(self, names: Mapping[int, str] | None = None) -> None:
         self.names = dict(names or {})
         self.costs: dict[int, float] = dict.fromkeys(self.names, 1.0)
-
-    def leaf(self, x: Node) -> bool:
-        """Whether it is written as it stands."""
-        return x.index in self.names or x.op in (NUMBER, SYMBOL)
 
     def sum(self, x: Node, top: bool = False) -> list[Term]:
         """Terms of an expression, in the order of reading; ``top``: though it may have a name."""
@@ -128,5 +126,9 @@ def negated(x: Node) -> bool:
 
 
 def number_text(x: float) -> str:
-    """A decimal of up to twelve digits."""
-    return f"{x:.12g}"
+    """A decimal of up to twelve digits; of more where it would be taken for a shorter one that it is not."""
+    short = f"{x:.12g}"
+    digits = short.partition("e")[0].lstrip("-0.").replace(".", "")
+    if len(digits) < KNOWN and abs(float(short) - x) > ROUNDED * abs(x):
+        return f"{x:.15g}"
+    return short

@@ -156,7 +156,7 @@ class Expander:
                 continue
             single = len(powers) == 1 and powers[0][1] == 1 and not waves
             one = self.graph.nodes[powers[0][0]] if single else self.parent.short({(powers, waves): 1.0})
-            inner = self._wrapped(one) if c == round(c) else None
+            inner = self._wrapped(one) if c % 1.0 == 0.0 else None
             for k, d in inner or ((one.index, 1.0),):
                 found[k] = found.get(k, 0.0) + c * d
         return tuple(sorted((k, c) for k, c in found.items() if c))
@@ -175,7 +175,7 @@ class Expander:
 
     def _wave(self, x: Node) -> Terms:
         angle = self.angle(x.args[0])
-        if angle is None:
+        if angle is None or not all(math.isfinite(c) for _, c in angle):
             return self.atom(self.parent.inside(x))
         kind = COS if x.op == "cos" else SIN
         found = dict(angle)
