@@ -22,7 +22,6 @@ from .linked import ENTRIES, Linked
 ARGUMENTS = "ptr %S, ptr %W, double %t, ptr %a, ptr %b, ptr %c, ptr %d"
 HEAD, DATA, A_DIMENSION = 40, 32, 16
 """Bytes of an array of a held tuple without its shape, where its numbers' address stands, and of a dimension."""
-LEVEL = 2  # of LLVM's optimisation
 _LOCK = threading.RLock()
 
 
@@ -73,7 +72,7 @@ def _target() -> Any:
     return target.create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=features,
-        opt=LEVEL,
+        opt=2,
         jit=True,
         codemodel="jitdefault",
     )
@@ -100,7 +99,7 @@ def assembled(text: str) -> bytes:
         module = llvm.parse_assembly(text)
         module.triple = llvm.get_default_triple()
         module.data_layout = str(target.target_data)
-        options = llvm.create_pipeline_tuning_options(speed_level=LEVEL)
+        options = llvm.create_pipeline_tuning_options(speed_level=2)
         options.slp_vectorization = False  # measured: slower, and longer in the making
         builder = llvm.create_pass_builder(target, options)
         passes = builder.getModulePassManager()

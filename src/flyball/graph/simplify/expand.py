@@ -26,6 +26,7 @@ from .terms import (
     times,
     wave,
 )
+from .units import reduced
 
 if TYPE_CHECKING:
     from .simplify import Simplifier
@@ -106,7 +107,8 @@ class Expander:
             a, b = sorted((a, b), key=len)
             b = self.factor(b)
             a = self.factor(a) if len(a) > self.most else a
-        return self.roots_squared(times(a, b))
+        found = self.roots_squared(times(a, b))
+        return reduced(found, self.parent.units) if self.parent.units else found
 
     def roots_squared(self, terms: Terms) -> Terms:
         """Squares of roots and of absolute values are what stands in them."""
