@@ -1,6 +1,7 @@
 """Expressions as text and LaTeX: precedence, fractions, powers, names."""
 
 import math
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from flyball.graph.node import Graph, Symbol
 from flyball.graph.printers import latex as latex_printer
 from flyball.graph.printers import text as text_printer
 from flyball.graph.printers.latex import latex
+from flyball.graph.printers.mathml import formula, mathml
 from flyball.graph.printers.spelling import name
 from flyball.graph.printers.text import text
 from flyball.graph.values import evaluate
@@ -33,9 +35,17 @@ CASES = [
     (lambda m, r, x, v: sqrt(x * x + r * r) / x**3, "sqrt(r^2 + x^2)/x^3", r"\frac{\sqrt{r^{2} + x^{2}}}{x^{3}}"),
     (lambda m, r, x, v: (1.0 / (x + r)) ** 2, "1/(r + x)^2", r"\frac{1}{(r + x)^{2}}"),
     (lambda m, r, x, v: math.pi / 4.0 * x, "pi*x/4", r"\frac{\pi}{4} x"),
-    (lambda m, r, x, v: 9.81 * m - 1e-7 * x, "9.81*m_1 - 1e-07*x", r"9.81 m_{1} - 1 \cdot 10^{-7} x"),
+    (lambda m, r, x, v: 9.81 * m - 1e-7 * x, "9.81*m_1 - 1e-07*x", r"9.81 m_{1} - 10^{-7} x"),
     (lambda m, r, x, v: choose(x, r, -x), "(r if x > 0 else -x)",
      r"\begin{cases} r & x > 0 \\ -x & \text{otherwise} \end{cases}"),
+    (lambda m, r, x, v: (x**1.5) * (x**1.5), "(x^(3/2))^2", r"\left(x^{\frac{3}{2}}\right)^{2}"),
+    (lambda m, r, x, v: m / ((x + r) ** v) ** 3, "m_1/((r + x)^(hinge.rate))^3",
+     r"\frac{m_{1}}{((r + x)^{\dot\varphi})^{3}}"),
+    (lambda m, r, x, v: m * choose(x, r, x) ** 2, "m_1*(r if x > 0 else x)^2",
+     r"m_{1} \left(\begin{cases} r & x > 0 \\ x & \text{otherwise} \end{cases}\right)^{2}"),
+    (lambda m, r, x, v: choose(x, r, x) + m, "m_1 + (r if x > 0 else x)",
+     r"m_{1} + \left(\begin{cases} r & x > 0 \\ x & \text{otherwise} \end{cases}\right)"),
+    (lambda m, r, x, v: 1.0000000000001 * x, "1.0000000000001*x", "1.0000000000001 x"),
     (lambda m, r, x, v: atan2(x, r), "atan2(x, r)", r"\operatorname{atan2}(x, r)"),
     (lambda m, r, x, v: 1.0 - cos(x), "1 - cos(x)", r"1 - \cos x"),
     (lambda m, r, x, v: abs(x / 3.0 + r), "abs(r + x/3)", r"\left|r + \frac{1}{3} x\right|"),
@@ -48,6 +58,20 @@ def test_written(make, plain, typeset):
     x = make(*symbols)
     assert text(x) == plain
     assert latex(x) == typeset
+
+
+@pytest.mark.parametrize(("make", "plain", "typeset"), CASES)
+def test_powers_in_mathml_have_a_base_and_an_exponent(make, plain, typeset):
+    g, *symbols = expressions()
+    page = ElementTree.fromstring(mathml(make(*symbols)))
+    assert all(len(e) == 2 for e in page.iter() if e.tag in ("msup", "msub", "mfrac"))
+    assert all(len(e) == 3 for e in page.iter("msubsup"))
+
+
+def test_a_prime_and_an_exponent_are_one_element():
+    (power,) = ElementTree.fromstring(formula("f'^{2}"))
+    assert power.tag == "msup"
+    assert len(power) == 2
 
 
 @pytest.mark.parametrize(("make", "plain", "typeset"), [c for c in CASES if " if " not in c[1]])

@@ -130,3 +130,29 @@ def test_numbers_and_shapes_stay():
     assert found.shape == (2, 2)
     assert [[found[i, j] == v for j, v in enumerate(row)] for i, row in enumerate([[0, 0], [1, 1]])] == [[True] * 2] * 2
     assert simplified([]) == []
+
+
+@pytest.mark.parametrize(
+    ("make", "at"),
+    [
+        (lambda x, y, z: 1e9 * x * x + 1e-5 * x * y + 1e9 * x * z + 1e-5 * y * z, (1e-9, 1e5, 2e-9)),
+        (lambda x, y, z: 4.0 * x * x + 1e-13 * x * y + 4.0 * x * z + 1e-13 * y * z, (1e-9, 1e5, 2e-9)),
+        (lambda x, y, z: x * x + 2.0 * x * y + (1.0 + 5e-14) * y * y, (1.0, -1.0, 0.0)),
+        (lambda x, y, z: x * x - y * y + 1e-15 * x * y, (1.0, 1.0, 0.0)),
+        (lambda x, y, z: cos(2.0 * x) - (1.0 + 1e-13) * cos(2.0 * y), (0.3, 0.3, 0.0)),
+    ],
+)
+def test_coefficients_of_other_atoms_are_not_compared(make, at):
+    g = Graph()
+    symbols = [g.symbol(n) for n in "xyz"]
+    x = make(*symbols)
+    values = dict(zip("xyz", at, strict=True))
+    assert evaluate(simplified([x]), values)[0] == pytest.approx(evaluate([x], values)[0], rel=0.2, abs=0.0)
+
+
+@pytest.mark.parametrize("number", [math.inf, math.nan])
+def test_what_is_no_number_stays(number):
+    g = Graph()
+    x = g.symbol("x")
+    for made in (sin(number * x), cos(x + number), number * cos(x) + number * sin(x), number * x * x + x):
+        assert len(simplified([made])) == 1

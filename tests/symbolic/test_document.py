@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.graph.node import Node
 from flyball.graph.values import evaluate, symbols
 from flyball.symbolic.document.parts import Formulas, Matrix
-from tests.mechanisms import example
+from tests.mechanisms import example, four_bar
 
 
 def arm(n=2):
@@ -225,3 +225,21 @@ def test_the_page_of_the_documentation_runs(capsys):
     exec(re.search(r"```python\n(.*?)```", text, re.S)[1], {})
     told = re.search(r"```text\n(.*?)```", text, re.S)[1]
     assert re.sub(" +", " ", told) in re.sub(" +", " ", capsys.readouterr().out)
+
+
+def test_a_body_on_a_ball_joint_has_a_constant_mass_matrix():
+    """Products of rotations that are the identity are seen to be: polynomials of the eighth degree in Euler parameters."""
+    m = fb.Mechanism("ball joint", gravity=(0, 0, 0), parameters={"I": 0.1, "m": 2.0, "l": 0.5})
+    m.add(fb.Body("bob", mass="m", inertia=("I", "I", "I"), position=(0, 0, "-l")))
+    m.add(fb.Spherical("O", "ground", "bob", at=(0, 0, 0)))
+    eq = m.symbolic(coordinates="joint")
+    assert eq.M.texts() == [["I + m*l^2", "0", "0"], ["0", "I + m*l^2", "0"], ["0", "0", "I"]]
+    assert eq.f.texts() == ["m*l^2*O.w_y*O.w_z", "-m*l^2*O.w_x*O.w_z", "0"]
+
+
+def test_matrices_stand_in_brackets_and_have_a_head():
+    made = four_bar().symbolic().html()
+    body = made[made.index('id="mass"') :]
+    body = body[: body.index("</section>")]
+    assert body.count('class="bracket opens"') == body.count('class="bracket closes"') == body.count("<tr>") - 1 > 0
+    assert "<th></th>" not in body  # tables with empty heads have none

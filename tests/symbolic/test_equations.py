@@ -202,3 +202,9 @@ def test_without_sympy(monkeypatch):
     assert str(eq.f) and eq.M.latex() and eq.M.at(eq.start).shape == (1, 1)
     with pytest.raises(ImportError, match=r"pip install 'flyball\[symbolic\]'"):
         eq.M.sympy()
+
+
+def test_why_these_coordinates_is_told():
+    m = mechanisms.four_bar()
+    assert m.symbolic().coordinates.startswith("joint: these make the fewest equations")
+    assert m.symbolic(coordinates="joint").coordinates.startswith("joint: as asked for")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -70,8 +72,6 @@ def test_steady_motions_seen_by_their_joints():
 
 def test_about_an_equilibrium_that_was_found():
     """The IFToMM governor: springs as stiff as rods, spinning at the speed that is kept."""
-    from pathlib import Path
-
     m = fb.load(Path(__file__).parents[2] / "examples" / "governor.toml")
     found = m.equilibrium(turning=["bearing.angle"])
     L = linear_equations(m, outputs=["guide.displacement"], at=found)
@@ -199,3 +199,25 @@ def test_rounding_is_no_force():
         assert pytest.approx(m.linearize(about=m.equilibrium(), coordinates=layer).A, rel=1e-9, abs=1e-9) == L.A.at(
             {}
         ).astype(float)
+
+
+def test_numbers_with_which_the_point_is_no_equilibrium_are_refused():
+    """A mass on a spring that is as long as drawn for one mass only; a length with which a loop opens."""
+    m = fb.Mechanism("hang", planar=True, gravity=(0, "-g"), parameters={"g": 10.0, "m": 1.0, "k": 100.0, "L0": 0.4})
+    m.add(fb.Body("b", mass="m", inertia=1.0, position=(0, -0.5)))
+    m.add(fb.Prismatic("P", "ground", "b", at=(0, -0.5), axis=(0, 1)))
+    m.add(fb.SpringDamper("s", "ground", "b", at=((0, 0), (0, -0.5)), force="k*(length-L0) + 1e3*(length-0.5)**3"))
+    for at in (None, m.equilibrium()):
+        L = m.symbolic().linear(["b.y"], at=at)
+        shown = str(L)
+        assert "A =" in shown and "C =" in shown and "k/m" in shown
+        for ask in (L.A.at, lambda x, L=L: L.values(**x), lambda x, L=L: L.routh().holds(**x)):
+            ask({"m": 2.0, "L0": 0.3})
+            ask({"m": 2.0, "g": 5.0})
+            with pytest.raises(fb.ModelError, match="m = 2 'hang' is in no equilibrium"):
+                ask({"m": 2.0})
+    m = fb.load(Path(__file__).parents[2] / "examples" / "slider_crank.toml")
+    m.drivers.clear()
+    L = m.symbolic().linear(at=m.equilibrium())
+    with pytest.raises(fb.ModelError, match="rod = 1 the loops of 'slider crank' do not close"):
+        L.A.at({"rod": 1.0})

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from ..analysis.linear.inputs import with_inputs
 from ..analysis.motion.start import begin
 from ..analysis.untouched import refuse_contact
@@ -30,12 +32,15 @@ def symbolic(model: Model, o: SymbolicOptions) -> Equations:
         told |= {i.parameter: Symbol(i.name, "input", unit=i.unit) for i in inputs if i.parameter != i.name}
     plain = plain.snapshot()
     wish = "joint" if o.coordinates == "auto" else o.coordinates
+    why = "these make the fewest equations"
     try:
         start = begin(plain, 0.0, o.parameters, None, wish)
-    except AnalysisError:  # friction that follows loads which joint coordinates do not know
+    except AnalysisError as error:  # friction that follows loads which joint coordinates do not know
         if o.coordinates != "auto":
             raise
-        start = begin(plain, 0.0, o.parameters, None, "absolute")
+        start, why = begin(plain, 0.0, o.parameters, None, "absolute"), str(error).partition(": ")[2]
+    if o.coordinates == "auto":
+        start = replace(start, coordinates=start.coordinates.replace("as asked for", why))
     out = Equations(plain, start, o, told)
     out.described = model.snapshot()
     return out

@@ -72,16 +72,21 @@ def matrix(m: Matrix) -> str:
         return f'<div class="group">{"".join(formula(f) for f in entries(m))}</div>'
     head = "".join(f"<th>{math(c.latex)}</th>" for c in m.columns)
     rows = "".join(
-        f"<tr><th>{math(name.latex)}</th>"
+        f"<tr><th>{math(name.latex)}</th>{bracket('opens')}"
         + "".join("<td class='zero'>·</td>" if c == r"\cdot" else f"<td>{math(c)}</td>" for c in row)
-        + "</tr>"
+        + f"{bracket('closes')}</tr>"
         for name, row in zip(m.rows, made, strict=True)
     )
-    left = math(f"{m.left.latex} =")
+    left, gap = math(f"{m.left.latex} ="), '<th class="gap"> </th>'
     return (
         f'<div class="matrix"><div class="whose">{left}</div><div class="scroll"><table>'
-        f"<thead><tr><th> </th>{head}</tr></thead><tbody>{rows}</tbody></table></div></div>"
+        f"<thead><tr><th> </th>{gap}{head}{gap}</tr></thead><tbody>{rows}</tbody></table></div></div>"
     )
+
+
+def bracket(side: str) -> str:
+    """A part of the bracket on one side of a matrix: its row's."""
+    return f'<td class="bracket {side}"></td>'
 
 
 def listing(t: Listing) -> str:

@@ -2,6 +2,7 @@ r"""Expressions in LaTeX: ``m_{2} \left(l_{1}^{2} + 2 l_{1} l_{c2} \cos q_{2}\ri
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..node import Node
-from ..operations import ADD, NUMBER, SYMBOL
+from ..operations import ADD, NUMBER, POWER, SYMBOL
 from ..simplify.numbers import Known
 from .layout import Layout, Power, Term, number_text
 from .spelling import escaped, spelt
@@ -48,7 +49,11 @@ class LatexPrinter:
 
     def expression(self, x: Any, top: bool = False) -> str:
         """A sum, with marks where it may be broken; ``top``: written out though it has a name."""
-        return self.signed(self.layout.sum(x, top), top) if isinstance(x, Node) else number(float(x))
+        if not isinstance(x, Node):
+            return number(float(x))
+        if x.op == "choose" and (top or x.index not in self.layout.names):
+            return self.cases(x).replace(BREAK, "")
+        return self.signed(self.layout.sum(x, top), top)
 
     def products(self, products: Sequence[tuple[Any, Node]]) -> str:
         """A sum of expressions times symbols, in the order given."""
@@ -95,13 +100,15 @@ class LatexPrinter:
             return self.function(OPERATORS[x.op] + (f"^{{{n}}}" if n != 1 else ""), x)
         inner = self.factor(x)
         inner = inner if x.op == ADD else inner.replace(BREAK, "")
-        return inner if n == 1 else f"{inner}^{{{n}}}"
+        if n == 1:
+            return inner
+        return f"{self.parentheses(inner) if x.op == POWER else inner}^{{{n}}}"
 
     def function(self, operator: str, x: Node) -> str:
         """A function: of one symbol without parentheses."""
         if len(x.args) == 1 and (x.args[0].op == SYMBOL or x.args[0].index in self.layout.names):
             return f"{operator} {self.expression(x.args[0])}"
-        return f"{operator}{self.parentheses(', '.join(self.expression(a) for a in x.args))}".replace(BREAK, "")
+        return f"{operator}{self.parentheses(', '.join(map(self.apart, x.args)))}".replace(BREAK, "")
 
     def factor(self, x: Node) -> str:
         """Any other factor without its exponent."""
@@ -109,17 +116,28 @@ class LatexPrinter:
             return rf"\sqrt{{{self.expression(x.args[0])}}}"
         if x.op == "absolute":
             return rf"\left|{self.expression(x.args[0])}\right|"
-        if x.op == "power":
-            return f"{self.parentheses(self.expression(x.args[0]))}^{{{self.expression(x.args[1])}}}"
+        if x.op == POWER:
+            base, exponent = x.args
+            symbol = base.op == SYMBOL and base.index not in self.layout.names
+            inner = _closed(spelt(base.data)) if symbol else self.parentheses(self.expression(base))
+            return f"{inner}^{{{self.expression(exponent)}}}"
         if x.op == "choose":
-            c, a, b = (self.expression(y) for y in x.args)
-            return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
+            return self.parentheses(self.cases(x))
         if x.op == "call":
             primes = "'" * x.data.told.get("order", 0)
             return rf"\operatorname{{{escaped(x.data.name)}}}{primes}" + self.parentheses(
-                ", ".join(self.expression(a) for a in x.args)
+                ", ".join(map(self.apart, x.args))
             )
         return self.parentheses(self.expression(x))
+
+    def apart(self, x: Node) -> str:
+        """An expression beside which others stand that are no part of it."""
+        return self.power((x, 1)) if x.op == "choose" else self.expression(x)
+
+    def cases(self, x: Node) -> str:
+        """One of two, as a condition says: nothing closes it on its right."""
+        c, a, b = map(self.apart, x.args)
+        return rf"\begin{{cases}} {a} & {c} > 0 \\ {b} & \text{{otherwise}} \end{{cases}}"
 
     @staticmethod
     def parentheses(inner: str) -> str:
@@ -158,8 +176,11 @@ def _closed(latex: str) -> str:
 
 def number(x: float) -> str:
     """A decimal, with a power of ten where it has one."""
+    if not math.isfinite(x):
+        return r"\mathrm{NaN}" if x != x else r"-\infty" if x < 0.0 else r"\infty"
     mantissa, _, exponent = number_text(x).partition("e")
-    return rf"{mantissa} \cdot 10^{{{int(exponent)}}}" if exponent else mantissa
+    front = "" if mantissa == "1" else "-" if mantissa == "-1" else rf"{mantissa} \cdot "
+    return f"{front}10^{{{int(exponent)}}}" if exponent else mantissa
 
 
 def matrix(rows: np.ndarray | Sequence[Sequence[Any]], names: Mapping[int, str] | None = None) -> str:

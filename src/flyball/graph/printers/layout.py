@@ -13,6 +13,8 @@ from ..simplify.numbers import Known, known
 
 Power = tuple[Node, int]
 FUNCTION, SECOND, SUM, OTHER = 6, 5, 4, 3
+KNOWN = 10  # digits below which a decimal is taken for exact
+ROUNDED = 1e-14  # of a number: what rounding makes of it
 
 
 @dataclass(frozen=True)
@@ -128,5 +130,9 @@ def negated(x: Node) -> bool:
 
 
 def number_text(x: float) -> str:
-    """A decimal of up to twelve digits."""
-    return f"{x:.12g}"
+    """A decimal of up to twelve digits; of more where it would be taken for a shorter one that it is not."""
+    short = f"{x:.12g}"
+    digits = short.partition("e")[0].lstrip("-0.").replace(".", "")
+    if len(digits) < KNOWN and abs(float(short) - x) > ROUNDED * abs(x):
+        return f"{x:.15g}"
+    return short

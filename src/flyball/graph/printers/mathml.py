@@ -105,16 +105,15 @@ class Converter:
 
     def scripted(self, base: str) -> str:
         """An element with what is below and above it."""
-        below = above = ""
+        below, above, count = "", "", 0
         while (token := self.skipped()) in ("_", "^", "'"):
             self.at += 1
             if token == "_":
                 below = self.argument()
-            elif token == "'":
-                above += "<mo>′</mo>"
             else:
-                above += self.argument()
-        if above.count("<mo>′</mo>") > 1:
+                above += "<mo>′</mo>" if token == "'" else self.argument()
+                count += 1
+        if count > 1:
             above = f"<mrow>{above}</mrow>"
         if below and above:
             return f"<msubsup>{base}{below}{above}</msubsup>"

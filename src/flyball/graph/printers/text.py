@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..node import Node
-from ..operations import NUMBER, SYMBOL
+from ..operations import NUMBER, POWER, SYMBOL
 from ..simplify.numbers import Known
 from .layout import Layout, Power, Term, number_text
 from .wrapping import wrapped
@@ -79,7 +79,9 @@ class TextPrinter:
         """A factor."""
         x, n = power
         inner = self.factor(x, top)
-        return inner if n == 1 else f"{inner}^{n}"
+        if n == 1:
+            return inner
+        return f"({inner})^{n}" if x.op == POWER and x.index not in self.layout.names else f"{inner}^{n}"
 
     def factor(self, x: Node, top: bool = False) -> str:
         """A factor without its exponent, in parentheses if it is a sum."""
@@ -90,8 +92,9 @@ class TextPrinter:
             return str(x.data.name)
         if x.op == "add":
             return f"({self.expression(x)})"
-        if x.op == "power":
-            return f"({self.expression(x.args[0])})^({self.expression(x.args[1])})"
+        if x.op == POWER:
+            base, exponent = (self.expression(y) for y in x.args)
+            return f"{base if x.args[0].op == SYMBOL else f'({base})'}^({exponent})"
         if x.op == "choose":
             c, a, b = (self.expression(y) for y in x.args)
             return f"({a} if {c} > 0 else {b})"

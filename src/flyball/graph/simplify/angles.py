@@ -47,7 +47,7 @@ def phased(terms: Terms) -> Terms:
     out = dict(terms)
     for powers, waves in terms:
         sine = (powers, ((SIN, waves[0][1]),)) if waves and waves[0][0] == COS else None
-        if sine in terms and sine is not None:
+        if sine in terms and sine is not None and math.isfinite(terms[powers, waves] + terms[sine]):
             a, b = terms[powers, waves], terms[sine]
             whole = math.atan2(b, a)
             quarter = round(whole / (0.5 * math.pi))
@@ -110,7 +110,7 @@ def _size(waves: tuple[Wave, ...]) -> float:
 def _product(c: float, u: Wave | None, d: float, w: Wave | None) -> tuple[float, tuple[Wave, ...]] | None:
     """C u + d w as one product, where |c| = |d| and the halves of the angles are whole."""
     a, b = u or (COS, ()), w or (COS, ())
-    if a[0] != b[0]:
+    if a[0] != b[0] or abs(abs(c) - abs(d)) > ROUNDING * abs(c):
         return None
     half = _halved(combined(a[1], b[1], 1.0)), _halved(combined(a[1], b[1], -1.0))
     if half[0] is None or half[1] is None:

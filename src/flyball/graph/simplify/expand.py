@@ -26,6 +26,7 @@ from .terms import (
     times,
     wave,
 )
+from .units import reduced
 
 if TYPE_CHECKING:
     from .simplify import Simplifier
@@ -106,7 +107,8 @@ class Expander:
             a, b = sorted((a, b), key=len)
             b = self.factor(b)
             a = self.factor(a) if len(a) > self.most else a
-        return self.roots_squared(times(a, b))
+        found = self.roots_squared(times(a, b))
+        return reduced(found, self.parent.units) if self.parent.units else found
 
     def roots_squared(self, terms: Terms) -> Terms:
         """Squares of roots and of absolute values are what stands in them."""
@@ -166,7 +168,7 @@ class Expander:
                 continue
             single = len(powers) == 1 and powers[0][1] == 1 and not waves
             one = self.graph.nodes[powers[0][0]] if single else self.parent.short({(powers, waves): 1.0})
-            inner = self._wrapped(one) if c == round(c) else None
+            inner = self._wrapped(one) if c % 1.0 == 0.0 else None
             for k, d in inner or ((one.index, 1.0),):
                 found[k] = found.get(k, 0.0) + c * d
         return tuple(sorted((k, c) for k, c in found.items() if c))
@@ -185,7 +187,7 @@ class Expander:
 
     def _wave(self, x: Node) -> Terms:
         angle = self.angle(x.args[0])
-        if angle is None:
+        if angle is None or not all(math.isfinite(c) for _, c in angle):
             return self.atom(self.parent.inside(x))
         kind = COS if x.op == "cos" else SIN
         found = dict(angle)

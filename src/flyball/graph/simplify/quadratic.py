@@ -8,7 +8,8 @@ from __future__ import annotations
 import math
 
 Term = tuple[float, dict[int, int]]
-NEAR = 1e-12
+NEAR = 1e-12  # of the two numbers whose difference it is: what may be none, if the product proves it
+ROUNDED = 2e-15  # of the very same coefficient: what the product may differ by
 ONE = -1  # an atom for what is no power of any
 
 
@@ -31,6 +32,8 @@ def as_product(terms: list[Term]) -> tuple[list[Term], list[Term]] | None:
         return None
     found = next((f for k in reversed(atoms) if (f := _by(form, atoms, k)) is not None), None)
     if found is None:
+        return None
+    if not _proved(form, *found):
         return None
     first, second = ([(c, {k: 1} if k != ONE else {}) for k, c in s.items() if c != 0.0] for s in found)
     return (first, second) if len(first) > 1 or len(second) > 1 else None
@@ -56,12 +59,38 @@ def _by(form: dict[tuple[int, int], float], atoms: list[int], k: int) -> tuple[L
     root = _root(square, rest)
     if root is None:
         return None
-    first = {k: a, **{i: 0.5 * (b[i] + root[i]) for i in rest}}
-    second = {k: 1.0, **{i: 0.5 * (b[i] - root[i]) / a for i in rest}}
-    size = max(map(abs, first.values()))
-    first = {i: c if abs(c) > NEAR * size else 0.0 for i, c in first.items()}
-    size = max(map(abs, second.values()))
-    return _whole(first, {i: c if abs(c) > NEAR * size else 0.0 for i, c in second.items()})
+    first, second = {k: a}, {k: 1.0}
+    for i in rest:
+        first[i], second[i] = _roots(a, b[i], root[i], form.get((i, i), 0.0))
+    return _whole(first, second)
+
+
+def _roots(a: float, b: float, root: float, c: float) -> tuple[float, float]:
+    """The coefficients of an atom in both sums, whose product is c: the smaller by the larger one."""
+    size = abs(b) + abs(root)
+    if abs(b + root) >= abs(b - root):
+        first = 0.5 * (b + root)
+        return first, 0.5 * (b - root) / a if c == 0.0 and abs(b - root) > NEAR * size else c / first if first else 0.0
+    second = 0.5 * (b - root) / a
+    return 0.5 * (b + root) if c == 0.0 and abs(b + root) > NEAR * size else c / second, second
+
+
+def _proved(form: dict[tuple[int, int], float], first: Line, second: Line) -> bool:
+    """Whether the product of two sums is the form, each coefficient but for its own rounding.
+
+    Coefficients of different atoms are not compared: they have different units.
+    """
+    atoms = sorted(first.keys() | second.keys())
+    for n, i in enumerate(atoms):
+        for j in atoms[n:]:
+            parts = [first.get(i, 0.0) * second.get(j, 0.0)] + (
+                [first.get(j, 0.0) * second.get(i, 0.0)] if i != j else []
+            )
+            wanted = form.get((i, j), 0.0)
+            size = abs(wanted) if wanted else sum(map(abs, parts))
+            if not abs(sum(parts) - wanted) <= ROUNDED * size:
+                return False
+    return True
 
 
 def _root(square: dict[tuple[int, int], float], atoms: list[int]) -> Line | None:

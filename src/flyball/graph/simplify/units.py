@@ -10,6 +10,26 @@ from .terms import Key, Powers, Terms, plus, powers_product, put
 SQUARE = 2
 
 
+def reduced(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
+    """Terms in which the first of every unit has no square: equal ones are then seen to be equal.
+
+    Without this a product of rotations that is the identity stays a polynomial of the eighth degree.
+    """
+    for first, *others in units:
+        high = [key for key in terms if any(k == first and n >= SQUARE for k, n in key[0])]
+        while high:
+            terms = dict(terms)
+            for key in high:
+                powers, waves = key
+                c = terms.pop(key)
+                lower = powers_product(powers, ((first, -SQUARE),))
+                put(terms, (lower, waves), c)
+                for k in others:
+                    put(terms, (powers_product(lower, ((k, SQUARE),)), waves), -c)
+            high = [key for key in terms if any(k == first and n >= SQUARE for k, n in key[0])]
+    return terms
+
+
 def shortened(terms: Terms, units: Sequence[tuple[int, ...]]) -> Terms:
     """Terms with multiples of x^2 + y^2 + ... - 1 added where fewer are left; ``units`` are indices of x, y, ..."""
     for unit in units:

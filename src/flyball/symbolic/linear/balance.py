@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -60,8 +61,13 @@ def conditions(m: Mechanics, point: Point, lam: np.ndarray, f: Free) -> list[Nod
     r = zeros(len(m.r), 1)
     r[:, 0] = replaced(list(m.r), [*point.replacing(m), *zip(m.multipliers, lam, strict=True)])
     found = replaced(list(product(f.Zv.T, r)[:, 0]), [(s, 0.0) for s in m.added])
-    told = [m.graph.node(x) for x, none in zip(found, vanishing(found), strict=True) if not none]
-    return [x for x in told if not x.known]  # what is a number is rounding, or refused
+    return varying(found)
+
+
+def varying(nodes: Sequence[Any]) -> list[Node]:
+    """Those that do not vanish for all parameters; what is a number is rounding, or refused."""
+    told = [x for x, none in zip(nodes, vanishing(nodes), strict=True) if isinstance(x, Node) and not none]
+    return [x for x in told if not x.known]
 
 
 def refuse_unbalanced(m: Mechanics, f: Free, stiffness: np.ndarray, at: dict[str, float]) -> None:
@@ -131,7 +137,10 @@ def balanced(m: Mechanics, at: Sequence[Node], names: Sequence[str]) -> list[tup
     """
     for name in names:
         if name not in m.given:
-            raise ModelError(f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by")
+            raise ModelError(
+                f"{m.model.name!r} has no parameter {name!r} with a value of its own to balance by; where an input is "
+                f"to balance, give the force or torque beside it a parameter: torque='tau'"
+            )
     if len(at) != len(names):
         raise ModelError(
             f"{len(at)} conditions of equilibrium tell {len(at)} parameters, not {len(names)} ({', '.join(names)})"

@@ -23,6 +23,7 @@ from .quotient import cancelled, coefficients, scaled
 from .routh import StabilityConditions, stability
 from .traced import Mechanics
 from .transfer import TransferFunction, checked
+from .validity import Validity
 
 FACTORED = 300  # operations
 
@@ -43,7 +44,7 @@ class LinearEquations(Home):
         What the properties tell, as arrays of nodes.
     conditions : list of Node
         What has to vanish for the point to be an equilibrium, where it does not by itself: the equations hold for
-        parameters with which it does.
+        parameters with which it does, and numbers with which it does not are refused.
     balanced_by : dict
         Parameter -> the expression of the others that it stands for, since equilibrium asks for it.
     found : tuple of str
@@ -59,6 +60,7 @@ class LinearEquations(Home):
     at: Perturbed = field(repr=False)
     free: Free = field(repr=False)
     mechanics: Mechanics = field(repr=False)
+    validity: Validity = field(default=Validity(), repr=False)
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -148,7 +150,7 @@ class LinearEquations(Home):
         Raises
         ------
         ModelError
-            If there is no such parameter, or equilibrium says what it is.
+            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
         """
         return {k: getattr(self, k).at(parameters).astype(float) for k in "ABCD"}
 
@@ -191,6 +193,7 @@ class LinearEquations(Home):
         return TransferFunction(
             name=self.name, **names, s=ring.s, num=tuple(both[0]), den=tuple(both[1]), cancelled=common,
             parameters=self.parameters, balanced_by=self.balanced_by, nodes=nodes,
+            validity=self.validity,
         )  # fmt: skip
 
     def routh(self, positive: Sequence[str] | None = None) -> StabilityConditions:
@@ -209,7 +212,9 @@ class LinearEquations(Home):
             If the package ``sympy`` is not installed.
         """
         P = self.pencil
-        return stability(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
+        out = stability(P.ring, P.characteristic(), self.name, (self.parameters, self.balanced_by), positive)
+        out.validity = self.validity
+        return out
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people: names, and what equilibrium asks of the parameters."""
@@ -231,6 +236,13 @@ class LinearEquations(Home):
 
     def __repr__(self) -> str:
         return "\n".join(f"{a}: {b}" for a, b in self.lines())
+
+    def __str__(self) -> str:
+        """The names, and the matrices."""
+        shown = "A" if self.matrices.improper else "ABCD"
+        told = [(k, getattr(self, k)) for k in shown]
+        out = [repr(self), *(f"{k} =\n{X}" for k, X in told if X.nodes.size)]
+        return "\n".join(out + ([self.matrices.improper] if self.matrices.improper else []))
 
     def latex(self) -> str:
         """x' = A x + B u, y = C x + D u as LaTeX; x' = A x alone without inputs and outputs."""

@@ -15,7 +15,7 @@ from ...model.model import Model
 from ...results.equilibrium import Equilibrium
 from ...results.result import Result
 from ...tables.spanning import spanning
-from .balance import balanced, conditions, multipliers, refuse_unbalanced
+from .balance import balanced, conditions, multipliers, refuse_unbalanced, varying
 from .derivatives import Derivatives
 from .equations import LinearEquations
 from .free import free
@@ -25,6 +25,7 @@ from .reduced import reduced
 from .solve import number
 from .steady import refuse_singular, refuse_unsteady
 from .traced import Mechanics, mechanics, refuse_unknown
+from .validity import Validity
 
 STILL = 1e-12  # [1/s]: slower is rounding
 
@@ -125,6 +126,7 @@ def about(model: Model, o: Asked) -> LinearEquations:
         free=f,
         mechanics=m,
         matrices=out,
+        validity=Validity([] if pairs else at_rest, varying(replaced(list(m.g), where))),
     )
 
 

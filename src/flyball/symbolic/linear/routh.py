@@ -21,6 +21,7 @@ from .quotient import coefficients
 from .ring import Ring
 from .signs import Signs, sides
 from .transfer import checked
+from .validity import Validity
 
 
 @dataclass
@@ -54,6 +55,7 @@ class StabilityConditions:
     balanced_by: dict[str, Node] = field(default_factory=dict)
     nodes: list[list[Node]] = field(default_factory=list, repr=False)  # of the factors
     told: list[Node] = field(default_factory=list, repr=False)  # left sides of the conditions
+    validity: Validity = field(default=Validity(), repr=False)
 
     def holds(self, **parameters: float) -> bool:
         """Whether it is stable with the parameters' own values, or others; eigenvalues that are always zero aside.
@@ -61,7 +63,7 @@ class StabilityConditions:
         Raises
         ------
         ModelError
-            If there is no such parameter, or equilibrium says what it is.
+            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
         """
         values = checked(self, parameters)
         return all(hurwitz(np.array(evaluate(a, values), float)) for a in self.nodes)

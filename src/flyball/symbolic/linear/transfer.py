@@ -14,6 +14,7 @@ from ...errors import ModelError
 from ...graph.node import Node
 from ...graph.values import evaluate
 from ...model.words import listing, suggest
+from .validity import Validity
 
 
 @dataclass
@@ -50,6 +51,7 @@ class TransferFunction:
     parameters: dict[str, float]
     balanced_by: dict[str, Node] = field(default_factory=dict)
     nodes: tuple[list[Any], list[Any]] = field(default=([], []), repr=False)  # of num and den
+    validity: Validity = field(default=Validity(), repr=False)
 
     @property
     def expression(self) -> Any:
@@ -66,7 +68,7 @@ class TransferFunction:
         Raises
         ------
         ModelError
-            If there is no such parameter, or equilibrium says what it is.
+            If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
         """
         told = checked(self, parameters)
         num, den = (np.array(evaluate(x, told), float) for x in self.nodes)
@@ -212,14 +214,16 @@ class TransferFunction:
 
 
 def checked(f: Any, parameters: Mapping[str, float]) -> dict[str, float]:
-    """Values by name; refuses parameters that there are not, and those that equilibrium tells."""
+    """Values by name; refuses parameters that there are not, those that equilibrium tells, and another point."""
     for name in parameters:
         if name in f.balanced_by:
             raise ModelError(f"{name!r} has the value with which the mechanism is in equilibrium")
         if name not in f.parameters:
             known = list(f.parameters)
             raise ModelError(f"{f.name!r} has no parameter {name!r}{suggest(name, known)}; {listing(known)}")
-    return {k: float(x) for k, x in parameters.items()}
+    values = {k: float(x) for k, x in parameters.items()}
+    f.validity.refuse(f.name, values)
+    return values
 
 
 def written(terms: Sequence[tuple[str, str]]) -> str:
