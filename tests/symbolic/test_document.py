@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.graph.node import Node
 from flyball.graph.values import evaluate, symbols
 from flyball.symbolic.document.parts import Formulas, Matrix
-from tests.mechanisms import example, four_bar
+from tests.mechanisms import example
 
 
 def arm(n=2):
@@ -238,7 +238,7 @@ def test_a_body_on_a_ball_joint_has_a_constant_mass_matrix():
 
 
 def test_matrices_stand_in_brackets_and_have_a_head():
-    made = four_bar().symbolic().html()
+    made = example("slider_crank.toml").symbolic(coordinates="absolute").html()
     body = made[made.index('id="mass"') :]
     body = body[: body.index("</section>")]
     assert body.count('class="bracket opens"') == body.count('class="bracket closes"') == body.count("<tr>") - 1 > 0
