@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...analysis.linear.free import compared, gaps
 from ...errors import ModelError
 from ...graph.derivative import tangents
 from ...graph.node import Node, Symbol
@@ -19,6 +20,7 @@ from ...tracing.trace import Traced
 from ..expressions import Expressions
 from ..state import places_at
 from .reduced import More, Reduced, reduced
+from .told import told
 
 if TYPE_CHECKING:
     from ..equations import Equations
@@ -145,12 +147,13 @@ class ExplicitEquations:
         place = s.place
         if not s.undetermined:
             return
-        y = parts(place.G * place.scale).dependencies
+        y = parts(compared(place.G, place.scale)).dependencies
         values = place.values | {a.data.name: 0.0 for a in self.equations.formulated.vdot}
         lam = s.traced.lam
         slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
+        slope = gaps(slope.T, place.G[: len(lam)], place.scale).T  # by multipliers of rows of unit size
         among = np.abs(y[: len(lam)].T @ slope)
-        if (among > FELT * max(1.0, float(np.abs(slope).max(initial=0.0)))).any():
+        if (among > FELT * np.abs(slope).max(initial=0.0)).any():
             raise ModelError(
                 f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
                 "for other quantities, or take the redundancy out: m.mobility() names it"
@@ -166,14 +169,7 @@ class ExplicitEquations:
         )
 
     def __str__(self) -> str:
-        lines = [
-            f"explicit equations of {self.equations.model.name!r}: M a = f",
-            f"independent: {', '.join(self.independent) or 'none, drivers leave no freedom'}",
-            *(f"{name}: {how}" for name, how in self.branches.items()),
-            *self.notes,
-        ]
-        size = {k: getattr(self, k).operations for k in ("M", "f")}
-        return "\n".join([*lines, f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}"])
+        return told(self)
 
 
 def explicit(equations: Equations, independent: Sequence[str] = (), closed: bool = False) -> ExplicitEquations:
