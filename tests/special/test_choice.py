@@ -166,12 +166,9 @@ def test_functions_that_may_remember_are_not_begun_anew(maker):
     assert r.health.engine.startswith("table-driven: a law is a Python function")
 
 
-def test_cams_are_left_to_the_loops(maker):
-    """Splines written out in straight lines are slower; the choice is the user's."""
+def test_cams_are_taken_as_others_are(maker):
     maker.where = "memory"
-    m = example("cam.py")
-    assert m.simulate(0.1).health.engine == "table-driven: what follows a curve takes longer by made code"
-    assert m.simulate(0.1, specialize=True).health.engine.startswith("made")
+    assert example("cam.py").simulate(30.0, outputs=2).health.engine.startswith("made")
 
 
 def test_an_interrupt_while_code_is_made_keeps_what_was_computed(maker, monkeypatch):

@@ -12,6 +12,7 @@ from ..graph.node import Node
 from ..graph.operations import MULTIPLY, NUMBER, SYMBOL
 from ..graph.printers.llvm import Place, Procedure
 from ..graph.printers.llvm_order import operations
+from ..graph.printers.llvm_spline import Head, asked, head
 from ..tables.system import ARTICULATED, FLAT, SOLVER
 from .recorder import FIRST_FREE
 from .stages import Stages
@@ -48,6 +49,7 @@ class Linked:
         self.scratch = FIRST_FREE
         self.hoisted: list[Node] = []
         self.reckoned: dict[str, set[int]] = {}
+        self.searched: dict[str, set[tuple[Head, int] | None]] = {}
         made = stages.procedures
         before = dict(BEFORE)
         if stages.S.kinds[SOLVER] == ARTICULATED:
@@ -81,7 +83,9 @@ class Linked:
                 raise KeyError(f"{p.name} needs {x!r}, and nobody has left it")
             to_see.extend(x.args)
         p.reads = reads
-        self.reckoned[p.name] = {x.index for x in operations(p.results, reads)}
+        made = operations(p.results, reads)
+        self.reckoned[p.name] = {x.index for x in made}
+        self.searched[p.name] = {_search(x) for x in made if x.index not in reads} - {None}
         for place, x in p.stores:
             if place[0] in LEFT and isinstance(x, Node) and x.moving:
                 self.slots.setdefault(x.index, place)
@@ -94,14 +98,22 @@ class Linked:
 
     def _left(self, x: Node, before: list[Procedure]) -> Place | None:
         for p in before:
-            if x.index in self.reckoned[p.name] or (x.op == SYMBOL and x.index in p.reads):
+            here = x.index in self.reckoned[p.name] or (x.op == SYMBOL and x.index in p.reads)
+            if here or _search(x) in self.searched[p.name]:  # where the piece is known, another order costs nothing
                 if x.index not in self.slots:
                     self.slots[x.index] = ("W_flat", self.scratch)
                     self.scratch += 1
                     p.stores.append((self.slots[x.index], x))
+                    self.reckoned[p.name].add(x.index)
                 return self.slots[x.index]
         return None
 
 
 def _is_multiple(x: Node) -> bool:
     return x.op == MULTIPLY and x.args[0].op == NUMBER
+
+
+def _search(x: Node) -> tuple[Head, int] | None:
+    """Which piece of a spline an operation needs: breaks, and the number of the argument."""
+    spline = asked(x.data)
+    return None if spline is None or not isinstance(x.args[0], Node) else (head(spline[0]), x.args[0].index)

@@ -72,7 +72,7 @@ def _target() -> Any:
     return target.create_target_machine(
         cpu=llvm.get_host_cpu_name(),
         features=features,
-        opt=int(__import__("os").environ.get("CL", "2")),
+        opt=2,
         jit=True,
         codemodel="jitdefault",
     )
@@ -99,7 +99,7 @@ def assembled(text: str) -> bytes:
         module = llvm.parse_assembly(text)
         module.triple = llvm.get_default_triple()
         module.data_layout = str(target.target_data)
-        options = llvm.create_pipeline_tuning_options(speed_level=int(__import__("os").environ.get("OL", "2")))
+        options = llvm.create_pipeline_tuning_options(speed_level=2)
         options.slp_vectorization = False  # measured: slower, and longer in the making
         builder = llvm.create_pass_builder(target, options)
         passes = builder.getModulePassManager()

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 
 from ... import special
-from ...constraints.registry import KINDS
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
@@ -37,8 +36,6 @@ TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
 CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
 
-CURVES = "what follows a curve takes longer by made code"
-
 
 def check_specialize(value: Any) -> None:
     """Refuse what is not a choice of the engine.
@@ -52,11 +49,9 @@ def check_specialize(value: Any) -> None:
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
 
 
-def _slower(c: Compiled) -> str:
-    """Why a motion is better off without made code, or cannot begin anew."""
-    if c.structure.functions:
-        return CALLS
-    return CURVES if any(KINDS[term.formula.kind].place for term in c.structure.terms) else ""
+def _bound(c: Compiled) -> str:
+    """Why a motion cannot begin anew."""
+    return CALLS if c.structure.functions else ""
 
 
 class Engine:
@@ -92,7 +87,7 @@ class Engine:
             return
         if wish is True:
             self._wanted(without)
-        elif why := without or _slower(c):
+        elif why := without or _bound(c):
             self.told = f"{TABLES}: {why}"
         else:
             self.told, self.due = SHORT, FIRST

@@ -16,7 +16,7 @@ import numpy as np
 from ..node import Node
 from ..operations import ADD, DIVIDE, MULTIPLY, NUMBER, POWER
 from .llvm_order import chains, depth_first, operations
-from .llvm_spline import SPLINE
+from .llvm_spline import PIECE, Pieces, asked
 
 Place = tuple[str, int]
 """A base and the number of the double there."""
@@ -95,15 +95,13 @@ class Module:
         self.arguments, self.based = arguments, based
         self.texts: list[str] = []
         self.bases: list[str] = []
-        self.tables: list[tuple[float, ...]] = []
+        self.tables: dict[bytes, Sequence[float]] = {}
 
     def table(self, numbers: Sequence[float]) -> str:
         """The name of a table's numbers."""
-        key = tuple(numbers)
-        if not any(np.array_equal(key, other, equal_nan=True) for other in self.tables):
-            self.tables.append(key)
-        k = next(k for k, other in enumerate(self.tables) if np.array_equal(key, other, equal_nan=True))
-        return f"@table{k}"
+        key = np.array(numbers, float).tobytes()
+        self.tables.setdefault(key, numbers)
+        return f"@table{list(self.tables).index(key)}"
 
     def scope(self, base: str) -> str:
         """What tells LLVM that places of other bases are others."""
@@ -146,10 +144,10 @@ class Module:
             told += [f"!{3 * k + 1} = distinct !{{!{3 * k + 1}, !0}}", f"!{3 * k + 2} = !{{!{3 * k + 1}}}"]
             told += [f"!{3 * k + 3} = !{{{others}}}"]
         data = []
-        for k, numbers in enumerate(self.tables):
+        for k, numbers in enumerate(self.tables.values()):
             listed = ", ".join(f"double {constant(x)}" for x in numbers)
             data.append(f"@table{k} = internal constant [{len(numbers)} x double] [{listed}]")
-        spline = [SPLINE] if self.tables else []
+        spline = [PIECE] if self.tables else []
         return "\n\n".join([DECLARED, *data, *spline, *self.texts, "\n".join(told)]) + "\n"
 
 
@@ -162,6 +160,7 @@ class _Lines:
         self.names: dict[int, str] = {}
         self.used: set[str] = set()
         self.chains: Mapping[int, tuple[Node | None, Sequence[Node]]] = {}
+        self.pieces = Pieces(self.new)
 
     def new(self, text: str) -> str:
         name = f"%x{len(self.lines)}"
@@ -205,10 +204,10 @@ class _Lines:
             return self.new(f"call double @{TWO[x.op]}(double {a[0]}, double {a[1]})")
         if x.op in DECIDING:
             return DECIDING[x.op](self, *a)
+        if (spline := asked(x.data)) is not None:
+            numbers, order = spline
+            return self.pieces.value((self.module.table(numbers), numbers), order, a[0])
         told = getattr(x.data, "told", {})
-        if "table" in told and not told["moved"]:
-            table = self.module.table(told["table"])
-            return self.new(f"call double @spline(ptr {table}, double {a[0]}, i64 {told['order']})")
         if "constant" in told:
             return constant(told["constant"])
         raise Unprintable(getattr(x.data, "name", x.op))
