@@ -13,7 +13,7 @@ import flyball as fb
 from flyball.graph.node import Node
 from flyball.graph.values import evaluate, symbols
 from flyball.symbolic.document.parts import Formulas, Matrix
-from tests.mechanisms import example, four_bar
+from tests.mechanisms import example
 
 
 def arm(n=2):
