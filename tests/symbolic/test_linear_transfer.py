@@ -7,7 +7,9 @@ import pytest
 import sympy
 
 import flyball as fb
+from flyball.graph.node import Graph
 from flyball.symbolic.linear.linear import linear_equations
+from flyball.symbolic.linear.ring import Ring
 from tests.analyses.made import chain
 from tests.symbolic.small import ball_on_beam, cart, quarter_car, two_masses, watt
 
@@ -146,3 +148,34 @@ def test_what_is_refused(monkeypatch):
     monkeypatch.setattr("flyball.symbolic.linear.minors.TERMS", 2)
     with pytest.raises(fb.ModelError, match=r"minors of \d+ terms, .* up to 2: give numbers"):
         linear_equations(cart()).routh()
+
+
+def test_what_a_parameter_that_is_zero_now_multiplies_stays():
+    """A damping that is zero as told, with a long number before it: no rounding."""
+    g = Graph()
+    k, d = g.symbol("k", 100.0), g.symbol("d", 0.0)
+    ring = Ring([np.array([[0.5 * k + 0.0123456789123 * d]], object)], "it", [])
+    x = ring.matrices[0][0, 0]
+    (told,) = ring.by_powers(x.numer.mul_ground(1 / x.denom.LC))
+    assert len(told) == 2
+
+
+def test_what_does_not_answer_is_said_so():
+    """A weight that hangs straight down is not lifted, to first order, by a torque."""
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, "-g"), parameters={"g": 9.81, "l": 1.0, "u": 0.0})
+    m.add(fb.Body("rod", mass=1.0, inertia=0.1, position=(0, "-l")))
+    m.add(fb.Revolute("hinge", "ground", "rod", at=(0, 0)), fb.PointTorque("motor", "rod", torque="u"))
+    L = m.symbolic(inputs=["motor"]).linear(["rod.y", "rod.x"])
+    assert "0: to first order the output does not answer" in str(L.transfer_function("motor", "rod.y"))
+    assert "denominator" in str(L.transfer_function("motor", "rod.x"))
+    with pytest.raises(fb.ModelError, match="must be a mapping of coordinates"):
+        m.symbolic().linear(at="drawn")
+
+
+def test_a_mechanism_without_parameters_is_stable_or_not():
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("rod", mass=1.0, inertia=0.1, position=(0, -1)), fb.Revolute("hinge", "ground", "rod", at=(0, 0)))
+    m.add(fb.CoordinateSpring("friction", "hinge.angle", stiffness=0.0, damping=0.3))
+    found = m.symbolic().linear().routh()
+    assert found.holds()
+    assert str(found) == "stable: always"

@@ -152,7 +152,7 @@ class LinearEquations(Home):
         ModelError
             If there is no such parameter, equilibrium says what it is, or the point is no equilibrium with it.
         """
-        return {k: getattr(self, k).at(parameters).astype(float) for k in "ABCD"}
+        return {k: getattr(self, k).at(parameters).astype(float) + 0.0 for k in "ABCD"}
 
     def eigenvalues(self, **parameters: float) -> np.ndarray:
         """Of A in numbers, (n,) complex [1/s]."""

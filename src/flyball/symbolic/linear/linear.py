@@ -167,4 +167,6 @@ def _pointed(model: Model, o: Asked) -> tuple[Mechanics, Point]:
 
 def drawn_or_given(m: Mechanics, at: Mapping[str, Any] | None) -> Point:
     """As drawn where loops close there, else moved."""
+    if not (at is None or isinstance(at, Mapping)):
+        raise ModelError(f"at={at!r}: must be a mapping of coordinates, an equilibrium, a result, or None for as drawn")
     return given(m, at or {}) if at or len(m.g) else drawn(m)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import ModelError
-from ...graph.node import Node
+from ...graph.node import Graph, Node
 from ...graph.printers.sympy import SHORT, SympyPrinter, fraction
 from ...graph.values import reached
 from .solve import number
@@ -47,6 +47,7 @@ class Ring:
                 f"the linear equations of {what} have {count} operations in their coefficients, and transfer functions "
                 f"with symbols are found up to {MOST}: ask for numbers (linearize), or give numbers for parameters"
             )
+        self.graph = next((x.graph for x in flat if isinstance(x, Node)), None) or Graph()  # where expressions live
         self.printer = SympyPrinter(positive=positive)
         self.sympy = sp = self.printer.sympy
         self.s = sp.Symbol("s")
@@ -197,11 +198,6 @@ class Ring:
         (node,) = self.printer.back([p.as_expr()], self.graph)
         return number(node)
 
-    @property
-    def graph(self) -> Any:
-        """Where the expressions live."""
-        return next(x.graph for x in self.printer.symbols.values() if isinstance(x, Node))
-
     def by_powers(self, p: Any) -> list[Any]:
         """Coefficients of s, the highest power first; each without its rounding."""
         degree = max((m[0] for m in p.itermonoms()), default=0)
@@ -211,12 +207,20 @@ class Ring:
         return [self._sound(x) for x in parts]
 
     def _sound(self, p: Any) -> Any:
-        """Without terms that rounding left: with long numbers, and nothing beside the largest."""
+        """Without terms that rounding left: with long numbers that are nothing beside the others.
+
+        Nothing with the parameters' own values (one, where that is zero) either: a coefficient of other parameters has
+        another unit.
+        """
         long = [c for c in p.itercoeffs() if c.denominator > SHORT**2]
         if not long:
             return p
-        values = [1.0 if self.ring.gens.index(g) == 0 else self.value(g.as_expr()) for g in self.ring.gens]
+        values = [1.0 if self.ring.gens.index(g) == 0 else self.value(g.as_expr()) or 1.0 for g in self.ring.gens]
         size = {m: abs(float(c) * float(np.prod(np.power(values, m)))) for m, c in p.iterterms()}
-        largest = max(size.values())
-        kept = {m: c for m, c in p.iterterms() if size[m] > JUNK * largest or c.denominator <= SHORT**2}
+        largest, most = max(size.values()), max(abs(float(c)) for c in p.itercoeffs())
+        kept = {
+            m: c
+            for m, c in p.iterterms()
+            if c.denominator <= SHORT**2 or size[m] > JUNK * largest or abs(float(c)) > JUNK * most
+        }
         return self.ring.from_dict(kept)

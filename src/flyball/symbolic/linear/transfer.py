@@ -165,12 +165,10 @@ class TransferFunction:
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
-        out = [
-            ("from", f"{self.input} [{self.input_unit}]"),
-            ("to", f"{self.output} [{self.output_unit}]"),
-            ("numerator", written(self._terms(self.num))),
-            ("denominator", written(self._terms(self.den))),
-        ]
+        out = [("from", f"{self.input} [{self.input_unit}]"), ("to", f"{self.output} [{self.output_unit}]")]
+        if all(c == 0 for c in self.num):
+            return [*out, ("transfer function", "0: to first order the output does not answer to this input")]
+        out += [("numerator", written(self._terms(self.num))), ("denominator", written(self._terms(self.den)))]
         if self.cancelled != 1:
             out.append(("cancelled", f"{self.cancelled}: eigenvalues that are not between this input and this output"))
         out += [("equilibrium", f"{k} is the value that balances") for k in self.balanced_by]
