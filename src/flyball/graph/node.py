@@ -215,6 +215,9 @@ class Graph:
     def __iter__(self) -> Iterator[Node]:
         return iter(self.nodes)
 
+    def __repr__(self) -> str:
+        return f"<graph of {len(self.nodes)} expressions>"
+
     def __reduce__(self) -> Any:
         raise TypeError("a graph of expressions is not stored; store what is made of it")
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -14,14 +15,16 @@ from ..graph.function import Opaque
 from ..graph.node import Node
 from ..graph.operations import SYMBOL
 from ..graph.printers import latex, text
+from ..graph.simplify.arctangents import Algebra, signed
+from ..graph.simplify.cost import length
 from ..graph.simplify.simplify import simplified
 from ..graph.values import evaluate, evaluated, reached
+from .listed import LINE, MOST, TOO_LONG, count, listed
 
 if TYPE_CHECKING:
     from .home import Home
 
 READ = 400  # operations up to which expressions are simplified to be shown
-MOST = 4000  # and up to which they are shown at all
 WIDE = 160  # letters of a line up to which a matrix is printed as such
 
 
@@ -71,7 +74,7 @@ class Expressions:
     @property
     def operations(self) -> int:
         """Operations that evaluate it, each counted once."""
-        return sum(bool(x.args) for x in reached(self.list()))
+        return count(self.list())
 
     def list(self) -> list[Any]:
         """All entries, row by row."""
@@ -129,8 +132,25 @@ class Expressions:
 
     @cached_property
     def _read(self) -> Expressions:
-        """What is shown: simplified if it is short enough to be read."""
-        return self.simplified() if self.operations <= READ else self
+        """What is shown: simplified if it is short enough to be read, sines of arctangents as algebra."""
+        if self.operations > MOST or not self.nodes.size:
+            return self
+        plain = self.simplified() if self.operations <= READ else self
+        flat = self.list()
+        if not any(x.op == "atan2" for x in reached(flat)):
+            return plain
+        made = Algebra()(flat)
+        if count(made) > READ:
+            return plain
+        out = np.empty(self.shape, object)
+        out.ravel()[:] = signed(simplified(made, units=self.home.units))
+        way = Expressions(self.home, out, self.rows, self.columns, self.unit)
+        return min(way, plain, key=lambda x: length(x.list()))
+
+    @property
+    def readable(self) -> Sequence[Any]:
+        """Entries as they are shown."""
+        return self._read.list()
 
     def texts(self) -> Any:
         """As text, simplified if it is short enough to be read: lists of lists as deep as it has dimensions."""
@@ -150,22 +170,35 @@ class Expressions:
 
     def __str__(self) -> str:
         if self.operations > MOST:
-            return f"{self!r}: too long to be read; .sympy(), .at(values) and entries such as [0] are there"
-        made = self.texts()
-        if not self.shape:
-            return str(made)
-        names = self.rows or tuple(map(str, range(self.shape[0])))
-        if len(self.shape) == 1:
-            wide = max(map(len, names), default=0)
-            return "\n".join(f"{name:{wide}}  {x}" for name, x in zip(names, made, strict=True)) or "none"
+            return self._refused
         if not self.nodes.size:
-            return f"no entries: {self.shape[0]} x {self.shape[1]}"
-        told = text.matrix(self._read.nodes)
-        if max(map(len, told.split("\n"))) <= WIDE:
-            return told
-        columns = self.columns or tuple(map(str, range(self.shape[1])))
-        entries = [(a, b, x) for a, row in zip(names, made, strict=True) for b, x in zip(columns, row, strict=True)]
-        return "\n".join(f"{a}, {b}: {x}" for a, b, x in entries if x != "0")
+            return "none" if len(self.shape) == 1 else f"no entries: {self.shape[0]} x {self.shape[1]}"
+        shown = self._read
+        if length(shown.list()) > LINE:
+            return self._parted
+        if len(self.shape) < 2:
+            names = (self.rows or tuple(map(str, range(self.shape[0])))) if self.shape else ("",)
+            wide = max(map(len, names)) + 2 if self.shape else 0
+            made = "\n".join(f"{n:{wide}}{text.text(x)}" for n, x in zip(names, shown.list(), strict=True))
+        else:
+            made = text.matrix(shown.nodes)
+        return made if max(map(len, made.split("\n"))) <= WIDE else self._parted
+
+    @property
+    def _refused(self) -> str:
+        return f"{self!r}: {TOO_LONG.format(self.operations)}"
+
+    @property
+    def _parted(self) -> str:
+        """Entry by entry, what recurs by a name."""
+        labels = [", ".join(x) for x in itertools.product(*self._names())]
+        rows = [(a, x) for a, x in zip(labels, self.readable, strict=True) if x != 0.0]
+        return "\n".join(listed(rows, self.home.units)) or self._refused
+
+    def _names(self) -> Sequence[tuple[str, ...]]:
+        """Names of rows and columns, or numbers."""
+        found = (self.rows, self.columns)
+        return [(found[k] if k < 2 else ()) or tuple(map(str, range(n))) for k, n in enumerate(self.shape)]
 
     def __repr__(self) -> str:
         what = " x ".join(map(str, self.shape)) if self.shape else "one expression"

@@ -116,12 +116,22 @@ class Expander:
         for (powers, waves), c in terms.items():
             rest: Terms = {(powers, waves): c}
             for k, n in powers:
-                if n > 1 and (root := self.graph.nodes[k]).op in ("sqrt", "absolute") and k not in self.parent.barriers:
+                if (
+                    abs(n) > 1
+                    and (root := self.graph.nodes[k]).op in ("sqrt", "absolute")
+                    and k not in self.parent.barriers
+                ):
                     inner = self(root.args[0])
-                    inner = inner if len(inner) <= 8 else self.factor(inner)
-                    gone: Terms = {(((k, -n + n % 2),), ()): 1.0}
+                    inner = inner if len(inner) <= 8 and n > 0 else self.factor(inner)
+                    even = n - n % 2 if n > 0 else n + n % 2
+                    gone: Terms = {(((k, -even),), ()): 1.0}
+                    if n < 0:
+                        if len(inner) != 1 or next(iter(inner))[1]:
+                            continue
+                        ((p, _), d) = next(iter(inner.items()))
+                        inner = {(inverse(p), ()): 1.0 / d}
                     rest = times(rest, gone)
-                    for _ in range(n // 2 if root.op == "sqrt" else n - n % 2):
+                    for _ in range(abs(even) // 2 if root.op == "sqrt" else abs(even)):
                         rest = times(rest, inner)
             out = plus(out, rest)
         return out
@@ -132,7 +142,7 @@ class Expander:
             return self.atom(self.parent.inside(x))
         same = divided(a, b)
         if same is not None:
-            return {(same[0], ()): same[1]}
+            return self.roots_squared({(same[0], ()): same[1]})
         if len(b) > 1:
             b = self.factor(b)
         ((powers, waves), c) = next(iter(b.items()))
@@ -144,7 +154,7 @@ class Expander:
             else:
                 more = tuple((opened(self.graph, u).index, -1) for u in waves)
                 out = plus(out, {(powers_product(powers_product(p, under), tuple(sorted(more))), w): d / c})
-        return out
+        return self.roots_squared(out)
 
     def angle(self, x: Node) -> Angle | None:
         """An expression as a sum of atoms with factors; None if it has too many."""

@@ -26,12 +26,15 @@ class Definition:
         What vanishes; as many as symbols.
     how : str
         How the formula was found, and which branch of it is taken.
+    radius : Node or number, optional
+        sqrt(x^2 + y^2) of a formula atan2(y, x), where that is known.
     """
 
     symbols: tuple[Node, ...]
     values: tuple[Any, ...] = ()
     residuals: tuple[Any, ...] = ()
     how: str = ""
+    radius: Any = None
 
     @property
     def closed(self) -> bool:

@@ -19,6 +19,7 @@ from ...tracing.trace import Traced
 from ..expressions import Expressions
 from ..state import places_at
 from .reduced import More, Reduced, reduced
+from .told import told
 
 if TYPE_CHECKING:
     from ..equations import Equations
@@ -166,14 +167,7 @@ class ExplicitEquations:
         )
 
     def __str__(self) -> str:
-        lines = [
-            f"explicit equations of {self.equations.model.name!r}: M a = f",
-            f"independent: {', '.join(self.independent) or 'none, drivers leave no freedom'}",
-            *(f"{name}: {how}" for name, how in self.branches.items()),
-            *self.notes,
-        ]
-        size = {k: getattr(self, k).operations for k in ("M", "f")}
-        return "\n".join([*lines, f"operations: {', '.join(f'{k} {n}' for k, n in size.items())}"])
+        return told(self)
 
 
 def explicit(equations: Equations, independent: Sequence[str] = (), closed: bool = False) -> ExplicitEquations:

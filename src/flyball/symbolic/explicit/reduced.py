@@ -51,7 +51,7 @@ class More:
 NOTHING = More()
 
 
-@dataclass
+@dataclass(repr=False)
 class Reduced:
     """Equations of motion in independent coordinates; see `reduced`.
 
@@ -98,6 +98,9 @@ class Reduced:
     def formulas(self) -> Formulas:
         """Puts in all formulas."""
         return Formulas(self.definitions)
+
+    def __repr__(self) -> str:
+        return f"<equations solved for the accelerations of {', '.join(self.independent) or 'nothing free'}>"
 
     def inlined(self, nodes: Sequence[Any]) -> list[Any]:
         """Expressions of q, v, lam in terms of the independent coordinates, their rates, and what has no formula."""

@@ -13,6 +13,7 @@ from ...graph.function import Opaque
 from ...graph.node import Node
 from ...graph.values import evaluate, symbols
 from ..expressions import Expressions
+from ..listed import TOO_LONG, listed
 from .definition import rates
 from .explicit import ExplicitEquations
 from .newton import Implicit
@@ -165,6 +166,18 @@ class StateEquations:
     def __repr__(self) -> str:
         size = f"{len(self.states)} states, {len(self.inputs)} inputs, {len(self.outputs)} outputs"
         return f"<state space of {self.equations.model.name!r}: {size}>"
+
+    def __str__(self) -> str:
+        lines = [f"state space of {self.equations.model.name!r}: x' = f(x, u, t), y = h(x, u, t)"]
+        for what, names in (("states", self.states), ("inputs", self.inputs), ("outputs", self.outputs)):
+            lines.append(f"{what}: {', '.join(names) or 'none'}")
+        lines += [f"implicit: {', '.join(self.implicit)}"] if self.implicit else []
+        for letter, made in (("f", self.f), ("h", self.h)):
+            if made.rows:
+                rows = [(f"{letter}[{n}]", x) for n, x in zip(made.rows, made.readable, strict=True)]
+                too_long = [f"{letter}: {TOO_LONG.format(made.operations)}"]
+                lines += ["", *(listed(rows, self.equations.units) or too_long)]
+        return "\n".join(lines)
 
 
 def _vector(nodes: Sequence[Any]) -> np.ndarray:

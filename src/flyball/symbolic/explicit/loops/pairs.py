@@ -63,7 +63,9 @@ def dyad(x: Pair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
     c, s = cos(w[0]), sin(w[0])
     r = [p[n] + P[n, 0] * c + P[n, 1] * s for n in range(2)]
     e = [-1.0 * (N[0, n] * r[0] + N[1, n] * r[1]) for n in range(2)]
-    return [first, Solution(atan2(e[1], e[0]), "direction of the other link")]
+    second = Solution(atan2(e[1], e[0]), "direction of the other link")
+    second.radius = square  # |e| = |N| |r|, and |r| = |N|
+    return [first, second]
 
 
 def sliding(x: Pair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
@@ -92,7 +94,9 @@ def sliding(x: Pair, w: tuple[Node, Node], probe: Probe) -> list[Solution]:
     first.how = f"slide on a turning link: {first.how}"
     T = s * N + L
     e = [-1.0 * (T[0, n] * k[0] + T[1, n] * k[1]) for n in range(2)]
-    return [first, Solution(atan2(e[1], e[0]), "direction of the slide")]
+    second = Solution(atan2(e[1], e[0]), "direction of the slide")
+    second.radius = reach  # |e| = |T| |k|, and |T| = |k|
+    return [first, second]
 
 
 def _turning(N: Matrix, probe: Probe) -> Any:

@@ -200,7 +200,7 @@ class Pool:
 
     def _solved(self, equations: Sequence[Node], unknowns: Sequence[Node], solutions: Sequence[Solution]) -> None:
         for w, solution in zip(unknowns, solutions, strict=True):
-            self.found.append(Definition((w,), (solution.value,), (), solution.how))
+            self.found.append(Definition((w,), (solution.value,), (), solution.how, solution.radius))
             self.never += [(w.data.name, y) for y in solution.never]
         self.equations = [x for x in self.equations if not any(x is y for y in equations)]
         self.unknowns = [w for w in self.unknowns if not any(w is y for y in unknowns)]

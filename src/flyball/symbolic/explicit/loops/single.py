@@ -24,7 +24,11 @@ class Solution:
         Form of the equation and branch.
     never : list of Node
         What must not vanish or become negative.
+    radius : Node or number, optional
+        sqrt(x^2 + y^2) of atan2(y, x), where that is known.
     """
+
+    radius: Any = None
 
     def __init__(self, value: Any, how: str, never: list[Any] | None = None) -> None:
         self.value, self.how, self.never = value, how, never or []
