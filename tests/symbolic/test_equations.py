@@ -204,6 +204,20 @@ def test_without_sympy(monkeypatch):
         eq.M.sympy()
 
 
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+def test_angles_that_are_measured_against_their_coordinate(coordinates):
+    """Springs about both axes of a universal joint, the second of which is measured the other way round."""
+    m = fb.Mechanism("cross", gravity=(0, 0, -9.81))
+    m.add(fb.Body("b", mass=1.0, inertia=(0.2, 0.3, 0.4), position=(0.3, 0.2, -0.5)))
+    m.add(fb.Universal("U", "ground", "b", at=(0, 0, 0), axes=((1, 0, 0), (0, 1, 0))))
+    m.add(fb.CoordinateSpring("first", "U.angle_1", stiffness=5.0))
+    m.add(fb.CoordinateSpring("second", "U.angle_2", stiffness=7.0))
+    p, eq = m.prepare(coordinates=coordinates), m.symbolic(coordinates=coordinates)
+    r = p.simulate(0.5, outputs=4)
+    for t, q, v in zip(r.t[1:], r.q[1:], r.v[1:], strict=True):
+        np.testing.assert_allclose(eq.f.at(eq.state(float(t), q, v)), p.forces(float(t), q, v), rtol=0, atol=1e-12)
+
+
 def test_why_these_coordinates_is_told():
     m = mechanisms.four_bar()
     assert m.symbolic().coordinates.startswith("joint: these make the fewest equations")

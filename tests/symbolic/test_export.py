@@ -243,3 +243,18 @@ def test_what_is_too_large_is_refused_before_it_is_made():
     ):
         m.export(coordinates="joint", functions=["right_hand_side"])
     assert m.export(coordinates="absolute", functions=["right_hand_side"]).operations["right_hand_side"] < 50_000
+
+
+def test_places_on_curves_move_as_the_follower_does():
+    """The rate that is exported is how fast the foot of the follower goes along the profile."""
+    m = example("cam.py")
+    p = m.prepare(coordinates="joint")
+    eq = m.symbolic(coordinates="joint")
+    code = eq.export(language="python", functions=["right_hand_side"])
+    (name,) = eq.places
+    r, h = p.simulate(0.02, outputs=3), 1e-4
+    t, q, v = float(r.t[1]), r.q[1], r.v[1]
+    found = call(code, "right_hand_side", given_at(eq, code, (t, q, v)))
+    names = list(next(x for x in code.routines if x.name == "right_hand_side").results)
+    a, b = (eq.checked(eq.state(t, p.step(q, s * v), v), {name: eq.places[name].symbol})[name] for s in (-h, h))
+    assert float(np.ravel(found[names.index("placesdot")])[0]) == pytest.approx((b - a) / (2 * h), rel=1e-6)

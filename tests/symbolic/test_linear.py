@@ -201,6 +201,22 @@ def test_rounding_is_no_force():
         ).astype(float)
 
 
+def test_a_body_that_spins_about_a_principal_axis():
+    """Euler's equations about it, and small turns in axes that turn with the body: x' = w_x + W y."""
+    m = fb.Mechanism("top", parameters={"A": 0.2, "B": 0.3, "C": 0.4, "W": 5.0})
+    m.add(fb.Body("b", mass=1.0, inertia=("A", "B", "C"), angular_velocity=(0, 0, "W")))
+    L = linear_equations(m)
+    for told in ({}, {"A": 0.5, "W": -2.0}):
+        p = {**L.parameters, **told}
+        found = L.A.at(told)
+        x, y = (L.states.index(f"b.turn {k}") for k in "xy")
+        wx, wy = (L.states.index(f"b.turn {k} rate") for k in "xy")
+        assert found[x, y] == pytest.approx(p["W"], rel=1e-14)
+        assert found[y, x] == pytest.approx(-p["W"], rel=1e-14)
+        assert found[wx, wy] == pytest.approx((p["B"] - p["C"]) / p["A"] * p["W"], rel=1e-12)
+        assert found[wy, wx] == pytest.approx((p["C"] - p["A"]) / p["B"] * p["W"], rel=1e-12)
+
+
 def test_numbers_with_which_the_point_is_no_equilibrium_are_refused():
     """A mass on a spring that is as long as drawn for one mass only; a length with which a loop opens."""
     m = fb.Mechanism("hang", planar=True, gravity=(0, "-g"), parameters={"g": 10.0, "m": 1.0, "k": 100.0, "L0": 0.4})

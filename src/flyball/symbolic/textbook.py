@@ -17,7 +17,7 @@ import numpy as np
 from ..constraints.registry import KINDS
 from ..errors import ModelError
 from ..graph.node import Graph, Node, Symbol
-from ..math.scalar import cos, sin
+from ..math.turns import axes_in_base, turn
 from ..math.vec import mm, neg, quaternion_matrix
 from ..model.joint import Joint
 from .angles import Cleaned
@@ -161,16 +161,13 @@ class Textbook(Home):
             R: tuple = quaternion_matrix(*(self._symbol(f"{f}.e{k}", "coordinate") for k in range(4)))
         else:
             b1, b2, b3 = (self._symbol(f"{f}.b{k}", "coordinate") for k in (1, 2, 3))
-            R = mm(mm(about(0, b1), about(1, b2)), about(2, b3))
+            R = mm(mm(turn(0, b1), turn(1, b2)), turn(2, b3))
         return p, R, w, v, alpha, a
 
     def _relation(self, f: str) -> Expressions:
         if self.orientation != "bryant":
             raise ModelError("H relates Bryant angles to angular velocities: ask with orientation='bryant'")
-        b1, b2 = self._symbols[f"{f}.b1"], self._symbols[f"{f}.b2"]
-        first = about(0, b1)
-        both = mm(first, about(1, b2))
-        H = np.array([[1.0, first[1], both[2]], [0.0, first[4], both[5]], [0.0, first[7], both[8]]], object)
+        H = np.array(axes_in_base(0, 1, 2, self._symbols[f"{f}.b1"], self._symbols[f"{f}.b2"]), object).T
         return Expressions(self, H, [f"{f}.w{a}" for a in AXES], [f"{f}.b{k}'" for k in (1, 2, 3)])
 
     def _sum(self, terms: Sequence[Term], data: Any) -> tuple:
@@ -199,17 +196,6 @@ class Textbook(Home):
 
     def _vector(self, nodes: Any) -> Expressions:
         return Expressions(self, nodes if isinstance(nodes, np.ndarray) else objects(nodes), self.labels)
-
-
-def about(axis: int, angle: Any) -> tuple:
-    """Rotation about one of the axes."""
-    c, s = cos(angle), sin(angle)
-    i, j = (axis + 1) % 3, (axis + 2) % 3
-    R: list[Any] = [0.0] * 9
-    R[4 * axis] = 1.0
-    R[4 * i] = R[4 * j] = c
-    R[3 * i + j], R[3 * j + i] = -s, s
-    return tuple(R)
 
 
 def textbook(x: Any, name: str, orientation: str) -> Textbook:

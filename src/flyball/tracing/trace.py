@@ -35,7 +35,9 @@ from ..tables.system import (
     MASS,
     NU,
     NV,
+    PLANAR,
     RETURNED,
+    TREE,
     V0,
     VALUE,
     System,
@@ -199,6 +201,6 @@ def mass_matrix(S: System, W: Work, nv: int) -> np.ndarray:
             M[v0 + k, v0 + k] = S.body_x[b, MASS]
         if n == 6:
             M[v0 + 3 : v0 + 6, v0 + 3 : v0 + 6] = S.body_x[b, INERTIA : INERTIA + 9].reshape(3, 3)
-        elif S.body_i[b, 1] == 1:
+        elif S.body_i[b, TREE] == PLANAR:
             M[v0 + 2, v0 + 2] = S.body_x[b, INERTIA + 8]
     return M

@@ -38,12 +38,6 @@ def page(document: Document) -> str:
     return filled(static("equations.html"), parts)
 
 
-def fragment(document: Document, *names: str) -> str:
-    """Some sections, for a notebook."""
-    parts = [b for s in document.sections if s.name in names for b in s.blocks]
-    return f'<div class="equations">{"".join(map(written, parts))}</div>'
-
-
 def written(block: Block) -> str:
     """A block."""
     if isinstance(block, Prose):

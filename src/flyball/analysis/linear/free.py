@@ -131,17 +131,23 @@ def _null(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Orthonormal basis of the scaled motions that rows allow."""
     import scipy.sparse as sp
 
-    A = _compared(G, scale)
+    A = compared(G, scale)
     if DENSE < len(A) < len(scale) and surely_independent(own := sp.csr_matrix(A)):
         return null_basis(own)
     return null_space(A)
 
 
-def _compared(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def compared(G: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Rows of unit size, turns counted in lengths."""
     A = G * scale
     size = np.sqrt((A * A).sum(axis=1))
     return A / np.where(size > 0.0, size, 1.0)[:, None]
+
+
+def gaps(g: np.ndarray, G: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """Values of rows as lengths, whatever they are in: what is left of each, by the size of its row."""
+    size = np.linalg.norm(G * scale, axis=1)
+    return np.asarray(g / np.where(size > 0.0, size, 1.0))
 
 
 def _basis(G: np.ndarray, scale: np.ndarray, chosen: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
@@ -224,7 +230,7 @@ def _nearby(c: Compiled, t: float, q: np.ndarray, step: np.ndarray, scale: np.nd
 
 def _lost(f: Free, G: np.ndarray, c: Compiled) -> tuple[str, ...]:
     """Elements whose rows take part in dependencies that are not there nearby."""
-    here, there = parts(_compared(f.holonomic, f.scale)).dependencies, parts(_compared(G, f.scale)).span
+    here, there = parts(compared(f.holonomic, f.scale)).dependencies, parts(compared(G, f.scale)).span
     part = np.abs(here @ (here.T @ there)).max(axis=1)
     of = [r.element.name for r in c.structure.rows if r.holonomic] + list(c.structure.prescribed)
     return tuple(dict.fromkeys(n for n, p in zip(of, part, strict=True) if p > 1e-3))

@@ -50,10 +50,6 @@ class Layout:
         self.names = dict(names or {})
         self.costs: dict[int, float] = dict.fromkeys(self.names, 1.0)
 
-    def leaf(self, x: Node) -> bool:
-        """Whether it is written as it stands."""
-        return x.index in self.names or x.op in (NUMBER, SYMBOL)
-
     def sum(self, x: Node, top: bool = False) -> list[Term]:
         """Terms of an expression, in the order of reading; ``top``: though it may have a name."""
         out: list[tuple[Node, bool]] = []

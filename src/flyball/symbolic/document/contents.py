@@ -91,7 +91,7 @@ def made_of(e: Any) -> str:
     return ", ".join(found)
 
 
-def symbols(eq: Equations, used: list[Node]) -> Section:
+def symbols(used: list[Node]) -> Section:
     """The symbols that occur, with meaning, unit and the parameters' values."""
     rows: dict[bool, list[tuple[Cell, ...]]] = {False: [], True: []}
     for x in used:

@@ -67,7 +67,7 @@ def document(eq: Equations) -> Document:
     at = next(k for k, s in enumerate(sections) if s.name == "coordinates") + 1
     sections[at:at] = later
     used = [x for x in reached([*made.expressions(), *added(sections)]) if x.op == SYMBOL]
-    sections.insert(1, contents.symbols(eq, used))
+    sections.insert(1, contents.symbols(used))
     return made
 
 

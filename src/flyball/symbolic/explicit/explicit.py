@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...analysis.linear.free import compared, gaps
 from ...errors import ModelError
 from ...graph.derivative import tangents
 from ...graph.node import Node, Symbol
@@ -146,12 +147,13 @@ class ExplicitEquations:
         place = s.place
         if not s.undetermined:
             return
-        y = parts(place.G * place.scale).dependencies
+        y = parts(compared(place.G, place.scale)).dependencies
         values = place.values | {a.data.name: 0.0 for a in self.equations.formulated.vdot}
         lam = s.traced.lam
         slope = np.array([self._slope(x.list(), symbol, values) for symbol in lam])
+        slope = gaps(slope.T, place.G[: len(lam)], place.scale).T  # by multipliers of rows of unit size
         among = np.abs(y[: len(lam)].T @ slope)
-        if (among > FELT * max(1.0, float(np.abs(slope).max(initial=0.0)))).any():
+        if (among > FELT * np.abs(slope).max(initial=0.0)).any():
             raise ModelError(
                 f"{name!r} is not determined: redundant constraints ({', '.join(s.undetermined)}) leave it open; ask "
                 "for other quantities, or take the redundancy out: m.mobility() names it"

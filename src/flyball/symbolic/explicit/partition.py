@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...analysis.linear.free import compared
 from ...errors import ModelError, SingularityError
 from ...model.model import listing, suggest
 from ...numerics.rank import null_space
@@ -63,9 +64,7 @@ def free(G: np.ndarray, scale: np.ndarray, wanted: Sequence[int] = (), only: boo
     """
     from scipy.linalg import qr
 
-    A = G * scale
-    size = np.sqrt((A * A).sum(axis=1))
-    A = A / np.where(size > 0.0, size, 1.0)[:, None]
+    A = compared(G, scale)
     N = null_space(A) if len(A) else np.eye(len(scale))
     f = N.shape[1]
     chosen: list[int] = []

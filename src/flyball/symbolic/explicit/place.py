@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from ...analysis.linear.free import compared, gaps
 from ...graph.values import evaluate, evaluated
 from ...numerics.rank import TOLERANCE, null_space, parts, rank
 from ...tables.names import velocity_names
@@ -60,26 +61,26 @@ class Place:
         which = np.flatnonzero(self.c.holonomic)
         if not f.chosen or not len(which):
             return
-        here = rank(self.G[which] * self.scale)
+        here = rank(compared(self.G[which], self.scale))
         rng = np.random.default_rng(0)
         for _ in range(2):
-            G = self._nearby(f, rng, which)
-            if G is not None and rank(G * self.scale) > here:
+            G = self._nearby(rng, which)
+            if G is not None and rank(compared(G, self.scale)) > here:
                 raise singular(self._lost(self.G[which], G, which), self.values[self.x.t.data.name])
 
-    def _nearby(self, f: Free, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
+    def _nearby(self, rng: np.random.Generator, which: np.ndarray) -> np.ndarray | None:
         """Constraints on positions at the closed position near a random step away; None if none is found."""
-        null = null_space(self.G[which] * self.scale)
+        null = null_space(compared(self.G[which], self.scale))
         a = null @ rng.standard_normal(null.shape[1])
         step = STEP * self.scale * self.length * a / np.abs(a).max()
         values = dict(self.values)
         for _ in range(PASSES):
             self._moved(values, step)
             G = self.jacobian(values)[which]
-            g = np.array(evaluate(list(self.c.g[which]), values), float)
+            g = gaps(np.array(evaluate(list(self.c.g[which]), values), float), G, self.scale)
             if np.abs(g).max(initial=0.0) < CLOSED * self.length:
                 return G
-            step = -self.scale * np.linalg.lstsq(G * self.scale, g, rcond=TOLERANCE)[0]
+            step = -self.scale * np.linalg.lstsq(compared(G, self.scale), g, rcond=TOLERANCE)[0]
         return None
 
     def _moved(self, values: dict[str, float], step: np.ndarray) -> None:
@@ -95,7 +96,7 @@ class Place:
 
     def _lost(self, here: np.ndarray, there: np.ndarray, which: np.ndarray) -> list[str]:
         """Elements whose rows take part in dependencies that are not there nearby."""
-        y, span = parts(here * self.scale).dependencies, parts(there * self.scale).span
+        y, span = parts(compared(here, self.scale)).dependencies, parts(compared(there, self.scale)).span
         part = np.abs(y @ (y.T @ span)).max(axis=1)
         found = [self.c.elements[k] for k, p in zip(which, part, strict=True) if p > 1e-3]
         return list(dict.fromkeys(found))

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.linear.free import compared
 from ...errors import ModelError
 from ...graph.node import Node
 from ...model.model import listing
@@ -230,7 +231,7 @@ class _Reduction:
         definitions += self._each(self.more.vdot, vdot, "accelerations") if self.more.vdot else []
         return Reduced(
             x, self.place, self.place.values, self.names, known, chosen, dependent, solved.definitions, definitions, M,
-            f, Z, vdot, self._all(rows, lam), self.singular, self._undetermined(rows), solved.notes,
+            f, Z, vdot, self._all(rows, lam), self.singular, self._undetermined(), solved.notes,
         )  # fmt: skip
 
     def _each(self, symbols: Sequence[Node], values: Any, how: str) -> list[Definition]:
@@ -254,10 +255,9 @@ class _Reduction:
         out[rows] = lam
         return out
 
-    def _undetermined(self, rows: list[int]) -> tuple[str, ...]:
+    def _undetermined(self) -> tuple[str, ...]:
         """Elements whose reactions redundancy leaves open."""
-        G = self.place.G * self.place.scale
-        y = parts(G).dependencies
+        y = parts(compared(self.place.G, self.place.scale)).dependencies
         open_ = np.abs(y).max(axis=1, initial=0.0) > 1e-8
         return tuple(dict.fromkeys(e for e, yes in zip(self.place.c.elements, open_, strict=True) if yes))
 

@@ -178,7 +178,7 @@ def closed(m: Mechanics, point: Point, fixed: Sequence[int], at: Mapping[str, An
     numbers = point.numbers(m)
     gaps = lambda: np.array(evaluate(list(m.g[which]), numbers), float)  # noqa: E731
     if not len(which) or np.abs(gaps()).max() <= CLOSED * length:
-        return _with_rates(m, point, at)
+        return _with_rates(m, point)
     G, T = _functions(m, which)
     for _ in range(PASSES):
         g = gaps()
@@ -199,7 +199,7 @@ def closed(m: Mechanics, point: Point, fixed: Sequence[int], at: Mapping[str, An
              if abs(numbers[s.data.name] - number(x)) > NEW * length]  # fmt: skip
     q = [numbers[m.x.q[k].data.name] if k in moved else x for k, x in enumerate(point.q)]
     names = tuple(k for k, p in coordinates(m).items() if not p.rate and p.k in moved)
-    return _with_rates(m, Point(q, point.v, point.z, point.t, names), at)
+    return _with_rates(m, Point(q, point.v, point.z, point.t, names))
 
 
 def _functions(m: Mechanics, which: np.ndarray) -> tuple[list[Any], list[Any]]:
@@ -211,7 +211,7 @@ def _moves(m: Mechanics, d: int, fixed: Sequence[int]) -> bool:
     return any(m.x.T[k, d] != 0.0 for k in fixed)
 
 
-def _with_rates(m: Mechanics, point: Point, at: Mapping[str, Any]) -> Point:
+def _with_rates(m: Mechanics, point: Point) -> Point:
     """With rates that the constraints ask for.
 
     Raises

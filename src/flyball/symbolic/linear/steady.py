@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...analysis.linear.free import gaps
 from ...errors import AnalysisError, ModelError
 from ...graph.node import Node
 from ...graph.values import evaluate
-from ...numerics.rank import null_space, parts, rank
+from ...numerics.rank import TOLERANCE, null_space, parts, rank
 from .balance import unsteady
 from .derivatives import Derivatives
 from .free import Free, based, compared
@@ -19,8 +20,9 @@ from .traced import Mechanics
 SWING = 0.1  # angle [rad], or part of the mechanism's length, that it moves by between the instants compared
 STEPS = 8
 SAME = 1e-7  # relative difference of equations that are the same
-STEP = 1e-2  # part of a radian that the mechanism is moved by to see whether its rank is the usual one
+STEP = 1e-2  # part of a radian, or of the mechanism's length, that it is moved by to see whether its rank is the usual
 PASSES = 20
+CLOSED = 1e-10  # of the mechanism's length
 
 
 def refuse_unsteady(m: Mechanics, d: Derivatives, f: Free, point: Point, known: dict[str, float]) -> None:
@@ -93,7 +95,7 @@ def refuse_singular(m: Mechanics, G: list[Node], point: Point) -> None:
     rng = np.random.default_rng(0)
     for _ in range(2 if N.shape[1] else 0):
         step = m.scale * (N @ rng.standard_normal(N.shape[1]))
-        step *= STEP / np.abs(step / m.scale).max()
+        step *= STEP * m.values.length / np.abs(step / m.scale).max()
         there = _nearby(m, G, dict(here), step, which)
         if there is not None and rank(there) > rank(now):
             raise ModelError(
@@ -116,11 +118,11 @@ def _nearby(
         T = np.array(evaluate(list(m.x.T.ravel()), at), float).reshape(len(names), -1)
         for k, dq in zip(names, T @ step, strict=True):
             at[k] += float(dq)
-        g = np.array(evaluate(list(m.g[which]), at), float)
-        if np.abs(g).max() < 1e-10 * m.values.length:
+        A = np.array(evaluate(G, at), float).reshape(len(m.n), -1)[which]
+        g = gaps(np.array(evaluate(list(m.g[which]), at), float), A, m.scale)
+        if np.abs(g).max() < CLOSED * m.values.length:
             return _rows(m, G, at)[which]
-        A = np.array(evaluate(G, at), float).reshape(len(m.n), -1)[which] * m.scale
-        step = m.scale * np.linalg.lstsq(A, -g, rcond=1e-8)[0]
+        step = m.scale * np.linalg.lstsq(compared(A, m.scale), -g, rcond=TOLERANCE)[0]
     return None
 
 

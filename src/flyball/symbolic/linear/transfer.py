@@ -133,11 +133,13 @@ class TransferFunction:
 
     def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
         """Zeros, poles [1/s] and gain: G(s) = gain prod(s - zeros) / prod(s - poles)."""
+        self.input_index(input), self.output_index(output)
         num, den = self.at()
         return np.roots(num), np.roots(den), float(num[0])
 
     def response(self, omega: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
         """As `response_at`, with the parameters' own values."""
+        self.input_index(input), self.output_index(output)
         return self.response_at(omega)
 
     def bode(self, omega: Sequence[float] | None = None, path: str | os.PathLike | None = None) -> Any:
@@ -180,10 +182,8 @@ class TransferFunction:
 
     def latex(self) -> str:
         """G(s) as LaTeX."""
-        from sympy import latex
-
         above, below = (self._latex(x) for x in (self.num, self.den))
-        return rf"G(s) = \frac{{{above}}}{{{below}}}" if latex else ""
+        return rf"G(s) = \frac{{{above}}}{{{below}}}"
 
     def _latex(self, coefficients: Sequence[Any]) -> str:
         from sympy import Add, latex
