@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.errors import ModelError
 from flyball.graph.node import Node
 from flyball.graph.values import evaluate, symbols
 from flyball.symbolic.document.parts import Formulas, Matrix
@@ -243,3 +244,19 @@ def test_matrices_stand_in_brackets_and_have_a_head():
     body = body[: body.index("</section>")]
     assert body.count('class="bracket opens"') == body.count('class="bracket closes"') == body.count("<tr>") - 1 > 0
     assert "<th></th>" not in body  # tables with empty heads have none
+
+
+def chain(links):
+    m = fb.Mechanism("chain", planar=True, gravity=(0, -9.81))
+    for k in range(links):
+        m.add(fb.Body(f"b{k}", mass=1, inertia=0.1, position=(0, -k - 0.5)))
+        m.add(fb.Revolute(f"j{k}", f"b{k - 1}" if k else "ground", f"b{k}", at=(0, -k)))
+    return m.symbolic(coordinates="joint")
+
+
+def test_what_is_too_large_to_be_read_says_so(tmp_path):
+    assert "Equations of motion" in str(chain(3)) or "equations of motion" in str(chain(3)).lower()
+    told = str(chain(12))
+    assert len(told) < 5000 and "too large for the screen" in told and "eq.export" in told
+    with pytest.raises(ModelError, match="'chain' are too large for a page"):
+        chain(40).to_html(tmp_path / "chain.html")

@@ -27,6 +27,15 @@ def symbols(nodes: Iterable[Node]) -> list[Node]:
     return [x for x in reached(nodes) if x.op == SYMBOL]
 
 
+def written_out(nodes: Iterable[Any]) -> int:
+    """How many symbols expressions have if nothing that recurs has a name."""
+    nodes = [x for x in nodes if isinstance(x, Node)]
+    size: dict[int, int] = {}
+    for x in reached(nodes):
+        size[x.index] = 1 + sum(size[a.index] for a in x.args)
+    return sum(size[x.index] for x in nodes)
+
+
 def evaluate(nodes: Sequence[Any], values: Mapping[str, Any]) -> list[Any]:
     """Values of expressions.
 

@@ -6,6 +6,8 @@ import os
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, cast
 
+from ..errors import ModelError
+from ..graph.values import written_out
 from .document.document import document
 from .document.parts import Document
 from .document.plain import plain
@@ -15,13 +17,37 @@ if TYPE_CHECKING:
     from .equations import Equations
 
 
+READABLE, WRITABLE = 1e7, 1e13  # symbols, written out: those of chains of 8 and of 22 links in joint coordinates
+
+
 class Shown:
     """What every set of equations of motion does to be read."""
 
     @cached_property
     def document(self) -> Document:
-        """Everything about the equations, short and in order: see `text`, `to_html` and `to_latex`."""
+        """Everything about the equations, short and in order: see `text`, `to_html` and `to_latex`.
+
+        Raises
+        ------
+        ModelError
+            If they are too large to be written for readers.
+        """
+        if self._written_out > WRITABLE:
+            raise ModelError(f"the {self._too_large('a page')}")
         return document(cast("Equations", self))
+
+    @cached_property
+    def _written_out(self) -> int:
+        """Symbols of the equations if nothing that recurs had a name."""
+        eq = cast("Equations", self)
+        return written_out(x for k in ("M", "f", "g", "G", "gamma") for x in getattr(eq, k).nodes.ravel())
+
+    def _too_large(self, what: str) -> str:
+        eq = cast("Equations", self)
+        return (
+            f"equations of {eq.model.name!r} are too large for {what}: {self._written_out:.2g} symbols if written out; "
+            "print single ones (eq.M[0, 0], eq['energy.kinetic']), or take them as code: eq.export(folder)"
+        )
 
     def text(self) -> str:
         """All of it as plain text: symbols, constraints, mass matrix, forces, equations of motion, energies."""
@@ -87,6 +113,9 @@ class Shown:
         return told | names | {"parameters": eq.parameters} | texts
 
     def __str__(self) -> str:
+        if self._written_out > READABLE:
+            told = "\n".join(f"{label:<12} {text}" for label, text in self.lines())
+            return f"{told}\nThe {self._too_large('the screen')}"
         return self.text()
 
     def _repr_html_(self) -> str:
