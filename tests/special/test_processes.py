@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 
-import flyball as fb
 from flyball.analysis.motion.engines import Engine
 from flyball.analysis.motion.start import begin
 from tests.mechanisms import four_bar
