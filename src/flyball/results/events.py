@@ -151,6 +151,7 @@ class Events(Sequence):
     def _table(self) -> tuple[list[tuple[str, ...]], str]:
         """Rows of the printed table, and what is left out of it."""
         shown = self._all if len(self._all) <= SHOWN else (*self._all[: SHOWN - 1], self._all[-1])
+        rows: list[tuple[str, ...]]
         rows = [(f"{h.t:.6g}", h.name, h.kind, "; ".join(h.done), f"{h.lost:.4g}" if h.lost else "") for h in shown]
         left = len(self._all) - len(shown)
         return rows, f"{left} more before the last one" if left else ""
