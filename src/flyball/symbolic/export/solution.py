@@ -18,13 +18,13 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.solve import ROUNDING, inverse_mass, natural_size, turn_rows
+from ...equations.solve import factor_schur, inverse_mass
 from ...errors import ModelError
 from ...graph.derivative import jacobian, replaced
 from ...graph.printers.routine import refuse_long
 from ...graph.values import symbols
-from ...numerics.ldl import Pattern, analyse, ldl_solve
-from ...tables.system import DIAGONAL, LENGTH, REGULARISE, SEMIDEFINITE, V0
+from ...numerics.ldl import Pattern, analyse, ldl_factor, ldl_solve
+from ...tables.system import LENGTH, REGULARISE, SEMIDEFINITE, V0
 from ...tracing.trace import Traced
 
 REFINEMENTS = 2  # what the regularisation leaves of a well determined solution goes below rounding with the first
@@ -84,16 +84,12 @@ def schur(x: Traced) -> Once:
     rows = np.repeat(np.arange(nr), np.diff(S.row_p[: nr + 1]))
     W = x.work._replace(G=_zeros(len(x.work.G)), H=_zeros(len(x.work.H)), row=x.work.row.copy())
     W.G[: len(rows)] = x.G[rows, S.col_i[: len(rows)]]
-    turn_rows(S, W)
-    A = _zeros(len(S.ldl.Ai))
-    for i, j, length, place in S.pair_i:
-        for k in range(length):
-            A[place] = A[place] + W.G[i + k] * W.H[j + k]
-    natural_size(S, W)
-    for k in range(nr):
-        place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
-        A[place] = A[place] + S.glob[REGULARISE] * W.row[DIAGONAL, k] + ROUNDING * A[place]
-    L, D = factored(S.ldl, A)
+    _refuse_long(S.ldl)
+    n = len(S.ldl.perm)
+    D = np.array([_zeros(n), _zeros(n), _zeros(n)], object)
+    W = W._replace(A=_zeros(len(S.ldl.Ai) + 1), L=_zeros(len(S.ldl.Li)), D=D)
+    factor_schur(S, W)
+    L, D = W.L, W.D[0]
 
     def once(f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         dx = _zeros(len(f))
@@ -149,29 +145,23 @@ def touched(row: np.ndarray) -> list[int]:
 
 
 def factored(P: Pattern, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L and the inverse diagonal: `numerics.ldl.ldl_factor`, without a look at pivots, whose size nobody knows here.
+    """L and the inverse diagonal: the engine's own factor on nodes, which takes pivots for granted.
 
     Raises
     ------
     ModelError
         If it takes more operations than straight-line code is written of.
     """
-    n, columns = len(P.perm), np.diff(P.Lp)
-    refuse_long("the solution", int(2 * (columns * (columns + 3)).sum()))
-    L, D, Y = _zeros(len(P.Li)), _zeros(n), _zeros(n)
-    for k in range(n):
-        last = P.Ap[k + 1] - 1
-        d = A[last]
-        Y[P.Ai[P.Ap[k] : last]] = A[P.Ap[k] : last]
-        for e in range(P.Rp[k], P.Rp[k + 1]):
-            i, at = P.Ri[e], P.Rx[e]
-            y, Y[i] = Y[i], 0.0
-            for p in range(P.Lp[i], at):
-                Y[P.Li[p]] = Y[P.Li[p]] - L[p] * y
-            L[at] = y * D[i]
-            d = d - L[at] * y
-        D[k] = 1.0 / d
+    _refuse_long(P)
+    n = len(P.perm)
+    L, D = _zeros(len(P.Li)), _zeros(n)
+    ldl_factor(P, A, L, D, _zeros(n))
     return L, D
+
+
+def _refuse_long(P: Pattern) -> None:
+    columns = np.diff(P.Lp)
+    refuse_long("the solution", int(2 * (columns * (columns + 3)).sum()))
 
 
 def solved(P: Pattern, L: np.ndarray, D: np.ndarray, b: np.ndarray) -> np.ndarray:
