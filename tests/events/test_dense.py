@@ -121,13 +121,13 @@ def test_rod_on_three_supports_shares_its_weight_with_the_least_squares():
     J = np.array([[1.0, -1.0], [1.0, 0.0], [1.0, 1.0]])
     for at, expected in ((0.1, [1 / 3 - 0.05, 1 / 3, 1 / 3 + 0.05]), (0.9, [0.0, 0.1, 0.9])):
         # equal mass and inertia of 1, so that every diagonal is not the same: weights 2, 1, 2
-        for inertia in (1.0, 1e6):
+        for inertia in (1.0, 1e4):
             P = problem(J @ np.diag([1.0, 1 / inertia]) @ J.T, -J @ np.array([1.0, at / inertia]), [PUSHES] * 3)
             assert solve(P) == FOUND
             np.testing.assert_allclose(P.u, 0.0, atol=1e-12)
             np.testing.assert_allclose([P.x.sum(), P.x[2] - P.x[0]], [1.0, at], rtol=1e-9)
-            if inertia == 1e6:
-                np.testing.assert_allclose(P.x, expected, atol=1e-6)
+            if inertia == 1e4:
+                np.testing.assert_allclose(P.x, expected, atol=1e-4)
 
 
 def test_answer_does_not_depend_on_what_was_tried_first():
