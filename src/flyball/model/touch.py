@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..constraints.blocks import Row
+from ..constraints.corner import foot
 from ..constraints.modes import SLIP, STOP
 from .element import element
 from .force import Force, TwoFrameForce
@@ -37,6 +38,8 @@ class Touch(TwoFrameForce):
         The same as it is watched while they are apart, where that is another.
     slips : tuples of 9 numbers
         The rows that say how fast the sides slide, one in the plane and two in space; none without friction.
+    face : int
+        Of a sharp corner on a sharp box: the face that it is on where two are as near.
     friction : two numbers
         Coefficients of rest and of sliding.
     restitution : number
@@ -46,10 +49,11 @@ class Touch(TwoFrameForce):
     gap: Term
     seen: Term | None = None
     slips: tuple[Term, ...] = ()
+    face: int = 0
     friction: tuple[float, float] = (0.0, 0.0)
     restitution: float = 0.0
 
-    kind: ClassVar[int] = -1  # no formula of its own: it acts by its switches
+    kind: ClassVar[int] = 1000  # behind all others; no formula of its own: it acts by its switches
     outputs: ClassVar[dict[str, str]] = {"gap": "m", "normal": "N", "friction": "N", "slip": "m/s"}
     sliding: ClassVar[bool] = True
 
@@ -65,6 +69,11 @@ class Touch(TwoFrameForce):
     def conservative(self) -> bool:
         """What is smooth takes nothing."""
         return not self.slips
+
+    def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float]:
+        """The face that its corner is on, and 0."""
+        records = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
+        return foot(self.gap[1:], *records, float(self.face), None), 0.0
 
     def switches(self) -> tuple[Switch, ...]:
         """The gap, and the slip along each tangent."""

@@ -257,4 +257,11 @@ def _on_core(F: _Side, M: _Side, core: _Core, ball: tuple[np.ndarray, float], ta
     slips = tuple((slip, *half, r, float(k), way, 0.0, 1.0) for k in which)
     par = (*half, r, 0.0, way, r + core.radius, 1.0)
     fields = _fields(F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *par), slips)
-    return fields | ({"seen": (touch.KIND_GAP, *par)} if sharp else {})
+    return fields | ({"seen": (touch.KIND_GAP, *par), "face": _face(core, M)} if sharp else {})
+
+
+def _face(core: _Core, M: _Side) -> int:
+    """The face of a core beyond which the other shape lies as a whole, or nearly."""
+    x = (M.p + M.corners @ M.R.T - core.p) @ core.R
+    beyond = np.concatenate([(x[:, i].min() - core.half[i], -x[:, i].max() - core.half[i]) for i in range(3)])
+    return int(np.argmax(beyond))
