@@ -1,8 +1,8 @@
 """A sharp corner M on a face of a box F: how high above it, and how fast it slides over it.
 
-The half edges par[0:3], the radius par[3], the tangent par[4:6] and the height par[6] are those of ``touch``. Which face
-it is does not follow from the pose where the corner comes to the end of a face: ``hint`` is its number. It stays during
-a step, and where another face is no nearer.
+The half edges par[0:3], the radius par[3], the tangent par[4:6] and the height par[6] are those of ``touch``. Which
+face it is does not follow from the pose where the corner comes to the end of a face: ``hint`` is its number. It stays
+during a step, and where another face is no nearer.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
 """A ball on a rounded box: how far apart they are, and how fast the material of one slides over that of the other.
 
-M's origin is the centre of the ball. F's origin is the middle of the core of the other side, all points within the half
-edges par[0:3] along F's axes: a point (of a ball), a line (of a capsule), a box. With q the point of the core nearest to
-the centre p and n = (p - q) / |p - q| the gap is |p - q| - par[6], par[6] being the sum of the radii. Of a motion only
-what changes p - q turns n, so faces, edges and corners are one formula; what is rolled over between them is a jump of
-curvature. Inside the core the nearest face counts.
+M's origin is the centre of the ball. F's origin is the middle of the core of the other side, all points within the
+half edges par[0:3] along F's axes: a point (of a ball), a line (of a capsule), a box. With q the point of the core
+nearest to the centre p and n = (p - q) / |p - q| the gap is |p - q| - par[6], par[6] being the sum of the radii. Of a
+motion only what changes p - q turns n, so faces, edges and corners are one formula; from one to the next the curvature
+jumps. Inside the core the nearest face counts.
 
 Slip is the velocity of M's material over F's at p - r n, r = par[3], along one of two tangents. Where par[4] is 0 it is
 the one in the plane, z x n. Else they are the par[4]-th of the two axes across n that turn with it without a jump
@@ -31,7 +31,7 @@ def beyond(x, h):
 
 @formula
 def face(par, p):
-    """Number of the face of the core that p lies farthest beyond, or nearest below: 0 to 5 for +x, -x, +y, -y, +z, -z."""
+    """The face of the core that p lies farthest beyond, or nearest below: 0 to 5 for +x, -x, +y, -y, +z, -z."""
     best = -1e300
     found = 0
     for i in range(3):

@@ -35,9 +35,10 @@ from ..tables.system import (
     TERM_ROW,
     TOLD,
 )
-from .loads import slides, wide
+from .loads import wide
 from .records import load
 from .rows import COEFFICIENT, measured
+from .sliding import slides
 
 SUBSTITUTIONS = 80
 AGAIN = 40  # after as many, once more from no load at all
@@ -89,7 +90,7 @@ def most_friction(S, k, arm, rate, load):
 
 @formula
 def pulled(S, n):
-    """Whether load n may be negative: at a place of contact, which pulls between where it opens and the end of a step."""
+    """Whether load n may be negative: a place of contact pulls from where it opens to the end of the step."""
     for x in range(S.load_i.shape[0]):
         if S.load_i[x, 0] == n:
             return S.load_i[x, 1] < 0

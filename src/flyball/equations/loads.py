@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..laws.evaluation import evaluate
-from ..math.scalar import sign, sqrt
+from ..math.scalar import sign
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..tables.system import (
     ALONG,
@@ -22,28 +22,20 @@ from ..tables.system import (
     FORCE_SWITCH,
     FORCE_WORK,
     INERTIA,
-    LENGTH,
     LOAD,
     MASS,
-    MODE,
     NV,
-    OFF,
     PARENT,
     RATE,
     SLIDING,
-    SWITCH_MEASURED,
-    SWITCH_OTHER,
-    SWITCH_PARTNER,
-    SWITCH_SLIDING,
     V0,
     VALUE,
 )
 from .dispatch import effort, inputs, wrench
 from .records import load
 from .rows import way_of
+from .sliding import slide
 from .tree import project
-
-SLOW = 1e-10  # lengths of the mechanism a second: slower sliding in space goes the way of its switch
 
 
 @formula
@@ -145,53 +137,6 @@ def way(S, W, k, rate):
     """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
     s = S.force_i[k, FORCE_SWITCH]
     return W.sensed[VALUE, way_of(S, W, s)] if s >= 0 else sign(rate)
-
-
-@formula
-def slides(S, W, s):
-    """Whether the place of contact whose first slip is switch s is closed and does not stick."""
-    return W.switch[MODE, s].real == OFF and W.switch[MODE, S.switch_i[s, SWITCH_OTHER]].real != OFF
-
-
-@formula
-def heading(S, W, sensed, s):
-    """Direction of sliding along the tangents of slip s and of its partner, and the speed.
-
-    In the plane it is the way of the switch. In space it is that of the velocity, reversed where it is more against the
-    way than with it: what comes to rest would slide on smoothly, until the event is found.
-    """
-    way = sensed[VALUE, way_of(S, W, s)]
-    u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
-    other = S.switch_i[s, SWITCH_PARTNER]
-    if other < 0:
-        return way, 0.0 * way, u * way
-    side = sensed[VALUE, way_of(S, W, other)]
-    v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
-    square = u * u + v * v
-    slow = SLOW * S.glob[LENGTH]
-    if square.real <= slow.real * slow.real:
-        return way, side, u * way + v * side
-    speed = sqrt(square) if (u * way + v * side).real >= 0.0 else -sqrt(square)
-    return u / speed, v / speed, speed
-
-
-@formula
-def slide(S, W, k, work, f):
-    """Add the friction -mu N d of a place of contact that slides along d; N is its load, the multiplier of its gap."""
-    s = S.force_i[k, FORCE_SWITCH]
-    work[S.force_i[k, FORCE_WORK]] = 0.0
-    if not slides(S, W, s):
-        return
-    d, e, speed = heading(S, W, W.sensed, s)
-    push = -S.switch_x[s, SWITCH_SLIDING] * W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]
-    for side in range(2):
-        m = S.force_i[k, FORCE_F] if side == 0 else S.force_i[k, FORCE_M]
-        if m < 0:
-            continue
-        r = S.row_i.shape[0] + m
-        for j in range(S.row_p[r], S.row_p[r + 1]):
-            f[S.col_i[j]] += push * (d if side == 0 else e) * W.G[j]
-    work[S.force_i[k, FORCE_WORK]] = push * speed
 
 
 @formula

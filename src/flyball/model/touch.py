@@ -11,7 +11,7 @@ from ..constraints.blocks import Row
 from ..constraints.corner import foot
 from ..constraints.modes import SLIP, STOP
 from .element import element
-from .force import Force, TwoFrameForce
+from .force import TwoFrameForce
 from .joint import WorldFrame
 from .switch import Switch
 

@@ -14,7 +14,7 @@ from ..constraints.modes import BRANCH, FRICTION, ONE_WAY, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
-from .specs import RowSpec, Structure, TermSpec, frame, ints
+from .specs import RowSpec, Structure, frame, ints
 from .system import (
     EITHER,
     FALLING,

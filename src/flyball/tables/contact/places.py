@@ -1,9 +1,9 @@
 """The places at which the bodies of a model may touch, as far as rows of constraint know such places exactly.
 
-A ball or a corner on a plane keeps its height; a ball on a rounded box its distance from the core (`constraints/touch`);
-a sharp corner on a sharp box its height above a face (`constraints/corner`). Whatever has corners or rounded ends touches
-a plane by these; in the plane two rectangles or rounded segments touch by the corners of either. Everything else is told
-by name and left to steps by impulses.
+A ball or a corner on a plane keeps its height; a ball on a rounded box its distance from the core
+(`constraints/touch`); a sharp corner on a sharp box its height above a face (`constraints/corner`). Whatever has
+corners or rounded ends touches a plane by these; in the plane two rectangles or rounded segments touch by the corners
+of either. Everything else is told by name and left to steps by impulses.
 """
 
 from __future__ import annotations
