@@ -72,8 +72,8 @@ class Touch(TwoFrameForce):
 
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float]:
         """The face that its corner is on, and 0."""
-        records = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
-        return foot(self.gap[1:], *records, float(self.face), None), 0.0
+        f, m = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
+        return foot(self.gap[1:], f, m, float(self.face), None), 0.0
 
     def switches(self) -> tuple[Switch, ...]:
         """The gap, and the slip along each tangent."""

@@ -78,7 +78,7 @@ def places(model: Model, given: Numbers) -> Places:
         return Places((), tuple(f"{e.title} is many bodies" for e in model.bulk))
     scene = touching(model, given, [b.name for b in model.bodies])
     found: list[tuple[str, dict]] = []
-    why_not = {}
+    why_not: dict[str, None] = {}
     for i, j in itertools.combinations(range(len(scene.geometry.shape_i)), 2):
         row = _meet(scene, i, j)
         if row is None:
