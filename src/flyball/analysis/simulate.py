@@ -15,6 +15,7 @@ from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
+from ..model.touching import has_contact
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -32,7 +33,6 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
-from .motion.touches import stepped, with_places
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
@@ -79,7 +79,6 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
-    model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
@@ -101,14 +100,14 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Stepping() if stepped(model, o.parameters) else USUAL)
+        o = replace(o, method=Stepping() if has_contact(model) else USUAL)
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if model.bulk:
+        if has_contact(model):
             raise ModelError(
-                f"method={o.method!r} integrates from touch to touch, and {model.bulk[0].title} is many bodies: leave "
-                f"method out, or give method='impulse'"
+                f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
+                f"give method='impulse'"
             )
         return o
     for name, usual in IDLE.items():
