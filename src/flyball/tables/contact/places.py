@@ -227,7 +227,7 @@ def _frame(p: np.ndarray, R: np.ndarray) -> tuple[float, ...]:
     return tuple(float(x) for x in (*p, *R.ravel()))
 
 
-def _fields(F: _Side, M: _Side, frames: tuple, gap: Term, slips: tuple[Term, ...]) -> dict:
+def _place(F: _Side, M: _Side, frames: tuple, gap: Term, slips: tuple[Term, ...]) -> dict:
     at = frames[1][:3]
     return {"body_i": F.body, "body_j": M.body, "at": at, "frames": frames, "gap": gap, "slips": slips}
 
@@ -240,7 +240,7 @@ def _on_plane(planar: bool, F: _Side, M: _Side, ball: tuple[np.ndarray, float]) 
     frames = _frame(F.p, axes), _frame(M.p + M.R @ x, M.R)
     gap = (along.KIND, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, r, 1.0)
     slips = tuple((rolling.KIND, *e, 0.0, r, 0.0, 0.0, 1.0) for e in np.eye(3)[: 1 if planar else 2].tolist())
-    return _fields(F, M, frames, gap, slips)
+    return _place(F, M, frames, gap, slips)
 
 
 def _on_core(F: _Side, M: _Side, core: _Core, ball: tuple[np.ndarray, float], tangents: int) -> dict:
@@ -256,7 +256,7 @@ def _on_core(F: _Side, M: _Side, core: _Core, ball: tuple[np.ndarray, float], ta
     which = range(1, tangents + 1) if tangents else (0,)
     slips = tuple((slip, *half, r, float(k), way, 0.0, 1.0) for k in which)
     par = (*half, r, 0.0, way, r + core.radius, 1.0)
-    fields = _fields(F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *par), slips)
+    fields = _place(F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *par), slips)
     return fields | ({"seen": (touch.KIND_GAP, *par), "face": _face(core, M)} if sharp else {})
 
 
