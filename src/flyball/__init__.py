@@ -11,6 +11,7 @@ Describe a mechanism
                   floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
                   moving surfaces
     Limit         hard stops of a coordinate
+    Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
@@ -29,7 +30,7 @@ Look before you run
 
 Ask how it moves
     m.simulate(t_end)             -> Result: motion, reactions, energies, health; with contact by steps of impulses,
-                                  of which method=Impulse(step=...) makes choices
+                                  of which method=Stepping(step=...) makes choices
     m.kinematics(times)           -> Result, where drivers prescribe the motion
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
@@ -80,7 +81,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assembly.start import Assembly as Assembly
-    from .analysis.motion.impulse.settings import Impulse as Impulse
+    from .analysis.motion.impulse.settings import Stepping as Stepping
     from .analysis.prepared import Prepared as Prepared
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
@@ -101,12 +102,19 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .forces import *
     from .joints import *
     from .mechanism import Mechanism as Mechanism
+    from .model.actions import Impulse as Impulse
+    from .model.actions import Lock as Lock
+    from .model.actions import Note as Note
+    from .model.actions import Release as Release
+    from .model.actions import Set as Set
+    from .model.actions import Stop as Stop
     from .model.body import Body as Body
     from .model.body import Driver as Driver
     from .model.body import Frame as Frame
     from .model.body import Initial as Initial
     from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
+    from .model.event import Event as Event
     from .model.ground import Ground as Ground
     from .model.limit import Limit as Limit
     from .model.material import Material as Material
@@ -149,7 +157,14 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
-    "Impulse": "analysis.motion.impulse.settings",
+    "Event": "model.event",
+    "Impulse": "model.actions",
+    "Lock": "model.actions",
+    "Note": "model.actions",
+    "Release": "model.actions",
+    "Set": "model.actions",
+    "Stop": "model.actions",
+    "Stepping": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
     "Limit": "model.limit",
     "Material": "model.material",
