@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
@@ -101,7 +101,7 @@ def _zero_ends(law: Law, wanted: list[int], c: Corner, t: Range, signs: Signs, b
 
 def _levels(c: Corner, x: Any, before: bool = False) -> np.ndarray:
     """Number of levels up to x; ``before``: without x itself."""
-    side = "left" if before else "right"
+    side: Literal["left", "right"] = "left" if before else "right"
     if c.period == 0.0:
         return np.searchsorted(c.levels, x, side=side)
     x = np.clip(np.nan_to_num(x), -1e15 * c.period, 1e15 * c.period)
