@@ -1,7 +1,7 @@
 """Bounces that come ever faster: where their series has become shorter than rounding, what bounced is at rest.
 
-A flight that begins with the rate u and is brought back by the acceleration -a is u^2 / 2 a high and lasts 2 u / a. Each
-is shorter than the one before by a ratio r, so all that are left last T / (1 - r), T being the one that begins.
+A flight that begins with the rate u and is brought back by the acceleration -a is u^2 / 2 a high and lasts 2 u / a.
+Each is shorter than the one before by a ratio r, so all that are left last T / (1 - r), T being the one that begins.
 """
 
 from __future__ import annotations

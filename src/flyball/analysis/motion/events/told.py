@@ -27,7 +27,8 @@ def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
     """Record a jump of velocities."""
     if not jumped.closing and not jumped.given:
         return
-    done, impulses = [], {}
+    done: list[str] = []
+    impulses: dict[str, float] = {}
     for s, (u, after) in jumped.closing.items():
         goes = "stays" if s in jumped.even else f"leaves at {abs(after):.6g}"
         done.append(f"{n.name(s)} closes at {abs(u):.6g}, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks")
