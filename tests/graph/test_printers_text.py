@@ -120,3 +120,10 @@ def test_long_sums_are_broken_before_their_terms():
     lines = text_printer.TextPrinter().lines(total, 40)
     assert max(map(len, lines)) <= 40
     assert " ".join(lines) == text(total)
+
+
+@pytest.mark.parametrize(("accent", "sign"), [("dot", "˙"), ("ddot", "¨")])
+def test_rates_in_mathml_carry_their_points(accent, sign):
+    page = ElementTree.fromstring(formula(rf"\{accent}{{x}}"))
+    over = page.find(".//{*}mover")
+    assert [child.text for child in over] == ["x", sign]
