@@ -54,7 +54,7 @@ from ..tables.system import (
 from .articulated import articulate, articulated_solve
 from .made import run
 from .mass import mass_entries
-from .rows import row_times
+from .rows import row_times, size_rows_off
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
@@ -130,6 +130,7 @@ def natural_size(S, W):
         elif n == 3:
             turn += W.G[at + 2] * W.G[at + 2]
         W.row[DIAGONAL, k] += shift * S.body_x[b, PER_BULK] + turn * S.body_x[b, PER_COMPACT]
+    size_rows_off(S, W)
 
 
 @formula
