@@ -70,7 +70,7 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     R, y = tableau(method), np.array(y, float)
     n = len(y) // 2
     S = Equations(f, lambda *a: np.asarray(g(*a), float), [0.0, y])
-    W: Watch = watching(np.array(way), R.c, R.order_i[1], n, np.zeros(0, int), (2, 2 * n), 0, 1)
+    W: Watch = watching(np.array(way), R.c, R.order_i[1], n, [], [], (np.zeros((2, 2 * n)), np.zeros(0)))
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
     real[ex.H_MAX] = min(h_max, t_end)

@@ -16,23 +16,32 @@ def expect(W, x, h):
     for m in range(n):
         value, rate = quintic(W.moving, m, x, h)
         W.sensed[0, m], W.sensed[1, m], W.sensed[0, n + m] = value, rate, rate
-    count = W.places.shape[0]
     rows = W.rows.shape[0]
+    count = W.places.shape[0]
     for m in range(W.levels.shape[1]):
-        if m < rows:
-            W.lam[W.rows[m]] = 0.0
-        else:
-            W.sensed[0, W.columns[m - rows]] = 0.0
+        put(W, m, rows, 0.0)
     for j in range(count):
         w = 1.0
         for k in range(count):
             if k != j:
                 w *= (x - W.places[k]) / (W.places[j] - W.places[k])
         for m in range(W.levels.shape[1]):
-            if m < rows:
-                W.lam[W.rows[m]] += w * W.levels[j, m]
-            else:
-                W.sensed[0, W.columns[m - rows]] += w * W.levels[j, m]
+            put(W, m, rows, got(W, m, rows) + w * W.levels[j, m])
+
+
+@formula
+def put(W, m, rows, x):
+    """Write what has no known rate to where guards look for it."""
+    if m < rows:
+        W.lam[W.rows[m]] = x
+    else:
+        W.sensed[W.spots[m - rows, 0], W.spots[m - rows, 1]] = x
+
+
+@formula
+def got(W, m, rows):
+    """What stands there."""
+    return W.lam[W.rows[m]] if m < rows else W.sensed[W.spots[m - rows, 0], W.spots[m - rows, 1]]
 
 
 @formula

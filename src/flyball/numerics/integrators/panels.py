@@ -33,6 +33,7 @@ PARTS = 16  # of a panel, in which slopes are compared
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
 NEAR = 1e-6  # part of a guard's change over the step that is near zero
 NOISE = 4.0  # times a guard's value at the start that is still zero
+ROUNDING = 1e-12  # part of its size in the step that is zero as well
 
 
 @formula
@@ -93,9 +94,9 @@ def fill(look, S, W, t, h, a, w):
 def resolved(W):
     """Whether every guard is the polynomial through its values at the nodes."""
     for i in range(W.way.shape[0]):
-        if W.g[NODE, i] != W.g[NODE, i]:
-            continue
         low, high = extent(W, i)
+        if not finite(low, high):
+            continue
         allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high))
         for j in range(NODES, NODES + CHECKS):
             if not abs(W.g[NODE + j, i] - through(W, i, node(j))) <= allowed:
@@ -122,21 +123,30 @@ def through(W, i, x):
 
 @formula
 def extent(W, i):
-    """Least and largest value of a guard in the panel."""
+    """Least and largest value of a guard in the panel; both nan if it is not a number somewhere."""
     low = W.g[NODE, i]
     high = low
     for j in range(1, NODES + CHECKS):
-        low = min(low, W.g[NODE + j, i])
-        high = max(high, W.g[NODE + j, i])
+        f = W.g[NODE + j, i]
+        if f != f:
+            return f, f
+        low = min(low, f)
+        high = max(high, f)
     return low, high
+
+
+@formula
+def finite(low, high):
+    """Whether both are numbers."""
+    return low - low == 0.0 and high - high == 0.0
 
 
 @formula
 def restless(W, i):
     """Whether a guard comes near zero in the panel. One that does not is on the side that it stays on."""
     low, high = extent(W, i)
-    if not (low - low == 0.0 and high - high == 0.0):  # not watched, or not everywhere
-        return W.g[NODE, i] == W.g[NODE, i] or W.g[NODE + NODES - 1, i] == W.g[NODE + NODES - 1, i]
+    if not finite(low, high):  # not watched, or not everywhere
+        return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:
         W.g[SIDE, i] = 1.0
@@ -162,8 +172,10 @@ def fires(way, side):
 @formula
 def passing(W, i):
     """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to the end."""
-    powers(W, i)
     low, high = extent(W, i)
+    if not finite(low, high):
+        return jumping(W, i)
+    powers(W, i)
     graze = GRAZE * (high - low)
     s = W.g[SIDE, i]
     f, d = value(W, 0.0)
@@ -246,10 +258,11 @@ def begin_sides(look, S, W, t, h):
     fill(look, S, W, t, h, 0.0, 1.0)
     for i in range(ng):
         low, high = extent(W, i)
-        W.g[MARK, i] = W.g[SIDE, i] = side_of(W.g[START, i])
-        if abs(W.g[START, i]) <= NEAR * max(abs(low), abs(high)):
+        W.g[SIDE, i] = side_of(W.g[START, i])
+        W.g[MARK, i] = -1.0
+        if finite(low, high) and abs(W.g[START, i]) <= NEAR * max(abs(low), abs(high)):
             W.g[SIDE, i] = 0.0
-            W.g[MARK, i] = 2.0  # to be looked at
+            W.g[MARK, i] = max(NOISE * abs(W.g[START, i]), ROUNDING * max(abs(low), abs(high)))
             near = True
     if not near:
         return -1, 0.0, 0.0, 0.0
@@ -271,10 +284,10 @@ def begun(W):
     for i in range(W.way.shape[0]):
         f = W.g[THERE, i]
         s = W.g[SIDE, i]
-        if W.g[MARK, i] != 2.0 or W.fired[i] != 0:
+        if W.g[MARK, i] < 0.0 or W.fired[i] != 0:
             continue
         if s == 0.0:
-            if abs(f) > NOISE * abs(W.g[START, i]):
+            if abs(f) > W.g[MARK, i]:
                 W.g[SIDE, i] = side_of(f)
         elif s * f < 0.0:
             if fires(W.way[i], s):

@@ -9,7 +9,7 @@ import numpy as np
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
-# making; which begin near zero; then at the nodes of a panel, and where these are checked
+# making; what is zero of those that begin near it; then at the nodes of a panel, and where these are checked
 START, END, TRUE, THERE, SIDE, MARK, NODE = range(7)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
@@ -34,13 +34,12 @@ class Watch(NamedTuple):
     count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
     stages: np.ndarray  # of a step, where levels are kept
     moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
-    levels: np.ndarray  # (2 + stages, rows + columns): what has no known rate: multipliers, loads
+    levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
     places: np.ndarray  # (2 + stages,): where in the step these were seen
     rows: np.ndarray  # multipliers that guards depend on
-    columns: np.ndarray  # of what is sensed behind values and rates
-    sensed: np.ndarray  # as Work.sensed, expected
-    lam: np.ndarray  # (nr,), expected
-    row: np.ndarray  # (1, ...): for the engine to write on
+    spots: np.ndarray  # (..., 2): rows and columns of what else is sensed
+    sensed: np.ndarray  # what is expected to be sensed: values and rates in its first rows; then rates as values
+    lam: np.ndarray  # multipliers expected
 
 
 def nodes() -> np.ndarray:
@@ -70,9 +69,8 @@ def watching(
     stages: int,
     measured: int,
     rows: np.ndarray,
-    sensed: tuple[int, int],
-    multipliers: int,
-    width: int,
+    spots: np.ndarray,
+    expected: tuple[np.ndarray, np.ndarray],
 ) -> Watch:
     """What a watched integration keeps, empty.
 
@@ -88,32 +86,29 @@ def watching(
         Quantities with rates.
     rows : ndarray
         Multipliers that guards depend on.
-    sensed : tuple of int
-        Shape of `Work.sensed`.
-    multipliers : int
-        How many there are.
-    width : int
-        Of a row of output.
+    spots : ndarray (..., 2)
+        Rows and columns of what else is sensed.
+    expected : tuple of ndarray
+        Where expected values of what is sensed, and of multipliers, are written.
     """
     ng = len(way)
     kept = np.array(kept_stages(c, stages), np.int64)
-    columns = np.arange(2 * measured, sensed[1])
+    spots = np.asarray(spots, np.int64).reshape(-1, 2)
     return Watch(
-        way=np.asarray(way, np.int64),
+        way=np.array(way, np.int64),
         side=np.zeros(ng),
         fired=np.zeros(ng, np.int64),
         g=np.full((GUARDS, ng), np.nan),
         poly=np.zeros(NODES),
-        basis=basis(),
+        basis=np.ascontiguousarray(basis()),
         real=np.zeros(REAL),
         count=np.zeros(COUNT, np.int64),
         stages=kept,
         moving=np.zeros((2, 3, measured)),
-        levels=np.zeros((2 + len(kept), len(rows) + len(columns))),
+        levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
         places=np.r_[0.0, c[kept], 1.0],
-        rows=np.asarray(rows, np.int64),
-        columns=columns.astype(np.int64),
-        sensed=np.zeros(sensed),
-        lam=np.zeros(multipliers),
-        row=np.zeros((1, width)),
+        rows=np.array(rows, np.int64),
+        spots=spots,
+        sensed=expected[0],
+        lam=expected[1],
     )
