@@ -37,6 +37,8 @@ class Here:
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
     failed : Exception
         Why the motion cannot go on here.
+    watched : str
+        How closely it was looked for events, in words.
     """
 
     start: Start
@@ -47,6 +49,7 @@ class Here:
     stopped: str = ""
     fresh: bool = False
     failed: Exception | None = None
+    watched: str = ""
 
     @property
     def c(self) -> Compiled:
