@@ -33,6 +33,10 @@ class Here:
         Mechanical energy [J] that kicks and changed parameters gave so far.
     stopped : str
         Why the motion ends here, in words; empty: it goes on.
+    kick : ndarray, optional
+        Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
+    bounces : dict
+        Switch -> `rest.Bounces`: how often it closed lately.
     fresh : bool
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
     failed : Exception
@@ -45,11 +49,13 @@ class Here:
     clock: Clock
     records: list[Any] = field(default_factory=list)
     lost: float = 0.0
-    given: float = 0.0
     stopped: str = ""
     fresh: bool = False
     failed: Exception | None = None
     watched: str = ""
+    given: float = 0.0
+    kick: np.ndarray | None = None
+    bounces: dict[int, Any] = field(default_factory=dict)
 
     @property
     def c(self) -> Compiled:
