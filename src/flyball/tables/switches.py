@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, FRICTION, ONE_WAY, STOP
+from ..constraints.modes import BRANCH, FRICTION, LOCK, ONE_WAY, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
+from . import events
 from .specs import RowSpec, Structure, TermSpec, frame, ints
 from .system import (
     EITHER,
@@ -48,11 +49,12 @@ class SwitchSpec:
     measured: int = -1
     force: int = -1
     law: int = -1
+    held: bool = False  # from the start
 
 
 def declared(model: Model) -> list[tuple[Element, Switch]]:
     """All that the model's elements declare."""
-    return [(e, w) for e in model.elements() for w in e.switches()]
+    return [*((e, w) for e in model.elements() for w in e.switches()), *events.locks(model)]
 
 
 def quantity(e: Element, w: Switch) -> str:
@@ -88,6 +90,13 @@ def rows(s: Structure) -> None:
         s.rows.append(RowSpec(e, w.label or "switch"))
         s.slices[e.name] = slice(s.slices[e.name].start if e.name in s.slices else first, len(s.rows))
         s.switches.append(SwitchSpec(e, w, row, s.measured[quantity(e, w)]))
+
+    for joint in events.parting(s.model):
+        at = s.slices[joint.name]
+        for k, row in enumerate(range(at.start, at.stop)):
+            spec = SwitchSpec(joint, Switch(LOCK, f"row {k}"), row, s.measured[events.own_row(joint, k)])
+            spec.held = True
+            s.switches.append(spec)
 
 
 def table(s: Structure) -> None:
