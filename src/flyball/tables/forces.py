@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 
 import numpy as np
 
 from ..constraints.blocks import DISTANCE, turning
 from ..model.element import LawOf, fields_with
 from ..model.event import Event
-from ..model.examine import measured
+from ..model.examine import Curve, measured
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
+from ..model.touch import Touch
 from .specs import Structure, frame
+from .system import SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -35,7 +36,7 @@ def measured_quantities(s: Structure, watched: Mapping[str, Event]) -> None:
         if sensor.name in named and (what := s.model.measured(sensor)) is not None:
             found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
     for name in curves:
-        if (what := measured(s.model, SimpleNamespace(title=watched[name].title, of=name))) is not None:
+        if (what := measured(s.model, Curve(watched[name].title, name))) is not None:
             found[name] = _sensed(s, watched[name], *what[:2]), what[2]
     values = len(s.measured)
     s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
@@ -92,7 +93,7 @@ def _sensed(s: Structure, e: Sensor | Event, kind: str, text: str) -> int:
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted(s.model.forces, key=lambda f: f.kind)
+    s.forces = sorted((f for f in s.model.forces if _acts(s, f)), key=lambda f: f.kind)
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
         table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
@@ -102,12 +103,22 @@ def forces(s: Structure) -> None:
                 table[k, 1] = _axis_frame(s, e)
                 table[k, 6] = 2 * len(s.measured) + len(s.loads)
                 s.loads.append(e)
+        elif isinstance(e, Touch):
+            table[k, :2] = [*(s.measured[f"{e.name}:slip_{i + 1}"] for i in range(len(e.slips))), -1][:2]
+            table[k, 6] = 2 * len(s.measured) + len(s.loads)
+            table[k, 8] = SLIDING
+            s.loads.append(e)
         else:
             table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
         _compile_laws(s, e, table[k])
         if not e.conservative():
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
+
+
+def _acts(s: Structure, e: Force) -> bool:
+    """Whether there is a force: of a place of contact if it has modes here, and friction."""
+    return not isinstance(e, Touch) or (bool(s.switches) and e.acts())
 
 
 def _axis_frame(s: Structure, e: CoordinateForce) -> int:
