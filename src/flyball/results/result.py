@@ -21,10 +21,12 @@ from .measured import Measured
 from .numbers import span
 from .reactions import Reactions
 from .records import Records
+from .stretches import Stretches
 from .turn import Turn
 from .views import view
 from .views.base import Curves
 from .views.bulk import MemberView, SetView
+from .views.spliced import Spliced
 
 TOLD = 12  # curves in a text
 UNSAID = ("initial", "tables", "ground", "materials", "material_pairs", "contacts")  # parts of the description only
@@ -59,7 +61,9 @@ class Result:
         Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
-        surfaces that move.
+        surfaces that move, given by kicks and changes of parameters.
+    stretches : Stretches
+        What held between events: modes of what switches, parameters; None where nothing can switch.
     """
 
     def __init__(
@@ -86,6 +90,7 @@ class Result:
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self.stretches: Stretches | None = None
         self.energy = Energy(self)
 
     @property
@@ -148,6 +153,21 @@ class Result:
         return self.model.planar
 
     @cached_property
+    def pieces(self) -> tuple[Result, ...]:
+        """The motion piece by piece, if parameters changed in it, each with its own; else none."""
+        cuts = self.stretches.pieces() if self.stretches is not None else []
+        if len(cuts) < 2:
+            return ()
+        out = []
+        for at, stretches in cuts:
+            over = self.t, self.q, self.v, self.states, self.vdot, self.multipliers
+            piece = Result(self.model, stretches.all[0].values, *(x[at] for x in over), self.health)
+            piece.stretches, piece.wound = stretches, self.wound
+            piece.exchanged = {k: x[at] for k, x in self.exchanged.items()}
+            out.append(piece)
+        return tuple(out)
+
+    @cached_property
     def records(self) -> Records:
         """Kinematics of every body and frame at the output times."""
         return Records(self.values, self.q, self.v, self.vdot, self.wound)
@@ -193,6 +213,8 @@ class Result:
         if name == ENERGY:
             return self.energy
         if (found := self._set_of(name)) is None:
+            if self.pieces:
+                return Spliced([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
             return view(self, self.model[name])
         own, k = found
         return SetView(self, own) if k is None else MemberView(self, own, k)
