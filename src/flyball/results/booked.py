@@ -27,18 +27,18 @@ def booked(result: Result) -> dict[str, np.ndarray]:
     for k, x in enumerate(stretches.all):
         before = stretches.all[k - 1] if k else x
         if x.values is not before.values:
-            total += _stored(result, x, x) - _stored(result, before, x)
+            total += _stored(result, x, before.end) - _stored(result, before, before.end)
         jumps.append(np.full(x.rows, total))
     return {"impact_loss": stretches.over("lost"), GIVEN: given + np.concatenate(jumps)}
 
 
-def _stored(result: Result, parameters: Stretch, state: Stretch) -> float:
-    """Energy [J] of the state that a stretch begins in, by the parameters of another; without what accounts for itself."""
-    s = parameters.values.structure
-    q, v, z = np.split(state.begin[None, :], [s.nq, s.nq + s.nv], axis=1)
+def _stored(result: Result, by: Stretch, y: np.ndarray) -> float:
+    """Energy [J] of a state by the parameters of a stretch; without elements that account for themselves."""
+    s = by.values.structure
+    q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
     rows = result.multipliers.shape[1]
     one = Result(
-        result.model, parameters.values, np.zeros(1), q, v, z, np.zeros((1, s.nv)), np.zeros((1, rows)), result.health
+        result.model, by.values, np.zeros(1), q, v, z, np.zeros((1, s.nv)), np.zeros((1, rows)), result.health
     )
     e = one.energy
     own = [f.name for f in s.forces if f"{f.name}.work" not in s.state_at]

@@ -34,8 +34,8 @@ class Stretch:
         Lost in impacts and sudden locking since the start.
     given : float [J]
         Given by kicks since the start.
-    begin : ndarray (ny,)
-        The state at its beginning, after the event.
+    end : ndarray (ny,)
+        The state at its end, before the event.
     """
 
     rows: int
@@ -44,7 +44,7 @@ class Stretch:
     values: Values
     lost: float
     given: float
-    begin: np.ndarray
+    end: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -78,6 +78,13 @@ class Stretches:
             out.append((slice(first, last), found))
             first = last
         return out
+
+    def changed(self) -> dict[str, float]:
+        """Parameters that events have set, as they were at the end."""
+        first, last = self.all[0].values, self.all[-1].values
+        if first is last:
+            return {}
+        return {k: x for k, x in last.given.env.items() if first.given.env.get(k) != x}
 
     def cut(self, rows: int) -> Stretches:
         """Those of the first so many output times."""
