@@ -92,7 +92,7 @@ class Energy(Named):
         for name in r.values.structure.states:
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
-                stored = element.energy if hasattr(type(element), "energy") else np.zeros(1)
+                stored = getattr(element, "energy", np.zeros(1))
                 out[element.element.name] = element.work + stored - stored[0]
         return out
 

@@ -24,13 +24,12 @@ from .reactions import Reactions
 from .records import Records
 from .stretches import Stretches
 from .turn import Turn
-from .views import view
+from .views import has_view, view
 from .views.base import Curves
 from .views.bulk import MemberView, SetView
 from .views.spliced import Spliced
 
 TOLD = 12  # curves in a text
-UNSAID = ("initial", "tables", "ground", "materials", "material_pairs", "contacts")  # parts of the description only
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
@@ -254,8 +253,7 @@ class Result:
 
     def parts(self) -> list[str]:
         """Names of all that the result says something of."""
-        parts = [e.name for e in self.model.elements() if e.category not in UNSAID]
-        return [*parts, ENERGY]
+        return [*(e.name for e in self.model.elements() if e.category == "bulk" or has_view(e)), ENERGY]
 
     def names(self) -> list[str]:
         """Every name that ``result[name]`` knows: parts, and ``"part.quantity"``."""
