@@ -97,7 +97,7 @@ def test_multipliers_are_those_of_the_modes_of_their_time():
 
 def test_parameters_are_those_of_their_time():
     r = two_stretches()
-    assert np.allclose(r["spring.effort"], [-10.0, -40.0, 0.0], atol=1e-12)
+    assert np.allclose(r["spring.force"], [-10.0, -40.0, 0.0], atol=1e-12)
     assert np.allclose(r.energy.elastic, [0.5, 2.0, 0.0], atol=1e-12)
     assert np.allclose(r.energy.kinetic, [0, 0, 0.09])
 
