@@ -82,7 +82,13 @@ def two_stretches(damping=0.0):
     health = Health(True, "", 0.0, 0.0, 0, 0, 0, 0, 0.0, {})
     result = Result(m, here.c.values, parts[0][:, 0], *parts[1:], health)
     result.final = (2.0, here.y)
-    health.late = {"mobility": m.mobility(), "energy_drift": 0.0, "acceleration_violation": 0.0, "creep": {}, "warnings": ()}
+    health.late = {
+        "mobility": m.mobility(),
+        "energy_drift": 0.0,
+        "acceleration_violation": 0.0,
+        "creep": {},
+        "warnings": (),
+    }
     seen.told(result)
     return result
 

@@ -69,7 +69,9 @@ def _instead(parts: list[Element]) -> str:
     for name, becomes in smooth.items():
         able = [e.title for e in parts if e.switches() and getattr(e, name, 0.0) is None]
         if able:
-            out.append(f"; or give {', '.join(able)} a {name}, which makes {'it' if len(able) == 1 else 'them'} {becomes}")
+            out.append(
+                f"; or give {', '.join(able)} a {name}, which makes {'it' if len(able) == 1 else 'them'} {becomes}"
+            )
     return "".join(out)
 
 

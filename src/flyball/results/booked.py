@@ -37,9 +37,7 @@ def _stored(result: Result, by: Stretch, y: np.ndarray) -> float:
     s = by.values.structure
     q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
     rows = result.multipliers.shape[1]
-    one = Result(
-        result.model, by.values, np.zeros(1), q, v, z, np.zeros((1, s.nv)), np.zeros((1, rows)), result.health
-    )
+    one = Result(result.model, by.values, np.zeros(1), q, v, z, np.zeros((1, s.nv)), np.zeros((1, rows)), result.health)
     e = one.energy
     own = [f.name for f in s.forces if f"{f.name}.work" not in s.state_at]
     return float(e.kinetic[0] + e.gravity[0] + sum(one[name].energy[0] for name in own))
