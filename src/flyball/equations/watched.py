@@ -15,7 +15,7 @@ from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
-from ..numerics.integrators.watching import END, STAGE, START, Watch, watching
+from ..numerics.integrators.watching import STAGE, START, watching
 from ..tables.system import BIAS, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
 from .engine import Sheet, engine
 from .guards import watch as guards

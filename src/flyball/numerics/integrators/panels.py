@@ -10,11 +10,11 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from ...math.scalar import cos
 from .watching import (
-    MARK,
     CHECKS,
     END,
     FRESH,
     LOOKS,
+    MARK,
     NODE,
     NODES,
     PANEL,

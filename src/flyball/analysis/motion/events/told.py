@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ....model.touch import Touch
 from ....results.events import Happening
 from ....tables.system import MODE, OFF
 from .instant import Instant
 from .jump import Jump
 
-HELD_WORDS = {STOP: ("close", "closes"), FRICTION: ("stick", "sticks"), ONE_WAY: ("lock", "locks"), LOCK: ("lock", "")}
-FREE_WORDS = {STOP: ("open", "opens"), FRICTION: ("slip", "slides"), ONE_WAY: ("overrun", "overruns"), LOCK: ("", "")}
+HELD_WORDS = {
+    STOP: ("close", "closes"),
+    FRICTION: ("stick", "sticks"),
+    SLIP: ("stick", "sticks"),
+    ONE_WAY: ("lock", "locks"),
+    LOCK: ("lock", ""),
+}
+FREE_WORDS = {
+    STOP: ("open", "opens"),
+    FRICTION: ("slip", "slides"),
+    SLIP: ("slip", "slides"),
+    ONE_WAY: ("overrun", "overruns"),
+    LOCK: ("", ""),
+}
 ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
+PLACE_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
 
 
 def words(n: Instant, s: int, held: bool) -> tuple[str, str]:
     """Kind and words of what switch s did."""
     kind, said = (HELD_WORDS if held else FREE_WORDS).get(int(n.kind[s]), ("", ""))
     if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
-        return ROPE_WORDS[kind]
+        return (PLACE_WORDS if isinstance(n.here.structure.switches[s].element, Touch) else ROPE_WORDS)[kind]
     return kind, said
 
 
