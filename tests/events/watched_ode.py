@@ -11,7 +11,7 @@ from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.expected import expect
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.numerics.integrators.watched import advance_watched
-from flyball.numerics.integrators.watching import END, EVENT, START, Watch, watching
+from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
 
 
 class Equations(NamedTuple):

@@ -171,7 +171,7 @@ class Watched:
 
     def __init__(self, R: Tableau, clock: Clock, S: System, W: Work, width: int) -> None:
         nm = len(S.row_p) - 1 - len(S.row_i)
-        self.R, self.clock = R, clock
+        self.R, self.clock, self.W = R, clock, W
         rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
         columns = np.arange(2 * nm, W.sensed.shape[1])
         loads = columns[: len(columns) - len(S.switch_i)]

@@ -1,8 +1,8 @@
 """Where in a step a guard may pass zero, as far as can be told without the equations.
 
 A step is looked at in panels. In each the guards are a polynomial through values at eight places; two more places say
-whether that is so, else the panel is halved. ``look(t, h, x, S, W, row)`` writes the guards expected at t + x h to a row
-of ``W.g``; W is a `Watch`.
+whether that is so, else the panel is halved. ``look(t, h, x, S, W, row)`` writes the guards expected at t + x h to a
+row of ``W.g``; W is a `Watch`.
 """
 
 from __future__ import annotations
@@ -31,9 +31,9 @@ QUIET = 0.3  # a guard that stays farther from zero than this part of its change
 GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
 PARTS = 16  # of a panel, in which slopes are compared
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
-NEAR = 1e-6  # part of a guard's change over the step that is near zero
-NOISE = 4.0  # times a guard's value at the start that is still zero
-ROUNDING = 1e-12  # part of its size in the step that is zero as well
+NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
+NOISE = 4.0  # times its value at the start that is about zero as well
+ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
 
 
 @formula
@@ -171,14 +171,14 @@ def fires(way, side):
 
 @formula
 def passing(W, i):
-    """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to the end."""
+    """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to there."""
     low, high = extent(W, i)
     if not finite(low, high):
         return jumping(W, i)
     powers(W, i)
     graze = GRAZE * (high - low)
     s = W.g[SIDE, i]
-    f, d = value(W, 0.0)
+    _, d = value(W, 0.0)
     for n in range(PARTS):
         x = n / PARTS
         y = (n + 1.0) / PARTS
@@ -188,17 +188,17 @@ def passing(W, i):
         if s * d < 0.0 and s * d1 >= 0.0:  # it goes towards zero, and away again
             z = x + (y - x) * d / (d - d1)
             fz, _ = value(W, z)
-            if s * fz <= 0.0 and fires(W.way[i], s):
-                return x, z
-            if s * fz <= graze and s * f1 > 0.0:
-                return x, y
+            if (s * fz <= 0.0 and fires(W.way[i], s)) or (s * fz <= graze and s * f1 > 0.0):
+                W.g[SIDE, i] = s
+                return x, z if s * fz <= 0.0 and fires(W.way[i], s) else y
         if s * f1 <= 0.0 and s != 0.0 and (f1 != 0.0 or fires(W.way[i], s)):
             if fires(W.way[i], s):
+                W.g[SIDE, i] = s
                 return x, y
             s = side_of(f1)
         elif s == 0.0:
             s = side_of(f1)
-        f, d = f1, d1
+        d = d1
     W.g[SIDE, i] = s
     return 0.0, -1.0
 
@@ -213,6 +213,7 @@ def jumping(W, i):
             s = 0.0
         elif s * f <= 0.0 and s != 0.0 and (f != 0.0 or fires(W.way[i], s)):
             if fires(W.way[i], s):
+                W.g[SIDE, i] = s
                 return node(j - 1), node(j)
             s = side_of(f)
         elif s == 0.0:
@@ -246,8 +247,8 @@ def value(W, x):
 def begin_sides(look, S, W, t, h):
     """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
 
-    A guard that is near zero as a segment of the motion begins is on the side that it goes to: places closer and closer
-    to the start tell which that is, and whether it comes back soon.
+    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is on
+     the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back soon.
     """
     ng = W.way.shape[0]
     near = False
@@ -260,9 +261,12 @@ def begin_sides(look, S, W, t, h):
         low, high = extent(W, i)
         W.g[SIDE, i] = side_of(W.g[START, i])
         W.g[MARK, i] = -1.0
-        if finite(low, high) and abs(W.g[START, i]) <= NEAR * max(abs(low), abs(high)):
+        size = max(abs(low), abs(high))
+        now = abs(W.g[START, i])
+        just = W.side[i] == 0.0
+        if finite(low, high) and now <= (NEAR if just else ROUNDING) * size:
             W.g[SIDE, i] = 0.0
-            W.g[MARK, i] = max(NOISE * abs(W.g[START, i]), ROUNDING * max(abs(low), abs(high)))
+            W.g[MARK, i] = NOISE * now if just else ROUNDING * size
             near = True
     if not near:
         return -1, 0.0, 0.0, 0.0

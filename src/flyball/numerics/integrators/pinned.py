@@ -21,6 +21,7 @@ CLOSE = 1e-13  # part of the step that a bracket is closed to
 FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
 ULP = 2.3e-16
+REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 AT_ONCE = 1e-11  # part of the step within which events are at the same instant
 OTHERS = 20  # guards that may turn out to be earlier
 
@@ -44,7 +45,10 @@ def true_guard(derivative, watch, S, W, R, c, h, x, i):
 
 @formula
 def crossing(derivative, watch, S, W, R, c, h, i, a, b, s):
-    """Where in the step guard i leaves side s, expected between a and b: (status, place or -1 if it does not)."""
+    """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
+
+    Where it only fires as it comes back to that side, it has to be on the other one in between.
+    """
     status, fa = true_guard(derivative, watch, S, W, R, c, h, a, i)
     wide = b - a
     while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
@@ -58,9 +62,13 @@ def crossing(derivative, watch, S, W, R, c, h, i, a, b, s):
     if status != 0:
         return status, -1.0
     if s * fb > 0.0:  # it may come back in between
-        status, b, fb = lowest(derivative, watch, S, W, R, c, h, i, a, b, s)
-        if status != 0 or s * fb > 0.0:
+        status, m, fm = lowest(derivative, watch, S, W, R, c, h, i, a, b, s)
+        if status != 0 or s * fm > 0.0:
             return status, -1.0
+        if fires(W.way[i], s):
+            b, fb = m, fm
+        else:
+            a, fa = m, fm
     return bracketed(derivative, watch, S, W, R, c, h, i, (a, fa, b, fb))
 
 
@@ -169,9 +177,10 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
     step as it was.
     """
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
+    near = 2.0 * ulp + REACHED * h
     low, high = 0.0, most
     bound = False  # whether a step that does not reach the event is known
-    stride = CLOSE * most + 4.0 * ulp
+    rough = stride = CLOSE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
     status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
     for n in range(TRIES):
@@ -181,7 +190,7 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
         if n > 0 and h != before and f != last:
             slope = (f - last) / (h - before)
         way = -f / slope if slope * s < 0.0 else 1e300
-        if abs(way) <= 2.0 * ulp or (n > 2 and abs(way) >= 0.5 * gone and abs(way) < stride):
+        if abs(way) <= near or (n > 2 and abs(way) >= 0.5 * gone and abs(way) < rough):
             break
         if s * f > 0.0:
             low, bound = h, True
@@ -255,7 +264,7 @@ def next_event(callbacks, S, W, R, c, h):
         s = W.g[SIDE, i]
         status, x = crossing(derivative, watch, S, W, R, c, h, i, a, b, s)
         if status != 0 or x > 0.0:
-            return status, i, x, s
+            return status, i, x, (s if fires(W.way[i], s) else -s)
         if b >= 1.0:
             break
         resume(look, S, W, c.real[T], h, b)

@@ -73,38 +73,55 @@ def advance_watched(callbacks, inspect, report, S, W, R, c, out):
             refuse(derivative, arrive, tangent, S, W, R, c, h, status, error)
             if c.real[T] < t:  # the step before is taken back
                 W.count[FRESH] = 1
+                for i in range(W.side.shape[0]):
+                    W.side[i] = 1.0
                 see(watch, note, S, W, c)
             continue
-        note(S, W, END)
-        inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
-        if overlooked(derivative, inspect, S, W, R, c, h):
-            shorten(c, 0.5 * h)
-            continue
-        whole = h
-        status, h, error, hit = first_event(callbacks, S, W, R, c, h, error)
-        if status == 0:
-            if hit:
-                inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
-            status, used = write(derivative, report, S, W, R, c, h, out, used)
-        if status != 0:  # what lies inside the step cannot be told: take a shorter one
-            shorten(c, 0.25 * whole)
-            continue
-        t = c.real[T_END] if h == c.real[T_END] - c.real[T] else c.real[T] + h
-        if hit and used > 0 and out[used - 1, 0] == t:  # written when it is known how the motion goes on
-            used -= 1
-            c.count[NEXT] -= 1
-        elif c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T] + h:
-            return used  # the buffer is full inside this step: it is taken again by the next call
-        enter(R, c, t, h, error)
-        W.count[STEPS] += 1
-        if hit:
-            c.real[H] = max(c.real[H], whole)
-            c.count[STATUS] = EVENT
-            W.count[EVENTS] += 1
+        used, over = go_on(callbacks, inspect, report, S, W, R, c, out, used, (h, error))
+        if over:
             return used
-        settled(W)
     c.count[STATUS] = DONE
     return used
+
+
+@formula
+def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
+    """Go on to the end of a step that is good, (width, error), or to the first event in it.
+
+    Returns (rows written, whether the loop returns); a step that cannot be taken makes the next one shorter.
+    """
+    derivative, _, _, _, note, _ = callbacks
+    whole, error = step
+    note(S, W, END)
+    inspect(c.real[T], whole, c.real[SPAN], AT_END, c.seen, S, W)
+    if overlooked(derivative, inspect, S, W, R, c, whole):
+        shorten(c, 0.5 * whole)
+        return used, False
+    status, h, error, hit = first_event(callbacks, S, W, R, c, whole, error)
+    if status == 0:
+        if hit:
+            inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
+        status, used = write(derivative, report, S, W, R, c, h, out, used)
+    if status != 0:  # what lies inside the step cannot be told: take a shorter one
+        shorten(c, 0.25 * whole)
+        return used, False
+    t = c.real[T_END] if h == c.real[T_END] - c.real[T] else c.real[T] + h
+    if hit and used > 0 and out[used - 1, 0] == t:  # written when it is known how the motion goes on
+        used -= 1
+        c.count[NEXT] -= 1
+    elif c.count[NEXT] < c.times.shape[0] and c.times[c.count[NEXT]] <= c.real[T] + h:
+        return used, True  # the buffer is full inside this step: it is taken again by the next call
+    enter(R, c, t, h, error)
+    W.count[STEPS] += 1
+    if hit:
+        c.real[H] = max(c.real[H], whole)
+        c.count[STATUS] = EVENT
+        W.count[EVENTS] += 1
+        for i in range(W.side.shape[0]):
+            W.side[i] = 0.0 if W.fired[i] == 1 else 1.0
+    else:
+        settled(W)
+    return used, hit
 
 
 @formula

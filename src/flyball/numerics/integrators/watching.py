@@ -25,7 +25,9 @@ class Watch(NamedTuple):
     """What a watched integration keeps besides its clock."""
 
     way: np.ndarray  # (ng,): which passing of zero is an event
-    side: np.ndarray  # (ng,): 1 where the guard is above zero now, -1 below, 0 not known
+    side: (
+        np.ndarray
+    )  # (ng,): 1 where the guard is above zero now, -1 below; in the first step 0 where it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
     g: np.ndarray  # (GUARDS, ng)
     poly: np.ndarray  # (NODES,): a guard over a panel, in powers
@@ -96,7 +98,7 @@ def watching(
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
     return Watch(
         way=np.array(way, np.int64),
-        side=np.zeros(ng),
+        side=np.ones(ng),
         fired=np.zeros(ng, np.int64),
         g=np.full((GUARDS, ng), np.nan),
         poly=np.zeros(NODES),

@@ -41,6 +41,8 @@ class Here:
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
     failed : Exception
         Why the motion cannot go on here.
+    watched : str
+        How closely it was looked for events, in words.
     """
 
     start: Start
@@ -53,6 +55,7 @@ class Here:
     kick: np.ndarray | None = None
     bounces: dict[int, Any] = field(default_factory=dict)
     failed: Exception | None = None
+    watched: str = ""
 
     @property
     def c(self) -> Compiled:

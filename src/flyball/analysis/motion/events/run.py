@@ -1,4 +1,4 @@
-"""A motion from event to event: the compiled loop, what is decided where it stops, and times at which laws have corners.
+"""A motion from event to event: the compiled loop, what is decided where it stops, times at which laws have corners.
 
 Where nothing is watched, steps only end on these times: the engine's own loop runs from one to the next.
 """
@@ -17,7 +17,7 @@ from ....errors import FlyballError
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
-from ....numerics.integrators.watching import EVENT
+from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ...progress import Tell
 from .happen import begin, happen
 from .here import Here
@@ -25,6 +25,7 @@ from .here import Here
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 LONGEST = 100_000  # steps in one call
 ENDLESS = 2000  # events
+PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -98,8 +99,11 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
-        c = here.c
-        self.watched = Watched(method, clock, c.system, c.work, width) if len(c.system.guard_i) else None
+        self.loop = self._loop() if len(here.c.system.guard_i) else None
+
+    def _loop(self) -> Watched:
+        c = self.here.c
+        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
     def go(self, breaks: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
@@ -124,6 +128,9 @@ class Run:
             return np.concatenate(self.rows), True
         except FlyballError as error:
             here.failed = error
+        finally:
+            if self.loop is not None:
+                here.watched = told(self.loop)
         return np.concatenate(self.rows), False
 
     def integrate(self) -> None:
@@ -132,10 +139,10 @@ class Run:
         before = time.perf_counter()
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
-            if self.watched is None:
+            if self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
-                used = self.watched.go_on(c.system, c.work, self.buffer)
+                used = self.loop.go_on(c.system, c.work, self.buffer)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
         if clock.count[ex.STATUS] == ex.RUNNING:
@@ -153,8 +160,10 @@ class Run:
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise self.endless()
-        happen(here, self.watched.fired if self.watched else ())
+        happen(here, self.loop.fired if self.loop else ())
         clock.count[ex.STARTED] = 0
+        if self.loop is not None and here.c.work is not self.loop.W:
+            self.loop = self._loop()
         if here.fresh:
             clock.real[ex.H], here.fresh = 0.0, False
 
@@ -171,6 +180,17 @@ class Run:
         here.y[:] = y
         self.take(row)
         clock.count[ex.STATUS] = ex.DONE
+
+
+def told(loop: Watched) -> str:
+    """How closely a motion was looked for events: what may have come and gone in between was not seen."""
+    count = loop.desk.count
+    guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
+    what = "1 guard" if guards == 1 else f"{guards} guards"
+    return (
+        f"{what} at {count[LOOKS] / steps:.0f} places a step on average, {PLACES} at least: what passes zero and comes "
+        f"back between two of them is not seen"
+    )
 
 
 def run_events(
