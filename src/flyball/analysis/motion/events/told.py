@@ -74,7 +74,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
         if now and not np.isnan(over):
             count = n.here.bounces.pop(s).count
             told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
-            n.over = max(n.over, over)
+            n.over = max(over, n.over)
         elif was != now and s not in hits:
             kind, said = words(n, s, now)
             if kind:
