@@ -41,7 +41,7 @@ def test_a_ball_bounces_to_rest(planar):
     assert np.allclose(z[-2:], r, rtol=0, atol=1e-12)
     hits = np.array([x.t for x in run.events])
     assert np.allclose(hits[:8], first * (1 + 2 * np.r_[0.0, np.cumsum(e ** np.arange(1, 8))]), rtol=0, atol=1e-8)
-    assert abs(hits[-1] - whole) < 1e-8
+    assert abs(next(x.t for x in run.events if x.kind == "rest") - whole) < 1e-9
     assert np.isclose(run["floor-ball"].normal[-1], G * _mass(run), rtol=1e-9)
     assert np.abs(run.energy.balance).max() < 1e-8 * _mass(run) * G * h
 
@@ -81,17 +81,17 @@ def test_a_block_thrown_up_a_slope(steep):
     top = 0.5 * v * stops
     assert np.allclose(run["block.x"][1], 0.75 * top, rtol=0, atol=1e-9)
     assert np.allclose(run["block.x"][2:], (top, top - 0.5 * down * 0.25), rtol=0, atol=1e-9)
-    assert abs(run.events[0].t - stops) < 1e-8
+    assert abs(next(x.t for x in run.events if x.t > 0.0) - stops) < 1e-8
     assert np.allclose(run["block.y"], 0.05, rtol=0, atol=1e-12)
 
 
 def test_the_lower_of_two_blocks_is_pulled_away():
     """mu1 between the blocks, mu2 on the floor: a2 = mu1 g, a1 = (F - mu1 m2 g - mu2 (m1 + m2) g) / m1."""
-    low = fb.Body("low", shape=fb.Box(edges=(1.0, 0.2, 0.1)), mass=2.0, position=(0, 0.1), material="low")
-    top = fb.Body("top", shape=fb.Box(edges=(0.2, 0.2, 0.1)), mass=1.0, position=(0, 0.3), material="top")
+    low = fb.Body("low", shape=fb.Box(edges=(1.0, 0.2, 0.1)), mass=2.0, position=(0, 0.1), material="steel")
+    top = fb.Body("top", shape=fb.Box(edges=(0.2, 0.2, 0.1)), mass=1.0, position=(0, 0.3), material="wood")
     m = fb.Mechanism("stack", planar=True, gravity=(0, -G))
-    m.add(floor(True), fb.Material("low", friction=0.2), fb.Material("top", friction=0.2))
-    m.add(low, top, fb.MaterialPair("low", "top", friction=0.3))
+    m.add(floor(True), fb.Material("steel", friction=0.2), fb.Material("wood", friction=0.2))
+    m.add(low, top, fb.MaterialPair("steel", "wood", friction=0.3))
     m.add(fb.Contact(friction=0.2), fb.PointForce("pull", "low", force=("20 N", 0), at=(0, 0.1)))
     t = 0.2
     run = m.simulate(t, outputs=[0.0, t], **TIGHT)
@@ -118,8 +118,9 @@ def test_a_block_rocks():
     hit = rate(0.0)
     m = scene(floor(True), block, planar=True, friction=5.0)
     run = m.simulate(quarter + 0.02, outputs=[0.0, 0.5 * quarter, quarter + 0.02], **TIGHT)
-    assert abs(run.events[0].t - quarter) < 1e-8
-    after = run.events[0].after["block.omega"]
+    first = next(x for x in run.events if x.kind == "impact")
+    assert abs(first.t - quarter) < 1e-8
+    after = first.after["block.omega"]
     assert np.isclose(after, ratio * hit, rtol=1e-8)
 
 

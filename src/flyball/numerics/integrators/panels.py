@@ -247,8 +247,9 @@ def value(W, x):
 def begin_sides(look, S, W, t, h):
     """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
 
-    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is on
-     the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back soon.
+    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is
+    on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
+    soon.
     """
     ng = W.way.shape[0]
     near = False

@@ -49,13 +49,13 @@ class Here:
     clock: Clock
     records: list[Any] = field(default_factory=list)
     lost: float = 0.0
-    given: float = 0.0
     stopped: str = ""
     fresh: bool = False
-    kick: np.ndarray | None = None
-    bounces: dict[int, Any] = field(default_factory=dict)
     failed: Exception | None = None
     watched: str = ""
+    given: float = 0.0
+    kick: np.ndarray | None = None
+    bounces: dict[int, Any] = field(default_factory=dict)
 
     @property
     def c(self) -> Compiled:

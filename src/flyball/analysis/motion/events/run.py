@@ -13,7 +13,7 @@ import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
-from ....errors import FlyballError
+from ....errors import FlyballError, ModelError
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
@@ -110,7 +110,7 @@ class Run:
         here, clock = self.here, self.here.clock
         forget(here.c.work.stack)
         try:
-            begin(here)
+            self.begin()
             legs = Legs(here, breaks)
             while not here.stopped:
                 self.integrate()
@@ -127,11 +127,18 @@ class Run:
         except KeyboardInterrupt:
             return np.concatenate(self.rows), True
         except FlyballError as error:
+            if isinstance(error, ModelError) and not here.t > self.first:  # the description is wrong
+                raise
             here.failed = error
         finally:
             if self.loop is not None:
                 here.watched = told(self.loop)
         return np.concatenate(self.rows), False
+
+    def begin(self) -> None:
+        """What happens as the motion begins."""
+        begin(self.here)
+        self.here.fresh = False
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
