@@ -7,7 +7,7 @@ import numpy as np
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
 from ....model.touch import Touch
 from ....results.events import Happening
-from ....tables.system import MODE, OFF
+from ....tables.system import MODE, OFF, SWITCH_PARTNER
 from .instant import Instant
 from .jump import Jump
 
@@ -79,11 +79,16 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
             kind, said = words(n, s, now)
             if kind:
                 told.setdefault(kind, []).append((s, said))
-        elif not was and not now and n.kind[s] == FRICTION and ways[s] * n.ways()[s] < 0.0:
+        elif not was and not now and _goes_both_ways(n, s) and ways[s] * n.ways()[s] < 0.0:
             told.setdefault("turn", []).append((s, "slides the other way"))
     for kind, all_of in told.items():
         names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
         record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
+
+
+def _goes_both_ways(n: Instant, s: int) -> bool:
+    """Whether a switch slides one way or the other: not a tangent of a place in space."""
+    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switch_i[s, SWITCH_PARTNER] < 0))
 
 
 def record(
