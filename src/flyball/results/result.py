@@ -174,8 +174,9 @@ class Result:
             return ()
         out = []
         for at, stretches in cuts:
-            over = self.t, self.q, self.v, self.states, self.vdot, self.multipliers
-            piece = Result(self.model, stretches.all[0].values, *(x[at] for x in over), self.health)
+            t, q, v, z = self.t[at], self.q[at], self.v[at], self.states[at]
+            vdot, lam = self.vdot[at], self.multipliers[at]
+            piece = Result(self.model, stretches.all[0].values, t, q, v, z, vdot, lam, self.health)
             piece.stretches, piece.wound = stretches, self.wound
             piece.exchanged = {k: x[at] for k, x in self.exchanged.items()}
             out.append(piece)
