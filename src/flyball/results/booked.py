@@ -2,42 +2,44 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 
-from .energy import GIVEN
-from .result import Result
-
-if TYPE_CHECKING:
-    from .stretches import Stretch
+GIVEN = "event_work"
+"""Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
+ALL = ""
 
 
-def booked(result: Result) -> dict[str, np.ndarray]:
-    """Energies [J] since the start, by their names in `Result.exchanged`: lost in impacts, given by events.
-
-    What a change of parameters gives is what the same state has more afterwards. Elements whose work is integrated
-    account for their own share (`Energy.work`).
-    """
-    stretches = result.stretches
-    if stretches is None:
+def booked(result: Any) -> dict[str, np.ndarray]:
+    """Energies [J] since the start, by their names in `Result.exchanged`: lost in impacts, given by events."""
+    if result.stretches is None:
         return {}
-    given, jumps = stretches.over("given"), list[np.ndarray]()
-    total = 0.0
-    for k, x in enumerate(stretches.all):
-        before = stretches.all[k - 1] if k else x
+    return {"impact_loss": result.stretches.over("lost"), GIVEN: result.stretches.over("given") + jumps(result)[ALL]}
+
+
+def jumps(result: Any) -> dict[str, np.ndarray]:
+    """What changes of parameters gave since the start [J] (n,): to each force that stores energy, and to all (`ALL`).
+
+    That is what the same state has more afterwards.
+    """
+    every, total = result.stretches.all, dict[str, float]()
+    out: dict[str, list[np.ndarray]] = {}
+    for k, x in enumerate(every):
+        before = every[k - 1] if k else x
         if x.values is not before.values:
-            total += _stored(result, x, before.end) - _stored(result, before, before.end)
-        jumps.append(np.full(x.rows, total))
-    return {"impact_loss": stretches.over("lost"), GIVEN: given + np.concatenate(jumps)}
+            now, then = (_stored(result, by, before.end) for by in (x, before))
+            total = {name: total.get(name, 0.0) + now[name] - then[name] for name in now}
+        for name in (ALL, *(f.name for f in x.values.structure.forces)):
+            out.setdefault(name, []).append(np.full(x.rows, total.get(name, 0.0)))
+    return {name: np.concatenate(parts) for name, parts in out.items()}
 
 
-def _stored(result: Result, by: Stretch, y: np.ndarray) -> float:
-    """Energy [J] of a state by the parameters of a stretch; without elements that account for themselves."""
+def _stored(result: Any, by: Any, y: np.ndarray) -> dict[str, float]:
+    """Energy [J] of a state by the parameters of a stretch: of every force, and all of it."""
     s = by.values.structure
     q, v, z = np.split(y[None, :], [s.nq, s.nq + s.nv], axis=1)
-    rows = result.multipliers.shape[1]
-    one = Result(result.model, by.values, np.zeros(1), q, v, z, np.zeros((1, s.nv)), np.zeros((1, rows)), result.health)
-    e = one.energy
-    own = [f.name for f in s.forces if f"{f.name}.work" not in s.state_at]
-    return float(e.kinetic[0] + e.gravity[0] + sum(one[name].energy[0] for name in own))
+    still, none = np.zeros((1, s.nv)), np.zeros((1, result.multipliers.shape[1]))
+    one = type(result)(result.model, by.values, np.zeros(1), q, v, z, still, none, result.health)
+    out = {f.name: float(one[f.name].energy[0]) for f in s.forces}
+    return out | {ALL: float(one.energy.kinetic[0] + one.energy.gravity[0]) + sum(out.values())}

@@ -10,6 +10,7 @@ import numpy as np
 from ..math.vec import dot, load9, mtv, mv
 from ..model.quantities import ENERGY, Quantity, quantities
 from ..tables.system import INERTIA, MASS
+from .booked import GIVEN, jumps
 from .views.base import Named
 
 if TYPE_CHECKING:
@@ -20,8 +21,6 @@ EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0}
 """Energies that contacts exchange, and by which sign the bodies have them."""
 STORED = "contact_elastic"
 """Energy stored in contacts that give way, among what contacts exchange."""
-GIVEN = "event_work"
-"""Energy that events gave: by kicks, and by changes of parameters that energy depends on."""
 
 
 class Energy(Named):
@@ -85,15 +84,17 @@ class Energy(Named):
     def work(self) -> dict[str, np.ndarray]:
         """Work that each damper, actuator, motor, given force and driver has put in since the start.
 
-        What a spring inside the same element stores is not counted: it is in the potential energy.
+        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a
+        change of its stiffness gave it, which an event did.
         """
         out = {}
         r = self._result
+        given = jumps(r) if r.pieces else {}
         for name in r.values.structure.states:
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
                 stored = getattr(element, "energy", np.zeros(1))
-                out[element.element.name] = element.work + stored - stored[0]
+                out[element.element.name] = element.work + stored - stored[0] - given.get(element.element.name, 0.0)
         return out
 
     def _of_pieces(self, name: str) -> np.ndarray:

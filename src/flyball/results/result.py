@@ -22,7 +22,7 @@ from .measured import Measured
 from .numbers import span
 from .reactions import Reactions
 from .records import Records
-from .stretches import Stretches
+from .stretches import Stretches, cut_up
 from .turn import Turn
 from .views import has_view, view
 from .views.base import Curves
@@ -169,17 +169,7 @@ class Result:
     @cached_property
     def pieces(self) -> tuple[Result, ...]:
         """The motion piece by piece, if parameters changed in it, each with its own; else none."""
-        cuts = self.stretches.pieces() if self.stretches is not None else []
-        if len(cuts) < 2:
-            return ()
-        out = []
-        for at, stretches in cuts:
-            over = self.t, self.q, self.v, self.states, self.vdot, self.multipliers
-            piece = Result(self.model, stretches.all[0].values, *(x[at] for x in over), self.health)
-            piece.stretches, piece.wound = stretches, self.wound
-            piece.exchanged = {k: x[at] for k, x in self.exchanged.items()}
-            out.append(piece)
-        return tuple(out)
+        return cut_up(self)
 
     @cached_property
     def records(self) -> Records:

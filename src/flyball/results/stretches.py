@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -99,3 +100,19 @@ class Stretches:
 def stretched(stretches: Sequence[Stretch]) -> Stretches | None:
     """The stretches of a motion; None where there is none."""
     return Stretches(tuple(stretches)) if stretches else None
+
+
+def cut_up(result: Any) -> tuple[Any, ...]:
+    """A result piece by piece, if parameters changed in it, each with its own; else none."""
+    cuts = result.stretches.pieces() if result.stretches is not None else []
+    if len(cuts) < 2:
+        return ()
+    names = "t", "q", "v", "states", "vdot", "multipliers"
+    out = []
+    for at, stretches in cuts:
+        parts = (getattr(result, name)[at] for name in names)
+        piece = type(result)(result.model, stretches.all[0].values, *parts, result.health)
+        piece.stretches, piece.wound = stretches, result.wound
+        piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
+        out.append(piece)
+    return tuple(out)
