@@ -69,6 +69,7 @@ def _happen(here: Here, fired: np.ndarray) -> None:
             resolve(Instant(here), fired)
         acts.told(["start"])
         fired = acts.passed()
+        here.acted.clear()  # what follows from it comes later
         if not len(fired) or here.stopped:
             return
     if len(fired):
