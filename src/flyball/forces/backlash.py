@@ -81,6 +81,10 @@ class Backlash(Unilateral):
         """What the sum is in the middle of the play; as drawn if None."""
         return n.middle
 
+    def first_weight(self, n: SimpleNamespace) -> float:
+        """Weights are relative to the first."""
+        return 1.0
+
     def examine(self, model: Model) -> None:
         """Its coordinates are there."""
         for text in self.coordinates:
@@ -114,6 +118,6 @@ class Backlash(Unilateral):
         kind = ELASTIC if self.acts() else STOP
         return (Switch(kind, along=self.coordinates, slides=self.acts()),)
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Half the gap to either side."""
         return switched(n, -0.5 * n.gap, 0.5 * n.gap)

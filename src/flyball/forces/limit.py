@@ -120,6 +120,6 @@ class Limit(Unilateral):
         """One along the coordinate."""
         return (Switch(ELASTIC if self.acts() else STOP, along=(self.coordinate,), slides=self.acts()),)
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Where it stops, and how."""
         return switched(n, n.lower, n.upper)

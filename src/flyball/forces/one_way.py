@@ -149,6 +149,6 @@ class Ratchet(Latch):
         """One along the coordinate or the difference."""
         return (Switch(RATCHET, along=self.along(), weighted=True),)
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """A tooth, the pitch, the restitution."""
         return n.direction * n.tooth, self.pitch_of(n), n.restitution

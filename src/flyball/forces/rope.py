@@ -147,7 +147,7 @@ class Rope(CoordinateForce):
         """One along its length."""
         return (Switch(ELASTIC if self.acts() else STOP, path=self.path(), slides=self.acts()),)
 
-    def switched(self, n: SimpleNamespace, label: str, separation: float = 0.0) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """It ends at its length."""
         return switched(n, None, self._free(n, separation))
 
