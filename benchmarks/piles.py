@@ -38,7 +38,7 @@ COLUMNS = {
 def contest(what: str, count: int, alone: bool) -> list[dict]:
     """A scene on every engine, in turn step by step."""
     p = cs.pile(what, count)
-    runs = {"flyball": flyball_contact.Run(flyball_contact.pile(p), fb.Impulse(step=cs.H))}
+    runs = {"flyball": flyball_contact.Run(flyball_contact.pile(p), fb.Stepping(step=cs.H))}
     if not alone and count < ALONE:
         import peer_mujoco_contact as mj
 
@@ -68,7 +68,7 @@ def main() -> None:
     p.add_argument("--json")
     a = p.parse_args()
     print(timing.heading())
-    flyball_contact.Run(flyball_contact.pile(cs.pile("mixed", 8)), fb.Impulse(step=cs.H)).step()  # compiled before
+    flyball_contact.Run(flyball_contact.pile(cs.pile("mixed", 8)), fb.Stepping(step=cs.H)).step()  # compiled before
     rows = []
     for scene in a.scenes:
         what, count = scene.split(":")

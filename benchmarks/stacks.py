@@ -38,11 +38,11 @@ def contest(name: str, shifted: bool, solver: str) -> list[dict]:
     import peer_mujoco_contact as mj
 
     s = cs.stack(cs.STACKS[name], shifted)
-    options = fb.Impulse(step=cs.H, solver=solver)
+    options = fb.Stepping(step=cs.H, solver=solver)
     runs = {
         "flyball": flyball_contact.Run(flyball_contact.stack(s), options),
         "flyball, 5 iterations": flyball_contact.Run(
-            flyball_contact.stack(s), fb.Impulse(step=cs.H, solver=solver, iterations=5)
+            flyball_contact.stack(s), fb.Stepping(step=cs.H, solver=solver, iterations=5)
         ),
         "MuJoCo Newton stiff": mj.Run(mj.stack(s, "stiff"), "Newton"),
         "MuJoCo CG stiff": mj.Run(mj.stack(s, "stiff"), "CG"),
@@ -73,7 +73,7 @@ def main() -> None:
     p.add_argument("--json")
     a = p.parse_args()
     print(timing.heading())
-    flyball_contact.Run(flyball_contact.stack(cs.stack([1.0, 1.0], False)), fb.Impulse(solver=a.solver)).step()
+    flyball_contact.Run(flyball_contact.stack(cs.stack([1.0, 1.0], False)), fb.Stepping(solver=a.solver)).step()
     rows = []
     for name in a.stacks:
         for shifted in (False, True):

@@ -12,7 +12,7 @@ import sys
 import flyball as fb
 
 BALLS, RADIUS, LENGTH = 5, 0.02, 0.15  # LENGTH: from the pivot to the middle of a ball [m]
-METHOD = fb.Impulse(step=1e-3, impacts="sequential")
+METHOD = fb.Stepping(step=1e-3, impacts="sequential")
 
 
 def mechanism(lifted: int = 1, angle: float = 0.6) -> fb.Mechanism:

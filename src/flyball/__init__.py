@@ -29,7 +29,7 @@ Look before you run
 
 Ask how it moves
     m.simulate(t_end)             -> Result: motion, reactions, energies, health; with contact by steps of impulses,
-                                  of which method=Impulse(step=...) makes choices
+                                  of which method=Stepping(step=...) makes choices
     m.kinematics(times)           -> Result, where drivers prescribe the motion
     m.inverse_dynamics(times)     -> InverseDynamics: what drives must give, what joints carry
     m.singularities(driver, range) -> Singularities: where it locks up or branches
@@ -80,7 +80,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from . import rotations as rotations
     from .analysis.assembly.start import Assembly as Assembly
-    from .analysis.motion.impulse.settings import Impulse as Impulse
+    from .analysis.motion.impulse.settings import Stepping as Stepping
     from .analysis.prepared import Prepared as Prepared
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
@@ -149,7 +149,7 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
-    "Impulse": "analysis.motion.impulse.settings",
+    "Stepping": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
     "Limit": "model.limit",
     "Material": "model.material",

@@ -81,7 +81,7 @@ def jellett(r: Result) -> np.ndarray:
 @pytest.fixture(scope="module")
 def tops() -> list[Result]:
     m = mechanism("tippe_top.py")
-    return [m.simulate(t, outputs=51, method=fb.Impulse(step=h)) for t, h in ((0.3, 4e-4), (0.3, 2e-4), (3.0, 2e-4))]
+    return [m.simulate(t, outputs=51, method=fb.Stepping(step=h)) for t, h in ((0.3, 4e-4), (0.3, 2e-4), (3.0, 2e-4))]
 
 
 def test_a_tippe_top_keeps_jelletts_quantity(tops):
@@ -154,7 +154,7 @@ def test_a_cradle_passes_the_blow_on():
     """The last ball rises as high as the first was lifted, the others hang still; two lifted, two fly off."""
     for lifted in (1, 2):
         m = mechanism("newtons_cradle.py", lifted=lifted)
-        r = m.simulate(0.6, outputs=61, method=fb.Impulse(step=5e-4, impacts="sequential"))
+        r = m.simulate(0.6, outputs=61, method=fb.Stepping(step=5e-4, impacts="sequential"))
         a = np.array([r[f"pivot {k}.angle"] for k in range(1, 6)])
         high = np.abs(a[:, 30:]).max(axis=1)
         np.testing.assert_allclose(high[5 - lifted :], 0.6, rtol=0.02)

@@ -82,7 +82,7 @@ def test_mechanisms_have_every_method_with_its_signature():
     for name, method in METHODS.items():
         assert inspect.signature(getattr(fb.Mechanism, name)) == inspect.signature(method)
     shown = str(inspect.signature(fb.Mechanism("m").simulate))
-    for part in ("rtol: 'float' = 1e-07", "method: 'str | Impulse' = 'auto'", "-> 'Result'"):
+    for part in ("rtol: 'float' = 1e-07", "method: 'str | Stepping' = 'auto'", "-> 'Result'"):
         assert part in shown
 
 

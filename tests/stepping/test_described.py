@@ -103,15 +103,15 @@ def test_whole_turns_count_and_round_bodies_turn_exactly():
         m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0.1))
         wheel = fb.Sphere(radius=0.1)
         m.add(fb.Body("wheel", shape=wheel, mass=1, inertia=0.01, position=(0, 2), angle=1.0, angular_velocity=100.0))
-        run = m.simulate(0.4, outputs=2, method=fb.Impulse(step=step))["wheel"]
+        run = m.simulate(0.4, outputs=2, method=fb.Stepping(step=step))["wheel"]
         assert run.angle == pytest.approx([1.0, 41.0], abs=1e-9)
 
 
 def test_a_solver_of_the_convex_problem_does_not_take_coulombs():
     """It would leave everything as it was: bodies would fall through the floor."""
     with pytest.raises(fb.ModelError, match="coulomb=False"):
-        fb.Impulse(solver="barzilai-borwein")
-    assert not fb.Impulse(solver="barzilai-borwein", coulomb=False).coulomb
+        fb.Stepping(solver="barzilai-borwein")
+    assert not fb.Stepping(solver="barzilai-borwein", coulomb=False).coulomb
 
 
 def test_a_belt_gives_the_energy_of_what_bounces_on_it():
@@ -121,7 +121,7 @@ def test_a_belt_gives_the_energy_of_what_bounces_on_it():
     m.add(fb.Ground("floor", shape=fb.Plane(), material="belt"))
     m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 0.5)))
     m.add(fb.Contact(friction=0.5, restitution=0.8))
-    run = m.simulate(0.6, outputs=61, method=fb.Impulse(step=1e-3))
+    run = m.simulate(0.6, outputs=61, method=fb.Stepping(step=1e-3))
     friction, belt = run.exchanged["friction_loss"], run.exchanged["surface_work"]
     assert np.diff(friction).min() > -1e-12
     before = np.searchsorted(run.t, np.sqrt(2 * 0.4 / G)) + 1

@@ -36,7 +36,7 @@ def test_a_pendulum_hits_a_ball_and_all_energy_is_accounted_for():
     m.add(fb.Body("bob", mass=1.0, inertia=(1e-6,) * 3, position=(-1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
     m.add(fb.Revolute("hinge", "ground", "bob", at=(0.0, 0, 1.1), axis=(0, 1, 0)))
     m.add(fb.Body("ball", mass=1.0, inertia=(0.004,) * 3, position=(0.2, 0, 0.1), shape=fb.Sphere(radius=0.1)))
-    r = m.simulate(1.0, outputs=201, method=fb.Impulse(step=1e-3))
+    r = m.simulate(1.0, outputs=201, method=fb.Stepping(step=1e-3))
     v = np.sqrt(2 * G)
     assert r["ball"].velocity[-1, 0] == pytest.approx(v / 2, rel=0.01)
     assert np.linalg.norm(r["bob"].position - (0, 0, 1.1), axis=1) == pytest.approx(1.0, abs=1e-12)
@@ -128,7 +128,7 @@ def test_newtons_cradle_on_joints():
         shape = fb.Sphere(radius=0.05)
         m.add(fb.Body(f"b{k}", mass=1.0, inertia=1e-6, position=(x - np.sin(a), -np.cos(a)), angle=-a, shape=shape))
         m.add(fb.Revolute(f"j{k}", "ground", f"b{k}", at=(x, 0)))
-    r = m.simulate(0.75, outputs=301, method=fb.Impulse(step=1e-3, impacts="sequential"))
+    r = m.simulate(0.75, outputs=301, method=fb.Stepping(step=1e-3, impacts="sequential"))
     fast = [np.abs(r[f"b{k}"].velocity[:, 0]).max() for k in range(5)]
     assert fast[4] == pytest.approx(2 * np.sqrt(G) * np.sin(0.15), rel=1e-3)
     assert max(fast[1:4]) < 0.01 * fast[4]

@@ -22,7 +22,7 @@ def ball(gravity: float = 0.0, gap: float = 0.0, speed: float = 0.0, **law: obje
 
 def hit(h: float, t_end: float, **law: object) -> fb.Result:
     """An impact at 1 m/s in n equal steps of about h, each of them an output."""
-    return ball(speed=1.0, **law).simulate(t_end, outputs=round(t_end / h) + 1, method=fb.Impulse(step=1.01 * h))
+    return ball(speed=1.0, **law).simulate(t_end, outputs=round(t_end / h) + 1, method=fb.Stepping(step=1.01 * h))
 
 
 def test_an_impact_by_hertz() -> None:
@@ -84,7 +84,7 @@ def test_a_linear_law_that_does_not_pull() -> None:
 def test_rest_under_weight_at_any_step(law: dict, overlap: float, h: float) -> None:
     """Where the force is the weight it stays; that overlap is no fault."""
     m = ball(gravity=G, gap=-overlap, **law)
-    run = m.simulate(1.0, outputs=11, method=fb.Impulse(step=h))
+    run = m.simulate(1.0, outputs=11, method=fb.Stepping(step=h))
     assert R - run["ball"].z == pytest.approx(overlap, rel=1e-5)
     assert run.contacts.force[-1] == pytest.approx([0, 0, G], rel=1e-5)
     assert run.energy.contact_elastic[0] == pytest.approx(
@@ -106,7 +106,7 @@ def test_steel_by_youngs_modulus() -> None:
         m.add(fb.Body(name, shape=shape, density=density, position=place, velocity=velocity, material="steel"))
     m.add(fb.Contact(law="hertz"))
     t_end = 3.5 * deepest / v
-    run = m.simulate(t_end, outputs=101, method=fb.Impulse(step=t_end / 99))
+    run = m.simulate(t_end, outputs=101, method=fb.Stepping(step=t_end / 99))
     assert (2 * r + run["a"].x - run["b"].x).max() == pytest.approx(deepest, rel=1e-3)
     assert run["b"].vx[-1] - run["a"].vx[-1] == pytest.approx(v, rel=1e-6)
     assert np.abs(run["a"].vx + run["b"].vx).max() < 1e-12
@@ -128,7 +128,7 @@ def test_hard_and_soft_contacts_in_one_scene() -> None:
     """The hard impact takes no time, so that the mat gives nothing to it; then all rest, the box in the mat."""
     m = on_a_mat(law="hunt-crossley", stiffness=1e6, dissipation=1)
     m.replace(fb.Body("ball", shape=fb.Sphere(radius=0.05), mass=1, position=(0, 0, 0.25)))
-    run = m.simulate(0.3, outputs=301, method=fb.Impulse(step=1e-3))
+    run = m.simulate(0.3, outputs=301, method=fb.Stepping(step=1e-3))
     k = int(np.argmax(np.diff(run["ball"].vz) > 0.1))
     v = -run["ball"].vz[k]
     assert run["ball"].vz[k + 1] == pytest.approx(v * (0.7 * 2 - 1) / 3, abs=2 * G * 1e-3)
@@ -148,7 +148,7 @@ def test_friction_on_what_gives_way(solver: str) -> None:
     position = (0, 0, 0.05 - 2 * G / 4e5)
     m.add(fb.Body("box", shape=fb.Box(edges=(0.2, 0.2, 0.1)), mass=2, position=position, velocity=(1, 0, 0)))
     m.add(fb.Contact(friction=0.3, law="linear", stiffness="100 kN/m", damping=200))
-    run = m.simulate(0.2, outputs=11, method=fb.Impulse(step=2e-3, solver=solver))
+    run = m.simulate(0.2, outputs=11, method=fb.Stepping(step=2e-3, solver=solver))
     assert run["box"].vx[-1] == pytest.approx(1 - 0.3 * G * 0.2, rel=1e-8)
     assert np.abs(run.energy.balance).max() < 1e-7
     assert run.energy.friction_loss[-1] == pytest.approx(0.5 * 2 * (1 - run["box"].vx[-1] ** 2), rel=1e-2)
@@ -161,7 +161,7 @@ def test_a_pendulum_hits_a_wall_that_gives_way() -> None:
     m.add(fb.Body("bob", shape=fb.Sphere(radius=R), mass=1, position=(0.8, 0, 0.4)))
     m.add(fb.Revolute("hinge", "ground", "bob", at=(0, 0, 1), axis=(0, 1, 0)))
     m.add(fb.Contact(friction=0, law="hertz", stiffness=1e6))
-    run = m.simulate(1.5, outputs=501, method=fb.Impulse(step=1e-3))
+    run = m.simulate(1.5, outputs=501, method=fb.Stepping(step=1e-3))
     assert np.abs(run.energy.balance).max() < 1e-4
     assert run["bob"].z[250:].max() == pytest.approx(0.4, abs=3e-3)
 
@@ -183,7 +183,7 @@ def test_stiff_balls_that_settle_make_no_energy() -> None:
 def test_far_too_large_steps_bring_to_rest_and_gain_nothing() -> None:
     """The impact takes 1.3 ms; steps of 10 ms."""
     m = ball(gravity=G, gap=0.05, law="hertz", stiffness=1e9)
-    run = m.simulate(1.0, outputs=101, method=fb.Impulse(step=0.01))
+    run = m.simulate(1.0, outputs=101, method=fb.Stepping(step=0.01))
     assert abs(run["ball"].vz[-1]) < 1e-6
     assert R - run["ball"].z[-1] == pytest.approx((G / 1e9) ** (2 / 3), rel=1e-3)
     assert np.abs(run.energy.balance).max() < 1e-10

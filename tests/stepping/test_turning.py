@@ -22,7 +22,7 @@ def ball(velocity: tuple, turning: tuple, solver: str) -> fb.Result:
     start = {"velocity": velocity, "angular_velocity": turning}
     m.add(fb.Body("ball", shape=fb.Sphere(radius=R), mass=1, position=(0, 0, R), **start))
     m.add(fb.Contact(friction=0.5, rolling_friction=RHO, spinning_friction=SIGMA))
-    return m.simulate(0.5, outputs=11, method=fb.Impulse(step=2e-3, solver=solver))
+    return m.simulate(0.5, outputs=11, method=fb.Stepping(step=2e-3, solver=solver))
 
 
 @pytest.mark.parametrize("solver", ["auto", "newton", "gauss-seidel"])
@@ -41,8 +41,8 @@ def test_rolling_and_spinning_slow_down(solver: str) -> None:
 
 def test_a_solver_of_the_convex_form_is_refused_for_coulombs_law() -> None:
     with pytest.raises(fb.ModelError, match=r"convex problem only(?s:.*)coulomb=False"):
-        fb.Impulse(solver="barzilai-borwein")
-    assert fb.Impulse(solver="barzilai-borwein", coulomb=False).solver == "barzilai-borwein"
+        fb.Stepping(solver="barzilai-borwein")
+    assert fb.Stepping(solver="barzilai-borwein", coulomb=False).solver == "barzilai-borwein"
 
 
 @pytest.mark.parametrize("held", [False, True])
@@ -57,7 +57,7 @@ def test_what_torques_take_in_impacts_is_frictions_too(restitution: float, law: 
     if held:  # its forces are not those of gravity alone
         m.add(fb.SpringDamper("spring", "ground", "ball", at=((0, 0, 9), (0, 0, R + 0.2)), stiffness=1e-3))
     m.add(fb.Contact(friction=0.5, rolling_friction=0.01, spinning_friction=0.01, restitution=restitution))
-    run = m.simulate(1, outputs=11, method=fb.Impulse(step=2e-3, restitution=law))
+    run = m.simulate(1, outputs=11, method=fb.Stepping(step=2e-3, restitution=law))
     assert run.energy.friction_loss[-1] > 0.9
     assert np.abs(run.energy.balance).max() < (1e-5 if held else 1e-12)
     assert np.diff(run.energy.total).max() < (1e-5 if held else 1e-12)

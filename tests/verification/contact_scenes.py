@@ -20,4 +20,4 @@ def floor(slope=0.0, planar=False, **contact):
 
 def stepped(m, span, step, outputs=2, **choices):
     """Simulate by steps of ``step`` seconds."""
-    return m.simulate(span, outputs=outputs, method=fb.Impulse(step=step, **choices))
+    return m.simulate(span, outputs=outputs, method=fb.Stepping(step=step, **choices))

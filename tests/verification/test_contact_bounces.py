@@ -23,7 +23,7 @@ def worst(e, step, law, planar=False):
     """Error of the heights of the first three bounces, in parts of the first height, from energies at their tops."""
     fall, up = np.sqrt(2 / G), 2 * e * np.sqrt(2 / G)
     times = [0.0, *(fall + up * (sum(e**k for k in range(n)) + e**n / 2) for n in range(3))]
-    run = ball(e, planar=planar).simulate(times[-1], outputs=times, method=fb.Impulse(step=step, restitution=law))
+    run = ball(e, planar=planar).simulate(times[-1], outputs=times, method=fb.Stepping(step=step, restitution=law))
     heights = (run.energy.total - run.energy.total[0]) / (2 * G) + 1
     return np.abs(heights[1:] - e ** (2 * np.arange(1, 4))).max()
 

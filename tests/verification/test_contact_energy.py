@@ -66,7 +66,7 @@ def test_energy_never_grows(seed, planar, law):
     """Its changes are what friction and impacts took, to rounding, and it never rises but by lifts out of overlaps."""
     m, step = scene(seed, planar)
     choices = {"impacts": law} if law == "sequential" else {"restitution": law}
-    run = m.simulate(1.0, outputs=int(1 / step) + 1, method=fb.Impulse(step=float(step), **choices))
+    run = m.simulate(1.0, outputs=int(1 / step) + 1, method=fb.Stepping(step=float(step), **choices))
     E = run.energy.total - run.energy.total[-1]  # above rest, about
     assert E[0] > 10
     lifts = np.diff(run.exchanged["impact_loss"]) + np.diff(run.exchanged["friction_loss"])

@@ -69,7 +69,7 @@ CASES = {
 def test_as_routh_says(case):
     angle, velocity, spin, mu, e = CASES[case]
     m = rod(angle, velocity, spin, mu, e)
-    run = m.simulate(1e-4, outputs=2, method=fb.Impulse(step=1e-5))
+    run = m.simulate(1e-4, outputs=2, method=fb.Stepping(step=1e-5))
     p, u, N = routh(angle, velocity, spin, mu, e)
     got = M * (run["rod"].velocity[-1] - run["rod"].velocity[0])
     assert got == pytest.approx(p, rel=2e-3, abs=2e-4)
@@ -84,7 +84,7 @@ def test_no_law_makes_energy(law):
     for _ in range(40):
         angle, mu, e = rng.uniform(0.2, 1.5), rng.uniform(0, 1.5), rng.uniform(0.3, 1)
         m = rod(angle, (rng.uniform(-4, 4), -1), rng.uniform(-3, 3), mu, e)
-        run = m.simulate(1e-4, outputs=2, method=fb.Impulse(step=2e-5, restitution=law))
+        run = m.simulate(1e-4, outputs=2, method=fb.Stepping(step=2e-5, restitution=law))
         assert run.energy.kinetic[-1] <= run.energy.kinetic[0] * (1 + 1e-9)
         told += any(law.title() in n for n in run.health.contact.notes)
     assert told > 0 or law != "newton"

@@ -28,7 +28,7 @@ from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
 from .motion.impulse.run import impulse_motion
-from .motion.impulse.settings import Impulse
+from .motion.impulse.settings import Stepping
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
@@ -50,7 +50,7 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 class SimulateOptions(Integration):
     """What `Mechanism.simulate` is asked."""
 
-    method: str | Impulse  # type: ignore[assignment]
+    method: str | Stepping  # type: ignore[assignment]
     t_end: float
     t_start: float | None
     outputs: int | Sequence[float]
@@ -65,7 +65,7 @@ class SimulateOptions(Integration):
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""
-        if not isinstance(self.method, Impulse) and self.method not in (AUTO, IMPULSE):
+        if not isinstance(self.method, Stepping) and self.method not in (AUTO, IMPULSE):
             super().check_method()
 
 
@@ -76,7 +76,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     o = chosen(model, o)
-    if isinstance(o.method, Impulse):
+    if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
@@ -100,10 +100,10 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Impulse() if has_contact(model) else USUAL)
+        o = replace(o, method=Stepping() if has_contact(model) else USUAL)
     elif o.method == IMPULSE:
-        o = replace(o, method=Impulse())
-    if not isinstance(o.method, Impulse):
+        o = replace(o, method=Stepping())
+    if not isinstance(o.method, Stepping):
         if has_contact(model):
             raise ModelError(
                 f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "

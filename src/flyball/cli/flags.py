@@ -89,7 +89,7 @@ KINDS: dict[str, tuple[Any, Callable[[Any, str, str], Any]]] = {  # annotation -
     "int": (int, _as_is),
     "float": (float, _as_is),
     "bool": (bool, _as_is),
-    "str | Impulse": (str, _as_is),
+    "str | Stepping": (str, _as_is),
     "bool | str": (bool, _as_is),
     "float | str": (str, quantity),
     "Sequence[str]": (list[str], _as_is),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from ..analysis.motion.impulse.settings import Impulse
+    from ..analysis.motion.impulse.settings import Stepping
     from ..analysis.prepared import Prepared
     from ..model.model import Model
     from ..results.comparison import Comparison
@@ -29,7 +29,7 @@ class Motions(Model):
         parameters: Mapping[str, float | str] | None = None,
         start: Result | None = None,
         coordinates: str = "auto",
-        method: str | Impulse = "auto",
+        method: str | Stepping = "auto",
         rtol: float = 1e-7,
         atol: float | None = None,
         max_step: float | str = math.inf,
@@ -63,10 +63,10 @@ class Motions(Model):
             Go on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
-        method : {"auto", "dop853", "rk45", "impulse"} or Impulse
-            ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``impulse``, or an
-            `Impulse` with choices of its own: steps of fixed length by impulses, for contact with friction. auto: those
-            where the mechanism has contact, else ``dop853``.
+        method : {"auto", "dop853", "rk45", "impulse"} or Stepping
+            ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``impulse``, or a
+            `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
+            those where the mechanism has contact, else ``dop853``.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least.
         atol : float [m, rad, m/s, rad/s], optional

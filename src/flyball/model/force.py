@@ -131,6 +131,7 @@ class CoordinateForce(Force):
         "rest": ("m", "rad"),
         "force": ("N", "N*m"),
     }
+    not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be
     sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
 
     def ends(self) -> dict[str, str]:

@@ -55,8 +55,8 @@ def check_references(model: Model, e: Element) -> None:
 
 def _check_path(model: Model, e: CoordinateForce) -> None:
     """What it acts along exists, and can move."""
-    if e.coordinate_text() or hasattr(e, "coordinate"):
-        model.coordinate(e.coordinate_text(), e)
+    for text in (e.coordinate_text(),) if hasattr(e, "coordinate") else e.along():
+        model.coordinate(text, e)
     carriers = [model.carrier(name, e) for name in e.ends().values()]
     for k, (a, b) in enumerate(itertools.pairwise(carriers)):
         if a == b:

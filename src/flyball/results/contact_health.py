@@ -76,7 +76,7 @@ class ContactHealth:
             share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"
             out.append(
                 f"{share}: forces are rough there; take shorter steps, or allow more by "
-                f"method=fb.Impulse(iterations=...)"
+                f"method=fb.Stepping(iterations=...)"
             )
         if self.size > 0.0 and self.worst_overlap > max(0.02 * self.size, 1.01 * self.overlap_at_start):
             part = f"{100.0 * self.worst_overlap / self.size:.2g} per cent of the smallest body"

@@ -51,8 +51,9 @@ def _along(s: Structure, e: CoordinateForce) -> int:
     if text in s.measured:
         return s.measured[text]
     m = s.measured[text] = len(s.measured)
-    if e.coordinate_text():
-        coordinate_term(s, text, e, m, measured=True)
+    for k, one in enumerate(e.along()):
+        term = coordinate_term(s, one, e, m, measured=True)
+        term.index, term.switch = k, None if e.coordinate_text() else ""
     for a, b, formula in e.path():
         measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
     return m

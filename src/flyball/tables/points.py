@@ -109,8 +109,8 @@ def _coordinates(model: Model) -> Iterator[tuple[str, Element]]:
         yield from ((text, coupling) for text in coupling.coupled())
     yield from ((d.coordinate, d) for d in model.drivers)
     for f in model.forces:
-        if isinstance(f, CoordinateForce) and f.coordinate_text():
-            yield f.coordinate_text(), f
+        if isinstance(f, CoordinateForce):
+            yield from ((text, f) for text in f.along())
 
 
 class _Places:

@@ -69,9 +69,10 @@ def _force(result: Result, places: Places, e: Any) -> Iterator[Found]:
         return
     M = places.end(e.name, "M")
     if M is None:
-        coordinate = e.coordinate_text() if isinstance(e, CoordinateForce) else ""
-        if coordinate:
-            yield from _along(result, places, e.name, coordinate, getattr(view, list(e.outputs)[-1]))
+        texts = e.along() if isinstance(e, CoordinateForce) else ()
+        effort = getattr(view, list(e.outputs)[-1]) if texts else None
+        for text, weight in zip(texts, e.switch_weights(None, "") or (1.0,) * len(texts), strict=True):
+            yield from _along(result, places, e.name, text, weight * effort)
         return
     force, torque = view.wrench
     if isinstance(e, BodyForce):

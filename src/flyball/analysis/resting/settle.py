@@ -25,7 +25,7 @@ from ..motion.impulse.collect import Collected, coordinates
 from ..motion.impulse.held import Held, acting_values, held_apart
 from ..motion.impulse.parts import parts
 from ..motion.impulse.scene import begin, placed, smallest
-from ..motion.impulse.settings import Impulse
+from ..motion.impulse.settings import Stepping
 from .closed import refuse_surfaces
 
 STEPS = 40_000
@@ -59,7 +59,7 @@ def settled(model: Model, base: Assembly, parameters: Mapping[str, float] | None
     held = held_apart(values, base.t, parameters, found, free)
     gravity = float(np.linalg.norm(values.system.glob[:3]))
     h = PART * math.sqrt(smallest(scene, values) / gravity) if gravity > 0.0 else 5e-3
-    o = Impulse(step=h, tolerance=1e-9 * (gravity or 1.0) * h, iterations=ITERATIONS, position_iterations=ITERATIONS)
+    o = Stepping(step=h, tolerance=1e-9 * (gravity or 1.0) * h, iterations=ITERATIONS, position_iterations=ITERATIONS)
     still = Assembly(base.compiled, base.t, base.q, 0.0 * base.v)
     if held:
         own = held.start.assembly.compiled

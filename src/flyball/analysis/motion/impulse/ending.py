@@ -36,7 +36,7 @@ from ...assembly.start import Assembly
 from ...mobility import mobility
 from .collect import Collected, coordinates, sets
 from .scene import smallest
-from .settings import Impulse
+from .settings import Stepping
 
 ROUNDING = 1e-9
 SLIGHT = 1e-6  # part of the potential energy that is no reason to say anything
@@ -49,7 +49,7 @@ def result_of(
     stepper: Stepper,
     kept: Collected,
     sides: Sides,
-    o: Impulse,
+    o: Stepping,
     since: float,
     interrupted: bool,
 ) -> Result:
@@ -123,7 +123,7 @@ def _picked(stepper: Stepper, solver: str) -> str:
     return f"auto: {newton} islands of bodies that touch by Newton's method, {sweeps} by Gauss-Seidel"
 
 
-def _contact_health(scene: Touching, stepper: Stepper, o: Impulse, size: float) -> ContactHealth:
+def _contact_health(scene: Touching, stepper: Stepper, o: Stepping, size: float) -> ContactHealth:
     real, count = stepper.pace.real, stepper.pace.count
     notes = []
     if stepper.halved:

@@ -28,11 +28,11 @@ from .going_on import base_of, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
 from .scene import begin, movers, placed
-from .settings import Impulse
+from .settings import Stepping
 
 NO_WAY = (
     "a force or a law gives no finite number, the equations have no solution, or joints cannot be closed: give shorter "
-    "steps, method=fb.Impulse(step=...)"
+    "steps, method=fb.Stepping(step=...)"
 )
 NOTICE = "compiling steps with contact for this machine, once: about a quarter of a minute"
 EACH = 1000  # steps after which it is told how far it is
@@ -42,7 +42,7 @@ def impulse_motion(
     model: Model,
     span: tuple[float, float],
     times: np.ndarray,
-    o: Impulse,
+    o: Stepping,
     parameters: Mapping[str, float] | None,
     tell: Tell,
     before: Result | None = None,
@@ -89,7 +89,7 @@ def impulse_motion(
     return result_of(base, scene, stepper, kept, sides, o, since, interrupted)
 
 
-def made_ready(scene: Touching, o: Impulse, free: int, mechanism: bool) -> Beside:
+def made_ready(scene: Touching, o: Stepping, free: int, mechanism: bool) -> Beside:
     """What compiles what the steps need; says so if it takes long."""
     turning = bool((scene.surfaces.pair[..., ROLLING : SPINNING + 1] > 0.0).any())
     small = is_small(free, int(mechanism), turning)
@@ -106,7 +106,7 @@ def _size(scene: Touching, name: str) -> int:
 
 
 def march(
-    stepper: Stepper, span: tuple[float, float], times: np.ndarray, o: Impulse, kept: Collected, tell: Tell
+    stepper: Stepper, span: tuple[float, float], times: np.ndarray, o: Stepping, kept: Collected, tell: Tell
 ) -> bool:
     """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted."""
     first, last = span

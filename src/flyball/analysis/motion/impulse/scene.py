@@ -33,7 +33,7 @@ from ....tables.coordinates import BodyState
 from ....tables.values import Values
 from ...assembly.start import Assembly
 from .held import Held
-from .settings import RESTITUTION, Impulse
+from .settings import RESTITUTION, Stepping
 
 MARGIN = 0.01  # gap up to which what does not approach is a contact, in parts of the smallest shape
 FLATTEST = 1e-9  # overlap that is none, in parts of the smallest shape
@@ -65,7 +65,7 @@ def movers(scene: Touching, bodies: Mapping[str, BodyState]) -> Movers:
     return M
 
 
-def begin(scene: Touching, M: Movers, values: Values, o: Impulse, held: Held | None = None) -> Stepper:
+def begin(scene: Touching, M: Movers, values: Values, o: Stepping, held: Held | None = None) -> Stepper:
     """The stepper at the start."""
     planar = values.structure.model.planar
     real, count = np.zeros(REALS), np.zeros(COUNTS, np.int64)

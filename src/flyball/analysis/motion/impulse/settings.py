@@ -16,8 +16,8 @@ IMPACTS = ("simultaneous", "sequential")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Impulse:
-    """How a motion with contact is stepped: ``simulate(..., method=fb.Impulse(step="2 ms"))``.
+class Stepping:
+    """How a motion with contact is stepped: ``simulate(..., method=fb.Stepping(step="2 ms"))``.
 
     Every step solves for the velocities at its end, with all contacts and joints at once, and then moves bodies out of
     what overlap is left without giving them velocity.
@@ -60,22 +60,24 @@ class Impulse:
         for name in ("step", "tolerance"):
             positive(getattr(self, name), name)
             if not math.isfinite(getattr(self, name)):
-                raise ModelError(f"{name} of Impulse must be finite")
+                raise ModelError(f"{name} of Stepping must be finite")
         for name in ("iterations", "position_iterations"):
             if getattr(self, name) is not None:
                 count(getattr(self, name), name)
         for name, known in (("solver", names()), ("restitution", RESTITUTION), ("impacts", IMPACTS)):
             if getattr(self, name) not in known:
-                raise ModelError(f"unknown {name} {getattr(self, name)!r} of Impulse; choose one of {', '.join(known)}")
+                raise ModelError(
+                    f"unknown {name} {getattr(self, name)!r} of Stepping; choose one of {', '.join(known)}"
+                )
         if self.impacts == "sequential" and self.restitution != "poisson":
             raise ModelError(
-                f"impacts='sequential' of Impulse go by Poisson's law, so restitution={self.restitution!r} would do "
+                f"impacts='sequential' of Stepping go by Poisson's law, so restitution={self.restitution!r} would do "
                 f"nothing; leave one of the two out"
             )
 
         if self.solver in CONVEX_ONLY and self.coulomb:
             raise ModelError(
-                f"solver {self.solver!r} of Impulse solves the convex problem only: give coulomb=False with it"
+                f"solver {self.solver!r} of Stepping solves the convex problem only: give coulomb=False with it"
             )
 
     @property
@@ -83,6 +85,6 @@ class Impulse:
         """The longest step [s]."""
         return float(self.step)
 
-    def bounded(self, longest: float) -> Impulse:
+    def bounded(self, longest: float) -> Stepping:
         """With steps of at most ``longest`` seconds."""
         return dataclasses.replace(self, step=min(self.longest, longest))
