@@ -11,7 +11,7 @@ from ..model.model import Model
 
 def touching_parts(model: Model) -> Iterator[Element]:
     """Parts that only a motion by impulses knows: contacts, limits, many bodies."""
-    yield from (*model.contacts, *model.limits, *model.bulk)
+    yield from (*model.contacts, *(e for e in model.limits if not e.acts()), *model.bulk)
 
 
 def refuse_contact(model: Model, analysis: str) -> None:
@@ -33,7 +33,7 @@ def refuse_contact(model: Model, analysis: str) -> None:
 
 def left_out(model: Model) -> str:
     """What freedoms are counted without, as a sentence; empty if that is nothing."""
-    parts = [e.title for e in (*model.contacts, *model.limits)]
+    parts = [e.title for e in (*model.contacts, *model.limits) if not (e in model.limits and e.acts())]
     out = f"{', '.join(parts)}: freedoms and the start are those without" if parts else ""
     bulk = [f"the {e.count} bodies of {e.title}" for e in model.bulk]
     return "; ".join(x for x in (out, f"{', '.join(bulk)}: not counted in freedoms" if bulk else "") if x)

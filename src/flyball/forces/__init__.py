@@ -35,11 +35,16 @@ INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench"
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
+    from .backlash import Backlash as Backlash
     from .bushing import Bushing as Bushing
     from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
+    from .detent import Detent as Detent
     from .joint_friction import JointFriction as JointFriction
+    from .limit import Limit as Limit
     from .motor import Motor as Motor
+    from .one_way import OneWay as OneWay
+    from .one_way import Ratchet as Ratchet
     from .point_force import PointForce as PointForce
     from .point_torque import PointTorque as PointTorque
     from .rope import Rope as Rope

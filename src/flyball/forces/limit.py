@@ -22,10 +22,10 @@ KIND = 8
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along x: max(0, k (lower - x) - c rate) below the lower stop, less max(0, k (x - upper) + c rate) above the upper.
+    """Along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above the upper.
 
-    A side without a stop has k = c = 0. Where the side is frozen (`constraints.modes.FROZEN`) the formula of that side goes
-    on beyond its corner.
+    A side without a stop has k = c = 0. Where the side is frozen (`constraints.modes.FROZEN`) the formula of that side
+    goes on beyond its corner.
     """
     o = 0.0 * x
     below, above = par[4] - x, x - par[5]

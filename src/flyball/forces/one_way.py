@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -11,36 +11,12 @@ import numpy as np
 from ..constraints.modes import ONE_WAY, RATCHET
 from ..errors import ModelError
 from ..model.element import Number, Ratio, Unit, element, nonnegative, positive
-from ..model.limit import Unilateral, check_direction, check_same_kind
+from ..model.limit import Latch, check_direction
 from ..model.material import check_restitution
 from ..model.switch import Switch
 
 if TYPE_CHECKING:
     from ..model.model import Model
-
-
-@dataclass(frozen=True)
-class Latch(Unilateral):
-    """What may move one way: a coordinate, or the difference of two."""
-
-    coordinate: str
-
-    def along(self) -> tuple[str, ...]:
-        """The coordinate, and that which it is relative to."""
-        other = getattr(self, "relative_to", None)
-        return (self.coordinate,) if other is None else (self.coordinate, other)
-
-    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Such that the quantity may grow."""
-        way = float(n.direction.real)
-        return (way, -way)[: len(self.along())]
-
-    def examine(self, model: Model) -> None:
-        """Its coordinates are there, and of one kind."""
-        for text in self.along():
-            model.coordinate(text, self)
-        if len(self.along()) == 2:
-            check_same_kind(self, model, *self.along())
 
 
 @element
@@ -56,8 +32,8 @@ class OneWay(Latch):
     coordinate : str
         ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
     relative_to : str
-        Another coordinate of the same kind: then it is the first less this one that goes one way. A bicycle's freewheel:
-        ``OneWay("freewheel", "wheel.angle", relative_to="sprocket.angle")``.
+        Another coordinate of the same kind: then it is the first less this one that goes one way. A bicycle's
+        freewheel: ``OneWay("freewheel", "wheel.angle", relative_to="sprocket.angle")``.
     direction : 1 or -1
         Whether it may grow or fall.
 
@@ -121,7 +97,7 @@ class Ratchet(Latch):
     direction: Annotated[Number, Unit("1")] = 1.0
     restitution: Ratio = 0.0
 
-    dimensions: ClassVar = Unilateral.dimensions | {"pitch": ("m", "rad"), "tooth": ("m", "rad")}
+    dimensions: ClassVar = Latch.dimensions | {"pitch": ("m", "rad"), "tooth": ("m", "rad")}
     drawn: ClassVar[str] = "ratchet"
 
     def examine(self, model: Model) -> None:

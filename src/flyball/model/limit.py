@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from .model import Model
 
 DIRECTIONS = (1.0, -1.0)
-SAME_UNIT = ("m", "rad")
 
 
 @dataclass(frozen=True)
@@ -38,16 +37,42 @@ class Unilateral(CoordinateForce):
         return getattr(self, "damping", 0.0) == 0.0
 
 
+@dataclass(frozen=True)
+class Latch(Unilateral):
+    """What may move one way: a coordinate, or the difference of two."""
+
+    coordinate: str
+
+    def along(self) -> tuple[str, ...]:
+        """The coordinate, and that which it is relative to."""
+        other = getattr(self, "relative_to", None)
+        return (self.coordinate,) if other is None else (self.coordinate, other)
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Such that the quantity may grow."""
+        way = float(n.direction.real)
+        return (way, -way)[: len(self.along())]
+
+    def examine(self, model: Model) -> None:
+        """Its coordinates are there, and of one kind."""
+        for text in self.along():
+            model.coordinate(text, self)
+        if len(self.along()) == 2:
+            check_same_kind(self, model, *self.along())
+
+
 def check_elastic(e: Element, n: SimpleNamespace) -> None:
     """Refuse a stiffness that is none, and what goes with the other kind of stop only."""
     positive(e, n, "stiffness", why="Leave it out for a rigid one, which gives no way")
     nonnegative(e, n, "damping")
     if n.stiffness is None and n.damping != 0.0:
-        raise ModelError(f"{e.title}: damping is {n.damping:g}, and a rigid one has none; give stiffness= or restitution=")
+        raise ModelError(
+            f"{e.title}: damping is {n.damping:g}, and a rigid one has none; give stiffness= too, or neither"
+        )
     if n.stiffness is not None and n.restitution is not None:
         raise ModelError(
-            f"{e.title}: restitution belongs to a rigid one and stiffness to an elastic one, which bounces off by itself; "
-            f"leave one out"
+            f"{e.title}: restitution belongs to a rigid one and stiffness to an elastic one, which bounces off by "
+            f"itself; leave one out"
         )
 
 

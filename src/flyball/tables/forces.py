@@ -14,7 +14,7 @@ from .terms import coordinate_frames, coordinate_term, measured_term
 
 def measured_quantities(s: Structure) -> None:
     """Number every quantity that a force acts along or that a law names; the slots in which laws find them."""
-    for e in s.model.forces:
+    for e in s.model.acting():
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
@@ -32,7 +32,7 @@ def measured_quantities(s: Structure) -> None:
 def _names(s: Structure) -> set[str]:
     """Names that some law uses."""
     out: set[str] = set()
-    for e in [*s.model.forces, *s.model.drivers]:
+    for e in [*s.model.acting(), *s.model.drivers]:
         for field, of in _laws(e).items():
             value = getattr(e, field)
             for law in value if isinstance(value, tuple) else (value,):
@@ -81,7 +81,7 @@ def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted(s.model.forces, key=lambda f: f.kind)
+    s.forces = sorted(s.model.acting(), key=lambda f: f.kind)
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
         table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
