@@ -104,6 +104,11 @@ def with_forces(where):
     m.add(fb.Motor("motor", "H", torque="3.0 - 0.1*rate"))
     m.add(fb.JointFriction("rub", "J", static=0.3, kinetic=0.2, bending_length=0.1, twist_length=0.2, preload=1.0))
     m.add(fb.Rope("rope", ("a", "b", "ground"), at=(p, q, r), stiffness=80.0, damping=1.0))
+    m.add(fb.Detent("notches", "H.angle", pitch="40 deg", holding="0.4 N*m", notch=0.1, damping=0.02))
+    m.add(fb.Detent("dimples", "J.displacement", pitch="4 cm", barrier="2 J"))
+    m.add(fb.Limit("soft", "H.angle", lower=-0.1, upper=0.1, stiffness=30.0, damping=0.3))
+    m.add(fb.Limit("buffer", "J.displacement", lower="1 cm", stiffness=30.0))
+    m.add(fb.Backlash("loose", ("H.angle", "a.x"), weights=(2, 3), gap="1 deg", stiffness=20.0, damping=0.1))
     m.add(fb.Rope("cut", ("a", "b"), at=(p, q), stiffness=80.0, length="30 cm"))
     if where == "space":
         m.add(fb.Bushing("mount", "ground", "b", at=q, stiffness=(1.0, 2.0, 3.0), orientation=(0.1, 0.2, 0.3)))

@@ -10,10 +10,13 @@ from ..model.force import Force
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
-ALL = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
+_HERE = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
+ALL = [c for c in _HERE if c.category == Force.category]
 """Every force element that a file of this folder defines; all are public."""
+LIMITS = [c for c in _HERE if c.category != Force.category]
+"""Every one-sided element: stops, plays, latches. What is elastic of them acts by a formula as forces do."""
 
-globals().update({c.__name__: c for c in ALL})
+globals().update({c.__name__: c for c in _HERE})
 
 
 def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
@@ -31,7 +34,7 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
     return out
 
 
-INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench", "effort"))
+INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here

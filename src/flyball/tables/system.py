@@ -36,6 +36,7 @@ FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FO
 # columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
 SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
 SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE, SWITCH_STIFFNESS, SWITCH_DAMPING = range(5)
+SWITCH_TOOTH, SWITCH_PITCH = 0, 1
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
