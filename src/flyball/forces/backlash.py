@@ -66,7 +66,6 @@ class Backlash(Unilateral):
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = Unilateral.dimensions | {"gap": ("m", "rad"), "middle": ("m", "rad")}
-    drawn: ClassVar[str] = "coupler"
 
     def along(self) -> tuple[str, ...]:
         """The coordinates."""

@@ -97,7 +97,6 @@ class Limit(Unilateral):
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = Unilateral.dimensions | {"lower": ("m", "rad"), "upper": ("m", "rad")}
-    drawn: ClassVar[str] = "limit"
 
     def coordinate_text(self) -> str:
         """As given."""

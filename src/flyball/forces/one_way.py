@@ -47,8 +47,6 @@ class OneWay(Latch):
     relative_to: str | None = None
     direction: Annotated[Number, Unit("1")] = 1.0
 
-    drawn: ClassVar[str] = "one_way"
-
     def check(self, n: SimpleNamespace) -> None:
         """A direction."""
         check_direction(self, n.direction.real)
@@ -98,7 +96,6 @@ class Ratchet(Latch):
     restitution: Ratio = 0.0
 
     dimensions: ClassVar = Latch.dimensions | {"pitch": ("m", "rad"), "tooth": ("m", "rad")}
-    drawn: ClassVar[str] = "ratchet"
 
     def examine(self, model: Model) -> None:
         """Teeth are counted around what turns."""

@@ -14,7 +14,7 @@ from .terms import coordinate_frames, coordinate_term, measured_term
 
 def measured_quantities(s: Structure) -> None:
     """Number every quantity that a force acts along or that a law names; the slots in which laws find them."""
-    for e in s.model.acting():
+    for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]

@@ -98,9 +98,7 @@ def _elastic(here: Here, s: int, sensed: np.ndarray, fired: Sequence[int] | None
         depth, rate = side * (W.switch[row, s] - sensed[VALUE, m]), -side * sensed[RATE, m]
         if not np.isfinite(depth):
             continue
-        hit = fired is not None and any(
-            S.guard_i[g, GUARD_OF] == s and S.guard_i[g, GUARD_KIND] == kind for g in fired
-        )
+        hit = fired is not None and any(S.guard_i[g, GUARD_OF] == s and S.guard_i[g, GUARD_KIND] == kind for g in fired)
         pressed = old != side if hit else depth > 0.0 and k * depth + c * rate > 0.0
         unit = _unit(here, s)
         if not hit and abs(depth) <= NEAR * unit:
