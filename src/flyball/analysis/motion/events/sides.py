@@ -20,7 +20,6 @@ from ....tables.system import (
     G_PRESS_UPPER,
     GUARD_KIND,
     GUARD_OF,
-    HELD,
     LOWER,
     MODE,
     OFF,
