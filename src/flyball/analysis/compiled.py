@@ -257,10 +257,17 @@ def compiled(
     tree: Sequence[str] = (),
     coupled: bool = False,
     solved: bool = True,
+    switches: bool = False,
 ) -> Compiled:
     """Compile a mechanism (see ``structure`` and ``values``)."""
     choices = Choices(
-        far=far, positions=positions, holds=tuple(holds), tree=tuple(tree), coupled=coupled, solved=solved
+        far=far,
+        positions=positions,
+        holds=tuple(holds),
+        tree=tuple(tree),
+        coupled=coupled,
+        solved=solved,
+        switches=switches,
     )
     with uncollected():
         x = values(structure(model, choices), parameters, held)

@@ -19,6 +19,7 @@ from ..numerics.integrators.tableaux import Tableau, tableau
 from ..tables.system import COORDINATES, System, Work
 from .dispatch import remember
 from .follow import follow
+from .guards import watch
 from .made import choose_code
 from .motion import arrive, derivative, report, respond
 from .projection import move, place, tangent
@@ -37,6 +38,7 @@ from .tasks import (
     SLOPES,
     SOLVE,
     TANGENT,
+    WATCH,
 )
 from .within import ROWS, inspect
 
@@ -56,6 +58,10 @@ def perform(S, W, R, clock, out, task):
         return 0
     if task == MOTION:
         return derivative(t, y, clock.K[0], S, W)
+    if task == WATCH:
+        status = derivative(t, y, clock.K[0], S, W)
+        watch(S, W, t, out[0])
+        return status
     if task == FOLLOW:
         return follow(S, W, clock, out)
     if task == ARRIVE:
@@ -140,7 +146,8 @@ def motion_kernel(S: System, W: Work, R: Tableau, clock: Clock, out: np.ndarray,
         ``out[2]`` and multipliers ``out[3]`` that other forces ``out[0]`` and right-hand sides of the rows ``out[1]``
         make; see ``motion.respond``. TANGENT: an error ``clock.K[0]`` less what the projection takes off it. INSPECT:
         see ``within.inspect``; in and out by the clock. SLOPES: of every force, see
-        ``slopes.slopes``. INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
+        ``slopes.slopes``. WATCH: MOTION, and what is watched, into ``out[0]``; see `guards`.
+        INTEGRATE: go on with the integration; FOLLOW: go on with what the drivers prescribe.
 
     Returns
     -------

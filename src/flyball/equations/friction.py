@@ -50,6 +50,12 @@ BLURRED = 1e-6  # where redundancy leaves a reaction open, rounding over the reg
 
 
 @formula
+def loads_end(S, W):
+    """Column behind those of the loads in W.sensed."""
+    return 2 * measured(S) + W.sensed.shape[0] - INVERSE_JACOBIAN
+
+
+@formula
 def reaction_loads(S, W):
     """Loads that follow from the reactions now in W, into row RETURNED."""
     for k in range(S.force_i.shape[0]):
@@ -126,7 +132,7 @@ def improve(S, W, attempt):
     Newton's method on load - returned load = 0 with Broyden's inverse Jacobian, which is learnt from a small step of
     each load by itself and kept from one evaluation to the next.
     """
-    first, last = 2 * measured(S), W.sensed.shape[1]
+    first, last = 2 * measured(S), loads_end(S, W)
     if attempt == AGAIN:
         W.info[LEARNT] = FORGOTTEN
         for n in range(first, last):
@@ -157,7 +163,7 @@ def improve(S, W, attempt):
 @formula
 def learnt(S, W):
     """Whether the slopes of all loads are known: until then the steps are small and tell nothing of convergence."""
-    return W.info[LEARNT] >= W.sensed.shape[1] - 2 * measured(S)
+    return W.info[LEARNT] >= W.sensed.shape[0] - INVERSE_JACOBIAN
 
 
 @formula

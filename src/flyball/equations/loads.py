@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..laws.evaluation import evaluate
+from ..math.scalar import sign
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..tables.system import (
     FORCE_ALONG,
@@ -16,6 +17,7 @@ from ..tables.system import (
     FORCE_LAW,
     FORCE_LOAD,
     FORCE_M,
+    FORCE_SWITCH,
     FORCE_WORK,
     INERTIA,
     LOAD,
@@ -28,6 +30,7 @@ from ..tables.system import (
 )
 from .dispatch import effort, inputs, wrench
 from .records import load
+from .rows import way_of
 from .tree import project
 
 
@@ -126,6 +129,13 @@ def power(F, M, force, torque):
 
 
 @formula
+def way(S, W, k, rate):
+    """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
+    s = S.force_i[k, FORCE_SWITCH]
+    return W.sensed[VALUE, way_of(S, W, s)] if s >= 0 else sign(rate)
+
+
+@formula
 def efforts(S, W, t, work, f):
     """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
     for k in range(S.force_i.shape[0]):
@@ -136,7 +146,7 @@ def efforts(S, W, t, work, f):
         rate = W.sensed[RATE, m]
         o = 0.0 * x
         pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
-        laws = (law(S, W, k, 0, (t + o, x, rate)), o, o)
+        laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
         s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed)
         r = S.row_i.shape[0] + m
         for e in range(S.row_p[r], S.row_p[r + 1]):

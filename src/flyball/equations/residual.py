@@ -39,7 +39,7 @@ from ..tables.system import (
     VALUE,
 )
 from .dispatch import row_biases, row_values, whole_rows
-from .friction import reaction_loads
+from .friction import loads_end, reaction_loads
 from .kinematics import frame_motions, frames, poses
 from .loads import efforts, forces, gather, inertial
 from .prescribed import prepare
@@ -142,7 +142,7 @@ def missed(S, W, t, p, lam, out):
         out[nv + 3 * nr + nm + m] = W.sensed[RATE, m]
         out[nv + 3 * nr + 2 * nm + m] = W.sensed[BIAS, m]
     reaction_loads(S, W)
-    for n in range(2 * nm, W.sensed.shape[1]):
+    for n in range(2 * nm, loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
     f = W.vel[F_APPLIED]
     inertial(S, W)

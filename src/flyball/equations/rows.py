@@ -17,16 +17,21 @@ from ..tables.system import (
     BIAS,
     G_VALUE,
     GAMMA,
+    HOLD,
     MIX_COUNT,
     MIX_FROM,
     MIX_ROW,
     MIX_SLOT,
     MIX_TO,
+    MODE,
     NU,
     NU_DOT,
+    OFF,
     RATE,
     ROW_LAW,
     ROW_WRAP,
+    STEADY,
+    SWITCH_ROW,
     TERM_F,
     TERM_HINT,
     TERM_M,
@@ -209,11 +214,44 @@ def end(S, W, t):
         else:
             W.row[NU, k] = 0.0
             W.row[NU_DOT, k] = 0.0
+    switch_rows(S, W)
     for x in range(S.mix_i.shape[0]):
         law = S.row_i[S.mix_i[x, MIX_ROW], ROW_LAW]
         _, slope, _ = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, S.mix_i[x, MIX_SLOT])
         for i in range(S.mix_i[x, MIX_COUNT]):
             W.G[S.mix_i[x, MIX_TO] + i] -= slope * W.G[S.mix_i[x, MIX_FROM] + i]
+
+
+@formula
+def way_of(S, W, s):
+    """Column of W.sensed in which the way of switch s stands: of sliding, of pushing, the sign of a corner."""
+    return W.sensed.shape[1] - S.switch_i.shape[0] + s
+
+
+@formula
+def switch_rows(S, W):
+    """Of rows with modes: what is off counts for nothing, what is held is compared with where it is held."""
+    for s in range(S.switch_i.shape[0]):
+        k = S.switch_i[s, SWITCH_ROW]
+        if k < 0:
+            continue
+        if W.switch[MODE, s].real == OFF:
+            for e in range(S.row_p[k], S.row_p[k + 1]):
+                W.G[e] = 0.0
+            W.row[G_VALUE, k] = 0.0
+        elif W.switch[MODE, s].real == STEADY:
+            W.row[G_VALUE, k] = 0.0
+        else:
+            W.row[G_VALUE, k] -= W.switch[HOLD, s]
+
+
+@formula
+def switch_biases(S, W):
+    """What is off has no right-hand side."""
+    for s in range(S.switch_i.shape[0]):
+        k = S.switch_i[s, SWITCH_ROW]
+        if k >= 0 and W.switch[MODE, s].real == OFF:
+            W.row[GAMMA, k] = 0.0
 
 
 @formula
@@ -242,6 +280,7 @@ def rates(S, W, v):
 @formula
 def end_biases(S, W, t):
     """Gamma of laws that follow sensors: f'' along the motion in place of its second derivative by time."""
+    switch_biases(S, W)
     last = -1
     for x in range(S.mix_i.shape[0]):
         k = S.mix_i[x, MIX_ROW]

@@ -11,7 +11,7 @@ from ..compiler.jit import formula
 from ..math.vec import add, col, cross, dot, norm, scale, sub
 from ..tables.system import FORCE_ALONG, FORCE_F, FORCE_KIND, FORCE_LOAD, FORCE_M, LENGTH, LOAD, RATE, VALUE
 from .dispatch import effort, inputs, wrench
-from .loads import law, wide
+from .loads import law, way, wide
 from .records import load
 
 # columns of a sheet of slopes: stiffness, damping and the force itself along up to six directions; how many there are
@@ -43,7 +43,7 @@ def along(S, W, t, k, out):
     for j in range(5):
         dx = d if j == 1 else -d if j == 2 else 0.0
         dr = e if j == 3 else -e if j == 4 else 0.0
-        laws = (law(S, W, k, 0, (t, x + dx, rate + dr)), 0.0, 0.0)
+        laws = (law(S, W, k, 0, (t, x + dx, rate + dr)), 0.0, way(S, W, k, rate))
         s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x + dx, rate + dr, laws, pressed)
         if j == 0:
             out[k, ALONG] = s

@@ -30,7 +30,9 @@ from ..tables.system import (
     LENGTH,
     MADE,
     MASS,
+    MODE,
     NV,
+    OFF,
     PARTED,
     PARTITION,
     PASS,
@@ -47,6 +49,7 @@ from ..tables.system import (
     SOLVES,
     STEP,
     STEP_UNLOADED,
+    SWITCH_ROW,
     V0,
     V1,
     V2,
@@ -130,6 +133,10 @@ def natural_size(S, W):
         elif n == 3:
             turn += W.G[at + 2] * W.G[at + 2]
         W.row[DIAGONAL, k] += shift * S.body_x[b, PER_BULK] + turn * S.body_x[b, PER_COMPACT]
+    for s in range(S.switch_i.shape[0]):  # rows that are off have no size of their own
+        k = S.switch_i[s, SWITCH_ROW]
+        if k >= 0 and W.switch[MODE, s].real == OFF:
+            W.row[DIAGONAL, k] = W.row[DIAGONAL, k] + 1.0
 
 
 @formula

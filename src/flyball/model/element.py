@@ -214,6 +214,18 @@ class Element:
     def check(self, n: SimpleNamespace) -> None:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
+    def switches(self) -> tuple[Any, ...]:
+        """Rows with modes that it has in a motion (`model.switch.Switch`)."""
+        return ()
+
+    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind."""
+        return ()
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Weights of the coordinates whose sum such a row acts along; 1 each if none are given."""
+        return ()
+
 
 _MARKED: dict[tuple[Any, Any], dict[str, Any]] = {}
 

@@ -151,6 +151,8 @@ def _fitting(p: Plan, S: System) -> Iterator[tuple[dict[str, Any], list[Entry], 
             told, machine_code = read
             entries = [(str(name), int(k)) for name, k in told["known"]]
             if path.stem.rpartition("-")[2] == digest(S, entries):
+                with contextlib.suppress(OSError):
+                    path.touch()  # what is used stays: the oldest are pushed out
                 yield told, entries, machine_code
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..equations.dispatch import progress, remember
-from ..equations.friction import reaction_loads
+from ..equations.friction import loads_end, reaction_loads
 from ..equations.motion import finish, loaded
 from ..equations.prescribed import prepare
 from ..equations.projection import move, place
@@ -152,7 +152,7 @@ class Stages(Solves):
     def loaded(self) -> None:
         """Generalised forces."""
         nm = self.nm
-        reads = self.fresh("sensed", LOAD, range(2 * nm, self.W.sensed.shape[1]))
+        reads = self.fresh("sensed", LOAD, range(2 * nm, loads_end(self.S, self.W)))
         rates = np.full(len(self.z), None, object)
         loaded(self.S, self.W, self.t, None, rates)
         stores = self.stored("vel", F_APPLIED, range(self.nv))

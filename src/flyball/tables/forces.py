@@ -82,9 +82,9 @@ def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
     s.forces = sorted(s.model.forces, key=lambda f: f.kind)
-    table = np.full((len(s.forces), 9), -1, np.int64)
+    table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
-        table[k, 7:] = e.kind, isinstance(e, CoordinateForce)
+        table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
         if isinstance(e, CoordinateForce):
             table[k, 0] = _along(s, e)
             if hasattr(e, "load"):

@@ -44,6 +44,7 @@ class TermSpec:
     measured: bool = False
     hint: int = -1  # state that it leans on
     index: int = 0  # which of the row's coordinates
+    switch: str | None = None  # label of the switch whose quantity it is part of, with a weight
 
 
 @dataclass
@@ -82,6 +83,8 @@ class Structure:
     slots: dict[str, int] = field(default_factory=dict)  # sensor -> slot that laws read (rates come after all values)
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
+    switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
+    guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, np.ndarray] = field(default_factory=dict)

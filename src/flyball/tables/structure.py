@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
-from . import forces, patterns, terms
+from . import forces, patterns, switches, terms
 from .forest import body_table
 from .points import single
 from .specs import FrameSpec, Structure
@@ -39,6 +39,8 @@ class Choices:
         Solve through the coupled matrix also where M is constant and block diagonal: to compare what that costs.
     solved : bool
         Whether accelerations are asked for; if not, no matrix is made ready to be factored.
+    switches : bool
+        With rows that have modes: those of a motion.
     """
 
     far: bool = False
@@ -47,6 +49,7 @@ class Choices:
     tree: tuple[str, ...] = ()
     coupled: bool = False
     solved: bool = True
+    switches: bool = False
 
 
 PLAIN = Choices()
@@ -80,9 +83,14 @@ def _decided(model: Model, choices: Choices) -> Structure:
         s.const += table.data()
     body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
+    if c.switches:
+        switches.quantities(s)
     forces.measured_quantities(s)
     terms.rows(s, c.holds)
+    if c.switches:
+        switches.rows(s)
     forces.forces(s)
+    switches.table(s)
     for e in s.loads:
         if (joint := getattr(e, "joint", "")) in s.tree_joints:
             raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")

@@ -32,7 +32,17 @@ ROW_LAW, ROW_WRAP, ROW_WORK = range(3)
 # columns of System.mix_i
 MIX_ROW, MIX_SLOT, MIX_TO, MIX_FROM, MIX_COUNT = range(5)
 # columns of System.force_i; forces along a measured quantity have its slot in place of frame F
-FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG = 0, 1, 2, 5, 6, 7, 8
+FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FORCE_SWITCH = 0, 1, 2, 5, 6, 7, 8, 9
+# columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
+SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
+SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE = range(3)
+# rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
+MODE, HOLD, LOWER, UPPER, SPARE = range(5)
+OFF, HELD, STEADY = 0.0, 1.0, 2.0
+# columns of System.guard_i; kinds of guards; what a guard's zero is watched for
+GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
+G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER = range(8)
+FALLING, EITHER, RISING = -1, 0, 1
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
@@ -41,7 +51,7 @@ F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
-# scratch; and the inverse Jacobian of the gaps
+# scratch; and the inverse Jacobian of the gaps. Then, in row VALUE, the way of each switch (`rows.way_of`)
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED, LATER, PLACED = range(11)
@@ -77,10 +87,13 @@ class System(NamedTuple):
     row_p: np.ndarray  # (nr + nm + 1,): first entry of each row, then of each measured quantity, in Work.G
     col_i: np.ndarray  # (nG,): velocity of each entry of Work.G
     mix_i: np.ndarray  # (nx, 5): drivers that follow sensors: row, slot, entries of G to and from, count
-    force_i: np.ndarray  # (nk, 9): F, M, three laws or -1, state of its work or -1, its load or -1, kind, family
+    force_i: np.ndarray  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
     load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
+    switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
+    switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
+    guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
     kinds: (
         np.ndarray
     )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
@@ -109,7 +122,8 @@ class Work(NamedTuple):
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (8, nv)
-    sensed: np.ndarray  # (6 + nl, 2 nm + nl): measured quantities: value, rate, bias; loads of joints with friction
+    sensed: np.ndarray  # (6 + nl, 2 nm + nl + nw): what is measured: value, rate, bias; loads; ways of the switches
+    switch: np.ndarray  # (5, nw): of each row with modes: its mode, where it is held, how far its quantity may go
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side

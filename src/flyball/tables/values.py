@@ -21,6 +21,7 @@ from ..model.coupling import Coupling
 from ..model.force import TwoPointForce
 from ..model.joint import Joint
 from ..model.kept import Kept, bits
+from . import switches
 from .afresh import Afresh
 from .coordinates import BodyState, free_velocities, positions
 from .hinges import tree_frames
@@ -112,12 +113,14 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     const, curve_at = _constants(s, numbers, env, dtype)
     term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
+    switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks)
     semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, t["angle_i"], t["load_i"],
+        t["switch_i"], switch_x, t["guard_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
@@ -197,6 +200,8 @@ def _term_x(
             x[k, 7] *= factors[e.name][t.index]
             x[k, 6] = _coupled(e, n, t, pose)
         elif t.owner is not None:
+            if t.switch is not None and (weights := e.switch_weights(n, t.switch)):
+                x[k, 7] *= weights[t.index]
             x[k, 6] = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
     return x
 

@@ -34,6 +34,7 @@ LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"
 SHORT = f"{TABLES}: too little is computed to make code for it"
+MODES = "rows that hold at times and let go at others, and events, are for the tables"
 CALLS = "a law is a Python function, which may remember calls: it is not begun anew"
 
 
@@ -51,6 +52,8 @@ def check_specialize(value: Any) -> None:
 
 def _bound(c: Compiled) -> str:
     """Why a motion cannot begin anew."""
+    if c.structure.guards:
+        return MODES
     return CALLS if c.structure.functions else ""
 
 
@@ -86,7 +89,7 @@ class Engine:
         if wish is False:
             return
         if wish is True:
-            self._wanted(without)
+            self._wanted(without or (MODES if c.structure.guards else ""))
         elif why := without or _bound(c):
             self.told = f"{TABLES}: {why}"
         else:

@@ -12,6 +12,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
+from ...tables.switches import declared
 from ...tables.system import Q0, SEMIDEFINITE
 from ..assemble import assemble
 from ..assembly.start import Assembly
@@ -89,8 +90,19 @@ def begin_at(
 
 def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None) -> Start:
     a, why = in_coordinates(base, wish, parameters)
+    a = with_switches(a, parameters)
     found = Start(base, a, a.y, why, _wound(base, a, a.y))
     return replace(found, base=base.again(), assembly=a.again())  # without the scratch
+
+
+def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
+    """The same with the rows that have modes, all off, if there are any."""
+    s = a.compiled.structure
+    if not declared(s.model):
+        return a
+    c = compiled(s.model, parameters=parameters, tree=s.tree, switches=True)
+    c.follow(a.compiled.hints)
+    return replace(a, compiled=c)
 
 
 def _wound(base: Assembly, a: Assembly, y: np.ndarray) -> dict[str, float]:

@@ -1,0 +1,106 @@
+"""What is watched while a motion is integrated: one number for each guard, whose way through zero is an event.
+
+    a law of the user's            its value
+    a stop that is open            x - lower, upper - x
+    one that is closed, a latch    way * lam: as long as it pushes
+    friction that holds            most that it holds - |lam|
+    friction that slides           way * rate
+    a freewheel that overruns      rate
+    a corner of a law              way * u
+
+A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..constraints.modes import STATIC
+from ..laws.evaluation import evaluate
+from ..math.scalar import magnitude
+from ..tables.system import (
+    FORCE_F,
+    FORCE_KIND,
+    FORCE_LOAD,
+    G_BACK,
+    G_CORNER,
+    G_HOLDS,
+    G_LAW,
+    G_LOWER,
+    G_PULL,
+    G_SLIDES,
+    G_UPPER,
+    GUARD_KIND,
+    GUARD_OF,
+    LAM,
+    LOWER,
+    MODE,
+    OFF,
+    RATE,
+    RETURNED,
+    SWITCH_FORCE,
+    SWITCH_LAW,
+    SWITCH_MEASURED,
+    SWITCH_ROW,
+    UPPER,
+    VALUE,
+)
+from .dispatch import effort
+from .loads import law, wide
+from .rows import way_of
+
+NOT_WATCHED = float("nan")
+
+
+@formula
+def watch(S, W, t, out):
+    """Value of every guard into ``out`` (ng,), kinematics, rows and solution at t being in W."""
+    for g in range(S.guard_i.shape[0]):
+        kind, of = S.guard_i[g, GUARD_KIND], S.guard_i[g, GUARD_OF]
+        if kind == G_LAW:
+            out[g] = evaluate(S.code, S.const, of, W.stack, (t, 0.0, 0.0), W.sensed)
+        else:
+            out[g] = watched(S, W, t, kind, of)
+
+
+@formula
+def watched(S, W, t, kind, s):
+    """Value of a guard of switch s."""
+    way = W.sensed[VALUE, way_of(S, W, s)]
+    if kind == G_CORNER:
+        return way * corner(S, W, t, s)
+    m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
+    x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
+    if W.switch[MODE, s] == OFF:
+        if kind == G_LOWER:
+            return x - W.switch[LOWER, s]
+        if kind == G_UPPER:
+            return W.switch[UPPER, s] - x
+        if kind == G_SLIDES:
+            return way * rate
+        if kind == G_BACK:
+            return rate
+        return NOT_WATCHED
+    if kind == G_PULL:
+        return way * W.row[LAM, k]
+    if kind == G_HOLDS:
+        return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
+    return NOT_WATCHED
+
+
+@formula
+def most(S, W, t, k):
+    """The most that force k holds along its quantity at rest: its own law, asked for that."""
+    x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
+    load = W.sensed[RETURNED, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else 0.0
+    laws = (law(S, W, k, 0, (t, x, 0.0)), 0.0, STATIC)
+    return magnitude(effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, 0.0, laws, load))
+
+
+@formula
+def corner(S, W, t, s):
+    """The function whose sign a corner of a law is, of the inputs of the force that has the law."""
+    k = S.switch_i[s, SWITCH_FORCE]
+    x, rate = 0.0, 0.0
+    if k >= 0:
+        x, rate = W.sensed[VALUE, S.force_i[k, FORCE_F]], W.sensed[RATE, S.force_i[k, FORCE_F]]
+    return evaluate(S.code, S.const, S.switch_i[s, SWITCH_LAW], W.stack, (t, x, rate), W.sensed)

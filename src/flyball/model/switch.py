@@ -1,0 +1,32 @@
+"""Rows with modes: what elements declare that hold at times and let go at others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..constraints.blocks import Row
+
+
+@dataclass(frozen=True)
+class Switch:
+    """A row with a mode along one quantity: a weighted sum of coordinates, or of terms of the element's own.
+
+    Attributes
+    ----------
+    kind : int
+        STOP, FRICTION, ONE_WAY or LOCK of `constraints.modes`.
+    label : str
+        Which of the element's it is; empty if it has one.
+    along : tuple of str
+        Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity; weights are `Switching.weights`.
+    path : tuple of (role, role, Row)
+        Or terms between frames of the element's own, such as the parts of a rope.
+    slides : bool
+        Whether the element is a force along the same quantity that acts while the row is off: friction.
+    """
+
+    kind: int
+    label: str = ""
+    along: tuple[str, ...] = ()
+    path: tuple[tuple[str, str, Row], ...] = ()
+    slides: bool = False

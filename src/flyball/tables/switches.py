@@ -1,0 +1,113 @@
+"""Rows with modes: what stops, holds, locks and latches, as rows of the fixed pattern; and what is watched of them.
+
+Only the tables of a motion have them (`Choices.switches`): to all that is asked of a position they are no constraints.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..constraints.modes import BRANCH, FRICTION, ONE_WAY, STOP
+from ..model.element import Element
+from ..model.model import Model
+from ..model.switch import Switch
+from .specs import RowSpec, Structure, TermSpec, frame, ints
+from .system import (
+    EITHER,
+    FALLING,
+    FORCE_SWITCH,
+    G_BACK,
+    G_CORNER,
+    G_HOLDS,
+    G_LOWER,
+    G_PULL,
+    G_SLIDES,
+    G_UPPER,
+)
+from .terms import coordinate_term, measured_term
+
+GUARDS = {
+    STOP: (G_LOWER, G_UPPER, G_PULL),
+    FRICTION: (G_HOLDS, G_SLIDES),
+    ONE_WAY: (G_BACK, G_PULL),
+    BRANCH: (G_CORNER,),
+}
+"""What is watched of each kind of switch."""
+
+
+@dataclass
+class SwitchSpec:
+    """One switch of a structure."""
+
+    element: Element
+    switch: Switch
+    row: int = -1
+    measured: int = -1
+    force: int = -1
+    law: int = -1
+
+
+def declared(model: Model) -> list[tuple[Element, Switch]]:
+    """All that the model's elements declare."""
+    return [(e, w) for e in model.elements() for w in e.switches()]
+
+
+def quantity(e: Element, w: Switch) -> str:
+    """Name of the quantity that a switch acts along, among what is measured."""
+    if len(w.along) == 1:
+        return w.along[0]
+    return f"{e.name}:{w.label or 'length'}"
+
+
+def quantities(s: Structure) -> None:
+    """Number the quantities that switches act along, before those of forces."""
+    for e, w in declared(s.model):
+        key = quantity(e, w)
+        if key in s.measured:
+            continue
+        m = s.measured[key] = len(s.measured)
+        for k, text in enumerate(w.along):
+            coordinate_term(s, text, e, m, measured=True).index = k
+            s.terms[-1].switch = w.label if len(w.along) > 1 else None
+        for a, b, formula in w.path:
+            measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
+
+
+def rows(s: Structure) -> None:
+    """The rows, behind all others."""
+    for e, w in declared(s.model):
+        row, first = len(s.rows), len(s.rows)
+        for k, text in enumerate(w.along):
+            coordinate_term(s, text, e, row, counted=True).index = k
+            s.terms[-1].switch = w.label if len(w.along) > 1 else None
+        for a, b, formula in w.path:
+            s.terms.append(TermSpec(row, frame(s, e, a), frame(s, e, b), formula, 1.0, e))
+        s.rows.append(RowSpec(e, w.label or "switch"))
+        s.slices[e.name] = slice(s.slices[e.name].start if e.name in s.slices else first, len(s.rows))
+        s.switches.append(SwitchSpec(e, w, row, s.measured[quantity(e, w)]))
+
+
+def table(s: Structure) -> None:
+    """The integers of switches and guards, when forces are numbered."""
+    s.tables["force_i"][:, FORCE_SWITCH] = -1
+    for k, spec in enumerate(s.switches):
+        if spec.switch.slides:
+            spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
+            s.tables["force_i"][spec.force, FORCE_SWITCH] = k
+        s.guards += [(kind, k, EITHER if kind == G_CORNER else FALLING) for kind in GUARDS.get(spec.switch.kind, ())]
+    s.tables["switch_i"] = ints([(x.row, x.measured, x.switch.kind, x.force, x.law, -1) for x in s.switches], 6)
+    s.tables["guard_i"] = ints(s.guards, 3)
+
+
+def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any) -> np.ndarray:
+    """Parameters of the switches, from the numbers of their elements."""
+    for k, spec in enumerate(s.switches):
+        if asks(spec.element):
+            par = spec.element.switched(of[spec.element.name], spec.switch.label)
+            x[k] = 0.0
+            x[k, :2] = -np.inf, np.inf
+            x[k, : len(par)] = par
+    return x
