@@ -1,0 +1,1 @@
+"""What happens at an instant of a motion, and the loop from one to the next."""

@@ -1,0 +1,73 @@
+"""A motion at an instant at which something happens: what decides and acts reads it and writes to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ....numerics.integrators.clock import NOW, Clock, T
+from ....tables.specs import Structure
+from ...compiled import Compiled
+from ..start import Start
+
+
+@dataclass
+class Here:
+    """A motion where it stands.
+
+    Modes are in ``c.work.switch``, the sides of switches behind what is sensed (see `equations.guards`).
+
+    Attributes
+    ----------
+    start : Start
+        Where and in which coordinates it began.
+    clock : Clock
+        Of the integration: its time and state are those of the instant.
+    records : list of Happening
+        What happened so far, in order.
+    lost : float
+        Mechanical energy [J] that impacts and sudden changes took so far.
+    stopped : str
+        Why the motion ends here, in words; empty: it goes on.
+    fresh : bool
+        Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
+    """
+
+    start: Start
+    clock: Clock
+    records: list[Any] = field(default_factory=list)
+    lost: float = 0.0
+    stopped: str = ""
+    fresh: bool = False
+
+    @property
+    def c(self) -> Compiled:
+        """Tables and scratch that the motion is computed with."""
+        return self.start.assembly.compiled
+
+    @property
+    def structure(self) -> Structure:
+        """Its integers."""
+        return self.c.structure
+
+    @property
+    def t(self) -> float:
+        """The instant [s]."""
+        return float(self.clock.real[T])
+
+    @property
+    def y(self) -> np.ndarray:
+        """The state there (q, v, z), to be written to in place, (ny,)."""
+        return self.clock.y[NOW]
+
+    @property
+    def q(self) -> np.ndarray:
+        """Its positions, in place, (nq,)."""
+        return self.y[: self.structure.nq]
+
+    @property
+    def v(self) -> np.ndarray:
+        """Its velocities, in place, (nv,)."""
+        return self.y[self.structure.nq : self.structure.nq + self.structure.nv]
