@@ -16,7 +16,7 @@ Describe a mechanism
                   RollingDisk, RollingBall, KnifeEdge
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Actuator, Motor,
-                  JointFriction, PointForce, PointTorque
+                  JointFriction, Clutch, Brake, PointForce, PointTorque
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one

@@ -36,6 +36,8 @@ if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .bushing import Bushing as Bushing
+    from .clutch import Brake as Brake
+    from .clutch import Clutch as Clutch
     from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
     from .joint_friction import JointFriction as JointFriction

@@ -8,12 +8,14 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from ..compiler.jit import formula
+from ..constraints.modes import FRICTION
 from ..errors import ModelError
 from ..math.scalar import absolute, choose, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
 from ..model.joint import Joint
+from ..model.switch import Switch
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -120,6 +122,10 @@ class JointFriction(CoordinateForce):
 
     def _coordinate(self) -> str:
         return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
+
+    def switches(self) -> tuple[Switch, ...]:
+        """It sticks, or slides; the regularised law knows no difference."""
+        return () if self.stick_speed is not None else (Switch(FRICTION, along=self.along(), slides=True),)
 
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""
