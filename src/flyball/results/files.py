@@ -22,6 +22,7 @@ from ..errors import ModelError
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
 from .stored_contacts import packed
+from .stored_events import packed as events_packed
 
 if TYPE_CHECKING:
     import pandas
@@ -200,7 +201,8 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "wound": json.dumps(result.wound),
     }
     told, more = packed(result)
-    texts |= told
+    happened, states = events_packed(result)
+    texts, more = texts | told | happened, more | states
     for name, text in texts.items():
         group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
     for name, (_, *rest) in ARRAYS.items():

@@ -37,6 +37,7 @@ class Health:
     crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
+    events: str = ""  # how many happened at instants, and how often each
     contact: ContactHealth | None = None  # how contacts were solved, where there are any
 
     @property
@@ -125,6 +126,8 @@ class Health:
         if crept:
             text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())
             out.append(("creep of friction", text))
+        if self.events:
+            out.append(("events", self.events))
         if self.contact:
             out += self.contact.lines()
         return out + [(f"warning {k}", text) for k, text in enumerate(self.warnings, 1)]

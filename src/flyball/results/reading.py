@@ -24,6 +24,7 @@ from .files import ARRAYS, FORMAT, GROUP, checksum, sealed
 from .health import Health
 from .result import Result
 from .stored_contacts import unpack
+from .stored_events import unpack as events_unpack
 
 M = TypeVar("M", bound=Model)
 
@@ -150,6 +151,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     result.final = (float(final[0]), final[1:])
     unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
+    events_unpack(stored, result)
     return result
 
 

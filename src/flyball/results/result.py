@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +16,7 @@ from ..tables.values import Values
 from .bulk import Bulk
 from .contacts import Contacts
 from .energy import Energy
+from .events import Events, Happening
 from .health import Health
 from .measured import Measured
 from .numbers import span
@@ -57,6 +58,8 @@ class Result:
         Where bodies touched and with which forces; None where the mechanism has no contact.
     bulk : dict
         Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
+    events : Events
+        What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
         surfaces that move.
@@ -86,6 +89,7 @@ class Result:
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self._events = Events(())
         self.energy = Energy(self)
 
     @property
@@ -105,6 +109,17 @@ class Result:
             if (find := self.unsolved) is not None:
                 self._vdot, self._multipliers = find()
                 self.unsolved = None
+
+    @property
+    def events(self) -> Events:
+        """What happened at instants, in the order of time."""
+        return self._events
+
+    @events.setter
+    def events(self, happened: Iterable[Happening]) -> None:
+        """Say what happened; states before and after are read by name from then on."""
+        self._events = Events(happened, self)
+        self.health.events = self._events.summary()
 
     @property
     def states(self) -> np.ndarray:
@@ -285,7 +300,9 @@ class Result:
     def as_dict(self) -> dict[str, Any]:
         """Everything as plain numbers and names: times, all curves with their units, and the health."""
         curves = {k: {"unit": unit, "values": np.asarray(v).tolist()} for k, (unit, v) in self.channels().items()}
-        return {"name": self.model.name, "t": self.t.tolist(), "curves": curves, "health": self.health.as_dict()}
+        out = {"name": self.model.name, "t": self.t.tolist(), "curves": curves}
+        out |= {"events": self.events.as_dict()} if len(self.events) else {}
+        return out | {"health": self.health.as_dict()}
 
     def to_xarray(self) -> xarray.Dataset:
         """All curves as a labelled dataset with units."""

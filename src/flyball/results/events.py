@@ -1,0 +1,183 @@
+"""What happened at an instant of a motion: events that the model names, impacts, stops, what stuck or let go."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, overload
+
+import numpy as np
+
+from ..errors import ModelError
+from ..model.words import listing, shortened, suggest
+from .moment import Moment
+
+if TYPE_CHECKING:
+    import pandas
+
+    from .result import Result
+
+SHOWN = 20  # lines of a printed table
+HEAD = ("t [s]", "name", "kind", "done", "lost [J]")
+
+
+@dataclass(frozen=True)
+class Happening:
+    """What happened at one instant.
+
+    Attributes
+    ----------
+    t : float [s]
+    name : str
+        Of the event or element; of several at once with commas between them.
+    kind : str
+        ``"event"`` where the model's `Event` says it, else what it was: ``"impact"``, ``"stop"``, ``"stick"``, ...
+    done : tuple of str
+        What was done, in words.
+    lost : float [J]
+        Energy that impacts and sudden locking took.
+    impulses : mapping
+        Joint or element -> impulse [N s] or [N m s]: a number along its coordinate, or components.
+    before, after : Moment, optional
+        The motion just before and after: ``happening.after["block.vx"]``.
+    """
+
+    t: float
+    name: str
+    kind: str
+    done: tuple[str, ...] = ()
+    lost: float = 0.0
+    impulses: Mapping[str, Any] = field(default_factory=dict)
+    before: Any = field(default=None, repr=False, compare=False)  # state vectors until a result has it
+    after: Any = field(default=None, repr=False, compare=False)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, without the states."""
+        told = {k: np.asarray(v).tolist() for k, v in self.impulses.items()}
+        return {
+            "t": float(self.t),
+            "name": self.name,
+            "kind": self.kind,
+            "done": list(self.done),
+            "lost": float(self.lost),
+            "impulses": told,
+        }
+
+    def __str__(self) -> str:
+        did = f": {', '.join(self.done)}" if self.done else ""
+        lost = f", {self.lost:.4g} J lost" if self.lost else ""
+        return f"t = {self.t:.6g} s, {self.name} ({self.kind}){did}{lost}"
+
+
+class Events(Sequence):
+    """All that happened at instants of a motion, in the order of time; ``run.events["hit"]`` are those of a name."""
+
+    def __init__(self, happened: Iterable[Happening], result: Result | None = None) -> None:
+        self._all = tuple(happened if result is None else (_bound(h, result) for h in happened))
+
+    def __len__(self) -> int:
+        return len(self._all)
+
+    def __iter__(self) -> Iterator[Happening]:
+        return iter(self._all)
+
+    @overload
+    def __getitem__(self, which: int) -> Happening: ...
+    @overload
+    def __getitem__(self, which: slice | str) -> Events: ...
+    def __getitem__(self, which: int | slice | str) -> Happening | Events:
+        """One by its number, several by a slice, or those of a name or kind."""
+        if isinstance(which, str):
+            return self.of(which)
+        return Events(self._all[which]) if isinstance(which, slice) else self._all[which]
+
+    def of(self, name: str) -> Events:
+        """Those of an event, element or kind of this name; none if it never happened.
+
+        Raises
+        ------
+        ModelError
+            If nothing of that name is among them; the message lists what is.
+        """
+        found = [h for h in self._all if h.kind == name or name in h.name.split(", ")]
+        if not found:
+            known = self.names()
+            raise ModelError(
+                f"nothing named {name!r} happened{suggest(name, known)}; {listing(known) if known else 'nothing did'}"
+            )
+        return Events(found)
+
+    def names(self) -> list[str]:
+        """Names of what happened, each once, in the order of time."""
+        return list(dict.fromkeys(part for h in self._all for part in h.name.split(", ")))
+
+    @property
+    def t(self) -> np.ndarray:
+        """When, (n,) [s]."""
+        return np.array([h.t for h in self._all])
+
+    @property
+    def lost(self) -> np.ndarray:
+        """Energy lost at each, (n,) [J]."""
+        return np.array([h.lost for h in self._all])
+
+    def counts(self) -> dict[str, int]:
+        """How often each happened, by name."""
+        return {name: sum(name in h.name.split(", ") for h in self._all) for name in self.names()}
+
+    def as_dict(self) -> list[dict[str, Any]]:
+        """Plain data."""
+        return [h.as_dict() for h in self._all]
+
+    def summary(self) -> str:
+        """How many, and how often each; empty where nothing happened."""
+        if not self._all:
+            return ""
+        told = shortened((f"{name} {n} times" if n > 1 else name for name, n in self.counts().items()), 90)
+        lost = f"; {self.lost.sum():.4g} J lost" if self.lost.any() else ""
+        return f"{len(self)}: {told}{lost}"
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """One row each: t, name, kind, done, lost; impulses as columns ``"impulse A"`` where they are plain numbers."""
+        import pandas as pd
+
+        rows: list[dict[str, Any]] = []
+        for h in self._all:
+            row = {"t": h.t, "name": h.name, "kind": h.kind, "done": "; ".join(h.done), "lost": h.lost}
+            rows.append(row | {f"impulse {k}": v for k, v in h.impulses.items() if np.ndim(v) == 0})
+        return pd.DataFrame(rows, columns=None if rows else ["t", "name", "kind", "done", "lost"])
+
+    def _table(self) -> tuple[list[tuple[str, ...]], str]:
+        """Rows of the printed table, and what is left out of it."""
+        shown = self._all if len(self._all) <= SHOWN else (*self._all[: SHOWN - 1], self._all[-1])
+        rows: list[tuple[str, ...]]
+        rows = [(f"{h.t:.6g}", h.name, h.kind, "; ".join(h.done), f"{h.lost:.4g}" if h.lost else "") for h in shown]
+        left = len(self._all) - len(shown)
+        return rows, f"{left} more before the last one" if left else ""
+
+    def __repr__(self) -> str:
+        if not self._all:
+            return "<no events>"
+        rows, left = self._table()
+        widths = [max(len(row[k]) for row in (HEAD, *rows)) for k in range(len(HEAD))]
+        text = ["  ".join(cell.ljust(w) for cell, w in zip(row, widths, strict=True)).rstrip() for row in (HEAD, *rows)]
+        if left:
+            text.insert(-1, f"... {left}")
+        return "\n".join(text)
+
+    def _repr_html_(self) -> str:
+        from html import escape
+
+        rows, left = self._table()
+        head = "".join(f"<th>{escape(cell)}</th>" for cell in HEAD)
+        body = ["".join(f"<td>{escape(cell)}</td>" for cell in row) for row in rows]
+        if left:
+            body.insert(-1, f"<td colspan={len(HEAD)}>... {left}</td>")
+        return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
+
+
+def _bound(h: Happening, result: Result) -> Happening:
+    """With states that can be read by name."""
+    before, after = (Moment(result, h.t, y) if isinstance(y, np.ndarray) else y for y in (h.before, h.after))
+    return dataclasses.replace(h, before=before, after=after)

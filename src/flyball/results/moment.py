@@ -1,0 +1,59 @@
+"""The motion at one instant that is no output time: just before or after an event."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import ModelError
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+class Moment:
+    """Positions and velocities at one instant: ``moment["block.vx"]``.
+
+    Accelerations and forces of constraints have no value there: they jump.
+
+    Attributes
+    ----------
+    t : float [s]
+    y : ndarray
+        State vector: coordinates, velocities, turns and works.
+    """
+
+    def __init__(self, result: Result, t: float, y: np.ndarray) -> None:
+        self._of, self.t, self.y = result, float(t), y
+
+    @cached_property
+    def _result(self) -> Result:
+        """A result of this one time; what nobody knows there is nan."""
+        r = self._of
+        s = r.values.structure
+        q, v, z = (p[None, :] for p in np.split(self.y, [s.nq, s.nq + s.nv]))
+        unknown = np.full((1, s.nv), np.nan), np.full((1, len(s.rows) + len(s.prescribed)), np.nan)
+        made = type(r)(r.model, r.values, np.array([self.t]), q, v, z, *unknown, r.health)
+        made.wound = r.wound
+        return made
+
+    def __getitem__(self, name: str) -> Any:
+        """A curve such as ``"block.vx"`` as a number, or a vector such as ``"block.velocity"``.
+
+        Raises
+        ------
+        ModelError
+            If there is no such curve, or it jumps there.
+        """
+        value = np.asarray(self._result.channel(name if "." in name else f"{name}.value")[1])[0]
+        if not np.isfinite(value).all():
+            raise ModelError(
+                f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "
+                f"constraints jump there; read positions, velocities and energies, or what is at output times"
+            )
+        return float(value) if np.ndim(value) == 0 else value
+
+    def __repr__(self) -> str:
+        return f"<{self._of.model.name!r} at t = {self.t:.6g} s>"

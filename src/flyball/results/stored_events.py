@@ -1,0 +1,52 @@
+"""Events of a result as the texts and arrays that its file holds, and back."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .events import Happening
+
+if TYPE_CHECKING:
+    from .result import Result
+
+
+def packed(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
+    """Texts and arrays; none where nothing happened. States before and after are rows, nan where they are not kept."""
+    if not len(result.events):
+        return {}, {}
+    states = {f"events_{k}": _rows([getattr(h, k) for h in result.events], len(result.final[1])) for k in SIDES}
+    return {"events": json.dumps(result.events.as_dict())}, states
+
+
+SIDES = ("before", "after")
+
+
+def _rows(moments: list[Any], n: int) -> np.ndarray:
+    out = np.full((len(moments), n), np.nan)
+    for k, m in enumerate(moments):
+        if m is not None:
+            out[k] = m.y
+    return out
+
+
+def unpack(stored: dict[str, Any], result: Result) -> None:
+    """Give a result what its file holds of events.
+
+    Raises
+    ------
+    ValueError
+        If the arrays do not fit together.
+    """
+    told = json.loads(stored.get("events", "[]"))
+    sides = [stored[f"events_{k}"] for k in SIDES] if told else [np.zeros((0, 0))] * 2
+    if any(len(x) != len(told) for x in sides):
+        raise ValueError(f"{len(told)} events, and states of {[len(x) for x in sides]}")
+    if told:
+        sides = [[None if np.isnan(y).any() else y for y in x] for x in sides]
+        result.events = [  # type: ignore[assignment]
+            Happening(**{**one, "done": tuple(one["done"]), "before": before, "after": after})
+            for one, before, after in zip(told, *sides, strict=True)
+        ]
