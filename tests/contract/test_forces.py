@@ -23,7 +23,7 @@ PARAMETERS = {
     "CoordinateSpring": (30.0, 2.0, 0.4),
     "Brake": (1.0, 1.2),
     "Clutch": (1.0, 1.2),
-    "JointFriction": (0.7, 0.4, 0.3, 100.0, 1000.0, 0.2, 1.0, 0.5, 2.0, 3.0),
+    "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0, 1.0, 1.0),
     "Motor": (),
     "Rope": (30.0, 2.0, 0.4),
     "TorsionalSpringDamper": (30.0, 2.0, 0.4),
@@ -169,13 +169,13 @@ def test_complex_numbers_and_arrays_change_nothing_along_a_coordinate(kind):
 def test_friction_that_sticks_slides_the_way_it_is_told(rate, way):
     """By its switch, not by the sign of the rate; what is viscous goes by the rate. At rest static friction holds."""
     r, static, kinetic, viscous, preload, load = 0.7, 0.4, 0.3, 0.2, 1.0, 5.0
-    par = padded((r, static, kinetic, 0.0, 0.0, viscous, preload, 0.5, 2.0, 3.0))
+    par = padded((r, static, kinetic, 1.0, 1.0, viscous, preload, 0.5, 2.0, 3.0))
     effort = forces.JointFriction.effort
     slides = -r * kinetic * (load + preload) * way - viscous * rate
     assert effort(par, 0.1, rate, (0.0, 0.0, way), load) == pytest.approx(slides, rel=1e-14)
     held = effort(par, 0.1, 0.0, (0.0, 0.0, STATIC), load)
     assert abs(held) == pytest.approx(r * static * (load + preload), rel=1e-14)
-    fall = padded((r, static, kinetic, 1.0 / 0.02, 0.0, viscous, preload, 0.5, 2.0, 3.0))
+    fall = padded((r, static, kinetic, 0.02, 1.0, viscous, preload, 0.5, 2.0, 3.0, 1.0))
     mu = kinetic + (static - kinetic) * np.exp(-((r * rate / 0.02) ** 2))
     slides = -r * mu * (load + preload) * way - viscous * rate
     assert effort(fall, 0.1, rate, (0.0, 0.0, way), load) == pytest.approx(slides, rel=1e-14)

@@ -108,7 +108,11 @@ def test_flywheel_braked_to_rest(planar):
     """W J / M until it stands, after w^2 J / 2 M; then it does not move at all."""
     m = fb.Mechanism("flywheel", planar=planar)
     m.add(fb.Body("wheel", mass=3.0, inertia=0.5 if planar else (0.3, 0.3, 0.5)))
-    m.add(fb.Revolute("axle", "ground", "wheel", at=(0, 0) if planar else (0, 0, 0), **({} if planar else {"axis": (0, 0, 1)})))
+    m.add(
+        fb.Revolute(
+            "axle", "ground", "wheel", at=(0, 0) if planar else (0, 0, 0), **({} if planar else {"axis": (0, 0, 1)})
+        )
+    )
     m.add(fb.Brake("brake", "axle.angle", capacity="2 N*m"))
     m.add(fb.Initial("axle.angle", value=0.0, rate=12.0))
     r = m.simulate(5.0, outputs=51, **TIGHT)
@@ -227,3 +231,34 @@ def test_stribeck_and_viscous_friction_while_it_slides():
     sliding = r.t > slips + 1e-3
     expected = [-law(v) for v in r["rail"].rate[sliding]]
     assert r["rub"].friction[sliding] == pytest.approx(expected, rel=1e-9)
+
+
+def shaken(seed, **law):
+    """A sled on a spring, and a pendulum on it: both rub, the hinge by the load of a swinging bob; a force shakes them."""
+    rng = np.random.default_rng(seed)
+    m = fb.Mechanism("shaken", planar=True, gravity=(0, -G))
+    m.add(fb.Body("sled", mass=2.0, inertia=0.1), fb.Body("bob", mass=1.0, inertia=0.02, position=(0.0, -0.5)))
+    m.add(fb.Translational("rail", "ground", "sled", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Revolute("hinge", "sled", "bob", at=(0, 0)))
+    m.add(fb.CoordinateSpring("spring", "rail.displacement", stiffness=rng.uniform(50, 200)))
+    w, F = rng.uniform(2, 9), rng.uniform(5, 20)
+    m.add(fb.Actuator("shake", "rail.displacement", force=f"{F}*sin({w}*t)"))
+    m.add(fb.Initial("hinge.angle", value=rng.uniform(-1, 1), rate=rng.uniform(-2, 2)))
+    mu = rng.uniform(0.1, 0.3, 2)
+    m.add(fb.JointFriction("slides", "rail", static=mu[0], **law))
+    m.add(fb.JointFriction("turns", "hinge", static=mu[1], radius=0.1, **law))
+    return m
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_regularised_law_tends_to_it(seed):
+    """As its stick speed goes to nothing, motion and works do; with it by so many metres."""
+    true = shaken(seed).simulate(2.0, outputs=41, rtol=1e-9, atol=1e-10)
+    assert {name for e in true.events for name in e.name.split(", ")} == {"slides", "turns"}
+    gaps = []
+    for v in (1e-3, 1e-5):
+        r = shaken(seed, stick_speed=v).simulate(2.0, outputs=41, rtol=1e-7, atol=1e-9)
+        gaps.append(max(np.abs(r[j] - true[j]).max() for j in ("rail.displacement", "hinge.angle")))
+        assert r["turns"].work[-1] == pytest.approx(true["turns"].work[-1], rel=300 * v + 1e-5)
+    assert gaps[1] < 1e-4
+    assert gaps[1] < 0.1 * gaps[0]

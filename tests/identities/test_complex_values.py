@@ -103,6 +103,9 @@ def with_forces(where):
     m.add(fb.TorsionalSpringDamper("twist", "H", stiffness=4.0, damping=0.3, angle="20 deg"))
     m.add(fb.Motor("motor", "H", torque="3.0 - 0.1*rate"))
     m.add(fb.JointFriction("rub", "J", static=0.3, kinetic=0.2, bending_length=0.1, twist_length=0.2, preload=1.0))
+    m.add(fb.JointFriction("creep", "H", static=0.3, kinetic=0.2, stribeck_speed=0.3, stick_speed=0.2, radius="3 cm"))
+    m.add(fb.Brake("hold", "H.angle", capacity="2.0 + rate**2", static=1.2))
+    m.add(fb.Clutch("grip", "J.displacement", "a.x", capacity="3 N"))
     m.add(fb.Rope("rope", ("a", "b", "ground"), at=(p, q, r), stiffness=80.0, damping=1.0))
     m.add(fb.Rope("cut", ("a", "b"), at=(p, q), stiffness=80.0, length="30 cm"))
     if where == "space":
