@@ -41,7 +41,7 @@ def load(par, axes, force, torque):
 
 @formula
 def coefficient(par, v, way):
-    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), mu_k where there is no v_s; mu_s where rest is asked for."""
+    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2); without v_s it is mu_k; at rest, if asked for, mu_s."""
     s = v / par[3]
     fall = choose(way - SLIDING, 1.0, choose(par[FALLS], exp(-s * s), 0.0))
     return par[2] + (par[1] - par[2]) * fall
