@@ -11,6 +11,7 @@ Describe a mechanism
                   floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
                   moving surfaces
     Limit         hard stops of a coordinate
+    Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
@@ -101,12 +102,19 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .forces import *
     from .joints import *
     from .mechanism import Mechanism as Mechanism
+    from .model.actions import Impulse as Impulse
+    from .model.actions import Lock as Lock
+    from .model.actions import Note as Note
+    from .model.actions import Release as Release
+    from .model.actions import Set as Set
+    from .model.actions import Stop as Stop
     from .model.body import Body as Body
     from .model.body import Driver as Driver
     from .model.body import Frame as Frame
     from .model.body import Initial as Initial
     from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
+    from .model.event import Event as Event
     from .model.ground import Ground as Ground
     from .model.limit import Limit as Limit
     from .model.material import Material as Material
@@ -149,6 +157,13 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
+    "Event": "model.event",
+    "Impulse": "model.actions",
+    "Lock": "model.actions",
+    "Note": "model.actions",
+    "Release": "model.actions",
+    "Set": "model.actions",
+    "Stop": "model.actions",
     "Stepping": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
     "Limit": "model.limit",

@@ -16,10 +16,12 @@ from ..math.vec import add, load3, scale
 from ..tables.system import (
     DIAGONAL,
     F_APPLIED,
+    FORCE_ALONG,
     FORCE_F,
     FORCE_KIND,
     FORCE_LOAD,
     FORCE_M,
+    FORCE_SWITCH,
     GAMMA,
     GAP_BEFORE,
     GUILTY,
@@ -30,6 +32,9 @@ from ..tables.system import (
     LOAD_BEFORE,
     MOVED,
     RETURNED,
+    SLIDING,
+    SWITCH_OTHER,
+    SWITCH_ROW,
     TERM_ROW,
     TOLD,
     VALUE,
@@ -38,6 +43,7 @@ from .dispatch import effort
 from .loads import law, wide
 from .records import load
 from .rows import COEFFICIENT, measured
+from .sliding import slides
 
 SUBSTITUTIONS = 80
 AGAIN = 40  # after as many, once more from no load at all
@@ -61,6 +67,12 @@ def reaction_loads(S, W):
     for k in range(S.force_i.shape[0]):
         n = S.force_i[k, FORCE_LOAD]
         if n < 0:
+            continue
+        if S.force_i[k, FORCE_ALONG] == SLIDING:
+            s = S.force_i[k, FORCE_SWITCH]
+            W.sensed[RETURNED, n] = W.row[LAM, S.switch_i[S.switch_i[s, SWITCH_OTHER], SWITCH_ROW]]
+            if not slides(S, W, s):  # nothing follows from it
+                W.sensed[LOAD, n] = W.sensed[RETURNED, n]
             continue
         o = 0.0 * W.row[LAM, 0]
         force = (o, o, o)
@@ -93,6 +105,15 @@ def dry_part(S, W, k, x, arm, load, way):
     laws = (law(S, W, k, 0, x), 0.0, way)
     whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
     return abs(whole - effort(kind, (0.0, *par[1:]), x[1], x[2], laws, load))
+
+
+@formula
+def pulled(S, n):
+    """Whether load n may be negative: a place of contact pulls from where it opens to the end of the step."""
+    for x in range(S.load_i.shape[0]):
+        if S.load_i[x, 0] == n:
+            return S.load_i[x, 1] < 0
+    return False
 
 
 @formula
@@ -157,7 +178,7 @@ def improve(S, W, attempt):
         new = W.sensed[LOAD, n]
         for k in range(first, last):
             new -= W.sensed[INVERSE_JACOBIAN + n - first, k] * W.sensed[GAP_BEFORE, k]
-        W.sensed[LOAD, n] = new if new > 0.0 else 0.0
+        W.sensed[LOAD, n] = new if new > 0.0 or pulled(S, n) else 0.0
 
 
 @formula

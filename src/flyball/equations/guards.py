@@ -7,6 +7,7 @@
     friction that slides           way * rate
     a freewheel that overruns      rate
     a corner of a law              way * u
+    a place of contact             see `sliding.watched_place`
 
 A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
 """
@@ -22,6 +23,7 @@ from ..tables.system import (
     FORCE_KIND,
     FORCE_LOAD,
     G_BACK,
+    G_CONE,
     G_CORNER,
     G_HOLDS,
     G_LAW,
@@ -47,6 +49,7 @@ from ..tables.system import (
 from .dispatch import effort
 from .loads import law, wide
 from .rows import way_of
+from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
 
@@ -68,6 +71,8 @@ def watched(S, W, t, kind, s):
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
         return way * corner(S, W, t, s)
+    if kind >= G_CONE:
+        return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
     m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:

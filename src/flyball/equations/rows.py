@@ -15,6 +15,7 @@ from ..math.scalar import atan2, cos, sin
 from ..math.vec import neg, put3
 from ..tables.system import (
     BIAS,
+    DIAGONAL,
     G_VALUE,
     GAMMA,
     HOLD,
@@ -252,6 +253,15 @@ def switch_biases(S, W):
         k = S.switch_i[s, SWITCH_ROW]
         if k >= 0 and W.switch[MODE, s].real == OFF:
             W.row[GAMMA, k] = 0.0
+
+
+@formula
+def size_rows_off(S, W):
+    """Rows that are off have a size, though nothing of them is left."""
+    for s in range(S.switch_i.shape[0]):
+        k = S.switch_i[s, SWITCH_ROW]
+        if k >= 0 and W.switch[MODE, s].real == OFF:
+            W.row[DIAGONAL, k] = W.row[DIAGONAL, k] + 1.0
 
 
 @formula

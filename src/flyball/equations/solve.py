@@ -30,9 +30,7 @@ from ..tables.system import (
     LENGTH,
     MADE,
     MASS,
-    MODE,
     NV,
-    OFF,
     PARTED,
     PARTITION,
     PASS,
@@ -49,7 +47,6 @@ from ..tables.system import (
     SOLVES,
     STEP,
     STEP_UNLOADED,
-    SWITCH_ROW,
     V0,
     V1,
     V2,
@@ -57,7 +54,7 @@ from ..tables.system import (
 from .articulated import articulate, articulated_solve
 from .made import run
 from .mass import mass_entries
-from .rows import row_times
+from .rows import row_times, size_rows_off
 
 REFINEMENTS = 20
 ROUNDING = 1e-13  # of a row's own entry: what its slender bodies blur
@@ -133,10 +130,7 @@ def natural_size(S, W):
         elif n == 3:
             turn += W.G[at + 2] * W.G[at + 2]
         W.row[DIAGONAL, k] += shift * S.body_x[b, PER_BULK] + turn * S.body_x[b, PER_COMPACT]
-    for s in range(S.switch_i.shape[0]):  # rows that are off have no size of their own
-        k = S.switch_i[s, SWITCH_ROW]
-        if k >= 0 and W.switch[MODE, s].real == OFF:
-            W.row[DIAGONAL, k] = W.row[DIAGONAL, k] + 1.0
+    size_rows_off(S, W)
 
 
 @formula

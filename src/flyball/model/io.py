@@ -20,6 +20,7 @@ from .contact import Contact
 from .copies import CATEGORIES
 from .coupling import Coupling
 from .element import Element, written
+from .event import Event
 from .force import Force
 from .function import function_name
 from .ground import Ground
@@ -46,6 +47,7 @@ ONE_KIND = {
     "initial": Initial,
     "contacts": Contact,
     "limits": Limit,
+    "events": Event,
 }
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {"joints": (Joint, "joints"), "couplings": (Coupling, "joints"), "forces": (Force, "forces")}
