@@ -12,12 +12,13 @@ Describe a mechanism
                   moving surfaces
     limits        Limit stops a coordinate, Backlash is play between some, OneWay a freewheel, Ratchet holds at teeth;
                   rigid or elastic, as Rope is; Detent (a force) has notches
+    Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
-                  JointFriction, PointForce, PointTorque
+                  JointFriction, Clutch, Brake, PointForce, PointTorque
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one
@@ -102,12 +103,19 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .forces import *
     from .joints import *
     from .mechanism import Mechanism as Mechanism
+    from .model.actions import Impulse as Impulse
+    from .model.actions import Lock as Lock
+    from .model.actions import Note as Note
+    from .model.actions import Release as Release
+    from .model.actions import Set as Set
+    from .model.actions import Stop as Stop
     from .model.body import Body as Body
     from .model.body import Driver as Driver
     from .model.body import Frame as Frame
     from .model.body import Initial as Initial
     from .model.bulk import Bodies as Bodies
     from .model.contact import Contact as Contact
+    from .model.event import Event as Event
     from .model.ground import Ground as Ground
     from .model.material import Material as Material
     from .model.material import MaterialPair as MaterialPair
@@ -149,6 +157,13 @@ _HOME = {
     "Initial": "model.body",
     "Bodies": "model.bulk",
     "Contact": "model.contact",
+    "Event": "model.event",
+    "Impulse": "model.actions",
+    "Lock": "model.actions",
+    "Note": "model.actions",
+    "Release": "model.actions",
+    "Set": "model.actions",
+    "Stop": "model.actions",
     "Stepping": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
     "Material": "model.material",

@@ -60,6 +60,8 @@ def everything():
     m.add(fb.CoordinateSpring("height", coordinate="tip.z", stiffness=30.0, damping=0.5, rest=0.2))
     m.add(fb.JointFriction("friction", joint="E", static=0.2, kinetic=0.1, radius=0.05, bending_length=0.3))
     m.add(fb.JointFriction("collar", joint="B", coordinate="angle", static=0.2, radius=0.05, twist_length=0.3))
+    m.add(fb.Clutch("clutch", "A.angle", "E.angle", capacity="0.02 + 0.01*t"))
+    m.add(fb.Brake("brake", "C.angle", capacity=0.03, static=1.2))
     m.add(fb.Motor("motor", joint="A", torque="0.5 - 0.1*rate + 0.2*turned"))
     m.add(fb.PointForce("wind", "e", force=("1 + speed", "2*t", 0.5), at=(2, 0.5, -0.7), axes="body"))
     m.add(fb.PointTorque("twist", "d", torque=(0.1, "0.2*cos(t)", 0.3)))

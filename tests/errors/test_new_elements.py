@@ -122,7 +122,22 @@ PLANAR = {
     "JointFriction negative": ({"joint": "S", "static": -0.1}, "static is -0.1; it must be zero or greater"),
     "JointFriction unit": ({"joint": "S", "static": "0.1 N"}, "'0.1 N': expected a plain number"),
     "JointFriction viscous": ({"joint": "S", "viscous": "1 N*m*s/rad"}, "viscous of.*expected a damping"),
-    "JointFriction rest": ({"joint": "S", "stick_speed": 0}, "stick_speed is 0 m/s; it must be greater than 0"),
+    "JointFriction rest": ({"joint": "S", "stick_speed": 0}, "stick_speed is 0 m/s.*greater than 0. Leave it out"),
+    "Brake negative": ({"capacity": -2}, r"capacity of Brake 'x' is -2 N\*m; it must be zero or greater"),
+    "Brake of a formula": ({"capacity": "3 - 5"}, r"capacity of Brake 'x' is -2 N\*m; it must be zero or greater"),
+    "Brake unit": ({"capacity": "2 N"}, "capacity of.*'2 N': expected a torque"),
+    "Brake bare": ({"capacity": None}, "field 'capacity' is missing"),
+    "Brake weak": ({"static": 0.9}, "static is 0.9; it must be 1 or greater: what it holds at rest"),
+    "Brake misspelt": ({"coordinate": "A.angel"}, "no coordinate 'angel'.*mean 'angle'"),
+    "Brake unknown name": ({"capacity": "2*pressure"}, "unknown name 'pressure'"),
+    "Clutch negative": ({"capacity": -2}, r"capacity of Clutch 'x' is -2 N\*m; it must be zero or greater"),
+    "Clutch weak": ({"static": 0}, "static is 0; it must be 1 or greater: what it holds at rest"),
+    "Clutch of one": ({"coordinate_j": "A.angle"}, "both its coordinates are 'A.angle'; name two"),
+    "Clutch of two kinds": (
+        {"coordinate_j": "S.displacement"},
+        "'A.angle' is in rad and 'S.displacement' in m; a clutch needs two angles or two displacements",
+    ),
+    "Clutch unknown": ({"coordinate_i": "B.angle"}, "no joint named 'B'"),
     "JointFriction lengths": ({"joint": "S", "bending_length": 0}, "bending_length is 0 m; it must be greater than 0"),
     # along coordinates
     "CoordinateSpring misspelt": ({"coordinate": "S.displacment"}, "'displacment'.*mean 'displacement'"),
@@ -217,6 +232,8 @@ NEEDED = {
     "Coupler": {"weights": [1, -1]},
     "JointFriction": {"static": 0.1},
     "Rope": {"stiffness": 1, "at": [(0, 0), (1, 0)]},
+    "Brake": {"coordinate": "A.angle", "capacity": 1},
+    "Clutch": {"coordinate_i": "A.angle", "coordinate_j": "W.angle", "capacity": 1},
 }
 CATEGORY = {"Sensor": "sensors", "IMU": "sensors", "Table": "tables", "Driver": "drivers"}
 CASES = [(plane, k, *v) for k, v in PLANAR.items()] + [(space, k, *v) for k, v in SPATIAL.items()]

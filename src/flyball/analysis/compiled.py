@@ -283,7 +283,7 @@ def _places(x: Values) -> np.ndarray:
     for t in s.terms:
         if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
             z[t.hint] = x.poses.turned(t.owner)
-    for joint in s.model.joints:
-        if (name := f"{joint.name}.place") in s.state_at:
-            z[s.state_at[name]] = joint.nearest(x.numbers[joint.name], *x.poses.ends(joint))[0]  # type: ignore[attr-defined]
+    for e in (*s.model.joints, *s.model.forces):
+        if (name := f"{e.name}.place") in s.state_at:
+            z[s.state_at[name]] = e.nearest(x.numbers[e.name], *x.poses.ends(e))[0]  # type: ignore[attr-defined, arg-type]
     return z

@@ -9,14 +9,19 @@ before that there is none: friction outweighs what causes it and the joint jams.
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..forces.joint_friction import coefficient
+from ..constraints.modes import STATIC
 from ..forces.joint_friction import load as pressed
+from ..math.scalar import sign
 from ..math.vec import add, load3, scale
 from ..tables.system import (
     DIAGONAL,
     F_APPLIED,
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_KIND,
     FORCE_LOAD,
     FORCE_M,
+    FORCE_SWITCH,
     GAMMA,
     GAP_BEFORE,
     GUILTY,
@@ -27,12 +32,18 @@ from ..tables.system import (
     LOAD_BEFORE,
     MOVED,
     RETURNED,
+    SLIDING,
+    SWITCH_OTHER,
+    SWITCH_ROW,
     TERM_ROW,
     TOLD,
+    VALUE,
 )
-from .loads import wide
+from .dispatch import effort
+from .loads import law, wide
 from .records import load
 from .rows import COEFFICIENT, measured
+from .sliding import slides
 
 SUBSTITUTIONS = 80
 AGAIN = 40  # after as many, once more from no load at all
@@ -57,6 +68,12 @@ def reaction_loads(S, W):
         n = S.force_i[k, FORCE_LOAD]
         if n < 0:
             continue
+        if S.force_i[k, FORCE_ALONG] == SLIDING:
+            s = S.force_i[k, FORCE_SWITCH]
+            W.sensed[RETURNED, n] = W.row[LAM, S.switch_i[S.switch_i[s, SWITCH_OTHER], SWITCH_ROW]]
+            if not slides(S, W, s):  # nothing follows from it
+                W.sensed[LOAD, n] = W.sensed[RETURNED, n]
+            continue
         o = 0.0 * W.row[LAM, 0]
         force = (o, o, o)
         torque = (o, o, o)
@@ -70,10 +87,33 @@ def reaction_loads(S, W):
 
 
 @formula
-def most_friction(S, k, arm, rate, load):
-    """What friction of force k can hold along its coordinate, where surfaces slide by ``arm`` times the rate."""
-    par = wide(S.force_x, k)
-    return arm * coefficient(par, arm * rate) * (load + par[6])
+def held_at_rest(S, W, k, t, arm, load):
+    """The most that friction of force k, with this arm and load, holds along its quantity at rest."""
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], 0.0), arm, load, STATIC)
+
+
+@formula
+def dry(S, W, k, t, rate, arm, load):
+    """How much of it there is while it slides, without what is viscous."""
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], rate), arm, load, sign(rate))
+
+
+@formula
+def dry_part(S, W, k, x, arm, load, way):
+    """What the arm adds to the effort of force k for the inputs x = (t, value, rate) of its law."""
+    par, kind = wide(S.force_x, k), S.force_i[k, FORCE_KIND]
+    laws = (law(S, W, k, 0, x), 0.0, way)
+    whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
+    return abs(whole - effort(kind, (0.0, *par[1:]), x[1], x[2], laws, load))
+
+
+@formula
+def pulled(S, n):
+    """Whether load n may be negative: a place of contact pulls from where it opens to the end of the step."""
+    for x in range(S.load_i.shape[0]):
+        if S.load_i[x, 0] == n:
+            return S.load_i[x, 1] < 0
+    return False
 
 
 @formula
@@ -138,7 +178,7 @@ def improve(S, W, attempt):
         new = W.sensed[LOAD, n]
         for k in range(first, last):
             new -= W.sensed[INVERSE_JACOBIAN + n - first, k] * W.sensed[GAP_BEFORE, k]
-        W.sensed[LOAD, n] = new if new > 0.0 else 0.0
+        W.sensed[LOAD, n] = new if new > 0.0 or pulled(S, n) else 0.0
 
 
 @formula

@@ -9,6 +9,7 @@
     a corner of a law              way * u
     an elastic stop that is open   how far it is, past it -(k d + c ddot)
     one that is pressed            what it pushes with, k d + c ddot
+    a place of contact             see `sliding.watched_place`
 
 A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
 """
@@ -24,6 +25,7 @@ from ..tables.system import (
     FORCE_KIND,
     FORCE_LOAD,
     G_BACK,
+    G_CONE,
     G_CORNER,
     G_HOLDS,
     G_LAW,
@@ -53,6 +55,7 @@ from ..tables.system import (
 from .dispatch import effort
 from .loads import law, wide
 from .rows import way_of
+from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
 
@@ -76,6 +79,8 @@ def watched(S, W, t, kind, s):
         return way * corner(S, W, t, s)
     if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
         return pressing(S, W, s, kind, way - FROZEN)
+    if kind >= G_CONE:
+        return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
     m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:

@@ -11,6 +11,8 @@ from ..laws.evaluation import evaluate
 from ..math.scalar import sign
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..tables.system import (
+    ALONG,
+    BETWEEN,
     FORCE_ALONG,
     FORCE_F,
     FORCE_KIND,
@@ -25,12 +27,14 @@ from ..tables.system import (
     NV,
     PARENT,
     RATE,
+    SLIDING,
     V0,
     VALUE,
 )
 from .dispatch import effort, inputs, wrench
 from .records import load
 from .rows import way_of
+from .sliding import slide
 from .tree import project
 
 
@@ -102,7 +106,7 @@ def wide(T, k):
 def forces(S, W, t, work):
     """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
     for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] == 1:
+        if S.force_i[k, FORCE_ALONG] != BETWEEN:
             continue
         kind = S.force_i[k, FORCE_KIND]
         i = S.force_i[k, FORCE_F]
@@ -139,7 +143,9 @@ def way(S, W, k, rate):
 def efforts(S, W, t, work, f):
     """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
     for k in range(S.force_i.shape[0]):
-        if S.force_i[k, FORCE_ALONG] == 0:
+        if S.force_i[k, FORCE_ALONG] != ALONG:
+            if S.force_i[k, FORCE_ALONG] == SLIDING:
+                slide(S, W, k, work, f)
             continue
         m = S.force_i[k, FORCE_F]
         x = W.sensed[VALUE, m]

@@ -15,6 +15,7 @@ from ..laws.evaluation import brief, evaluate, evaluate_jet
 from ..math.scalar import cos
 from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, TO_RATE
 from ..tables.system import (
+    ALONG,
     BODY_LAW,
     FORCE_ALONG,
     FORCE_F,
@@ -25,6 +26,7 @@ from ..tables.system import (
     RATE,
     ROW_LAW,
     SAMPLED,
+    SLIDING,
     VALUE,
 )
 from .dispatch import inputs
@@ -101,7 +103,9 @@ def take_note(S, W, seen, row):
         seen[row, m] = W.sensed[VALUE, m]
         seen[row + 1, m] = W.sensed[RATE, m]
     for f in range(S.force_i.shape[0]):
-        if S.force_i[f, FORCE_ALONG] == 1:
+        if S.force_i[f, FORCE_ALONG] == SLIDING:
+            continue
+        if S.force_i[f, FORCE_ALONG] == ALONG:
             a, b = W.sensed[VALUE, S.force_i[f, FORCE_F]], W.sensed[RATE, S.force_i[f, FORCE_F]]
         else:
             F = load(W.FK, S.force_i[f, FORCE_F])

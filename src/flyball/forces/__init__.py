@@ -40,6 +40,8 @@ if set(WRENCHES) & set(EFFORTS):
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
     from .backlash import Backlash as Backlash
     from .bushing import Bushing as Bushing
+    from .clutch import Brake as Brake
+    from .clutch import Clutch as Clutch
     from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
     from .detent import Detent as Detent

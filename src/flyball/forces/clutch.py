@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import field
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -30,9 +31,12 @@ def effort(par, x, rate, laws, load):
     return -par[0] * capacity * choose(laws[2] - SLIDING, par[1] + o, laws[2] + o)
 
 
-@dataclass(frozen=True)
-class DryCoupling(CoordinateForce):
+class ByCapacity:
     """What clutches and brakes share: a capacity by law, and how much more than that holds at rest."""
+
+    title: str
+    capacity: Law
+    along: Callable[[], tuple[str, ...]]
 
     kind: ClassVar[int] = KIND
     effort: ClassVar = staticmethod(effort)
@@ -59,11 +63,11 @@ class DryCoupling(CoordinateForce):
 
     def laws(self) -> tuple[Law | None, ...]:
         """The capacity."""
-        return (self.capacity,)  # type: ignore[attr-defined]
+        return (self.capacity,)
 
 
 @element
-class Brake(DryCoupling):
+class Brake(ByCapacity, CoordinateForce):
     """A brake along a coordinate: it holds it, or slips where more than its capacity pulls.
 
     What it carries while it slips is its capacity, against the motion; what it holds at rest is ``static`` times that.
@@ -99,7 +103,7 @@ class Brake(DryCoupling):
 
 
 @element
-class Clutch(DryCoupling):
+class Clutch(ByCapacity, CoordinateForce):
     """A clutch between two coordinates, such as the angles of two shafts: it locks them together, slips, or is open.
 
     Slip is the second coordinate less the first one. While it slips it carries its capacity, against the slip, as a

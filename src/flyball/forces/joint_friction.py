@@ -8,18 +8,21 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from ..compiler.jit import formula
+from ..constraints.modes import FRICTION
 from ..errors import ModelError
 from ..math.scalar import absolute, choose, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
 from ..model.joint import Joint
+from ..model.switch import Switch
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
 KIND = 6
 SLIDING = 1.5  # ways of sliding are -1, 0 and 1; `constraints.modes.STATIC` is more, and asks for what holds at rest
+FALLS, CREEPS = 10, 11  # parameters that are 1 where there is a Stribeck speed, a stick speed; else 0
 STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
 FALL = 0.01  # m/s: Stribeck speed of the regularised law
 
@@ -38,9 +41,9 @@ def load(par, axes, force, torque):
 
 @formula
 def coefficient(par, v, way):
-    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2), mu_k where no v_s is given; mu_s where rest is asked for."""
-    s = v * par[3]
-    fall = choose(way - SLIDING, 1.0, choose(par[3], exp(-s * s), 0.0))
+    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2); without v_s it is mu_k; at rest, if asked for, mu_s."""
+    s = v / par[3]
+    fall = choose(way - SLIDING, 1.0, choose(par[FALLS], exp(-s * s), 0.0))
     return par[2] + (par[1] - par[2]) * fall
 
 
@@ -51,7 +54,7 @@ def effort(par, x, rate, laws, load):
     The direction d is that of its switch; with a stick speed v_0 it is tanh(v / v_0).
     """
     v = par[0] * rate
-    way = choose(laws[2] - SLIDING, 1.0, choose(par[4], tanh(v * par[4]), laws[2]))
+    way = choose(laws[2] - SLIDING, 1.0, choose(par[CREEPS], tanh(v / par[4]), laws[2]))
     return -par[0] * coefficient(par, v, laws[2]) * (load + par[6]) * way - par[5] * rate
 
 
@@ -121,6 +124,10 @@ class JointFriction(CoordinateForce):
     def _coordinate(self) -> str:
         return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
 
+    def switches(self) -> tuple[Switch, ...]:
+        """It sticks, or slides; the regularised law knows no difference."""
+        return () if self.stick_speed is not None else (Switch(FRICTION, along=self.along(), slides=True),)
+
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""
         found = model.find(self.joint)
@@ -154,7 +161,7 @@ class JointFriction(CoordinateForce):
     @staticmethod
     def sticking(par: tuple[float, ...]) -> tuple[float, float]:
         """Arm of the surfaces about the coordinate, and the sliding speed [m/s] below which they should stick."""
-        return par[0], STICKING / par[4]
+        return par[0], STICKING * par[4]
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
@@ -162,7 +169,7 @@ class JointFriction(CoordinateForce):
         kinetic = n.static if n.kinetic is None else n.kinetic
         arm = n.radius if turning else 1.0
         fall = FALL if n.stribeck_speed is None and n.stick_speed is not None else n.stribeck_speed
-        bending, twist, fall, stick = (
-            0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length, fall, n.stick_speed)
-        )
-        return (arm, n.static, kinetic, fall, stick, n.viscous, n.preload, n.thrust_factor, bending, twist)
+        bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
+        fall, falls, stick, creeps = (y for x in (fall, n.stick_speed) for y in ((1.0, 0.0) if x is None else (x, 1.0)))
+        laws = n.viscous, n.preload, n.thrust_factor, bending, twist
+        return (arm, n.static, kinetic, fall, stick, *laws, falls, creeps)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..math import scalar
+from .branch import taken
 from .function import Function, Functions
 from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
 
@@ -196,7 +197,6 @@ class Node:
         return f"<{self.op} {self.index}>"
 
 
-SMALLEST = 1e-300  # what is greater than zero with this added to it is not negative
 NUMPY = {"arcsin": "asin", "arccos": "acos", "arctan": "atan"}
 
 
@@ -336,16 +336,8 @@ class Graph:
         nodes = tuple(self.node(x) for x in args)
         if all(x.op == NUMBER for x in nodes):
             return self.number(FUNCTIONS[name](*(x.value for x in nodes)))
-        if name == "choose":
-            if nodes[1] is nodes[2]:
-                return nodes[1]
-            if nodes[0].op == NUMBER:
-                return nodes[1] if nodes[0].value > 0.0 else nodes[2]
-            if _most(nodes[0]) <= 0.0:
-                return nodes[2]
-            if nodes[1].op == NUMBER and nodes[1].value != nodes[1].value:  # a number that there is not
-                self.granted.append((self.subtract(SMALLEST, nodes[0]), "positive"))
-                return nodes[2]
+        if name == "choose" and (one := taken(*nodes)) is not None:
+            return one
         if name in ("minimum", "maximum") and nodes[0] is nodes[1]:
             return nodes[0]
         if len(nodes) == 1 and (name in ODD or name in EVEN):
@@ -396,14 +388,6 @@ class Graph:
 def _value(op: str, args: tuple[Node, ...], data: Any) -> float:
     values = [x.value for x in args]
     return float(data.python(*values) if op == CALL else OPERATIONS[op](*values))
-
-
-def _most(x: Node) -> float:
-    """What the sign of something, and a number, are at most; inf where nobody knows."""
-    if x.op == ADD and NUMBER in (x.args[0].op, x.args[1].op):
-        first, second = x.args if x.args[0].op == NUMBER else x.args[::-1]
-        return first.value + (1.0 if second.op == "sign" else math.inf)
-    return 1.0 if x.op == "sign" else math.inf
 
 
 def _scaled(x: Node) -> tuple[float, Node]:

@@ -34,6 +34,7 @@ CATEGORIES = (
     "initial",
     "contacts",
     "limits",
+    "events",
 )
 SETTINGS = ("name", "planar", "gravity_told")
 

@@ -42,6 +42,7 @@ class LawOf:
 
     dimension: str | None
     inputs: tuple[str, ...] = ()
+    curves: bool = False  # whether it may name curves of parts, such as A.angle
 
 
 def plain(value: Any) -> Any:
@@ -282,7 +283,7 @@ def limited(value: Any, dimension: str | None, where: str) -> Any:
     return value
 
 
-def written(e: Element) -> dict[str, Any]:
+def written(e: Any) -> dict[str, Any]:
     """The fields that differ from their defaults, as plain data: what a model file holds."""
     out: dict[str, Any] = {}
     for f in dataclasses.fields(e):
@@ -299,7 +300,7 @@ def written(e: Element) -> dict[str, Any]:
 def _data(value: Any) -> Any:
     if isinstance(value, (tuple, list)):
         return [_data(v) for v in value]
-    if isinstance(value, Element):
+    if dataclasses.is_dataclass(value):
         return {"type": type(value).__name__, **written(value)}
     return value
 

@@ -38,15 +38,15 @@ class Expression:
     where: str = field(default="", repr=False, compare=False)  # what it is the law of, for messages
 
     @classmethod
-    def parse(cls, text: str, tables: Collection[str] = ()) -> Expression:
-        """Read an expression; ``tables`` are names that it may call like functions.
+    def parse(cls, text: str, tables: Collection[str] = (), curves: bool = False) -> Expression:
+        """Read an expression; ``tables`` are names that it may call like functions, ``curves``: dots in names.
 
         Raises
         ------
         ExpressionError
             If the text is not an expression of the known operators, functions, tables and constants.
         """
-        return _parsed(text, frozenset(tables))
+        return _parsed(text, frozenset(tables), curves)
 
     @classmethod
     def of_function(cls, function: Callable[..., Any], where: str = "") -> Expression:
@@ -138,9 +138,9 @@ class Expression:
 
 
 @lru_cache(maxsize=8192)
-def _parsed(text: str, tables: frozenset[str]) -> Expression:
+def _parsed(text: str, tables: frozenset[str], curves: bool) -> Expression:
     """The same text is read when an element is added, and again for each analysis."""
-    return Expression(*read(text, tables))
+    return Expression(*read(text, tables, curves))
 
 
 def number(
@@ -182,18 +182,23 @@ def number(
 
 
 def law_expression(
-    value: Any, dimension: str | None, where: str, tables: Collection[str] = (), names: Collection[str] = ()
+    value: Any,
+    dimension: str | None,
+    where: str,
+    tables: Collection[str] = (),
+    names: Collection[str] = (),
+    curves: bool = False,
 ) -> Expression:
     """Turn what a user wrote as a law into an expression.
 
     It may be a number, a quantity ("120 rpm"), a formula of t that may call ``tables``, or a Python function. ``names``
-    are those that the law may use, t besides.
+    are those that the law may use, t besides; ``curves``: also those of parts, such as A.angle.
     """
     try:
         if isinstance(value, Expression):
             return value
         if isinstance(value, str) and split_quantity(value) is None:
-            return Expression.parse(value, tables)
+            return Expression.parse(value, tables, curves)
         if callable(value):
             return Expression.of_function(value, where)
     except ModelError as error:

@@ -73,14 +73,17 @@ class Node:
             yield from arg.walk()
 
 
-def read(text: str, tables: Collection[str] = ()) -> tuple[str, Node]:
-    """The text on one line, and its tree; `ExpressionError` if it is not a formula. ``tables``: names of tables."""
+def read(text: str, tables: Collection[str] = (), curves: bool = False) -> tuple[str, Node]:
+    """The text on one line, and its tree; `ExpressionError` if it is not a formula.
+
+    ``tables``: names of tables; ``curves``: whether names may have dots, such as A.angle.
+    """
     text = "".join(" " if c.isspace() else c for c in text).strip()
     if not text:
         raise ExpressionError("the expression is empty; write a number, a quantity such as '5 mm', or a formula")
     try:
         masked, quantities = _masked(text)
-        return text, _Reader(text, masked, quantities, tables).read(ast.parse(masked, mode="eval").body)
+        return text, _Reader(text, masked, quantities, tables, curves).read(ast.parse(masked, mode="eval").body)
     except SyntaxError as error:
         start = (error.offset or 1) - 1
         refuse(text, start, start + 1, f"cannot read the expression ({error.msg})", _remedy(text))
@@ -116,12 +119,17 @@ class _Reader:
     """Turns Python's syntax tree into nodes, refusing all that is no formula."""
 
     def __init__(
-        self, text: str, masked: str, quantities: dict[str, tuple[float, int]], tables: Collection[str]
+        self,
+        text: str,
+        masked: str,
+        quantities: dict[str, tuple[float, int]],
+        tables: Collection[str],
+        curves: bool = False,
     ) -> None:
         self.text = text
         self.masked = masked  # as Python reads it, as long as the text
         self.quantities = quantities
-        self.tables = tables
+        self.tables, self.curves = tables, curves
         self.depth = 0
 
     def read(self, node: ast.AST, *, condition: bool = False) -> Node:
@@ -173,6 +181,18 @@ class _Reader:
         if node.id in CONSTANTS:
             return self.made(node, "number", value=CONSTANTS[node.id])
         return self.made(node, "name", value=node.id)
+
+    def read_Attribute(self, node: ast.Attribute) -> Node:
+        """A curve of a part, such as A.angle: a name with a dot."""
+        owner: ast.AST = node
+        while isinstance(owner, ast.Attribute):
+            owner = owner.value
+        named = isinstance(owner, ast.Name) and owner.id not in self.quantities
+        if not (named and self.curves):
+            text = ast.unparse(node)
+            sensor = f"laws use curves by sensors: add fb.Sensor('name', '{text}') and write its name"
+            self.refuse(node, f"'{text}' is not allowed in an expression", sensor if named else _ALLOWED)
+        return self.made(node, "name", value=ast.unparse(node))
 
     def read_UnaryOp(self, node: ast.UnaryOp) -> Node:
         if isinstance(node.op, ast.Not):

@@ -20,6 +20,7 @@ from .contact import Contact
 from .copies import CATEGORIES
 from .coupling import Coupling
 from .element import Element, written
+from .event import Event
 from .force import Force
 from .function import function_name
 from .ground import Ground
@@ -45,6 +46,7 @@ ONE_KIND = {
     "drivers": Driver,
     "initial": Initial,
     "contacts": Contact,
+    "events": Event,
 }
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {

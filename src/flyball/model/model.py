@@ -2,28 +2,28 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ..errors import ExpressionError, ModelError
+from ..errors import ModelError
 from .body import GROUND, Body, Driver, Frame, Initial
 from .bulk import Bodies
 from .contact import Contact
 from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
 from .coupling import Coupling
-from .element import Element, LawOf, Number, field_with, fields_with, limited, plain, resolve
+from .element import Element, LawOf, Number, field_with, fields_with, plain, resolve
+from .event import Event
 from .examine import but_is, carriers, check_units, measured
-from .expressions import folded, law_expression, number, resolve_parameters
+from .expressions import number, resolve_parameters
 from .force import Force
-from .function import function_name
 from .geometry import vector
 from .ground import Ground
 from .joint import Joint
 from .kept import Kept
+from .lawful import law_of
 from .limit import Unilateral
 from .material import Material, MaterialPair
 from .references import check_references
@@ -31,7 +31,7 @@ from .sensor import IMU, Sensor
 from .summary import summary
 from .table import Table
 from .units import same_kind
-from .validity import check_kind, check_vectors, refuse_twins, told_gravity
+from .validity import check_kind, check_vectors, told_gravity
 from .words import listing as listing
 from .words import suggest as suggest
 
@@ -95,6 +95,7 @@ class Model:
         self.bulk: list[Bodies] = []
         self.contacts: list[Contact] = []
         self.limits: list[Unilateral] = []
+        self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
 
     def environment(self, changed: Mapping[str, Number | complex] | None = None) -> dict[str, float]:
@@ -202,7 +203,7 @@ class Model:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
                 raise ModelError(
                     f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table, initial "
-                    f"condition, part of ground, material, contact or limit"
+                    f"condition, part of ground, material, contact, limit or event"
                 )
             self._check_name(e)
             check_references(self, e)
@@ -351,44 +352,8 @@ class Model:
 
     def law(self, value: Any, of: LawOf, where: str, driver: bool = False) -> Any:
         """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
-        if value is None:
-            return None
-        if driver and callable(value):
-            raise ExpressionError(
-                f"{where} is the Python function '{function_name(value)}', whose derivatives a driver cannot know; "
-                f"give an expression, or a Table that is called in one"
-            )
-        tables = {x.name: x for x in self.tables}
-        try:
-            expression = law_expression(value, of.dimension, where, tables, self.names_in_laws(of))
-            expression = dataclasses.replace(expression, where=where)
-            if expression.tree.kind == "number":
-                limited(expression.tree.value, of.dimension, where)
-            sensors = {k: x for k in expression.names if isinstance(x := self.by_name.get(k), Sensor)}
-            expression.require(self.names_in_laws(of))
-            folded(expression.tree, expression.text)
-            refuse_twins(expression.names, of.inputs, sensors, self.parameters)
-        except ExpressionError as error:
-            text = str(error)
-            raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
-        for name in sorted(sensors):
-            self._check_sensed(sensors[name], where, driver)
-        return expression
+        return law_of(self, value, of, where, driver)
 
     def names_in_laws(self, of: LawOf) -> set[str]:
-        """All names that such a law may use."""
+        """All names that such a law may use; curves besides, where it may."""
         return {"t", *of.inputs, *self.parameters, *(x.name for x in self.sensors if isinstance(x, Sensor))}
-
-    def _check_sensed(self, e: Sensor, where: str, driver: bool) -> None:
-        """Whether a law may use a sensor."""
-        found = self.measured(e)
-        if found is None:
-            raise ModelError(
-                f"{where}: sensor {e.name!r} measures {e.of!r}, which is known only after the accelerations are; laws "
-                f"can use positions, angles, lengths and their rates"
-            )
-        if driver and found[2] > 0:
-            raise ModelError(
-                f"{where}: sensor {e.name!r} measures {e.of!r}, a rate; a driver follows positions and angles only. "
-                f"For a controller use an Actuator or a Motor"
-            )

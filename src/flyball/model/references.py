@@ -11,6 +11,8 @@ from .bulk import Bodies
 from .contact import Contact
 from .coupling import Coupling
 from .element import Element
+from .event import Event
+from .event_check import check_event
 from .force import BodyForce, CoordinateForce, TwoFrameForce, TwoPointForce
 from .ground import Ground
 from .joint import Joint
@@ -45,6 +47,8 @@ def check_references(model: Model, e: Element) -> None:
         e.examine(model)
     elif isinstance(e, Sensor):
         model.measured(e)
+    elif isinstance(e, Event):
+        check_event(model, e)
     elif isinstance(e, IMU):
         if model.carrier(e.frame, e) == GROUND:
             raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")

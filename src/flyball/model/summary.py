@@ -32,6 +32,7 @@ def lines(model: Model) -> list[tuple[str, str]]:
     out += _line("drivers", (f"{d.name} ({d.coordinate} = {d.law})" for d in model.drivers))
     for category in ("sensors", "tables", "initial", "materials", "contacts", "limits"):
         out += _line(category, (e.name for e in getattr(model, category)))
+    out += _line("events", (f"{e.name} ({e.when})" for e in model.events))
     return out + _line("parameters", (f"{k} = {v}" for k, v in model.parameters.items()))
 
 

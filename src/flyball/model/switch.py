@@ -14,13 +14,17 @@ class Switch:
     Attributes
     ----------
     kind : int
-        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC or RATCHET of `constraints.modes`.
+        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC, RATCHET or SLIP of `constraints.modes`.
     label : str
         Which of the element's it is; empty if it has one.
     along : tuple of str
         Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity, with weights if there are several.
     path : tuple of (role, role, Row)
         Or terms between frames of the element's own, such as the parts of a rope.
+    seen : tuple of (role, role, Row)
+        What is measured in place of ``path``, where the row itself says less than that while it is off.
+    other : str
+        Label of the element's switch that it belongs to: of a slip, the gap.
     slides : bool
         Whether the element is a force along the same quantity that acts while the row is off (friction), or whose
         corners are watched (what is elastic).
@@ -32,6 +36,8 @@ class Switch:
     label: str = ""
     along: tuple[str, ...] = ()
     path: tuple[tuple[str, str, Row], ...] = ()
+    seen: tuple[tuple[str, str, Row], ...] = ()
+    other: str = ""
     slides: bool = False
     weighted: bool = False
 

@@ -28,7 +28,15 @@ from .views.base import Curves
 from .views.bulk import MemberView, SetView
 
 TOLD = 12  # curves in a text
-UNSAID = ("initial", "tables", "ground", "materials", "material_pairs", "contacts")  # parts of the description only
+UNSAID = (
+    "initial",
+    "tables",
+    "ground",
+    "materials",
+    "material_pairs",
+    "contacts",
+    "events",
+)  # parts of the description only
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:

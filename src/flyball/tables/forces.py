@@ -8,7 +8,9 @@ from ..constraints.blocks import DISTANCE, turning
 from ..model.element import LawOf, fields_with
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
+from ..model.touch import Touch
 from .specs import Structure, frame
+from .system import SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
@@ -81,7 +83,7 @@ def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted(s.model.acting(), key=lambda f: f.kind)
+    s.forces = sorted((f for f in s.model.acting() if _acts(s, f)), key=lambda f: f.kind)
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
         table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
@@ -91,12 +93,22 @@ def forces(s: Structure) -> None:
                 table[k, 1] = _axis_frame(s, e)
                 table[k, 6] = 2 * len(s.measured) + len(s.loads)
                 s.loads.append(e)
+        elif isinstance(e, Touch):
+            table[k, :2] = [*(s.measured[f"{e.name}:slip_{i + 1}"] for i in range(len(e.slips))), -1][:2]
+            table[k, 6] = 2 * len(s.measured) + len(s.loads)
+            table[k, 8] = SLIDING
+            s.loads.append(e)
         else:
             table[k, :2] = frame(s, e, "F") if "F" in e.ends() else 0, frame(s, e, "M")
         _compile_laws(s, e, table[k])
         if not e.conservative():
             table[k, 5] = s.state(f"{e.name}.work")
     s.tables["force_i"] = table
+
+
+def _acts(s: Structure, e: Force) -> bool:
+    """Whether there is a force: of a place of contact if it has modes here, and friction."""
+    return not isinstance(e, Touch) or (bool(s.switches) and e.acts())
 
 
 def _axis_frame(s: Structure, e: CoordinateForce) -> int:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ..errors import ModelError
@@ -30,7 +32,7 @@ def patterns(s: Structure, solved: bool = True) -> None:
         for m in r.sensors
         for b in sorted(touched[len(s.rows) + m])
     ]
-    load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in s.terms_of.get(e.joint, ())]  # type: ignore[attr-defined]
+    load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in _pressing(s, e)]
     s.tables |= {
         "term_i": ints(term_i, 6),
         "seg_i": ints(seg_i, 3),
@@ -49,6 +51,11 @@ def patterns(s: Structure, solved: bool = True) -> None:
         _coupled(s, parents)
     else:
         _nothing(s)
+
+
+def _pressing(s: Structure, e: Any) -> list[int]:
+    """Terms whose reactions are a load; -1 for the multiplier of the row that presses two sides together."""
+    return s.terms_of.get(e.joint, []) if hasattr(e, "joint") else [-1]
 
 
 def _touched(s: Structure, ways: list[tuple[list[int], list[int]]]) -> list[set[int]]:

@@ -10,16 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, ELASTIC, FRICTION, ONE_WAY, RATCHET, STOP
+from ..constraints.modes import BRANCH, ELASTIC, FRICTION, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
-from .specs import RowSpec, Structure, TermSpec, frame, ints
+from .specs import RowSpec, Structure, frame, ints
 from .system import (
     EITHER,
     FALLING,
     FORCE_SWITCH,
+    G_ASTRAY,
     G_BACK,
+    G_CONE,
     G_CORNER,
     G_HOLDS,
     G_LOWER,
@@ -27,6 +29,7 @@ from .system import (
     G_PRESS_UPPER,
     G_PULL,
     G_SLIDES,
+    G_TURNS,
     G_UPPER,
 )
 from .terms import coordinate_term, measured_term
@@ -38,6 +41,7 @@ GUARDS = {
     ELASTIC: (G_PRESS_LOWER, G_PRESS_UPPER),
     RATCHET: (G_LOWER, G_SLIDES, G_PULL),
     BRANCH: (G_CORNER,),
+    SLIP: (G_CONE, G_TURNS),
 }
 """What is watched of each kind of switch."""
 
@@ -52,6 +56,8 @@ class SwitchSpec:
     measured: int = -1
     force: int = -1
     law: int = -1
+    other: int = -1
+    partner: int = -1
 
 
 def declared(model: Model) -> list[tuple[Element, Switch]]:
@@ -76,7 +82,7 @@ def quantities(s: Structure) -> None:
         for k, text in enumerate(w.along):
             coordinate_term(s, text, e, m, measured=True).index = k
             s.terms[-1].switch = w.label if w.summed else None
-        for a, b, formula in w.path:
+        for a, b, formula in w.seen or w.path:
             measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
 
 
@@ -91,10 +97,17 @@ def rows(s: Structure) -> None:
             coordinate_term(s, text, e, row, counted=True).index = k
             s.terms[-1].switch = w.label if w.summed else None
         for a, b, formula in w.path:
-            s.terms.append(TermSpec(row, frame(s, e, a), frame(s, e, b), formula, 1.0, e))
-        s.rows.append(RowSpec(e, w.label or "switch"))
+            measured_term(s, row, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
+            s.terms[-1].measured = False
+        s.rows.append(RowSpec(e, w.label or "switch", holonomic=all(x.holonomic for _, _, x in w.path)))
         s.slices[e.name] = slice(s.slices[e.name].start if e.name in s.slices else first, len(s.rows))
         s.switches.append(SwitchSpec(e, w, row, s.measured[quantity(e, w)]))
+    for k, spec in enumerate(s.switches):
+        if spec.switch.other:
+            one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
+            spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
+            like = [i for i in one if i != k and s.switches[i].switch.other == spec.switch.other]
+            spec.partner = like[0] if like else -1
 
 
 def table(s: Structure) -> None:
@@ -104,9 +117,18 @@ def table(s: Structure) -> None:
         if spec.switch.slides:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["force_i"][spec.force, FORCE_SWITCH] = k
-        s.guards += [(kind, k, EITHER if kind == G_CORNER else FALLING) for kind in GUARDS.get(spec.switch.kind, ())]
-    s.tables["switch_i"] = ints([(x.row, x.measured, x.switch.kind, x.force, x.law, -1) for x in s.switches], 6)
+        s.guards += [(kind, k, EITHER if kind == G_CORNER else FALLING) for kind in _watched(k, spec)]
+    s.tables["switch_i"] = ints(
+        [(x.row, x.measured, x.switch.kind, x.force, max(x.law, x.partner), x.other) for x in s.switches], 6
+    )
     s.tables["guard_i"] = ints(s.guards, 3)
+
+
+def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
+    """What is watched of a switch: of two tangents of a place, the first is watched for both."""
+    if x.switch.kind == SLIP and -1 < x.partner < k:
+        return ()
+    return (*GUARDS.get(x.switch.kind, ()), *((G_ASTRAY,) if x.switch.seen else ()))
 
 
 def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:

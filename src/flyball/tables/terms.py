@@ -12,7 +12,9 @@ from ..constraints.registry import KINDS
 from ..model.body import Driver, Initial
 from ..model.element import Element, LawOf
 from ..model.expressions import Expression
+from ..model.force import Force
 from ..model.joint import Coordinate, Joint
+from ..model.touch import Touch
 from .forest import step_of
 from .specs import RowSpec, Structure, TermSpec, frame, ints
 from .system import ARTICULATED, BODY_LAW, COUPLED, SCHUR, TERM_KINDS
@@ -136,6 +138,8 @@ def _turning(s: Structure) -> None:
 def measured_term(s: Structure, m: int, F: int, M: int, formula: Row, sign: float, e: Element) -> None:
     """Add a term to a measured quantity."""
     s.terms.append(TermSpec(m, F, M, formula, sign, e, measured=True))
+    if KINDS[formula.kind].place:
+        s.terms[-1].hint = s.state(f"{e.name}.place")
 
 
 def sort(s: Structure) -> None:
@@ -170,11 +174,16 @@ def sort(s: Structure) -> None:
     _force_frames(s, new)
 
 
+def frame_columns(e: Force) -> tuple[int, ...]:
+    """Columns of the force table in which a force has frames; others have what is measured there."""
+    return () if isinstance(e, Touch) else (1,) if hasattr(e, "effort") else (0, 1)
+
+
 def _used(s: Structure) -> set[int]:
     """Frames that the compiled loops ask for; those of tree joints often only results do."""
     used = {k for t in s.terms for k in (t.F, t.M)} | {k for angle in s.angles for k in angle[:2]}
     for k, e in enumerate(s.forces):
-        used |= {int(s.tables["force_i"][k, column]) for column in ((1,) if hasattr(e, "effort") else (0, 1))}
+        used |= {int(s.tables["force_i"][k, column]) for column in frame_columns(e)}
     return used - {-1}  # forces along a measured quantity that have no frame of their own
 
 

@@ -1,0 +1,65 @@
+"""Contact in a motion that is integrated: the places where bodies may touch, as parts of a copy of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from ...errors import ModelError
+from ...model.model import Model
+from ...model.touch import Touch
+from ...tables.contact.places import Places, places
+from ...tables.numbers import numbers
+
+FEW = 48  # places; with more, a step with all their rows costs more than many steps by impulses
+KEPT = 4  # copies of one model at other values of the parameters
+IMPULSES = "leave method out, or give method='impulse'"
+
+
+def found(model: Model, parameters: Mapping[str, float] | None) -> Places:
+    """The places of a model at the values of the parameters."""
+    given = numbers(model, parameters)
+    return model.kept.get("places", given.key, KEPT, lambda: places(model, given))
+
+
+def stepped(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """Why a motion of a model with contact is better computed by steps by impulses; empty if it is not."""
+    if not (model.contacts or model.bulk):
+        return ""
+    p = found(model, parameters)
+    if p.why_not:
+        return f"{_several(p.why_not)}, which rows of constraint do not know"
+    n = len(p.touches)
+    return f"bodies may touch at {n} places, too many to integrate from touch to touch (most {FEW})" if n > FEW else ""
+
+
+def with_places(model: Model, parameters: Mapping[str, float] | None) -> Model:
+    """A copy of the model in which places of contact are parts.
+
+    Raises
+    ------
+    ModelError
+        If rows do not know all of them.
+    """
+    if not model.contacts or any(isinstance(e, Touch) for e in model.forces):
+        return model
+    p = found(model, parameters)
+    if p.why_not:
+        raise ModelError(
+            f"{model.contacts[0].title}: a motion that is integrated knows contact of balls, corners and rounded ends "
+            f"with planes, of balls with balls, boxes and capsules, and in the plane of rectangles and segments. Here "
+            f"{_several(p.why_not)}; {IMPULSES}"
+        )
+    key = numbers(model, parameters).key
+    return model.kept.get("with places", key, KEPT, lambda: _joined(model, p.touches))
+
+
+def _joined(model: Model, touches: tuple[Touch, ...]) -> Model:
+    out = model.copy()
+    for e in touches:
+        out.add(e)
+    return out.snapshot()
+
+
+def _several(texts: tuple[str, ...]) -> str:
+    """The first, and how many there are."""
+    return texts[0] + (f" (and {len(texts) - 1} more)" if len(texts) > 1 else "")

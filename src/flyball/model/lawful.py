@@ -1,0 +1,73 @@
+"""Laws as expressions: which names they may use, and what they must not."""
+
+from __future__ import annotations
+
+import dataclasses
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+from ..errors import ExpressionError, ModelError
+from .element import LawOf, limited
+from .examine import measured
+from .expressions import Expression, folded, law_expression
+from .function import function_name
+from .sensor import Sensor
+from .validity import refuse_twins
+
+if TYPE_CHECKING:
+    from .model import Model
+
+
+def law_of(model: Model, value: Any, of: LawOf, where: str, driver: bool = False) -> Expression | None:
+    """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
+    if value is None:
+        return None
+    if driver and callable(value):
+        raise ExpressionError(
+            f"{where} is the Python function '{function_name(value)}', whose derivatives a driver cannot know; "
+            f"give an expression, or a Table that is called in one"
+        )
+    tables = {x.name: x for x in model.tables}
+    names = model.names_in_laws(of)
+    try:
+        expression = law_expression(value, of.dimension, where, tables, names, of.curves)
+        expression = dataclasses.replace(expression, where=where)
+        if expression.tree.kind == "number":
+            limited(expression.tree.value, of.dimension, where)
+        sensors = {k: x for k in expression.names if isinstance(x := model.find(k), Sensor)}
+        curves = {k for k in expression.names if "." in k} if of.curves else set()
+        expression.require({*names, *curves})
+        folded(expression.tree, expression.text)
+        refuse_twins(expression.names, of.inputs, sensors, model.parameters)
+    except ExpressionError as error:
+        text = str(error)
+        raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
+    for name in sorted(sensors):
+        _check_sensed(model, sensors[name], where, driver)
+    for name in sorted(curves):
+        _check_curve(model, name, where)
+    return expression
+
+
+def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:
+    """Whether a law may use a sensor."""
+    found = model.measured(e)
+    if found is None:
+        raise ModelError(
+            f"{where}: sensor {e.name!r} measures {e.of!r}, which is known only after the accelerations are; laws "
+            f"can use positions, angles, lengths and their rates"
+        )
+    if driver and found[2] > 0:
+        raise ModelError(
+            f"{where}: sensor {e.name!r} measures {e.of!r}, a rate; a driver follows positions and angles only. "
+            f"For a controller use an Actuator or a Motor"
+        )
+
+
+def _check_curve(model: Model, name: str, where: str) -> None:
+    """Whether a curve is one of positions or velocities."""
+    if measured(model, SimpleNamespace(title=where, of=name)) is None:  # type: ignore[arg-type]
+        raise ModelError(
+            f"{where}: {name!r} is known only after the accelerations are; use positions, angles, lengths and their "
+            f"rates"
+        )
