@@ -63,6 +63,7 @@ class Backlash(Unilateral):
     damping: Annotated[Number, Unit(None)] = 0.0
 
     kind: ClassVar[int] = KIND
+    kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHTS}
     effort: ClassVar = staticmethod(effort)
     energy: ClassVar = staticmethod(energy)
     dimensions: ClassVar = Unilateral.dimensions | {"gap": ("m", "rad"), "middle": ("m", "rad")}

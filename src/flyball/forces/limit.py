@@ -103,13 +103,18 @@ class Limit(Unilateral):
         return self.coordinate
 
     def check(self, n: SimpleNamespace) -> None:
-        """One stop at least, the lower below the upper, rigid or elastic."""
+        """One stop at least, rigid or elastic."""
         check_restitution(self, n)
         check_elastic(self, n)
         if self.lower is None and self.upper is None:
             raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")
+
+    def check_sides(self, n: SimpleNamespace, unit: str) -> None:
+        """The lower one is below the upper."""
         if n.lower is not None and n.upper is not None and not n.lower.real < n.upper.real:
-            raise ModelError(f"{self.title}: lower is {n.lower:g}; it must be less than upper, {n.upper:g}")
+            raise ModelError(
+                f"{self.title}: lower is {n.lower:g} {unit}; it must be less than upper, {n.upper:g} {unit}"
+            )
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""

@@ -128,7 +128,7 @@ class Rope(CoordinateForce):
         if n.at is not None and len(n.at) != len(self.bodies):
             raise ModelError(f"{self.title}: {len(self.bodies)} bodies need as many points in 'at', got {len(n.at)}")
         check_restitution(self, n)
-        check_elastic(self, n)
+        check_elastic(self, n, "a rope that does not stretch")
         nonnegative(self, n, "length")
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:

@@ -32,6 +32,9 @@ class Unilateral(CoordinateForce):
         """Whether it is a force: an elastic one."""
         return getattr(self, "stiffness", None) is not None
 
+    def check_sides(self, n: SimpleNamespace, unit: str) -> None:
+        """Refuse sides that leave no room; ``unit`` is that of its quantity."""
+
     def conservative(self) -> bool:
         """Whether its energy is all that it ever takes or gives."""
         return getattr(self, "damping", 0.0) == 0.0
@@ -61,9 +64,9 @@ class Latch(Unilateral):
             check_same_kind(self, model, *self.along())
 
 
-def check_elastic(e: Element, n: SimpleNamespace) -> None:
+def check_elastic(e: Element, n: SimpleNamespace, rigid: str = "a rigid one, which gives no way") -> None:
     """Refuse a stiffness that is none, and what goes with the other kind of stop only."""
-    positive(e, n, "stiffness", why="Leave it out for a rigid one, which gives no way")
+    positive(e, n, "stiffness", why=f"Leave it out for {rigid}")
     nonnegative(e, n, "damping")
     if n.stiffness is None and n.damping != 0.0:
         raise ModelError(

@@ -14,6 +14,7 @@ from .geometry import vector
 from .ground import Ground
 from .inertia import mass_properties
 from .joint import Joint
+from .limit import Unilateral
 from .weighing import checked
 
 if TYPE_CHECKING:
@@ -40,6 +41,8 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
         check_frame(model, e, n)
     elif isinstance(e, Joint):
         check_joint(model, e, n)
+    elif isinstance(e, Unilateral):
+        e.check_sides(n, model.unit(e.along()[0], e))
     elif isinstance(e, Force):
         e.placed(n, model.planar)
         if isinstance(e, TwoFrameForce) and n.at is None:
