@@ -15,7 +15,7 @@ from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
-from ..model.touching import has_contact
+from ..model.touching import smooth_only
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -102,16 +102,21 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Stepping() if has_contact(model) else USUAL)
+        o = replace(o, method=Stepping() if model.contacts or model.bulk else USUAL)
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if has_contact(model):
+        if model.contacts or model.bulk:
             raise ModelError(
                 f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
                 f"give method='impulse'"
             )
         return o
+    if unknown := smooth_only(model):
+        raise ModelError(
+            f"steps by impulses do not know {', '.join(e.title for e in unknown)}; the adaptive integrators do: leave "
+            f"method out, or give method={USUAL!r}"
+        )
     for name, usual in IDLE.items():
         if getattr(o, name) != usual:
             raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
