@@ -219,8 +219,11 @@ class Element:
         """Rows with modes that it has in a motion (`model.switch.Switch`)."""
         return ()
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind."""
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
+        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind.
+
+        ``separation`` is how far its points are apart as drawn.
+        """
         return ()
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:

@@ -60,6 +60,10 @@ class Force(Element):
         """Whether its energy is all that it ever takes or gives."""
         return False
 
+    def acts(self) -> bool:
+        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
+        return True
+
     def on_points(self) -> bool:
         """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
         return False
@@ -127,6 +131,7 @@ class CoordinateForce(Force):
         "rest": ("m", "rad"),
         "force": ("N", "N*m"),
     }
+    not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be
     sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
 
     def ends(self) -> dict[str, str]:
@@ -136,6 +141,10 @@ class CoordinateForce(Force):
     def coordinate_text(self) -> str:
         """The coordinate that it acts along: ``"A.angle"``."""
         return ""
+
+    def along(self) -> tuple[str, ...]:
+        """Coordinates whose sum it acts along, each times its weight (`switch_weights`); none if it has a path."""
+        return (self.coordinate_text(),) if self.coordinate_text() else ()
 
     def examine(self, model: Model) -> None:
         """Refuse what it cannot act along."""

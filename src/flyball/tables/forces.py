@@ -16,7 +16,7 @@ from .terms import coordinate_frames, coordinate_term, measured_term
 
 def measured_quantities(s: Structure) -> None:
     """Number every quantity that a force acts along or that a law names; the slots in which laws find them."""
-    for e in s.model.forces:
+    for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
@@ -34,7 +34,7 @@ def measured_quantities(s: Structure) -> None:
 def _names(s: Structure) -> set[str]:
     """Names that some law uses."""
     out: set[str] = set()
-    for e in [*s.model.forces, *s.model.drivers]:
+    for e in [*s.model.acting(), *s.model.drivers]:
         for field, of in _laws(e).items():
             value = getattr(e, field)
             for law in value if isinstance(value, tuple) else (value,):
@@ -53,8 +53,9 @@ def _along(s: Structure, e: CoordinateForce) -> int:
     if text in s.measured:
         return s.measured[text]
     m = s.measured[text] = len(s.measured)
-    if e.coordinate_text():
-        coordinate_term(s, text, e, m, measured=True)
+    for k, one in enumerate(e.along()):
+        term = coordinate_term(s, one, e, m, measured=True)
+        term.index, term.switch = k, None if e.coordinate_text() else ""
     for a, b, formula in e.path():
         measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
     return m
@@ -82,7 +83,7 @@ def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted((f for f in s.model.forces if _acts(s, f)), key=lambda f: f.kind)
+    s.forces = sorted((f for f in s.model.acting() if _acts(s, f)), key=lambda f: f.kind)
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
         table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)
