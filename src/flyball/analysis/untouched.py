@@ -1,39 +1,78 @@
-"""What analyses say of a mechanism that touches, when they know no contact."""
+"""What analyses say of parts that hold at times and let go at others, where they do not know them.
+
+Each analysis names the kinds that it knows: it answers for what holds at the place that it is asked about, or refuses
+the part by name (`docs/events.md` has the table; `tests/events/test_every_analysis.py` asks every one of every part).
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
+from ..constraints.modes import ELASTIC, FRICTION
 from ..errors import ModelError
 from ..model.element import Element
 from ..model.model import Model
 
+SLIPPING = frozenset({FRICTION})
+"""Kinds that are plain forces while they slip, whose way an analysis of a motion knows."""
+TOUCH = ("contacts", "limits", "bulk")
+INSTEAD = {"stick_speed": "regularised", "stiffness": "elastic"}
+"""Numbers that make a part a plain force if they are given, and what it is then called."""
 
-def touching_parts(model: Model) -> Iterator[Element]:
-    """Parts that only a motion by impulses knows: contacts, limits, many bodies."""
-    yield from (*model.contacts, *(e for e in model.limits if not e.acts()), *model.bulk)
+
+def holding_parts(model: Model, knows: Collection[int] = ()) -> Iterator[Element]:
+    """Parts that only a motion knows: contacts, many bodies, events, and what holds at times.
+
+    What is elastic is a force anywhere; ``knows`` are other kinds (`constraints.modes`) that are left out.
+    """
+    known = {ELASTIC, *knows}
+    yield from (*model.contacts, *model.bulk)
+    for e in model.elements():
+        if e.category == "events" or any(w.kind not in known for w in e.switches()):
+            yield e
 
 
-def refuse_contact(model: Model, analysis: str) -> None:
+def refuse_contact(model: Model, analysis: str, knows: Collection[int] = ()) -> None:
     """Refuse to answer as if parts were not there.
 
     Raises
     ------
     ModelError
-        If the mechanism has a contact, a limit or many bodies.
+        If the mechanism has a contact, many bodies, an event, or another part that holds at times, of no kind that the
+        analysis ``knows``.
     """
-    parts = list(touching_parts(model))
-    if parts:
-        without = ", ".join(f"{e.name!r}: None" for e in parts)
-        raise ModelError(
-            f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows no contact, limits or "
-            f"Bodies; simulate does. Without them: m.changed({{{without}}}).{analysis}(...)"
-        )
+    parts = list(holding_parts(model, knows))
+    if not parts:
+        return
+    without = ", ".join(f"{e.name!r}: None" for e in parts)
+    raise ModelError(
+        f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows {_unknown(parts)}; simulate "
+        f"does. Without them: m.changed({{{without}}}).{analysis}(...){_instead(parts)}"
+    )
+
+
+def _unknown(parts: list[Element]) -> str:
+    """What is not known, in words."""
+    kinds = {e.category for e in parts}
+    said = ["no contact, limits or Bodies"] if kinds & set(TOUCH) else []
+    said += ["nothing that sticks, locks or goes taut"] if kinds - {*TOUCH, "events"} else []
+    said += ["no events"] if "events" in kinds else []
+    return ", and ".join(said)
+
+
+def _instead(parts: list[Element]) -> str:
+    """What could be given in its place."""
+    out = []
+    for name, becomes in INSTEAD.items():
+        able = [e.title for e in parts if hasattr(e, name)]
+        if able:
+            out.append(f"; or give {', '.join(able)} a {name}: {'it is' if len(able) == 1 else 'they are'} {becomes} then")
+    return "".join(out)
 
 
 def left_out(model: Model) -> str:
     """What freedoms are counted without, as a sentence; empty if that is nothing."""
-    parts = [e.title for e in (*model.contacts, *model.limits) if not (e in model.limits and e.acts())]
+    parts = [e.title for e in holding_parts(model) if e.category != "bulk"]
     out = f"{', '.join(parts)}: freedoms and the start are those without" if parts else ""
     bulk = [f"the {e.count} bodies of {e.title}" for e in model.bulk]
     return "; ".join(x for x in (out, f"{', '.join(bulk)}: not counted in freedoms" if bulk else "") if x)
