@@ -43,6 +43,8 @@ class Here:
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
     """
 
     start: Start
@@ -56,6 +58,7 @@ class Here:
     given: float = 0.0
     kick: np.ndarray | None = None
     bounces: dict[int, Any] = field(default_factory=dict)
+    seen: Any = None
 
     @property
     def c(self) -> Compiled:

@@ -21,6 +21,7 @@ from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ...progress import Tell
 from .happen import begin, happen
 from .here import Here
+from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 LONGEST = 100_000  # steps in one call
@@ -99,6 +100,7 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
+        here.seen = Segments()
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 
     def _loop(self) -> Watched:
@@ -160,6 +162,7 @@ class Run:
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
         self.rows.append(rows)
+        self.here.seen.add(self.here, rows)
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""
