@@ -80,8 +80,9 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
     hits: dict[int, bool] = {}
     for _ in range(ROUNDS):
         n.look()
-        teeth(n)
-        at, still = sides(n, fired), at_rest(n, fired)
+        still = at_rest(n, fired)
+        teeth(n, still)
+        at = sides(n, fired)
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
@@ -91,7 +92,7 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still[list(jumped.even)] = True
         pressed(n, fired)
         found = decided(n, at, still, fired)
-        turned(n)
+        turned(n, hits)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
