@@ -1,0 +1,159 @@
+"""Times at which laws have corners, jump, or begin and end to do something brief, as far as these depend on time alone.
+
+They are found before a motion begins, from the laws' programs, by interval arithmetic, so that none is missed however
+brief it is. What depends on the state cannot be known before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from .intervals.crossings import MOST, Spans, crossings
+from .intervals.enclose import Law
+from .intervals.resolve import grades
+from .intervals.steps import NOTHING, STATE, TIME, Corner, Step, brief, corners, needed, read
+from .opcodes import CONSTANT, INPUT
+
+NONE = np.zeros(0)
+NEAR = 64.0  # units in the last place that breaks are apart
+
+
+class Breaks(NamedTuple):
+    """Times [s] at which a step of the integration ends, and starts of laws of which not all could be found."""
+
+    times: np.ndarray  # ascending
+    sharp: np.ndarray  # whether a law has a corner there, or jumps; otherwise a step only has to end there
+    given_up: tuple[int, ...]
+
+
+def found_beforehand(code: Sequence[int], const: np.ndarray, starts: Iterable[int], t0: float, t1: float) -> Breaks:
+    """Where laws that start at ``starts`` in the code have corners or act briefly between two times [s].
+
+    Parameters
+    ----------
+    code, const
+        Programs of the laws and their constants.
+    starts : integers
+        Negative ones are left out, equal laws are looked at once.
+    t0, t1 : float
+        The time [s] that is looked at, without its ends.
+
+    Returns
+    -------
+    Breaks
+        Where a law is sharp it may belong to either side at the time itself: a step ends `margin` before, and the
+        next begins as much behind.
+    """
+    times: list[np.ndarray] = [NONE]
+    smooth: list[np.ndarray] = [NONE]
+    given_up = []
+    done: dict[Any, bool] = {}
+    for at in dict.fromkeys(int(a) for a in starts if a >= 0):
+        steps = read(code, at)
+        key = _meaning(steps, const)
+        if key not in done:
+            sharp, brief, done[key] = _of_law(steps, const, t0, t1)
+            times.append(sharp)
+            smooth.append(brief)
+        if not done[key]:
+            given_up.append(at)
+    corner = _apart(np.unique(np.concatenate(times)), t0, t1)
+    every = _apart(np.union1d(corner, np.concatenate(smooth)), t0, t1, corner)
+    return Breaks(every, np.isin(every, corner), tuple(given_up))
+
+
+def margin(t: float) -> float:
+    """How far [s] from a sharp time t a law is on one side of it for sure, as far as rounding goes."""
+    return 8.0 * float(np.spacing(abs(t)))
+
+
+def _apart(t: np.ndarray, t0: float, t1: float, kept: np.ndarray = NONE) -> np.ndarray:
+    """Times that are apart by more than both their margins, and from the ends; ``kept`` stay in any case."""
+    near = NEAR * np.spacing(max(abs(t0), abs(t1)))
+    t = t[(t > t0 + near) & (t < t1 - near)]
+    if len(kept) and len(t):
+        k = np.searchsorted(kept, t)
+        beside = np.minimum(np.abs(t - kept[np.maximum(k - 1, 0)]), np.abs(t - kept[np.minimum(k, len(kept) - 1)]))
+        t = t[(beside > near) | (beside == 0.0)]
+    return t[np.r_[True, np.diff(t) > near][: len(t)]]
+
+
+def reached(
+    code: Sequence[int], const: np.ndarray, at: int, t0: float, t1: float
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Times [s] at which a law of time alone changes its sign, whether it is positive behind each, and if that is all.
+
+    Raises
+    ------
+    ValueError
+        If the law depends on more than time.
+    """
+    steps = read(code, at)
+    if steps[-1].on == STATE:
+        raise ValueError("the law depends on more than time")
+    if steps[-1].on == NOTHING or not t1 > t0:
+        return NONE, np.zeros(0, bool), True
+    law, spans, complete = _cut(steps, const, t0, t1)
+    with np.errstate(all="ignore"):
+        zeros, all_found = crossings(law, Corner(-1, len(steps) - 1, np.zeros(1)), spans)
+        edges = np.unique(np.r_[spans.edges, zeros])
+        middle = 0.5 * (edges[:-1] + edges[1:])
+        positive = np.broadcast_to(law.points(range(len(steps)), middle)[0][len(steps) - 1], middle.shape) > 0.0
+    change = np.flatnonzero(positive[1:] != positive[:-1])
+    return edges[1:-1][change], positive[1:][change], complete and all_found
+
+
+def depends(code: Sequence[int], at: int) -> int:
+    """What a law depends on: NOTHING, TIME, STATE."""
+    return read(code, at)[-1].on
+
+
+def acts_briefly(code: Sequence[int], at: int) -> bool:
+    """Whether a law can act briefly by more than time alone, so that samples have to guard it."""
+    steps = read(code, at)
+    return any(s.on == STATE and brief(s, steps) for s in steps)
+
+
+def _of_law(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Its corners, where brief actions of it begin and end, and whether these are all."""
+    if not t1 > t0 or not any(s.on == TIME and brief(s, steps) for s in steps):
+        return NONE, NONE, True
+    law, spans, complete = _cut(steps, const, t0, t1)
+    if not complete:
+        return spans.edges[1:-1], NONE, False
+    with np.errstate(all="ignore"):
+        more, complete = grades(law, spans)
+    return spans.edges[1:-1], more, complete
+
+
+def _cut(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[Law, Spans, bool]:
+    """The law, the time cut at its corners, inner ones first, and whether all are found."""
+    law = Law(steps, const)
+    spans = Spans(np.array([t0, t1], float), {})
+    known: list[Corner] = []
+    complete = True
+    with np.errstate(all="ignore"):
+        for c in corners(steps, const):
+            times, found = crossings(law, c, spans)
+            complete = complete and found and len(spans.edges) + len(times) <= MOST
+            known.append(c)
+            edges = np.unique(np.r_[spans.edges, times])
+            middle = 0.5 * (edges[:-1] + edges[1:])
+            at = law.points(needed(steps, [c.of for c in known]), middle)[0]
+            spans = Spans(edges, {c.at: np.sign(np.broadcast_to(at[c.of], middle.shape)) for c in known})
+            if not complete:
+                break
+    return law, spans, complete
+
+
+def _meaning(steps: list[Step], const: np.ndarray) -> Any:
+    """What tells laws apart."""
+    return tuple(
+        (s.operation, float(const[s.operand].real) if s.operation == CONSTANT else s.operand, s.args)
+        if s.on != STATE or s.operation == INPUT
+        else (s.operation, s.args)
+        for s in steps
+    )

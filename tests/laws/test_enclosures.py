@@ -1,0 +1,111 @@
+"""Ranges of laws over intervals hold all their values and slopes there; all changes of sign are found."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flyball.laws.breaks import found_beforehand, reached
+from flyball.laws.intervals.enclose import Law
+from flyball.laws.intervals.steps import read
+from tests.laws.written import program, values
+
+SMOOTH = ["sin", "cos", "exp", "tanh", "atan", "sinh", "cosh", "sqrt", "log", "asin", "acos", "tan", "bow"]
+BENT = ["abs", "sign", "saw", "rise"]
+
+
+def laws(functions, poles=True):
+    number = st.floats(-3, 3).map(lambda x: f"({x:.3g})")
+    leaf = st.one_of(st.just("t"), st.just("t"), number)
+
+    def more(inner):
+        return st.one_of(
+            st.tuples(st.sampled_from(functions), inner).map(lambda x: f"{x[0]}({x[1]})"),
+            st.tuples(inner, st.sampled_from(["+", "-", "*", *("/" * poles)]), inner).map(
+                lambda x: f"({x[0]} {x[1]} {x[2]})"
+            ),
+            st.tuples(inner, st.sampled_from([2, *(-1, 3, 10) * poles])).map(lambda x: f"({x[0]})**({x[1]})"),
+            st.tuples(inner, inner).map(lambda x: f"atan2({x[0]}, {x[1]})"),
+        )
+
+    return st.recursive(leaf, more, max_leaves=6).filter(lambda x: "t" in x.replace("tan", "").replace("rt", ""))
+
+
+def compiled(text):
+    try:
+        return program(text)
+    except ValueError:
+        return None
+
+
+@settings(max_examples=250, deadline=None)
+@given(laws(SMOOTH), st.floats(-4, 4), st.floats(1e-6, 2))
+def test_ranges_hold_values_and_slopes(text, start, width):
+    made = compiled(text)
+    if made is None:
+        return
+    code, const, at = made
+    steps = read(code, at)
+    with np.errstate(all="ignore"):
+        law = Law(steps, const)
+        (lo, hi), (down, up) = law.enclose(range(len(steps)), (np.array([start]), np.array([start + width])), {})[
+            len(steps) - 1
+        ]
+        t = start + width * np.linspace(0, 1, 257)
+        f, slope = (np.broadcast_to(x[len(steps) - 1], t.shape) for x in law.points(range(len(steps)), t))
+        assert f == pytest.approx(values(text, t), nan_ok=True)
+    near = 1e-9 * (1.0 + np.abs(f))
+    fine = np.isfinite(f)
+    assert (f >= lo - near)[fine].all() and (f <= hi + near)[fine].all()
+    fine &= np.isfinite(slope)
+    near = 1e-7 * (1.0 + np.abs(slope))
+    assert (slope >= down - near)[fine].all() and (slope <= up + near)[fine].all()
+
+
+@settings(max_examples=150, deadline=None)
+@given(laws(["sin", "cos", "tanh", "abs", "sign", "saw", "rise", "bow"]))
+def test_no_change_of_sign_is_missed(text):
+    made = compiled(text)
+    if made is None:
+        return
+    code, const, at = made
+    if read(code, at)[-1].on == 0:
+        return
+    times, up, complete = reached(code, const, at, 0.0, 3.0)
+    if not complete:
+        return
+    t = np.linspace(0.0, 3.0, 3001) + 1e-4
+    f = values(text, t)
+    size = np.nanmax(np.abs(np.where(np.isfinite(f), f, 0.0)))
+    clear = np.isfinite(f) & (np.abs(f) > 1e-9 * size) & (t < 3.0)
+    k = np.searchsorted(times, t[clear])
+    if len(times):
+        sign = np.where(k > 0, up[np.maximum(k - 1, 0)], ~up[0])
+        assert (sign == (f[clear] > 0.0)).all()
+    elif clear.any():
+        assert (f[clear] > 0.0).all() or (f[clear] < 0.0).all()
+
+
+@settings(max_examples=100, deadline=None)
+@given(laws([*BENT, "sin", "tanh"], poles=False))
+def test_between_breaks_laws_are_smooth(text):
+    """Where the second difference of a law does not fall with the square of the step there is a break."""
+    made = compiled(text)
+    if made is None:
+        return
+    code, const, at = made
+    b = found_beforehand(code, const, [at], 0.0, 3.0)
+    if b.given_up:
+        return
+    h = 1e-5
+    t = np.linspace(0.011, 2.989, 2000)
+    f = [values(text, t + n * h) for n in (-2, -1, 0, 1, 2)]
+    with np.errstate(all="ignore"):
+        bent = np.abs(f[0] - 4 * f[1] + 6 * f[2] - 4 * f[3] + f[4])
+        size = np.nanmax(np.where(np.isfinite(f[2]), np.abs(f[2]), 0.0))
+        kinks = t[np.isfinite(bent) & (bent > 1e-3 * h * size) & (np.abs(f[2]) < 1e3)]
+    edges = np.r_[0.0, b.times, 3.0]
+    for k in kinks:
+        assert np.abs(edges - k).min() <= 4 * h
