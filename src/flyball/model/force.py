@@ -60,10 +60,6 @@ class Force(Element):
         """Whether its energy is all that it ever takes or gives."""
         return False
 
-    def acts(self) -> bool:
-        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
-        return True
-
     def on_points(self) -> bool:
         """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
         return False
