@@ -37,6 +37,7 @@ def begin(here: Here) -> None:
         return
     n = Instant(here)
     n.look()
+    n.restored()
     refuse_violated(n)
     resolve(n, np.zeros(0, np.int64))
 
@@ -108,9 +109,11 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     here = n.here
     parts = of_velocities(n, at, still)
     kick, here.kick = here.kick, None
+    blows, here.blows = tuple(here.blows), []
     if kick is None and not must_jump(n, parts, n.rate):
         return None
     jumped = jump(n, parts, kick)
+    jumped.blows = blows
     if jumped.ended != FOUND:
         n.restored()
         raise no_impulses(n, parts)
