@@ -13,6 +13,7 @@ from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
+from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..model.touching import has_contact
@@ -28,6 +29,7 @@ from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
 from .motion.events.here import Here
+from .motion.events.legs import breaks
 from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
@@ -35,6 +37,7 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
+from .motion.touches import with_places
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
@@ -81,6 +84,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
+    model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
     begun.since = started
     if o.stabilization != "projection":
@@ -106,10 +110,11 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if has_contact(model):
+        if model.bulk or any(not e.switches() for e in model.limits):
+            part = next((e for e in model.limits if not e.switches()), None) or model.bulk[0]
             raise ModelError(
-                f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
-                f"give method='impulse'"
+                f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
+                f"out, or give method='impulse'"
             )
         return o
     for name, usual in IDLE.items():
@@ -147,10 +152,12 @@ def moved(
     later = open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if watched(begun):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell)
+    c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    known = breaks(c, here.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
+    if watched(begun) or len(known.times):
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
