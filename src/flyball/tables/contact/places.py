@@ -207,8 +207,10 @@ def _core(s: _Side) -> _Core | None:
 
 
 def _rectangle(s: _Side) -> _Core | None:
-    """A polygon that is a rectangle or a segment; none for others."""
+    """A polygon that is a rectangle, a segment or a point; none for others."""
     x = s.corners
+    if len(x) == 1:
+        return _Core(s.p + s.R @ x[0], s.R, np.zeros(3), float(s.par[0]))
     if len(x) not in (2, 4):
         return None
     middle, along, other = x.mean(axis=0), x[1] - x[0], x[2] - x[1] if len(x) == 4 else np.zeros(3)
