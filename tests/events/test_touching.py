@@ -169,6 +169,18 @@ def test_a_ball_rolls_slips_and_leaves_a_hill():
     assert np.isclose(on_a_hill(mu), np.cos(slides.y[0, -1]), rtol=0, atol=1e-8)
 
 
+def test_a_block_slides_off_a_table():
+    """Its corner passes the edge, then the table's corner carries it; it tips when its middle passes the edge."""
+    table = fb.Ground("table", shape=fb.Box(edges=(2.0, 1.0, 0.1)), position=(0, -0.5))
+    box = fb.Body("b", shape=fb.Box(edges=(0.4, 0.2, 0.1)), density=500, position=(0.5, 0.1), velocity=(2.0, 0))
+    run = scene(table, box, planar=True, friction=0.0).simulate(1.0, outputs=[0.0, 0.2, 0.25, 1.0], **TIGHT)
+    t = [x.t for x in run.events if x.kind == "part"]
+    assert np.allclose(t[:2], (0.15, 0.25), rtol=0, atol=1e-9)
+    assert np.allclose(run["b"].position[:3], [(0.5, 0.1), (0.9, 0.1), (1.0, 0.1)], rtol=0, atol=1e-10)
+    assert run["b"].angle[-1] < -0.5
+    assert np.isclose(run.energy.total[-1], run.energy.total[0], rtol=1e-10)
+
+
 def test_the_same_by_short_impulses():
     """A box thrown onto the floor, tumbling, with friction: steps by impulses come nearer as they get shorter."""
     ball = fb.Body("ball", shape=fb.Sphere(radius=0.1), density=1000, position=(0, 0, 0.4), velocity=(1, 0.3, 0),

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ..constraints.modes import BRANCH, EDGE, FRICTION, LOCK, ONE_WAY, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
@@ -39,6 +39,7 @@ GUARDS = {
     ONE_WAY: (G_BACK, G_PULL),
     BRANCH: (G_CORNER,),
     SLIP: (G_CONE, G_TURNS),
+    EDGE: (G_ASTRAY,),
 }
 """What is watched of each kind of switch."""
 
@@ -88,6 +89,9 @@ def rows(s: Structure) -> None:
     """The rows, behind all others."""
     for e, w in declared(s.model):
         row, first = len(s.rows), len(s.rows)
+        if w.kind == EDGE:
+            s.switches.append(SwitchSpec(e, w, -1, s.measured[quantity(e, w)]))
+            continue
         for k, text in enumerate(w.along):
             coordinate_term(s, text, e, row, counted=True).index = k
             s.terms[-1].switch = w.label if len(w.along) > 1 else None
@@ -101,7 +105,7 @@ def rows(s: Structure) -> None:
         if spec.switch.other:
             one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
             spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
-            like = [i for i in one if i != k and s.switches[i].switch.other == spec.switch.other]
+            like = [i for i in one if i != k and s.switches[i].switch.kind == spec.switch.kind == SLIP]
             spec.partner = like[0] if like else -1
 
     for joint in events.parting(s.model):
@@ -130,7 +134,7 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
     """What is watched of a switch: of two tangents of a place, the first is watched for both."""
     if x.switch.kind == SLIP and -1 < x.partner < k:
         return ()
-    return (*GUARDS.get(x.switch.kind, ()), *((G_ASTRAY,) if x.switch.seen else ()))
+    return GUARDS.get(x.switch.kind, ())
 
 
 def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any) -> np.ndarray:
