@@ -89,7 +89,7 @@ class Touch(TwoFrameForce):
             out.append(Switch(EDGE, "edge", path=(("F", "M", _row(margin)),), other="gap"))
         return tuple(out)
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Of the gap its least value and the restitution, of a slip both coefficients."""
         return (0.0, np.inf, self.restitution) if label == "gap" else () if label == "edge" else self.friction
 

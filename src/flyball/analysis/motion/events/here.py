@@ -46,11 +46,13 @@ class Here:
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
-        Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
+        Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
     failed : Exception
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
     """
 
     start: Start
@@ -65,6 +67,7 @@ class Here:
     kick: np.ndarray | None = None
     blows: list[Any] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
+    seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
