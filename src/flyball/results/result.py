@@ -23,7 +23,6 @@ from .numbers import span
 from .reactions import Reactions
 from .records import Records
 from .stretches import Stretches, cut_up
-from .touched import contacts as touched
 from .turn import Turn
 from .views import has_view, view
 from .views.base import Curves
@@ -90,24 +89,12 @@ class Result:
         self._states = states
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
-        self._contacts: Contacts | None = None
+        self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
         self.stretches: Stretches | None = None
         self._events = Events(())
         self.energy = Energy(self)
-
-    @property
-    def contacts(self) -> Contacts | None:
-        """Where bodies touched at each output time, and with which forces; None where nothing may touch."""
-        with self._turn:
-            if self._contacts is None:
-                self._contacts = touched(self)
-        return self._contacts
-
-    @contacts.setter
-    def contacts(self, found: Contacts | None) -> None:
-        self._contacts = found
 
     @property
     def vdot(self) -> np.ndarray:
