@@ -14,7 +14,7 @@ from .failed import no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant
 from .jump import Jump, jump, must_jump
-from .modes import Decided, decide
+from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
 from .told import tell_jump, tell_modes
@@ -89,6 +89,7 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still = at_rest(n, fired[:0])
             still[list(jumped.even)] = True
         found = decided(n, at, still, fired)
+        come_to_rest(n, found)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)

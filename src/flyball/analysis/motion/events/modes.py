@@ -96,6 +96,16 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     return Decided(parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, status)
 
 
+def come_to_rest(n: Instant, found: Decided) -> None:
+    """Take the rounding from the rates of what holds."""
+    B, P = n.rooms[len(found.parts)]
+    held = [i for i, p in enumerate(found.parts) if found.state[i] == EVEN and n.rate[p.switch] != 0.0]
+    if held:
+        rates = B.sign[held] * n.rate[B.which[held]]
+        x = np.linalg.lstsq(P.A[np.ix_(held, held)], -rates, rcond=1e-12)[0]
+        n.here.v[:] += x @ B.Y[held]
+
+
 def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     """Modes, ways and places to hold into the motion."""
     W, ways = n.W, n.ways()
