@@ -8,8 +8,9 @@ import numpy as np
 
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
-from ....numerics.cone.dense.problem import FOUND
+from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
 from ....tables.system import G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from .doubtful import doubt, shock
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant
@@ -78,9 +79,11 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
     here = n.here
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
     hits: dict[int, bool] = {}
+    calm: list[int] = []
     for _ in range(ROUNDS):
         n.look()
         at, still = sides(n, fired), at_rest(n, fired)
+        still[calm] = True
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
@@ -89,6 +92,10 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still = at_rest(n, fired[:0])
             still[list(jumped.even)] = True
         found = decided(n, at, still, fired)
+        if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
+            tell_jump(n, found, before)
+            fired, calm = fired[:0], list(found.even)
+            continue
         come_to_rest(n, found)
         n.arrive()
         if jumped is not None:
@@ -119,17 +126,25 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     return jumped
 
 
-def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
-    """Modes; a series of bounces that has become shorter than rounding is over."""
+def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided | Jump:
+    """Modes; a series of bounces that has become shorter than rounding is over.
+
+    Where there are no accelerations velocities may jump without a collision.
+    """
     found = decide(n, at, still, fired)
     if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
         still |= over
         n.bared()
         found = decide(n, at, still, fired)
-    if found.ended != FOUND:
+    if found.ended == FOUND:
+        doubt(n, found)
+        return found
+    blow = shock(n, of_velocities(n, at, still)) if found.ended == NONE_FOUND else None
+    if blow is None:
         n.restored()
         raise no_forces(n, found)
-    return found
+    n.here.lost, n.here.fresh = n.here.lost + blow.lost, True
+    return blow
 
 
 def broken(n: Instant, found: Decided) -> np.ndarray:

@@ -35,6 +35,8 @@ class Jump:
         Switch -> rate at which it closed, and that at which it goes on.
     lost, given : float
         Energy [J] that the impacts took, and that kicks gave.
+    jammed : tuple of int
+        Switches that stopped without a collision.
     rows, along : ndarray
         Impulses of all rows, then of drivers that prescribe coordinates; and change of the velocities, (nv,).
     """
@@ -48,6 +50,7 @@ class Jump:
     blows: tuple[Any, ...] = ()
     even: frozenset[int] = frozenset()  # switches whose quantities are at rest afterwards
     ended: int = FOUND
+    jammed: tuple[int, ...] = ()
 
 
 def must_jump(n: Instant, parts: list[Part], rate: np.ndarray) -> bool:
@@ -62,7 +65,7 @@ def must_jump(n: Instant, parts: list[Part], rate: np.ndarray) -> bool:
 def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     """Change the velocities of the motion as the rules of these rows ask; see the module."""
     B, P, _ = n.problem(parts)
-    out = Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
+    out = nothing(n)
     before = B.sign * n.rate[B.which]
     drive = np.zeros_like(out.along)
     if kick is not None:
@@ -76,6 +79,20 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
         return out
     if len(parts):
         x, u = expanded(n, B, P, parts, before, (x, u))
+    return finish(n, (B, P), parts, (before, x, u), out, drive)
+
+
+def finish(
+    n: Instant,
+    solved: tuple[Bench, Dense],
+    parts: list[Part],
+    found: tuple[np.ndarray, np.ndarray, np.ndarray],
+    out: Jump,
+    drive: np.ndarray,
+) -> Jump:
+    """Velocities of the motion after impulses x, which take the rows' rates from ``before`` to u."""
+    B, P = solved
+    before, x, u = found
     out.lost = -float(x @ (before + u)) / 2.0
     out.rows += x @ B.L
     out.along += x @ B.Y
@@ -89,6 +106,11 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     driven(n, out, drive)
     n.here.v[:] += out.along
     return out
+
+
+def nothing(n: Instant) -> Jump:
+    """No jump."""
+    return Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
 
 
 def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray) -> np.ndarray:

@@ -36,7 +36,8 @@ class Decided:
     lean: np.ndarray
     reach: np.ndarray
     sizes: dict[int, float]
-    status: int = 0
+    A: np.ndarray
+    gain: np.ndarray
 
 
 def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
@@ -80,7 +81,7 @@ def _let_go(p: Part, x: float) -> Part:
 
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
-    B, P, status = n.problem(parts)
+    B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
         ended = n.balance(B, P, False)
@@ -93,7 +94,14 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
-    return Decided(parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, status)
+    return Decided(
+        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, P.A.copy(), P.gain.copy()
+    )
+
+
+def elements(n: Instant, parts: list[Part]) -> list[str]:
+    """Titles of the elements that rows are of."""
+    return list(dict.fromkeys(n.here.structure.switches[p.switch].element.title for p in parts))
 
 
 def come_to_rest(n: Instant, found: Decided) -> None:
