@@ -161,7 +161,7 @@ def moved(
 def watched(begun: Start) -> bool:
     """Whether something may happen at an instant: there are guards, or rows with modes."""
     s = begun.assembly.compiled.structure
-    return bool(s.guards or s.switches)
+    return bool(s.guards or s.switches or s.model.events)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:
