@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....model.words import listing
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS, PUSHES
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing
@@ -39,7 +38,7 @@ def _several(n: Instant, found: Decided) -> str:
         B, P, _ = n.problem(parts)
         size = np.abs(P.b).max()
         if n.balance(B, P, False) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
-            who = listing(elements(n, found.parts))
+            who = " and ".join(elements(n, found.parts))
             return (
                 f"at t = {n.here.t:.6g} s rigid bodies with friction can go on in several ways (Painleve's paradox) at "
                 f"{who}; taken: the one that goes on from the modes before"
@@ -60,7 +59,7 @@ def _undetermined(n: Instant, found: Decided) -> str:
     open_ = [i for i in grips if (np.abs(found.gain[i][held] @ Z) > OTHER * np.abs(found.gain[i][held]).max()).any()]
     if not open_:
         return ""
-    who = listing(elements(n, [found.parts[i] for i in open_]))
+    who = " and ".join(elements(n, [found.parts[i] for i in open_]))
     return (
         f"whether {who} holds is not determined: the most that it holds follows reactions that redundancy leaves open; "
         f"taken: those whose sum of squares, each by the mass that it moves, is least"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
 from ....errors import SimulationError
-from ....model.words import listing
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from .instant import Instant, Part
 from .modes import Decided
@@ -15,7 +14,7 @@ ROLES = {STOP: "is closed", FRICTION: "has friction", ONE_WAY: "goes one way onl
 def who(n: Instant, parts: list[Part]) -> str:
     """Elements of rows, with the part that they take."""
     seen = dict.fromkeys((n.here.structure.switches[p.switch].element.title, ROLES[n.kind[p.switch]]) for p in parts)
-    return listing([f"{title}, which {role}" for title, role in seen])
+    return " and ".join(f"{title}, which {role}" for title, role in seen)
 
 
 def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
@@ -48,6 +47,6 @@ def no_end(t: float, names: list[str], rounds: int) -> SimulationError:
     """What happens at an instant has no end."""
     return SimulationError(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
-        f"{listing(list(dict.fromkeys(names)))}; each undoes what the other did",
+        f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
         t=t,
     )

@@ -40,7 +40,7 @@ def begin(here: Here) -> None:
         n.look()
         n.restored()
         refuse_violated(n)
-        resolve(n, np.zeros(0, np.int64))
+        resolve(n, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
     _happen(here, acts.passed())
 
@@ -91,12 +91,13 @@ def refuse_violated(n: Instant) -> None:
             raise ModelError(f"{element.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
-def resolve(n: Instant, fired: np.ndarray) -> None:
-    """Jumps and modes at the instant, until nothing is against its rule."""
+def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
+    """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
     hits: dict[int, bool] = {}
     calm: list[int] = []
+    gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
     for _ in range(ROUNDS):
         n.look()
         at, still = sides(n, fired), at_rest(n, fired)
@@ -117,10 +118,12 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
-        fired = broken(n, found)
-        if not len(fired):
-            tell_modes(n, (modes, ways), before, hits)
+        new = np.setdiff1d(broken(n, found), gone)
+        if not len(new):
+            if told:
+                tell_modes(n, (modes, ways), before, hits)
             return
+        fired = gone = np.r_[gone, new]
     raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
 
 

@@ -17,7 +17,7 @@ from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, 
 from .instant import DECIDED, Instant, Part
 from .parts import of_accelerations
 
-TIED = 1e-7  # of the forces that a force is the difference of: as good as none
+TIED = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
 CASCADE = 20  # times that others are asked again after some began to slide
 
 
@@ -43,32 +43,36 @@ class Decided:
 def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
     """Modes by one problem of accelerations, into the motion; ``n`` has looked there.
 
-    What a guard says has just reached the end of what it holds is not held on to for the sake of rounding.
+    What a guard says has reached the end of what it holds lets go where that is against no rule: not for the sake of
+    rounding, and not where redundancy leaves open who carries what, should it be held on to.
     """
     parts = of_accelerations(n, at, still)
     found = solved(n, parts)
-    if found.ended == FOUND and (loose := _loose(n, found, fired)):
+    loose = _loose(n, found, fired) if found.ended == FOUND else set()
+    while loose:
         other = solved(n, [_let_go(p, found.x[i]) if i in loose else p for i, p in enumerate(parts)])
-        found = other if other.ended == FOUND else found
+        back = {i for i in loose if other.ended != FOUND or _against(other, i)}
+        if not back:
+            found = other
+        loose = loose - back if back else set()
     if found.ended == FOUND:
         write(n, found, still)
     return found
 
 
 def _loose(n: Instant, found: Decided, fired: np.ndarray) -> set[int]:
-    """Rows that hold at the very end of what they can, by guards that fired."""
+    """Rows that hold and whose guards fired."""
     ends = {int(s): int(kind) for kind, s, _ in n.S.guard_i[fired] if int(kind) in (G_PULL, G_HOLDS)}
-    out = set()
-    for i, p in enumerate(found.parts):
-        kind = ends.get(p.switch)
-        least = TIED * found.sizes[p.switch]
-        if kind is None or found.state[i] != EVEN:
-            continue
-        if (kind == G_PULL and p.rule == PUSHES and found.x[i] <= least) or (
-            kind == G_HOLDS and p.rule == GRIPS and abs(found.x[i]) >= found.reach[i] - least
-        ):
-            out.add(i)
-    return out
+    asked = {(G_PULL, PUSHES), (G_HOLDS, GRIPS)}
+    return {
+        i for i, p in enumerate(found.parts) if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked
+    }
+
+
+def _against(found: Decided, i: int) -> bool:
+    """Whether row i, which was let go, moves against its rule."""
+    p, least = found.parts[i], TIED * found.sizes[found.parts[i].switch] * found.A[i, i]
+    return bool(found.u[i] * (p.lean if p.rule == DRIVEN else 1.0) < -least)
 
 
 def _let_go(p: Part, x: float) -> Part:
