@@ -16,6 +16,7 @@ from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, Instant, Part
 from .parts import of_accelerations
+from .slips import loose, slide_on, write_slips
 
 TIED = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
 CASCADE = 20  # times that others are asked again after some began to slide
@@ -48,31 +49,36 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     """
     parts = of_accelerations(n, at, still)
     found = solved(n, parts)
-    loose = _loose(n, found, fired) if found.ended == FOUND else set()
-    while loose:
-        other = solved(n, [_let_go(p, found.x[i]) if i in loose else p for i, p in enumerate(parts)])
-        back = {i for i in loose if other.ended != FOUND or _against(other, i)}
+    let_go = _loose(n, found, fired) if found.ended == FOUND else {}
+    while let_go:
+        other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
+        back = [i for i in let_go if other.ended != FOUND or _against(other, i)]
         if not back:
             found = other
-        loose = loose - back if back else set()
+        let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
     if found.ended == FOUND:
         write(n, found, still)
     return found
 
 
-def _loose(n: Instant, found: Decided, fired: np.ndarray) -> set[int]:
-    """Rows that hold and whose guards fired."""
+def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
+    """Rows that hold and whose guards fired, as they are when they do not."""
     ends = {int(s): int(kind) for kind, s, _ in n.S.guard_i[fired] if int(kind) in (G_PULL, G_HOLDS)}
+    out = loose(n, found.parts, (found.x, found.state, found.reach, np.full(len(found.x), np.inf)), fired)
     asked = {(G_PULL, PUSHES), (G_HOLDS, GRIPS)}
-    return {
-        i for i, p in enumerate(found.parts) if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked
-    }
+    for i, p in enumerate(found.parts):
+        if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked:
+            out[i] = _let_go(p, found.x[i])
+    return out
 
 
 def _against(found: Decided, i: int) -> bool:
-    """Whether row i, which was let go, moves against its rule."""
+    """Whether row i, which was let go, moves against its rule; of rows that slip together whether both do."""
     p, least = found.parts[i], TIED * found.sizes[found.parts[i].switch] * found.A[i, i]
-    return bool(found.u[i] * (p.lean if p.rule == DRIVEN else 1.0) < -least)
+    if p.rule != DRIVEN:
+        return bool(found.u[i] < -least)
+    own = [k for k, q in enumerate(found.parts) if k == i or (p.of >= 0 and q.of == p.of and q.rule == DRIVEN)]
+    return bool(found.u[own] @ [found.parts[k].lean for k in own] < -least)
 
 
 def _let_go(p: Part, x: float) -> Part:
@@ -90,11 +96,11 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     for _ in range(CASCADE):
         ended = n.balance(B, P, False)
         slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN))
-        if ended != FOUND or not len(slips):
+        if ended != FOUND or not (slide_on(n, parts, P) or len(slips)):
             break
         for i in slips.tolist():
             P.rule[i], P.lean[i] = DRIVEN, 1.0 if P.state[i] == LOW else -1.0
-            B.way[i] = P.lean[i]
+            B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
@@ -135,5 +141,6 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
             ways[s] = p.sign if p.rule == PUSHES else 0.0
         elif kind == FRICTION:
             ways[s] = found.lean[i]
+    write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     if len(n.S.load_i):
         W.info[LEARNT] = FORGOTTEN
