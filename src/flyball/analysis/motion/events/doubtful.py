@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS, PUSHES
+from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
+from ....numerics.cone.dense.settle import solve
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing
 from .modes import Decided, elements
@@ -30,14 +31,12 @@ def doubt(n: Instant, found: Decided) -> None:
 
 
 def _several(n: Instant, found: Decided) -> str:
-    """Other solutions, looked for from the opposite modes."""
-    if not (found.x[[p.rule == PUSHES for p in found.parts]] >= 0.0).any():
-        return ""
+    """Other solutions of the problem that was solved last, looked for from the opposite modes."""
+    _, P = n.rooms[len(found.parts)]
+    size = np.abs(P.b).max()
     for state in (FREE, EVEN):
-        parts = [p._replace(state=state) for p in found.parts]
-        B, P, _ = n.problem(parts)
-        size = np.abs(P.b).max()
-        if n.balance(B, P, False) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
+        P.state[:] = state
+        if solve(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
             who = " and ".join(elements(n, found.parts))
             return (
                 f"at t = {n.here.t:.6g} s rigid bodies with friction can go on in several ways (Painleve's paradox) at "

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import SimulationError
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from .instant import Instant, Part
@@ -10,6 +10,7 @@ from .modes import Decided
 
 ROLES = {
     STOP: "is closed",
+    RATCHET: "is latched",
     FRICTION: "has friction",
     ONE_WAY: "goes one way only",
     SLIP: "has friction",

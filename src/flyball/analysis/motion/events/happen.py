@@ -19,6 +19,7 @@ from .jump import Jump, jump, must_jump
 from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
+from .sides import pressed, teeth, turned
 from .told import tell_jump, tell_modes
 
 ROUNDS = 100
@@ -100,8 +101,10 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
     for _ in range(ROUNDS):
         n.look()
-        at, still = sides(n, fired), at_rest(n, fired)
+        still = at_rest(n, fired)
         still[calm] = True
+        teeth(n, still)
+        at = sides(n, fired)
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
@@ -109,11 +112,13 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             hits |= {s: s in jumped.even for s in jumped.closing}
             still = at_rest(n, fired[:0])
             still[list(jumped.even)] = True
+        pressed(n, fired)
         found = decided(n, at, still, fired)
         if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
             tell_jump(n, found, before)
             fired, calm = fired[:0], list(found.even)
             continue
+        turned(n, hits)
         come_to_rest(n, found)
         n.arrive()
         if jumped is not None:

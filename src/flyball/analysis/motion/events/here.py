@@ -53,6 +53,8 @@ class Here:
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
     """
 
     start: Start
@@ -68,6 +70,7 @@ class Here:
     blows: list[Any] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
+    seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
