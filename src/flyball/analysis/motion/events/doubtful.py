@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....equations.instant import BLOWS, OF_A_STEP
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
 from ....numerics.cone.dense.settle import solve
 from .instant import Instant, Part
@@ -65,23 +66,27 @@ def _undetermined(n: Instant, found: Decided) -> str:
     )
 
 
-def shock(n: Instant, parts: list[Part]) -> Jump | None:
-    """The jump of velocities without a collision, if there is one, for rows that have no accelerations."""
+def shock(n: Instant, parts: list[Part], held: float) -> Jump | None:
+    """The jump of velocities without a collision, if there is one, for rows that have no accelerations.
+
+    ``held`` is what friction holds at least, without any load.
+    """
     B, P, _ = n.problem(parts)
     forces, before = P.b.copy(), B.sign * n.rate[B.which]
     size = np.abs(before).max(initial=0.0)
     if not size > 0.0:
         return None
-    step = INSTANT * size / max(np.abs(forces).max(), 1e-300)
-    P.b[:] = before + step * forces
-    B.loaded[:] = 0.0
-    if n.balance(B, P, True) != FOUND:
+    scale = np.sqrt(np.maximum(P.A.diagonal(), 1e-300))
+    finite = max(np.abs(forces).max(), (P.A.diagonal() * held).max())
+    B.step[0] = INSTANT * size / max(finite, 1e-300)
+    P.b[:] = before + B.step[0] * forces
+    B.loaded[:] *= B.step[0]
+    if n.balance(B, P, OF_A_STEP) != FOUND:
         return None
-    scale = np.sqrt(np.maximum(P.A.diagonal(), 0.0))
-    if not (scale * np.abs(P.x)).max() > STRUCK * INSTANT * size / max(scale.max(), 1e-300):
+    if not (scale * np.abs(P.x)).max() > STRUCK * B.step[0] * finite / scale.max():
         return None
-    P.b[:] = before
-    if n.balance(B, P, True) != FOUND:
+    P.b[:], B.loaded[:] = before, 0.0
+    if n.balance(B, P, BLOWS) != FOUND:
         return None
     out = nothing(n)
     out.jammed = tuple(p.switch for p in parts)

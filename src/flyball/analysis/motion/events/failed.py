@@ -6,7 +6,7 @@ from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import SimulationError
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from .instant import Instant, Part
-from .modes import Decided
+from .modes import Decided, elements
 
 ROLES = {
     STOP: "is closed",
@@ -41,7 +41,8 @@ def no_forces(n: Instant, found: Decided) -> SimulationError:
     else:
         why = (
             "friction grows with the load that it makes itself faster than that can hold it (a jam, or Painleve's "
-            f"paradox), at {who(n, sliding)}: a smaller coefficient, or an elastic stop or joint, has a solution"
+            f"paradox), at {' and '.join(elements(n, sliding))}: with less friction, or an elastic stop or joint, "
+            "there is a solution"
         )
     return SimulationError(
         f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "

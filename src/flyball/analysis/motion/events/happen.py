@@ -164,7 +164,11 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
     if found.ended == FOUND:
         doubt(n, found)
         return found
-    blow = shock(n, of_velocities(n, at, still)) if found.ended == NONE_FOUND else None
+    blow = (
+        shock(n, of_velocities(n, at, still), np.abs(found.reach).max(initial=0.0))
+        if found.ended == NONE_FOUND
+        else None
+    )
     if blow is None:
         n.restored()
         raise no_forces(n, found)

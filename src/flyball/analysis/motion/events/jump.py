@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ....equations.instant import Bench
+from ....equations.instant import BLOWS, Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
 from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, SWITCH_ROW, V0
 from .instant import STOPS, Instant, Part
@@ -72,7 +72,7 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     P.grain[:] = n.still[B.which]
     B.loaded[:] = 0.0
     P.b[:] = before
-    out.ended = n.balance(B, P, True)
+    out.ended = n.balance(B, P, BLOWS)
     x, u = P.x.copy(), P.u.copy()
     if out.ended != FOUND:
         return out
@@ -120,7 +120,7 @@ def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray)
     out.along += dv
     out.rows += rows
     drive += effort
-    return B.sign * n.gradients(B.which) @ dv if len(B.which) else np.zeros(0)
+    return B.sign * (n.gradients(B.which) @ dv) if len(B.which) else np.zeros(0)
 
 
 def expanded(
@@ -153,7 +153,7 @@ def by_impulses(n: Instant, B: Bench, P: Dense, least: np.ndarray, u: np.ndarray
     P.const[:] = np.where(B.way == 0.0, fixed, 0.0)
     P.b[:] = u + P.A @ least
     B.loaded[:] = least @ B.L
-    n.balance(B, P, True)
+    n.balance(B, P, BLOWS)
     return P.x + least, P.u - u
 
 
@@ -163,7 +163,7 @@ def by_velocities(
     """Newton: what closes goes back with e times its speed at least."""
     back = np.where((P.rule == PUSHES) & (before < 0.0), bounce * before, 0.0)
     P.b[:] = before + back
-    n.balance(B, P, True)
+    n.balance(B, P, BLOWS)
     return P.x.copy(), P.u - back
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from ....constraints.modes import FRICTION
 from ....equations.friction import FORGOTTEN
+from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, STOPS, Instant, Part
@@ -94,7 +95,7 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
-        ended = n.balance(B, P, False)
+        ended = n.balance(B, P, FORCES)
         slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN))
         if ended != FOUND or not (slide_on(n, parts, P) or len(slips)):
             break
