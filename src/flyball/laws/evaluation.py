@@ -46,6 +46,7 @@ from .opcodes import (
     ASIN,
     ATAN,
     ATAN2,
+    BLEND,
     BY_MOTION,
     CALL,
     CONSTANT,
@@ -120,6 +121,9 @@ def evaluate(code, const, at, stack, x, sensed):
         elif operation == WHERE:
             top -= 2
             stack[top, 0] = choose(stack[top, 0] - 0.5, stack[top + 1, 0], stack[top + 2, 0])
+        elif operation == BLEND:
+            top -= 2
+            stack[top, 0] = blend(stack[top, 0], stack[top + 1, 0], stack[top + 2, 0])
         elif operation >= ADD:
             top -= 1
             stack[top, 0] = combined(operation, stack[top, 0], stack[top + 1, 0])
@@ -172,6 +176,11 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
             yes = stack[top, 0] - 0.5
             for k in range(3):
                 stack[top, k] = choose(yes, stack[top + 1, k], stack[top + 2, k])
+        elif operation == BLEND:
+            top -= 2
+            way = stack[top, 0]
+            for k in range(3):
+                stack[top, k] = blend(way, stack[top + 1, k], stack[top + 2, k])
         elif operation == FREEZE:
             put(stack, top, stack[top, 0], 0.0, 0.0)
         elif operation == FUNCTION:  # its derivatives are not known
@@ -227,9 +236,19 @@ def brief(code, at):
         elif operation == DIVIDE:
             if code[i - 2] != CONSTANT:
                 return True
-        elif not (operation <= SENSOR or operation == FREEZE or ADD <= operation <= MULTIPLY):
+        elif not (operation <= SENSOR or FREEZE <= operation <= MULTIPLY):
             return True
     return False
+
+
+@formula
+def blend(way, a, b):
+    """A on the one side of a corner (way 1), b on the other (-1); while sliding along it, what is between."""
+    if way.real >= 1.0:
+        return a
+    if way.real <= -1.0:
+        return b
+    return b + 0.5 * (1.0 + way) * (a - b)
 
 
 @formula

@@ -41,6 +41,8 @@ SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE = range(3)
 SWITCH_REST, SWITCH_SLIDING = range(2)  # coefficients of friction of a slip
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
+# (of corners of laws along which the motion is held: du/dt; side and du/dt of the pass before; scratch; dsides/d(du/dt))
+DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(5, 11)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # columns of System.guard_i; kinds of guards; what a guard's zero is watched for
 GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
@@ -127,7 +129,7 @@ class Work(NamedTuple):
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (8, nv)
     sensed: np.ndarray  # (6 + nl, 2 nm + nl + nw): what is measured: value, rate, bias; loads; ways of the switches
-    switch: np.ndarray  # (5, nw): of each row with modes: its mode, where it is held, how far its quantity may go
+    switch: np.ndarray  # (11 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side
