@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import sys
 import warnings
 from pathlib import Path
@@ -32,6 +33,20 @@ def warn(text: str, category: type[Warning]) -> None:
     while frame.f_back is not None and Path(frame.f_code.co_filename).is_relative_to(PACKAGE):
         depth, frame = depth + 1, frame.f_back
     warnings.warn(text, category, stacklevel=depth)
+
+
+def optional(package: str, extra: str) -> Any:
+    """A package that not everybody has.
+
+    Raises
+    ------
+    ImportError
+        With what to install, if it is not there.
+    """
+    try:
+        return importlib.import_module(package)
+    except ImportError as error:
+        raise ImportError(f"this needs the package {package}: pip install 'flyball[{extra}]'") from error
 
 
 class PerformanceNotice(UserWarning):

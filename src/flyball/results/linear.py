@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, optional
 from ..model.model import listing, suggest
 from .descriptor import Descriptor
 
@@ -162,10 +162,7 @@ class LinearModel:
         ImportError
             If the package ``control`` is not installed.
         """
-        try:
-            import control
-        except ImportError as error:
-            raise ImportError("this needs the package control: pip install 'flyball[control]'") from error
+        control = optional("control", "control")
         names = {k: [_plain(name) for name in getattr(self, k)] for k in ("states", "inputs", "outputs")}
         return control.ss(self.A, self.B, self.C, self.D, name=_plain(self.name), **names)
 

@@ -7,7 +7,6 @@ constraints with a multiplier, the effort, whichever coordinates these are. Angl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -17,6 +16,7 @@ from ..constraints.curve import point
 from ..constraints.registry import KINDS
 from ..equations.records import load
 from ..equations.rows import BY_TIME, parameters
+from ..graph.arrays import objects
 from ..graph.node import Graph, Node, Symbol
 from ..laws.evaluation import evaluate_jet
 from ..math.vec import mtv, sub
@@ -155,13 +155,6 @@ def _prescribed(T: Traced, S: Any, lam: list[Node]) -> Traced:
         G=np.vstack([T.G, G]),
         gamma=np.r_[T.gamma, objects(gamma)],
     )
-
-
-def objects(x: Sequence[Any]) -> np.ndarray:
-    """A vector of objects."""
-    out = np.empty(len(x), object)
-    out[:] = x
-    return out
 
 
 ARRAYS = ("T", "M", "f", "g", "nu", "G", "gamma", "measured", "gradients", "powers", "returned")

@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..equations.tree import quaternion_at
+from ..graph.arrays import objects
 from ..graph.derivative import jacobian
 from ..math.vec import cross
 from .document.forces import along
 from .expressions import Expressions
-from .formulated import objects
 
 if TYPE_CHECKING:
     from .equations import Equations

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import AnalysisError, ModelError
+from ..graph.arrays import objects
 from ..graph.node import Undecided
 from ..model.quantities import ENERGY
 from ..results.result import Result
 from ..tables.system import FREE, TREE
 from .expressions import Expressions
-from .formulated import objects
 
 if TYPE_CHECKING:
     from .equations import Equations

@@ -12,10 +12,11 @@ from ..constraints.registry import KINDS
 from ..equations.records import load
 from ..equations.rows import parameters
 from ..errors import ModelError
+from ..graph.arrays import objects
 from ..graph.values import evaluate
 from ..math.spline import BREAKS
 from ..math.vec import mtv, sub
-from .formulated import Formulated, Place, objects
+from .formulated import Formulated, Place
 
 POINTS = 20  # of a curve between two of its breaks that are looked at first
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.assembly.start import Assembly
 from ..analysis.options import Options
+from ..graph.arrays import objects
 from ..graph.node import Graph, Node, Symbol
 from ..model.expressions import is_number_text
 from ..model.model import Model
@@ -18,7 +19,7 @@ from ..tables.structure import Choices, structure
 from ..tables.values import values
 from .coordinates import Chosen, started
 from .expressions import Expressions
-from .formulated import Formulated, Place, formulated, objects
+from .formulated import Formulated, Place, formulated
 from .home import Home
 from .quaternions import quaternions
 from .state import named_state, places_at

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..errors import ModelError
+from ..graph.arrays import objects
 from ..graph.node import Graph, Node, Symbol
 from ..graph.values import symbols
 from ..math.turns import axes_in_base, turn
@@ -26,7 +27,6 @@ from ..tables.structure import structure
 from ..tables.values import values
 from .angles import Cleaned
 from .expressions import Expressions
-from .formulated import objects
 from .home import Home
 from .vectors import VECTORS, Vector
 

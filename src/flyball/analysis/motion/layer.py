@@ -143,11 +143,11 @@ def _unsound(c: Compiled, a: Assembly) -> str | None:
     for i, j, x in zip(
         row[own].tolist(),
         column[own].tolist(),
-        (c.work.M[own] / c.sizes[row[own]] / c.sizes[column[own]]).tolist(),
+        (c.work.M[own] * c.sizes[row[own]] * c.sizes[column[own]]).tolist(),
         strict=True,
     ):
         M.setdefault(int(of[i]), {})[i, j] = x
-    size = S.body_x[:, MASS].sum()
+    size = S.body_x[:, MASS].sum() * c.values.length**2
     for k in sorted(M):
         first = min(i for i, _ in M[k])
         block = np.zeros((max(i for i, _ in M[k]) - first + 1,) * 2)

@@ -2,34 +2,19 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...errors import ModelError
+from ...errors import ModelError, optional
 from ...math.spline import BREAKS, PIECE
 from ..function import Function
 from ..node import ADD, CALL, DIVIDE, MULTIPLY, NUMBER, SYMBOL, Node
 from ..values import reached
 from .routine import Routine
 from .tables import refuse_opaque
-
-
-def casadi_module() -> Any:
-    """CasADi.
-
-    Raises
-    ------
-    ImportError
-        With what to install, if it is not there.
-    """
-    try:
-        return importlib.import_module("casadi")
-    except ImportError as error:
-        raise ImportError("this needs the package casadi: pip install 'flyball[casadi]'") from error
 
 
 def casadi_function(routine: Routine) -> Any:
@@ -43,7 +28,7 @@ def casadi_function(routine: Routine) -> Any:
     ModelError
         If it calls a Python function, or takes too many operations.
     """
-    ca = casadi_module()
+    ca = optional("casadi", "casadi")
     refuse_opaque([routine], "CasADi")
     routine.check()
     given = [ca.SX.sym(a.name, 1 if a.single else len(a.nodes)) for a in routine.arguments]

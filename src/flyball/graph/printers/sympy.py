@@ -6,7 +6,6 @@ trigonometric expressions, roots, powers, cases, and the functions that were han
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from fractions import Fraction
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ModelError
+from ...errors import ModelError, optional
 from ...math.spline import symbolic
 from ..function import Function
 from ..node import Graph, Node
@@ -28,20 +27,6 @@ DIGITS = 9  # of decimals that are
 TURN = 720  # denominators of parts of pi
 ROUNDING = 4.0  # spacings by which a number may miss the fraction that it is taken for
 POSITIVE = ("kg", "kg*m^2", "kg m^2", "kg*m**2")  # units of what is greater than zero wherever it is not zero
-
-
-def sympy_module() -> Any:
-    """SymPy.
-
-    Raises
-    ------
-    ImportError
-        With what to install, if it is not there.
-    """
-    try:
-        return importlib.import_module("sympy")
-    except ImportError as error:
-        raise ImportError("this needs the package sympy: pip install 'flyball[symbolic]'") from error
 
 
 class SympyPrinter:
@@ -62,7 +47,7 @@ class SympyPrinter:
     def __init__(self, tables: str = "function", fractions: bool = True, positive: Collection[str] = ()) -> None:
         if tables not in ("function", "piecewise"):
             raise ModelError(f"tables={tables!r}: must be 'function' or 'piecewise'")
-        self.sympy = sympy_module()
+        self.sympy = optional("sympy", "symbolic")
         self.tables, self.fractions, self.positive = tables, fractions, set(positive)
         self.symbols: dict[Any, Node] = {}  # what SymPy's symbols stand for
         self.functions: dict[str, Function] = {}  # and its functions

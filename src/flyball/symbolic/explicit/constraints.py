@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...equations.rows import BY_TIME
+from ...graph.arrays import zeros
 from ...laws.evaluation import evaluate_jet
 from ...tables.system import BODY_LAW, OFFSET, Q0, V0
 from ...tracing.trace import Traced
-from .solve import zeros
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ def constraints(x: Traced) -> Constraints:
     there = len(x.g) > len(s.rows)  # prescribed coordinates are among the rows already
     n = 0 if there else len(s.prescribed)
     later = sorted(s.prescribed, key=lambda name: s.slices[name].start) if there else list(s.prescribed)
-    G, g, nu, gamma = zeros((n, s.nv)), zeros((n,)), zeros((n,)), zeros((n,))
+    G, g, nu, gamma = zeros(n, s.nv), zeros(n), zeros(n), zeros(n)
     for k, b in enumerate(s.prescribed[name] for name in later[:n]):
         law = S.body_i[b, BODY_LAW]
         value, rate, second = evaluate_jet(S.code, S.const, law, W.stack, x.t, W.sensed, BY_TIME)

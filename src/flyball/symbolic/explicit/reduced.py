@@ -19,6 +19,7 @@ import numpy as np
 
 from ...analysis.linear.free import compared
 from ...errors import ModelError
+from ...graph.arrays import zeros
 from ...graph.node import Node
 from ...model.model import listing
 from ...numerics.rank import parts
@@ -30,7 +31,7 @@ from .definition import Definition, Formulas
 from .partition import free, named, positions
 from .place import Place
 from .positions import Solved, solved_positions
-from .solve import Determinants, pattern, solve, solve_symmetric, times, transposed, zeros
+from .solve import Determinants, pattern, solve, solve_symmetric, times, transposed
 
 
 @dataclass(frozen=True)
@@ -212,7 +213,7 @@ class _Reduction:
         X = solve(Gw, right, dets, order)
         self._told("constraints for", dets, [self.names[d] for d in dependent])
         n = len(chosen)
-        Z, b = zeros((nv, n)), zeros((nv,))
+        Z, b = zeros(nv, n), zeros(nv)
         Z[chosen] = np.eye(n)
         Z[dependent], b[dependent] = -X[:, :n], X[:, n + 1]
         u = np.array([x.v[d] for d in chosen], object)
@@ -221,7 +222,7 @@ class _Reduction:
         M = times(Z.T, times(x.M, Z))
         f = times(Z.T, x.f - times(x.M, b))
         pivots = Determinants()
-        a = solve_symmetric(M, f[:, None], pivots)[:, 0] if n else zeros((0,))
+        a = solve_symmetric(M, f[:, None], pivots)[:, 0] if n else zeros(0)
         self._told("inertia of", pivots, [self.names[d] for d in chosen])
         vdot = times(Z, a) + b
         dets = Determinants()
@@ -251,7 +252,7 @@ class _Reduction:
         return out + self._each(x.lam, all_[: len(x.lam)], "reactions")
 
     def _all(self, rows: list[int], lam: np.ndarray) -> np.ndarray:
-        out = zeros((len(self.place.c.elements),))
+        out = zeros(len(self.place.c.elements))
         out[rows] = lam
         return out
 

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...graph.arrays import zeros
 from ...math.scalar import sqrt
 from .blocks import Block, blocks
 
@@ -54,7 +55,7 @@ def solve(A: np.ndarray, B: np.ndarray, dets: Determinants, order: list[Block] |
     order = blocks(pattern(A)) if order is None else order
     if order is None:
         raise ZeroDivisionError("the equations are singular")
-    X = zeros(B.shape)
+    X = zeros(*B.shape)
     done: list[int] = []
     for rows, columns in order:
         right = B[rows] - times(A[np.ix_(rows, done)], X[done])
@@ -68,16 +69,9 @@ def transposed(order: list[Block]) -> list[Block]:
     return [(columns, rows) for rows, columns in reversed(order)]
 
 
-def zeros(shape: tuple[int, ...]) -> np.ndarray:
-    """Plain zeros among which expressions may stand."""
-    out = np.zeros(shape, object)
-    out[...] = 0.0
-    return out
-
-
 def times(A: np.ndarray, B: np.ndarray) -> np.ndarray:
     """A B, zeros dropped."""
-    out = zeros((len(A), *B.shape[1:]))
+    out = zeros(len(A), *B.shape[1:])
     for i, row in enumerate(A):
         for k, a in enumerate(row):
             if a != 0.0:
@@ -97,7 +91,7 @@ def _block(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determinants)
 def _adjugate(A: np.ndarray) -> tuple[np.ndarray, Any]:
     """Adjugate and determinant of up to three rows."""
     n = len(A)
-    out = zeros((n, n))
+    out = zeros(n, n)
     if n == 1:
         out[0, 0] = 1.0
     elif n == 2:
@@ -114,7 +108,7 @@ def _adjugate(A: np.ndarray) -> tuple[np.ndarray, Any]:
 def _orthogonal(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determinants) -> np.ndarray:
     n = len(A)
     Q = [A[:, k].copy() for k in range(n)]
-    C, R, Y = B.copy(), zeros((n, n)), zeros(B.shape)
+    C, R, Y = B.copy(), zeros(n, n), zeros(*B.shape)
     det: Any = 1.0
     for k in range(n):
         R[k, k] = sqrt(sum((x * x for x in Q[k]), 0.0))
@@ -127,7 +121,7 @@ def _orthogonal(A: np.ndarray, B: np.ndarray, columns: list[int], dets: Determin
             Y[k, j] = _dot(e, C[:, j])
             C[:, j] = C[:, j] - Y[k, j] * e
     dets.add(columns, det)
-    X = zeros(B.shape)
+    X = zeros(*B.shape)
     for k in reversed(range(n)):
         X[k] = (Y[k] - times(R[k : k + 1, k + 1 :], X[k + 1 :])[0]) / R[k, k]
     return X
@@ -140,7 +134,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> Any:
 def solve_symmetric(M: np.ndarray, B: np.ndarray, pivots: Determinants) -> np.ndarray:
     """X with M X = B by M = L D L^T, for a positive definite M; the pivots are added."""
     n = len(M)
-    L, D = zeros((n, n)), zeros((n,))
+    L, D = zeros(n, n), zeros(n)
     for k in range(n):
         for j in range(k):
             L[k, j] = (M[k, j] - sum((L[k, i] * D[i] * L[j, i] for i in range(j)), 0.0)) / D[j]

@@ -18,13 +18,14 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.solve import ROUNDING, inverse_mass, natural_size, turn_rows
+from ...equations.solve import factor_schur, inverse_mass
 from ...errors import ModelError
+from ...graph.arrays import objects, zeros
 from ...graph.derivative import jacobian, replaced
 from ...graph.printers.routine import refuse_long
 from ...graph.values import symbols
-from ...numerics.ldl import Pattern, analyse, ldl_solve
-from ...tables.system import DIAGONAL, LENGTH, REGULARISE, SEMIDEFINITE, V0
+from ...numerics.ldl import Pattern, analyse, ldl_factor, ldl_solve
+from ...tables.system import LENGTH, REGULARISE, SEMIDEFINITE, V0
 from ...tracing.trace import Traced
 
 REFINEMENTS = 2  # what the regularisation leaves of a well determined solution goes below rounding with the first
@@ -58,7 +59,7 @@ def solution(x: Traced) -> Solution:
     """
     once = coupled(x) if len(x.system.mass_i) else schur(x)
     if not x.loads:
-        return Solution(*_refined(x, once, x.f, x.gamma), _zeros(0))
+        return Solution(*_refined(x, once, x.f, x.gamma), zeros(0))
     return _loaded(x, once)
 
 
@@ -68,35 +69,31 @@ def _refined(x: Traced, once: Once, f: np.ndarray, gamma: np.ndarray) -> tuple[n
     balanced = not len(x.system.mass_i) and not light  # each step fulfils M vdot = f + G^T lam then
     vdot, lam = once(f, gamma)
     for _ in range(LIGHT if light else REFINEMENTS if len(lam) else 1):
-        left = _zeros(len(f)) if balanced else f - x.M @ vdot + _forces(x.G, lam)
+        left = zeros(len(f)) if balanced else f - x.M @ vdot + _forces(x.G, lam)
         dv, dl = once(left, gamma - x.G @ vdot if len(lam) else gamma)
         vdot, lam = vdot + dv, lam + dl
     return vdot, lam
 
 
 def _forces(G: np.ndarray, lam: np.ndarray) -> np.ndarray:
-    return G.T @ lam if len(lam) else _zeros(G.shape[1])
+    return G.T @ lam if len(lam) else zeros(G.shape[1])
 
 
 def schur(x: Traced) -> Once:
     """Through S = G M^-1 G^T, M being of the bodies themselves: `solve.factor_schur`."""
     S, nr = x.system, len(x.lam)
     rows = np.repeat(np.arange(nr), np.diff(S.row_p[: nr + 1]))
-    W = x.work._replace(G=_zeros(len(x.work.G)), H=_zeros(len(x.work.H)), row=x.work.row.copy())
+    W = x.work._replace(G=zeros(len(x.work.G)), H=zeros(len(x.work.H)), row=x.work.row.copy())
     W.G[: len(rows)] = x.G[rows, S.col_i[: len(rows)]]
-    turn_rows(S, W)
-    A = _zeros(len(S.ldl.Ai))
-    for i, j, length, place in S.pair_i:
-        for k in range(length):
-            A[place] = A[place] + W.G[i + k] * W.H[j + k]
-    natural_size(S, W)
-    for k in range(nr):
-        place = S.ldl.Ap[S.ldl.perm[k] + 1] - 1
-        A[place] = A[place] + S.glob[REGULARISE] * W.row[DIAGONAL, k] + ROUNDING * A[place]
-    L, D = factored(S.ldl, A)
+    _refuse_long(S.ldl)
+    n = len(S.ldl.perm)
+    D = np.array([zeros(n), zeros(n), zeros(n)], object)
+    W = W._replace(A=zeros(len(S.ldl.Ai) + 1), L=zeros(len(S.ldl.Li)), D=D)
+    factor_schur(S, W)
+    L, D = W.L, W.D[0]
 
     def once(f: np.ndarray, gamma: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        dx = _zeros(len(f))
+        dx = zeros(len(f))
         for b in range(len(S.body_i)):
             inverse_mass(S, b, f, S.body_i[b, V0], dx, S.body_i[b, V0])
         mu = solved(S.ldl, L, D, gamma - x.G @ dx) if nr else gamma
@@ -122,7 +119,7 @@ def coupled(x: Traced) -> Once:
     below = [(i, j) for i in range(nv + nr) for j in touched(K[i, :i])]
     i, j = np.array(below, np.int64).reshape(-1, 2).T
     P, place = analyse(nv + nr, i, j)
-    A = _zeros(len(P.Ai))
+    A = zeros(len(P.Ai))
     for at, entry in zip(place, [*K[i, j], *K.diagonal()], strict=True):
         A[at] = entry
     L, D = factored(P, A)
@@ -149,34 +146,28 @@ def touched(row: np.ndarray) -> list[int]:
 
 
 def factored(P: Pattern, A: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """L and the inverse diagonal: `numerics.ldl.ldl_factor`, without a look at pivots, whose size nobody knows here.
+    """L and the inverse diagonal: the engine's own factor on nodes, which takes pivots for granted.
 
     Raises
     ------
     ModelError
         If it takes more operations than straight-line code is written of.
     """
-    n, columns = len(P.perm), np.diff(P.Lp)
-    refuse_long("the solution", int(2 * (columns * (columns + 3)).sum()))
-    L, D, Y = _zeros(len(P.Li)), _zeros(n), _zeros(n)
-    for k in range(n):
-        last = P.Ap[k + 1] - 1
-        d = A[last]
-        Y[P.Ai[P.Ap[k] : last]] = A[P.Ap[k] : last]
-        for e in range(P.Rp[k], P.Rp[k + 1]):
-            i, at = P.Ri[e], P.Rx[e]
-            y, Y[i] = Y[i], 0.0
-            for p in range(P.Lp[i], at):
-                Y[P.Li[p]] = Y[P.Li[p]] - L[p] * y
-            L[at] = y * D[i]
-            d = d - L[at] * y
-        D[k] = 1.0 / d
+    _refuse_long(P)
+    n = len(P.perm)
+    L, D = zeros(len(P.Li)), zeros(n)
+    ldl_factor(P, A, L, D, zeros(n))
     return L, D
+
+
+def _refuse_long(P: Pattern) -> None:
+    columns = np.diff(P.Lp)
+    refuse_long("the solution", int(2 * (columns * (columns + 3)).sum()))
 
 
 def solved(P: Pattern, L: np.ndarray, D: np.ndarray, b: np.ndarray) -> np.ndarray:
     """Solve with a factor."""
-    z = _zeros(len(b))
+    z = zeros(len(b))
     z[P.perm] = b
     ldl_solve(P, L, D, z)
     return z[P.perm]
@@ -190,16 +181,16 @@ def _loaded(x: Traced, once: Once) -> Solution:
     slopes = jacobian(list(x.f), x.loads)
     if set(symbols(list(slopes.ravel()))) & set(x.loads):
         raise ModelError("a force is no linear function of the load of a joint with friction: simulate it here")
-    f0 = _array(replaced(list(x.f), [(s, 0.0) for s in x.loads]))
+    f0 = objects(replaced(list(x.f), [(s, 0.0) for s in x.loads]))
     vdot, lam = _refined(x, once, f0, x.gamma)
-    columns = [_refined(x, once, slopes[:, n], _zeros(len(lam))) for n in range(len(x.loads))]
+    columns = [_refined(x, once, slopes[:, n], zeros(len(lam))) for n in range(len(x.loads))]
     A, K = (np.array([c[k] for c in columns], object).T for k in (0, 1))
     by_lam = jacobian(list(x.returned), x.lam)
-    loads = _zeros(len(x.loads))
+    loads = zeros(len(x.loads))
     for _ in range(STEPS):
         at = list(zip(x.lam, lam + K @ loads, strict=True))
-        back = _array(replaced(list(x.returned), at))
-        slope = _array(replaced(list(by_lam.ravel()), at)).reshape(by_lam.shape) @ K
+        back = objects(replaced(list(x.returned), at))
+        slope = objects(replaced(list(by_lam.ravel()), at)).reshape(by_lam.shape) @ K
         loads = loads + eliminated(np.eye(len(loads)) - slope, back - loads)
     return Solution(vdot + A @ loads, lam + K @ loads, loads)
 
@@ -217,15 +208,3 @@ def eliminated(A: np.ndarray, b: np.ndarray) -> np.ndarray:
             b[k] = b[k] - A[k, j] * b[j]
         b[k] = b[k] / A[k, k]
     return b
-
-
-def _zeros(n: int) -> np.ndarray:
-    out = np.empty(n, object)
-    out[:] = 0.0
-    return out
-
-
-def _array(items: list[Any]) -> np.ndarray:
-    out = _zeros(len(items))
-    out[:] = items
-    return out

@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 
 from ...errors import AnalysisError, ModelError
+from ...graph.arrays import zeros
 from ...graph.derivative import jacobian, replaced
 from ...graph.node import SYMBOL, Node
 from ...graph.values import reached
 from .free import Free
 from .point import Point
 from .size import sizes, vanishing
-from .solve import Dependent, numbers, product, solved, zeros
+from .solve import Dependent, numbers, product, solved
 from .traced import Mechanics
 
 BALANCED = 1e-6  # of the terms that cancel, and of the largest force anywhere: what is left at an equilibrium

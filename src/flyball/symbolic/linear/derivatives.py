@@ -16,10 +16,10 @@ from typing import Any
 import numpy as np
 
 from ...equations.tree import quaternion_at
+from ...graph.arrays import zeros
 from ...graph.derivative import replaced, tangents
 from ...graph.node import Node
 from ...graph.values import evaluate
-from .solve import zeros
 from .traced import Mechanics
 
 BY = ("x", "v", "a", "l", "w")

@@ -13,9 +13,10 @@ import numpy as np
 
 from ...analysis.linear.free import pivoted
 from ...errors import ModelError
+from ...graph.arrays import zeros
 from ...numerics.rank import TOLERANCE, null_space, rank
 from .derivatives import Perturbed
-from .solve import is_zero, numbers, solved, zeros
+from .solve import is_zero, numbers, solved
 from .traced import Mechanics
 
 ROUNDED = 1e-13  # part of the largest row below which one is what rounding left of none

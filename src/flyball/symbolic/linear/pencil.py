@@ -15,11 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from ...graph.arrays import zeros
 from .derivatives import Perturbed
 from .free import Free
 from .minors import determinant
 from .ring import Ring
-from .solve import is_zero, product, zeros
+from .solve import is_zero, product
 from .traced import Mechanics
 
 

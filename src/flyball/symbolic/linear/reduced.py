@@ -16,9 +16,10 @@ from typing import Any
 import numpy as np
 
 from ...analysis.linear.reduced import without_inertia
+from ...graph.arrays import zeros
 from .derivatives import Perturbed
 from .free import Free
-from .solve import Dependent, is_zero, numbers, product, solved, zeros
+from .solve import Dependent, is_zero, numbers, product, solved
 from .traced import Mechanics
 
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding

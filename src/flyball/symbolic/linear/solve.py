@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ...graph.arrays import zeros
+
 GOOD = 1e-3  # part of the largest pivot that one which is simpler may have
 NOTHING = 1e-12  # part of its row below which a pivot is none
 
@@ -27,13 +29,6 @@ def number(x: Any) -> float:
 def numbers(A: np.ndarray) -> np.ndarray:
     """Values of an array of expressions."""
     return np.array([number(x) for x in A.ravel()], float).reshape(A.shape)
-
-
-def zeros(*shape: int) -> np.ndarray:
-    """An array of objects."""
-    out = np.empty(shape, object)
-    out[...] = 0.0
-    return out
 
 
 def product(A: np.ndarray, B: np.ndarray) -> np.ndarray:

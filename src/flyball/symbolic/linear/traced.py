@@ -11,6 +11,7 @@ import numpy as np
 
 from ...analysis.linear.inputs import Input, with_inputs
 from ...errors import ModelError
+from ...graph.arrays import objects, zeros
 from ...graph.derivative import replaced
 from ...graph.node import Graph, Node, Symbol
 from ...laws.evaluation import evaluate_jet
@@ -26,7 +27,6 @@ from ...tables.system import BODY_LAW, OFFSET, Q0, V0
 from ...tables.values import Values, values
 from ...tracing.model import parameters
 from ...tracing.trace import Traced, plain, traced
-from .solve import zeros
 
 
 @dataclass
@@ -101,7 +101,7 @@ class Mechanics:
     def result(self) -> Result:
         """The state as a result of expressions at one time: outputs are its curves."""
         x = self.x
-        q, v, a, lam, z = (_array(part)[None] for part in (x.q, x.v, self.vdot, self.multipliers, x.z))
+        q, v, a, lam, z = (objects(part)[None] for part in (x.q, x.v, self.vdot, self.multipliers, x.z))
         health = Health(True, "one state", 0.0, 0.0, 0, 0, 0, 0, 0.0)
         return Result(self.model, self.values, np.array([x.t], object), q, v, z, a, lam, health)
 
@@ -157,8 +157,8 @@ def mechanics(model: Model, tree: Sequence[str], inputs: Sequence[str], told: Ma
     n = (x.G @ np.array(x.v, object) - x.nu).tolist() if x.lam else []
     return Mechanics(
         values=V, x=x, given=given, env=V.env, inputs=named, names=velocity_names(s), vdot=vdot,
-        g=_array([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
-        n=_array([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
+        g=objects([*x.g.tolist(), *(x.q[k] - law for k, _, law, _ in laws)]),
+        n=objects([*n, *(x.v[d] - rate for _, d, _, rate in laws)]),
         multipliers=[*x.lam, *efforts], r=r,
         holonomic=np.array([*(row.holonomic for row in s.rows), *(True for _ in laws)], bool), laws=laws,
     )  # fmt: skip
@@ -176,12 +176,6 @@ def _with_values(model: Model, told: Mapping[str, float]) -> Model:
     out.environment(told)  # refuses those that do not exist
     for name, x in told.items():
         out.parameters[name] = x
-    return out
-
-
-def _array(x: Sequence[Any]) -> np.ndarray:
-    out = zeros(len(x))
-    out[:] = x
     return out
 
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ModelError
+from ...errors import ModelError, optional
 from ...graph.node import Node
 from ...graph.values import evaluate
 from ...model.words import listing, suggest
@@ -156,10 +156,7 @@ class TransferFunction:
         ImportError
             If the package ``control`` is not installed.
         """
-        try:
-            import control
-        except ImportError as error:
-            raise ImportError("this needs the package control: pip install 'flyball[control]'") from error
+        control = optional("control", "control")
         names = {"inputs": [_plain(self.input)], "outputs": [_plain(self.output)], "name": _plain(self.name)}
         return control.tf(*self.at(**parameters), **names)
 

@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import ModelError
+from ...graph.arrays import zeros
 from ...graph.derivative import jacobian, replaced
 from ...graph.node import Node
 from ...numerics.rank import TOLERANCE
-from .solve import is_zero, numbers, product, solved, zeros
+from .solve import is_zero, numbers, product, solved
 from .traced import Mechanics
 
 SAME = 1e-9  # of the largest: velocities that differ by less are the same

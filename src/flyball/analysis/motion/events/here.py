@@ -31,6 +31,12 @@ class Here:
         Mechanical energy [J] that impacts and sudden changes took so far.
     stopped : str
         Why the motion ends here, in words; empty: it goes on.
+    given : float
+        Energy [J] that kicks gave so far.
+    kick : ndarray, optional
+        Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
+    bounces : dict
+        Switch -> `rest.Bounces`: how often it closed lately.
     fresh : bool
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
     """
@@ -41,6 +47,9 @@ class Here:
     lost: float = 0.0
     stopped: str = ""
     fresh: bool = False
+    given: float = 0.0
+    kick: np.ndarray | None = None
+    bounces: dict[int, Any] = field(default_factory=dict)
 
     @property
     def c(self) -> Compiled:

@@ -1,0 +1,53 @@
+"""What is said where an instant has no answer."""
+
+from __future__ import annotations
+
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....errors import SimulationError
+from ....model.words import listing
+from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
+from .instant import Instant, Part
+from .modes import Decided
+
+ROLES = {STOP: "is closed", FRICTION: "has friction", ONE_WAY: "goes one way only", LOCK: "is locked"}
+
+
+def who(n: Instant, parts: list[Part]) -> str:
+    """Elements of rows, with the part that they take."""
+    seen = dict.fromkeys((n.here.structure.switches[p.switch].element.title, ROLES[n.kind[p.switch]]) for p in parts)
+    return listing([f"{title}, which {role}" for title, role in seen])
+
+
+def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
+    """Velocities cannot change as all ask."""
+    return SimulationError(
+        f"at t = {n.here.t:.9g} s no impulses let the velocities fulfil all that is asked of them at once; it is asked "
+        f"by {who(n, parts)}. Where a driver moves what a stop or a lock holds, one of them must give way",
+        t=n.here.t,
+    )
+
+
+def no_forces(n: Instant, found: Decided) -> SimulationError:
+    """Accelerations cannot be as all ask."""
+    sliding = [p for p in found.parts if p.rule in (DRIVEN, GRIPS)]
+    if found.ended == NOT_HELD or not sliding:
+        why = "what they hold cannot be held together: one of them must give way"
+    else:
+        why = (
+            "friction grows with the load that it makes itself faster than that can hold it (a jam, or Painleve's "
+            f"paradox), at {who(n, sliding)}: a smaller coefficient, or an elastic stop or joint, has a solution"
+        )
+    return SimulationError(
+        f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "
+        f"{who(n, found.parts)}; {why}",
+        t=n.here.t,
+    )
+
+
+def no_end(n: Instant, names: list[str], rounds: int) -> SimulationError:
+    """What happens at an instant has no end."""
+    return SimulationError(
+        f"at t = {n.here.t:.9g} s events follow each other without end ({rounds} times at one instant): "
+        f"{listing(list(dict.fromkeys(names)))}; each undoes what the other did",
+        t=n.here.t,
+    )

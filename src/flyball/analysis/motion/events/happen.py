@@ -1,0 +1,139 @@
+"""What happens at an instant: what events ask for, velocities that jump, modes; until nothing is against its rule."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....constraints.modes import ONE_WAY, STOP
+from ....errors import ModelError
+from ....numerics.cone.dense.problem import FOUND
+from ....tables.system import G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from .failed import no_end, no_forces, no_impulses
+from .here import Here
+from .instant import Instant
+from .jump import Jump, jump, must_jump
+from .modes import Decided, decide
+from .parts import at_rest, of_velocities, sides
+from .rest import coming_to_rest, note_bounces
+from .told import tell_jump, tell_modes
+
+ROUNDS = 100
+BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
+VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
+
+
+def begin(here: Here) -> None:
+    """As the motion begins: what is kicked, closed, stuck or slides there.
+
+    Raises
+    ------
+    ModelError
+        If a limit starts violated.
+    """
+    if not len(here.c.system.switch_i):
+        return
+    n = Instant(here)
+    n.look()
+    refuse_violated(n)
+    resolve(n, np.zeros(0, np.int64))
+
+
+def happen(here: Here, fired: Sequence[int]) -> None:
+    """Where guards fired.
+
+    Parameters
+    ----------
+    here : Here
+    fired : sequence of int
+        Rows of `System.guard_i`.
+
+    Raises
+    ------
+    SimulationError
+        If no forces or impulses go with all that is asked, or there is no end of it.
+    """
+    if len(here.c.system.switch_i):
+        resolve(Instant(here), np.array(fired, np.int64))
+
+
+def refuse_violated(n: Instant) -> None:
+    """Refuse a start beyond a limit."""
+    for s, kind in enumerate(n.kind.tolist()):
+        lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
+        beyond = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else -n.rate[s] if kind == ONE_WAY else 0.0
+        if beyond > VIOLATED * n.unit[s]:
+            element = n.here.structure.switches[s].element
+            if kind == STOP:
+                said = f"its quantity is {n.x[s]:.6g} and must be within {lower:.6g} and {upper:.6g}"
+            else:
+                said = f"its rate is {n.rate[s]:.6g} and must not be negative"
+            raise ModelError(f"{element.title}: the motion begins beyond it: {said}; change the start or the limit")
+
+
+def resolve(n: Instant, fired: np.ndarray) -> None:
+    """Jumps and modes at the instant, until nothing is against its rule."""
+    here = n.here
+    before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
+    hits: dict[int, bool] = {}
+    for _ in range(ROUNDS):
+        n.look()
+        at, still = sides(n, fired), at_rest(n, fired)
+        jumped = jumps(n, at, still)
+        if jumped is None:
+            still |= n.mode != OFF
+        else:
+            hits |= {s: s in jumped.even for s in jumped.closing}
+            still = at_rest(n, fired[:0])
+            still[list(jumped.even)] = True
+        found = decided(n, at, still, fired)
+        n.arrive()
+        if jumped is not None:
+            tell_jump(n, jumped, before)
+        fired = broken(n, found)
+        if not len(fired):
+            tell_modes(n, (modes, ways), before, hits)
+            return
+    raise no_end(n, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
+
+
+def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
+    """The jump of velocities, if there is one; ``n`` has looked where it leads."""
+    here = n.here
+    parts = of_velocities(n, at, still)
+    kick, here.kick = here.kick, None
+    if kick is None and not must_jump(n, parts, n.rate):
+        return None
+    jumped = jump(n, parts, kick)
+    if jumped.ended != FOUND:
+        n.restored()
+        raise no_impulses(n, parts)
+    here.lost, here.given, here.fresh = here.lost + jumped.lost, here.given + jumped.given, True
+    n.look_again()
+    note_bounces(n, jumped)
+    return jumped
+
+
+def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
+    """Modes; a series of bounces that has become shorter than rounding is over."""
+    found = decide(n, at, still, fired)
+    if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
+        still |= over
+        n.bared()
+        found = decide(n, at, still, fired)
+    if found.ended != FOUND:
+        n.restored()
+        raise no_forces(n, found)
+    return found
+
+
+def broken(n: Instant, found: Decided) -> np.ndarray:
+    """Guards of what holds that say that it cannot, beyond rounding."""
+    g = n.guards()
+    out = [
+        k
+        for k, (kind, s, _) in enumerate(n.S.guard_i.tolist())
+        if kind in (G_PULL, G_HOLDS) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
+    ]
+    return np.array(out, np.int64)

@@ -1,0 +1,192 @@
+"""The engine at an instant: what every row with a mode does there, and the small problem of those that take part."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....equations.engine import Sheet, engine, through
+from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
+from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
+from ....numerics.cone.dense.problem import ENDED, FREE, Dense, dense
+from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock, T
+from ....numerics.integrators.tableaux import tableau
+from ....tables.system import (
+    EFFORT,
+    FORCE_LOAD,
+    HELD,
+    HOLD,
+    MODE,
+    OFF,
+    RATE,
+    SWITCH_FORCE,
+    SWITCH_KIND,
+    SWITCH_MEASURED,
+    VALUE,
+)
+from .here import Here
+
+NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
+STILL = 1e-11  # of the terms of a rate: their rounding
+SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+DECIDED = (STOP, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
+
+
+class Part(NamedTuple):
+    """A row of the small problem."""
+
+    switch: int
+    rule: int
+    sign: float = 1.0
+    way: float = 0.0  # what its friction is asked for; 0: reach is const + gain on row ``of``
+    rate: float = 0.0
+    lean: float = 0.0
+    const: float = 0.0
+    gain: float = 0.0
+    of: int = -1
+    state: int = FREE
+
+
+class Instant:
+    """A motion at an instant, with all that is decided on its own.
+
+    Attributes
+    ----------
+    x, rate : ndarray (ns,)
+        Value and rate of every switch's quantity.
+    near, still : ndarray (ns,)
+        What of these is nothing.
+    mode, hold, way : ndarray (ns,)
+        Modes, places and ways as they were when it was looked at.
+    over : float
+        When a series of bounces is over that has become shorter than rounding here.
+    """
+
+    def __init__(self, here: Here) -> None:
+        c, self.here = here.c, here
+        self.S, self.W = c.system, c.work
+        S, s = self.S, c.structure
+        self.kind, self.m = S.switch_i[:, SWITCH_KIND], S.switch_i[:, SWITCH_MEASURED]
+        self.force = S.switch_i[:, SWITCH_FORCE]
+        self.first = self.W.sensed.shape[1] - len(self.kind)
+        ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
+        none, y = np.zeros(0, np.int64), np.zeros((STATES, ny))
+        seen = np.zeros((here.clock.seen.shape[0], 0))
+        self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
+        self.R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
+        self.unit = np.array([c.values.length if metric else 1.0 for metric in _metric(here)])
+        self.over = np.nan
+        self.rooms: dict[int, tuple[Bench, Dense]] = {}
+
+    def ways(self) -> np.ndarray:
+        """Ways of all switches, in place."""
+        return self.W.sensed[VALUE, self.first :]
+
+    def ask(self, task: int) -> int:
+        """Have the engine do a task at the state of the motion; the desk has a copy of it."""
+        self.desk.real[T] = self.here.t
+        self.desk.y[0] = self.here.y
+        given = self.S, self.W, self.R, self.desk, self.sheet
+        return int(through(engine.address(*given), *given, task))
+
+    def look(self) -> None:
+        """Quantities and rates of all switches, where none of those that are decided acts."""
+        self.mode, self.hold, self.way = self.W.switch[MODE].copy(), self.W.switch[HOLD].copy(), self.ways().copy()
+        self.look_again()
+
+    def look_again(self) -> None:
+        """The same after a jump."""
+        S, W = self.S, self.W
+        self.bared()
+        self.ask(MOTION)
+        self.x, self.rate = W.sensed[VALUE, self.m].copy(), W.sensed[RATE, self.m].copy()
+        self.near = NEAR * self.unit
+        self.still, v = np.zeros(len(self.m)), np.abs(self.here.v)
+        most, nr = v.max(initial=0.0), len(S.row_i)
+        for s, m in enumerate(self.m.tolist()):
+            if m >= 0:
+                at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
+                G = np.abs(W.G[at])
+                self.still[s] = STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
+
+    def bared(self) -> None:
+        """Switch off what is decided; friction without a load that slides goes on doing so."""
+        ways, rows = self.ways(), self.S.force_i
+        for s, kind in enumerate(self.kind.tolist()):
+            if kind in DECIDED:
+                self.W.switch[MODE, s] = OFF
+                if kind == FRICTION and rows[self.force[s], FORCE_LOAD] >= 0:
+                    ways[s] = 0.0
+
+    def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What a generalised force does at the state last looked at: accelerations, multipliers, efforts of drivers."""
+        out, nv, nr = self.sheet.rows, len(force), len(self.S.row_i)
+        out[:2] = 0.0
+        out[0, :nv] = force
+        self.ask(SOLVE)
+        return out[2, :nv].copy(), out[3, :nr].copy(), self.W.vel[EFFORT].copy()
+
+    def gradients(self, which: np.ndarray) -> np.ndarray:
+        """Gradients of the quantities of these switches, (n, nv)."""
+        S, nr = self.S, len(self.S.row_i)
+        out = np.zeros((len(which), self.here.structure.nv))
+        for i, s in enumerate(which.tolist()):
+            at = slice(S.row_p[nr + self.m[s]], S.row_p[nr + self.m[s] + 1])
+            out[i, S.col_i[at]] += self.W.G[at]
+        return out
+
+    def restored(self) -> None:
+        """Modes and ways as they were when it was looked at."""
+        self.W.switch[MODE] = self.mode
+        self.ways()[:] = self.way
+
+    def problem(self, parts: list[Part]) -> tuple[Bench, Dense, int]:
+        """The small problem of these rows at the state of the motion; and how its evaluation ended."""
+        n = len(parts)
+        if n not in self.rooms:
+            self.rooms[n] = bench(n, self.here.structure.nv, len(self.S.row_i)), dense(n)
+        B, P = self.rooms[n]
+        for x in (B.asks, P.const, P.gain, P.lean, P.grain):
+            x[...] = 0
+        for i, part in enumerate(parts):
+            B.which[i], B.sign[i], B.way[i], B.rate[i] = part.switch, part.sign, part.way, part.rate
+            P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.lean, part.const, part.state
+            if part.of >= 0:
+                P.gain[i, part.of] = part.gain
+        self.desk.real[T] = self.here.t
+        self.desk.y[0] = self.here.y
+        given = self.S, self.W, self.R, self.desk, self.sheet
+        return B, P, int(bare_kernel(engine.address(*given), *given, B, P))
+
+    def balance(self, B: Bench, P: Dense, impulses: bool) -> int:
+        """Solve it. Returns how it ended."""
+        B.asks[IMPULSES] = int(impulses)
+        balanced_kernel(self.S, self.W, self.here.t, B, P)
+        return int(P.info[ENDED])
+
+    def arrive(self) -> None:
+        """Put the state on the rows as they are now held."""
+        if self.ask(ARRIVE) == 0:
+            self.here.y[:] = self.desk.y[0]
+
+    def guards(self) -> np.ndarray:
+        """What is watched, (ng,)."""
+        self.ask(WATCH)
+        return self.sheet.rows[0, : len(self.S.guard_i)].copy()
+
+    def name(self, s: int) -> str:
+        """Name of the element that switch s is of."""
+        return str(self.here.structure.switches[s].element.name)
+
+    def holds(self, s: int) -> bool:
+        """Whether switch s held when it was looked at."""
+        return bool(self.mode[s] == HELD)
+
+
+def _metric(here: Here) -> list[bool]:
+    """Of every switch whether its quantity is a length."""
+    s, rows = here.structure, len(here.structure.rows)
+    measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured}
+    return [measures.get(int(m)) == "m" for m in here.c.system.switch_i[:, SWITCH_MEASURED]]

@@ -1,0 +1,155 @@
+"""Velocities that change at once: what closes, what is locked, what is kicked, all together.
+
+Impulses x along the rows that take part, u+ = A x + u-, each by its rule: what pushes does not pull, what is locked
+holds, friction carries no more than the impulse of its own load lets it. Restitution by Poisson's law: an inelastic
+impact, then impulses of at least e times those (Pfeiffer and Glocker 1996, section 8.3); or by Newton's, u+ >= -e u-.
+Neither may make energy: what goes beyond the inelastic impact goes only as far as there is energy for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ....constraints.modes import STOP
+from ....equations.instant import Bench
+from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
+from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, V0
+from .instant import Instant, Part
+
+REST = 1e-12  # of the terms of a rate after the jump: none
+NEWTON = 3  # column of switch_x: 1 where restitution is by Newton's law
+
+
+@dataclass
+class Jump:
+    """What a jump did.
+
+    Attributes
+    ----------
+    impulse : dict
+        Switch -> impulse along its quantity.
+    closing : dict
+        Switch -> rate at which it closed, and that at which it goes on.
+    lost, given : float
+        Energy [J] that the impacts took, and that kicks gave.
+    rows, along : ndarray
+        Impulses of all rows, (nr,), and change of the velocities, (nv,).
+    """
+
+    impulse: dict[int, float] = field(default_factory=dict)
+    closing: dict[int, tuple[float, float]] = field(default_factory=dict)
+    lost: float = 0.0
+    given: float = 0.0
+    rows: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    along: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    even: frozenset[int] = frozenset()  # switches whose quantities are at rest afterwards
+    ended: int = FOUND
+
+
+def must_jump(n: Instant, parts: list[Part], rate: np.ndarray) -> bool:
+    """Whether a rate is against a rule."""
+    for p in parts:
+        u, still = p.sign * rate[p.switch], n.still[p.switch]
+        if (p.rule == PUSHES and u < -still) or (p.rule == HOLDS and abs(u) > still):
+            return True
+    return False
+
+
+def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
+    """Change the velocities of the motion as the rules of these rows ask; see the module."""
+    B, P, _ = n.problem(parts)
+    out = Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
+    before = B.sign * n.rate[B.which]
+    drive = np.zeros_like(out.along)
+    if kick is not None:
+        before = before + kicked(n, kick, out, B, drive)
+    P.grain[:] = n.still[B.which]
+    B.loaded[:] = 0.0
+    P.b[:] = before
+    out.ended = n.balance(B, P, True)
+    x, u = P.x.copy(), P.u.copy()
+    if out.ended != FOUND:
+        return out
+    if len(parts):
+        x, u = expanded(n, B, P, parts, before, (x, u))
+    out.lost = -float(x @ (before + u)) / 2.0
+    out.rows += x @ B.L
+    out.along += x @ B.Y
+    drive += x @ B.E
+    for p, xi, b, a in zip(parts, x.tolist(), before.tolist(), u.tolist(), strict=True):
+        out.impulse[p.switch] = out.impulse.get(p.switch, 0.0) + p.sign * xi
+        if (p.rule == PUSHES and b < -n.still[p.switch]) or (p.rule == HOLDS and abs(b) > n.still[p.switch]):
+            out.closing[p.switch] = (b, a)
+    size = np.abs(P.A) @ np.abs(x) + np.abs(before)
+    out.even = frozenset(B.which[np.abs(u) <= REST * size + n.still[B.which]].tolist())
+    driven(n, out.rows, drive)
+    n.here.v[:] += out.along
+    return out
+
+
+def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray) -> np.ndarray:
+    """Change of the rows' rates by a generalised impulse alone; what it does goes to ``out``."""
+    dv, rows, effort = n.response(kick)
+    v = n.here.v
+    out.given = float(kick @ (v + 0.5 * dv))
+    out.along += dv
+    out.rows += rows
+    drive += effort
+    return B.sign * n.gradients(B.which) @ dv if len(B.which) else np.zeros(0)
+
+
+def expanded(
+    n: Instant, B: Bench, P: Dense, parts: list[Part], before: np.ndarray, hit: tuple[np.ndarray, np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Impulses and velocities with what restitution gives back."""
+    x, u = hit
+    bounce = np.array([n.S.switch_x[p.switch, SWITCH_BOUNCE] if n.kind[p.switch] == STOP else 0.0 for p in parts])
+    least = np.where((P.rule == PUSHES) & (x > 0.0), bounce * x, 0.0)
+    if not least.any():
+        return x, u
+    newton = all(n.S.switch_x[p.switch, NEWTON] == 1.0 for p, more in zip(parts, least, strict=True) if more > 0.0)
+    if newton:
+        more, speed = by_velocities(n, B, P, before, bounce)
+        more, speed = more - x, speed - u
+    else:
+        more, speed = by_impulses(n, B, P, least, u)
+    # energy on the way s from the inelastic impact: E + a s + b s^2
+    E, a, b = 0.5 * float(x @ (before + u)), float(more @ (before + u) + x @ speed) / 2.0, float(more @ speed) / 2.0
+    s = 1.0
+    if E + a + b > 0.0 and b > 0.0:
+        s = min(1.0, max(0.0, (-a + np.sqrt(max(a * a - 4.0 * b * E, 0.0))) / (2.0 * b)))
+    return x + s * more, u + s * speed
+
+
+def by_impulses(n: Instant, B: Bench, P: Dense, least: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Poisson: further impulses of at least so much."""
+    gain = P.gain.copy()
+    fixed = np.where(B.way == 0.0, gain @ least, 0.0)
+    P.const[:] = np.where(B.way == 0.0, fixed, 0.0)
+    P.b[:] = u + P.A @ least
+    B.loaded[:] = least @ B.L
+    n.balance(B, P, True)
+    return P.x + least, P.u - u
+
+
+def by_velocities(
+    n: Instant, B: Bench, P: Dense, before: np.ndarray, bounce: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Newton: what closes goes back with e times its speed at least."""
+    back = np.where((P.rule == PUSHES) & (before < 0.0), bounce * before, 0.0)
+    P.b[:] = before + back
+    n.balance(B, P, True)
+    return P.x.copy(), P.u - back
+
+
+def driven(n: Instant, rows: np.ndarray, drive: np.ndarray) -> None:
+    """What drivers do in the jump: their impulses times the rates that they prescribe."""
+    S, W, y = n.S, n.W, n.here.y
+    z = y[n.here.structure.nq + n.here.structure.nv :]
+    for k in np.flatnonzero(S.row_i[:, ROW_WORK] >= 0).tolist():
+        z[S.row_i[k, ROW_WORK]] += rows[k] * W.row[NU, k]
+    for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():
+        d = S.body_i[b, V0]
+        z[S.body_i[b, BODY_WORK]] += drive[d] * n.here.v[d]

@@ -1,0 +1,89 @@
+"""Who takes part: rows of the small problem, of velocities in a jump or of accelerations where modes are decided."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC, STOP
+from ....numerics.cone.dense.problem import DRIVEN, EVEN, FREE, GRIPS, HOLDS, PUSHES
+from ....tables.system import (
+    FORCE_LOAD,
+    G_BACK,
+    G_LOWER,
+    G_SLIDES,
+    G_UPPER,
+    LOWER,
+    OFF,
+    UPPER,
+)
+from .instant import Instant, Part
+
+SIDES = {G_LOWER: 1.0, G_UPPER: -1.0}
+
+
+def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
+    """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
+    hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
+    out = {}
+    for s in np.flatnonzero(n.kind == STOP).tolist():
+        gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
+        held = n.way[s] if n.mode[s] != OFF else 0.0
+        at = tuple(w for w, gap in gaps.items() if gap <= n.near[s] or (s, w) in hit or w == held)
+        if at:
+            out[s] = at
+    return out
+
+
+def at_rest(n: Instant, fired: np.ndarray) -> np.ndarray:
+    """Whether the rate of each switch is none, (ns,)."""
+    still = np.abs(n.rate) <= n.still
+    for kind, s, _ in n.S.guard_i[fired]:
+        if int(kind) in (G_SLIDES, G_BACK):
+            still[int(s)] = True
+    return still
+
+
+def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[Part]:
+    """Rows that impulses may act along."""
+    out = []
+    for s, kind in enumerate(n.kind.tolist()):
+        if kind == STOP and s in at:
+            out += _stop(s, at[s])
+        elif kind == ONE_WAY:
+            out.append(Part(s, PUSHES, state=EVEN))
+        elif kind == LOCK and n.mode[s] != OFF:
+            out.append(Part(s, HOLDS))
+        elif kind == FRICTION and n.S.force_i[n.force[s], FORCE_LOAD] >= 0:
+            held = bool(still[s]) or n.mode[s] != OFF
+            out.append(
+                Part(s, GRIPS, 1.0, STATIC if held else _sign(n.rate[s]), 0.0 if held else n.rate[s], state=EVEN)
+            )
+    return out
+
+
+def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[Part]:
+    """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
+    out = []
+    for s, kind in enumerate(n.kind.tolist()):
+        if kind == STOP and s in at and still[s]:
+            out += _stop(s, at[s])
+        elif kind == ONE_WAY and still[s]:
+            out.append(Part(s, PUSHES, state=EVEN if n.mode[s] != OFF else FREE))
+        elif kind == LOCK and n.mode[s] != OFF:
+            out.append(Part(s, HOLDS))
+        elif kind == FRICTION:
+            if still[s]:
+                out.append(Part(s, GRIPS, way=STATIC, state=EVEN))
+            elif n.S.force_i[n.force[s], FORCE_LOAD] >= 0:
+                sign = _sign(n.rate[s])
+                out.append(Part(s, DRIVEN, way=sign, rate=float(n.rate[s]), lean=sign))
+    return out
+
+
+def _stop(s: int, at: tuple[float, ...]) -> list[Part]:
+    """One that is at both sides holds."""
+    return [Part(s, HOLDS)] if len(at) > 1 else [Part(s, PUSHES, at[0], state=EVEN)]
+
+
+def _sign(x: float) -> float:
+    return 1.0 if x > 0.0 else -1.0

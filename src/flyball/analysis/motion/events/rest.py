@@ -1,0 +1,57 @@
+"""Bounces that come ever faster: where their series has become shorter than rounding, what bounced is at rest.
+
+A flight that begins with the rate u and is brought back by the acceleration -a is u^2 / 2 a high and lasts 2 u / a.
+Each is shorter than the one before by a ratio r, so all that are left last T / (1 - r), T being the one that begins.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....equations.tasks import MOTION
+from ....tables.system import BIAS, COORDINATES
+from .instant import Instant
+from .jump import Jump
+
+LOW = 1e-13  # of the mechanism's length or a radian: a flight that is none
+
+
+@dataclass
+class Bounces:
+    """Those of one stop: how many there were, when the last one and the one before it were, when they are over."""
+
+    count: int = 0
+    last: float = -np.inf
+    before: float = -np.inf
+    over: float = np.nan
+
+
+def note_bounces(n: Instant, jumped: Jump) -> None:
+    """Count what closed and goes on apart, or lets something else go."""
+    t = n.here.t
+    for s in jumped.closing:
+        b = n.here.bounces.setdefault(s, Bounces())
+        if t - b.last > 1.5 * (b.last - b.before):
+            b.count = 0  # another series
+        b.count, b.before, b.last, b.over = b.count + 1, b.last, t, np.nan
+
+
+def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> np.ndarray:
+    """Switches whose flights are none, (ns,); the modes are written, and their rates are those that they start with."""
+    over = np.zeros(len(n.kind), bool)
+    leaving = [s for s, side in at.items() if not still[s] and len(side) == 1 and s in n.here.bounces]
+    if not leaving:
+        return over
+    n.ask(MOTION)
+    nq = n.S.kinds[COORDINATES]
+    a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
+    for s, acceleration in zip(leaving, a.tolist(), strict=True):
+        u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
+        if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * LOW * n.unit[s]:
+            over[s] = True
+            b, flight = n.here.bounces[s], 2.0 * u / back
+            past = n.here.t - (b.before if b.last == n.here.t else b.last)
+            b.over = n.here.t + (flight / (1.0 - flight / past) if flight < past < np.inf else flight)
+    return over

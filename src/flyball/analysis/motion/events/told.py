@@ -1,0 +1,81 @@
+"""What happened at an instant, in words, into the records of a motion."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....results.events import Happening
+from ....tables.system import MODE, OFF
+from .instant import Instant
+from .jump import Jump
+
+HELD_WORDS = {STOP: ("close", "closes"), FRICTION: ("stick", "sticks"), ONE_WAY: ("lock", "locks"), LOCK: ("lock", "")}
+FREE_WORDS = {STOP: ("open", "opens"), FRICTION: ("slip", "slides"), ONE_WAY: ("overrun", "overruns"), LOCK: ("", "")}
+ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
+
+
+def words(n: Instant, s: int, held: bool) -> tuple[str, str]:
+    """Kind and words of what switch s did."""
+    kind, said = (HELD_WORDS if held else FREE_WORDS).get(int(n.kind[s]), ("", ""))
+    if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
+        return ROPE_WORDS[kind]
+    return kind, said
+
+
+def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
+    """Record a jump of velocities."""
+    if not jumped.closing and not jumped.given:
+        return
+    done: list[str] = []
+    impulses: dict[str, float] = {}
+    for s, (u, after) in jumped.closing.items():
+        goes = "stays" if s in jumped.even else f"leaves at {abs(after):.6g}"
+        done.append(f"{n.name(s)} closes at {abs(u):.6g}, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks")
+    for s, x in jumped.impulse.items():
+        if x != 0.0:
+            impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
+    names = ", ".join(dict.fromkeys(n.name(s) for s in jumped.closing)) or "start"
+    record(n, names, "impact" if jumped.closing else "kick", tuple(done), jumped, impulses, before)
+
+
+def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarray, hits: dict[int, bool]) -> None:
+    """Record what holds, slides or let go now and did not before, one record a kind.
+
+    Parameters
+    ----------
+    n : Instant
+    old : tuple of ndarray
+        Modes and ways before.
+    before : ndarray
+        The state before.
+    hits : dict
+        Switches whose impact is recorded already, and whether they stay.
+    """
+    modes, ways = old
+    told: dict[str, list[tuple[int, str]]] = {}
+    for s in range(len(n.kind)):
+        was, now = modes[s] != OFF, n.W.switch[MODE, s] != OFF
+        over = n.here.bounces[s].over if s in n.here.bounces else np.nan
+        if now and not np.isnan(over):
+            count = n.here.bounces.pop(s).count
+            told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
+            n.over = max(n.over, over)
+        elif was != now and s not in hits:
+            kind, said = words(n, s, now)
+            if kind:
+                told.setdefault(kind, []).append((s, said))
+        elif not was and not now and n.kind[s] == FRICTION and ways[s] * n.ways()[s] < 0.0:
+            told.setdefault("turn", []).append((s, "slides the other way"))
+    for kind, all_of in told.items():
+        names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
+        record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
+
+
+def record(
+    n: Instant, names: str, kind: str, done: tuple[str, ...], jumped: Jump | None, impulses: dict, before: np.ndarray
+) -> None:
+    """Append a record."""
+    t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
+    lost = jumped.lost if jumped else 0.0
+    n.here.records.append(Happening(t, names, kind, done, lost, impulses, before.copy(), n.here.y.copy()))

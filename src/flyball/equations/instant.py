@@ -1,0 +1,235 @@
+"""Rows with modes at an instant, as a small problem: what forces or impulses along them do, and how much each can hold.
+
+All of them off, the motion goes on with velocities v and accelerations a; a force along row i changes the accelerations
+by the response Y_i and the multipliers of all other rows by L_i. So u = A x + b, A = D Y, b = D a + what bends (of
+impulses: b = D v). How much friction holds follows from its own law, asked with the load that these multipliers make;
+loads that depend on x are found together with it, the law being made linear at each try (Newton's method).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.door import enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..math.scalar import magnitude, sqrt
+from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND
+from ..numerics.cone.dense.settle import settle
+from ..tables.system import (
+    BIAS,
+    EFFORT,
+    FORCE_F,
+    FORCE_KIND,
+    FORCE_LOAD,
+    LAM,
+    RETURNED,
+    SWITCH_FORCE,
+    SWITCH_MEASURED,
+    VALUE,
+    X_SOLVED,
+)
+from .dispatch import effort
+from .friction import reaction_loads
+from .loads import law, wide
+from .tasks import MOTION, SOLVE
+
+IMPULSES, TRIED = range(2)  # entries of Bench.asks: impulses or forces; how often it was solved
+TRIES = 60
+SETTLED = 1e-13  # of the largest impulse
+NUDGE = 1e-6  # part of an impulse that tells how loads follow it
+GRAIN = 1e-13  # of the terms of a quantity's acceleration: their rounding
+FAR = 1e8  # times a load, beside which what friction has besides it is nothing
+
+
+class Bench(NamedTuple):
+    """Rows of the small problem, by the switches that they are of, and what each does to everything."""
+
+    which: np.ndarray  # (n,): switch of each row
+    sign: np.ndarray  # (n,): +1, or -1 where the row is turned round: what pushes against an upper side
+    way: (
+        np.ndarray
+    )  # (n,): what friction is asked for: STATIC, or the way it slides; 0: its reach stands in the problem
+    rate: np.ndarray  # (n,): at which it slides
+    Y: np.ndarray  # (n, nv): accelerations by a unit force
+    L: np.ndarray  # (n, nr): multipliers
+    E: np.ndarray  # (n, nv): efforts of what drivers prescribe
+    free: np.ndarray  # (nv,): accelerations with everything off
+    loaded: np.ndarray  # (nr,): multipliers with everything off, or of impulses that went before
+    asks: np.ndarray  # (2,)
+    seen: np.ndarray  # (n,): impulses of the try before
+    now: np.ndarray  # (n,): what friction holds at them
+
+
+def bench(n: int, nv: int, nr: int) -> Bench:
+    """Room for n rows."""
+    z = np.zeros
+    i = np.int64
+    return Bench(z(n, i), z(n), z(n), z(n), z((n, nv)), z((n, nr)), z((n, nv)), z(nv), z(nr), z(2, i), z(n), z(n))
+
+
+@formula
+def bare(address, S, W, R, clock, sheet, B, P):
+    """The motion with everything off, and what every row does: A, b of the problem. Returns a status."""
+    status = enter(address, S, W, R, clock, sheet, MOTION)
+    for d in range(W.vel.shape[1]):
+        B.free[d] = W.vel[X_SOLVED, d]
+    for k in range(S.row_i.shape[0]):
+        B.loaded[k] = W.row[LAM, k]
+    if status != 0:
+        return status
+    for i in range(B.which.shape[0]):
+        respond(address, S, W, R, clock, sheet, B, i)
+    for i in range(B.which.shape[0]):
+        m = S.switch_i[B.which[i], SWITCH_MEASURED]
+        size = magnitude(W.sensed[BIAS, m])
+        P.b[i] = B.sign[i] * (W.sensed[BIAS, m] + along(S, W, m, B.free))
+        r = S.row_i.shape[0] + m
+        for e in range(S.row_p[r], S.row_p[r + 1]):
+            size += magnitude(W.G[e] * B.free[S.col_i[e]])
+        P.grain[i] = GRAIN * size
+        for j in range(B.which.shape[0]):
+            P.A[i, j] = B.sign[i] * along(S, W, m, B.Y[j])
+    for i in range(B.which.shape[0]):  # it is symmetric but for rounding
+        for j in range(i):
+            P.A[i, j] = P.A[j, i] = 0.5 * (P.A[i, j] + P.A[j, i])
+    return 0
+
+
+@formula
+def along(S, W, m, a):
+    """Gradient of measured quantity m times a."""
+    s = 0.0
+    r = S.row_i.shape[0] + m
+    for e in range(S.row_p[r], S.row_p[r + 1]):
+        s += W.G[e] * a[S.col_i[e]]
+    return s
+
+
+@formula
+def respond(address, S, W, R, clock, sheet, B, i):
+    """Response of row i."""
+    nv, nr = W.vel.shape[1], S.row_i.shape[0]
+    out = sheet.rows
+    for d in range(out.shape[1]):
+        out[0, d] = out[1, d] = 0.0
+    r = nr + S.switch_i[B.which[i], SWITCH_MEASURED]
+    for e in range(S.row_p[r], S.row_p[r + 1]):
+        out[0, S.col_i[e]] += B.sign[i] * W.G[e]
+    enter(address, S, W, R, clock, sheet, SOLVE)
+    for d in range(nv):
+        B.Y[i, d], B.E[i, d] = out[2, d], W.vel[EFFORT, d]
+    for k in range(nr):
+        B.L[i, k] = out[3, k]
+
+
+@formula
+def held_by(S, W, t, B, i, load):
+    """What friction of row i holds, or slides with, under a load; of an impulse what it adds to no load."""
+    k = S.switch_i[B.which[i], SWITCH_FORCE]
+    x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
+    first = law(S, W, k, 0, (t, x, B.rate[i]))
+    kind, par = S.force_i[k, FORCE_KIND], wide(S.force_x, k)
+    if B.asks[IMPULSES] != 0:
+        most = effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), FAR * load)
+        return magnitude(most - effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), 0.0)) / FAR
+    most = effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), load)
+    return magnitude(most - effort(kind, par, x, B.rate[i], (first, 0.0, 0.0), load))
+
+
+@formula
+def load_of(S, W, i, B):
+    """Load of row i's friction by the multipliers in W; 0 if none."""
+    k = S.switch_i[B.which[i], SWITCH_FORCE]
+    n = S.force_i[k, FORCE_LOAD]
+    return W.sensed[RETURNED, n] if n >= 0 else 0.0
+
+
+@formula
+def carry(S, W, B, P, j, more):
+    """Multipliers of all rows under the impulses of P, that of row j being ``more``."""
+    for k in range(S.row_i.shape[0]):
+        s = B.loaded[k]
+        for i in range(B.which.shape[0]):
+            s += (P.x[i] + (more if i == j else 0.0)) * B.L[i, k]
+        W.row[LAM, k] = s
+    reaction_loads(S, W)
+
+
+@formula
+def step_of(B, P, j):
+    """An impulse of row j that is small beside what they all are."""
+    size = 0.0
+    for i in range(B.which.shape[0]):
+        d = root(P, i)
+        size = max(size, magnitude(P.x[i]) * d, magnitude(P.b[i]) / d)
+    return NUDGE * size / root(P, j)
+
+
+@formula
+def root(P, i):
+    """Square root of A's diagonal, by which impulses of different units compare; 1 where nothing moves."""
+    return sqrt(P.A[i, i]) if P.A[i, i] > 0.0 else 1.0
+
+
+@formula
+def reaches(S, W, t, B, P):
+    """How much every friction holds at the impulses of P, and how that follows them. Returns whether it does."""
+    n, follows = B.which.shape[0], False
+    carry(S, W, B, P, -1, 0.0)
+    for i in range(n):
+        if B.way[i] != 0.0:
+            P.const[i] = held_by(S, W, t, B, i, load_of(S, W, i, B))
+            for j in range(n):
+                P.gain[i, j] = 0.0
+            follows = follows or S.force_i[S.switch_i[B.which[i], SWITCH_FORCE], FORCE_LOAD] >= 0
+    if not follows:
+        return False
+    for i in range(n):
+        B.now[i] = P.const[i]
+    for j in range(n):
+        step = step_of(B, P, j)
+        if step > 0.0:
+            carry(S, W, B, P, j, step)
+            for i in range(n):
+                if B.way[i] != 0.0:
+                    P.gain[i, j] = (held_by(S, W, t, B, i, load_of(S, W, i, B)) - B.now[i]) / step
+                    P.const[i] -= P.gain[i, j] * P.x[j]
+    return True
+
+
+@formula
+def balanced(S, W, t, B, P):
+    """The problem solved, with what friction holds by what it carries. How it ended stands in ``P.info``."""
+    n = B.which.shape[0]
+    for i in range(n):
+        P.x[i] = 0.0
+    for _ in range(TRIES):
+        B.asks[TRIED] += 1
+        follows = reaches(S, W, t, B, P)
+        for i in range(n):
+            B.seen[i] = P.x[i]
+        settle(P)
+        if not follows or P.info[ENDED] != FOUND:
+            return
+        change, size = 0.0, 0.0
+        for i in range(n):
+            s = root(P, i)
+            change, size = max(change, s * magnitude(P.x[i] - B.seen[i])), max(size, s * magnitude(P.x[i]))
+        if change <= SETTLED * size:
+            return
+    P.info[ENDED] = NONE_FOUND
+
+
+@kernel
+def bare_kernel(address, S, W, R, clock, sheet, B, P):
+    """`bare`, called from Python."""
+    return bare(address, held(S), held(W), held(R), held(clock), held(sheet), B, P)
+
+
+@kernel
+def balanced_kernel(S, W, t, B, P):
+    """`balanced`, called from Python."""
+    balanced(held(S), held(W), t, B, P)

@@ -1,0 +1,152 @@
+"""The small problem solved: states tried first, then pivoting, then values without the softening.
+
+The law of pairs that slip is not linear: it is made so at the velocities now, and all is solved again (Newton's method
+where everything else has its own rules: Josephy 1979).
+"""
+
+from __future__ import annotations
+
+from ....compiler.jit import formula, kernel
+from ....math.scalar import sqrt
+from .pivots import pivoted
+from .problem import (
+    BIAS,
+    DRIVEN,
+    ENDED,
+    EVEN,
+    FIRST,
+    FOUND,
+    FREE,
+    GRIPS,
+    HIGH,
+    HOLDS,
+    KEEN,
+    LED,
+    LOW,
+    NONE_FOUND,
+    NOT_HELD,
+    PASSES,
+    PIVOTS,
+    PUSHES,
+    REST,
+    SCALE,
+    SLIPS,
+    TURNS,
+    WAY,
+    WITH,
+    Dense,
+)
+from .sets import exchanged, reaching, rounding, scaled, solved, velocity
+
+NOT_EVEN = 1e-6  # of the largest velocity: what holds and is left with more cannot hold
+ALIGNED = 1e-13
+TRIES = 60  # of the ways of pairs
+
+
+@formula
+def admitted(P):
+    """States that go with the rules."""
+    for i in range(P.b.shape[0]):
+        rule, state = P.rule[i], P.state[i]
+        if rule == HOLDS or rule == TURNS or rule == WITH:
+            P.state[i] = EVEN
+        elif rule == DRIVEN:
+            P.state[i] = LED
+        elif rule == PUSHES:
+            P.state[i] = EVEN if state == EVEN else FREE
+        elif rule == GRIPS:
+            P.state[i] = state if state == LOW or state == HIGH else EVEN
+        else:
+            P.state[i] = FREE
+
+
+@formula
+def found(P):
+    """States and impulses of the problem as it is scaled and turned. Returns how it ended."""
+    n = P.b.shape[0]
+    if not exchanged(P, FIRST, 10 + 3 * n):
+        if not pivoted(P):
+            return NONE_FOUND
+        exchanged(P, FIRST, 10 + n)  # pivots are as good as rounding lets them be
+    for i in range(n):
+        P.at[i] = P.state[i]
+    if not exchanged(P, REST, 10 + n):
+        for i in range(n):
+            P.state[i] = P.at[i]
+        if not solved(P):
+            return NONE_FOUND
+    most = 0.0
+    for i in range(n):
+        most = max(most, abs(P.row[BIAS, i]))
+    for i in range(n):
+        if P.state[i] == EVEN and abs(velocity(P, P.row[REST], i)) > NOT_EVEN * most:
+            return NOT_HELD
+    return FOUND
+
+
+@formula
+def slipped(P):
+    """The ways of pairs that slip, by their velocities now. Returns by how much they turned at most."""
+    x, most = P.row[REST], 0.0
+    for i in range(P.b.shape[0]):
+        if P.rule[i] != TURNS or P.state[i] != SLIPS:
+            continue
+        u, v = velocity(P, x, i), velocity(P, x, i + 1)
+        size, reach = sqrt(u * u + v * v), max(reaching(P, x, i), 0.0)
+        if not size > rounding(P, x, i) + rounding(P, x, i + 1):
+            continue
+        most = max(most, abs(u / size - P.row[WAY, i]), abs(v / size - P.row[WAY, i + 1]))
+        P.row[WAY, i], P.row[WAY, i + 1], P.row[KEEN, i] = u / size, v / size, reach / size
+    return most
+
+
+@formula
+def written(P):
+    """Impulses, velocities and reaches in the units of the problem."""
+    n = P.b.shape[0]
+    x = P.row[REST]
+    for i in range(n):
+        P.reach[i] = reaching(P, x, i - 1 if P.rule[i] == WITH else i) / P.row[SCALE, i]
+        P.x[i] = x[i] / P.row[SCALE, i]
+    for i in range(n):
+        u = P.b[i]
+        for j in range(n):
+            u += P.A[i, j] * P.x[j]
+        P.u[i] = u
+
+
+@formula
+def settle(P):
+    """Solve in place; how it ended stands in ``P.info``."""
+    P.info[PASSES] = P.info[PIVOTS] = 0
+    scaled(P)
+    admitted(P)
+    for _ in range(TRIES):
+        P.info[PASSES] += 1
+        P.info[ENDED] = found(P)
+        if P.info[ENDED] == NONE_FOUND or slipped(P) <= ALIGNED:
+            break
+    written(P)
+
+
+@kernel
+def settle_kernel(P):
+    """`settle`, called from Python."""
+    settle(P)
+
+
+def solve(P: Dense) -> int:
+    """Impulses, velocities and states of all rows, in place, from the states that stand there.
+
+    Parameters
+    ----------
+    P : Dense
+        The problem; see `problem`.
+
+    Returns
+    -------
+    int
+        FOUND; NONE_FOUND: no impulses fulfil all rules (or none were found); NOT_HELD: rows that hold cannot.
+    """
+    settle_kernel(P)
+    return int(P.info[ENDED])
