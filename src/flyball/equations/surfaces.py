@@ -1,4 +1,4 @@
-"""Motion along the surface on which a law's corner lies: both sides push towards it, what is between them holds it there.
+"""Motion along the surface on which a law's corner lies: both sides push towards it, what is between holds it there.
 
 The side of the corner, a number between -1 and 1, is such that du/dt = 0 (Filippov, *Differential Equations with
 Discontinuous Righthand Sides*, 1988, section 4). Accelerations depend on it by one more solve; it is found by Newton's
@@ -43,10 +43,10 @@ def along(S, W, s):
 @formula
 def bound(S, W):
     """Whether the motion is held on some corner."""
+    count = 0
     for s in range(S.switch_i.shape[0]):
-        if along(S, W, s):
-            return True
-    return False
+        count += 1 if along(S, W, s) else 0
+    return count > 0
 
 
 @formula

@@ -11,7 +11,6 @@ from ..model.expressions import Expression, folded
 from ..model.function import arguments
 from ..model.grammar import Node
 from .functions import Called
-from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side
 from .native import native
 from .opcodes import (
     ADD,
@@ -36,6 +35,7 @@ from .opcodes import (
     WHERE,
     WHOLE_POWER,
 )
+from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
 _UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}

@@ -85,10 +85,7 @@ def _smooth_square(node: Node) -> bool:
     if node.kind != "*":
         return False
     a, b = node.args
-    for u, v in ((a, b), (b, a)):
-        if v.kind == "abs" and any(_same(v.args[0], x) for x in _factors(u)):
-            return True
-    return False
+    return any(v.kind == "abs" and any(_same(v.args[0], x) for x in _factors(u)) for u, v in ((a, b), (b, a)))
 
 
 def _factors(node: Node) -> list[Node]:

@@ -41,7 +41,7 @@ SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE = range(3)
 SWITCH_REST, SWITCH_SLIDING = range(2)  # coefficients of friction of a slip
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
-# (of corners of laws along which the motion is held: du/dt; side and du/dt of the pass before; scratch; dsides/d(du/dt))
+# (of corners of laws that hold the motion: du/dt; side and du/dt of the pass before; scratch; sides by du/dt)
 DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(5, 11)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # columns of System.guard_i; kinds of guards; what a guard's zero is watched for

@@ -9,10 +9,11 @@ import numpy as np
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND
-from ....tables.system import G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
+from .branches import Corners
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
-from .instant import Instant
+from .instant import DECIDED, Instant
 from .jump import Jump, jump, must_jump
 from .modes import Decided, decide
 from .parts import at_rest, of_velocities, sides
@@ -35,9 +36,11 @@ def begin(here: Here) -> None:
     if not len(here.c.system.switch_i):
         return
     n = Instant(here)
+    corners = Corners(n)
+    corners.begin()
     n.look()
     refuse_violated(n)
-    resolve(n, np.zeros(0, np.int64))
+    settled(n, corners, np.zeros(0, np.int64))
 
 
 def happen(here: Here, fired: Sequence[int]) -> None:
@@ -55,7 +58,21 @@ def happen(here: Here, fired: Sequence[int]) -> None:
         If no forces or impulses go with all that is asked, or there is no end of it.
     """
     if len(here.c.system.switch_i):
-        resolve(Instant(here), np.array(fired, np.int64))
+        n = Instant(here)
+        settled(n, Corners(n), np.array(fired, np.int64))
+
+
+def settled(n: Instant, corners: Corners, fired: np.ndarray) -> None:
+    """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
+    corners.fired(fired)
+    decided_by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
+    if not len(fired) or decided_by_rows.any():
+        resolve(n, fired[decided_by_rows])
+    for _ in range(ROUNDS):
+        if not corners.settle() or not np.isin(n.kind, DECIDED).any():
+            return
+        resolve(n, fired[:0])
+    raise no_end(n, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
 def refuse_violated(n: Instant) -> None:
