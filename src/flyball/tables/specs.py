@@ -86,6 +86,7 @@ class Structure:
     switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
     branches: Any = None  # what finds the sides of laws' corners (`branches.Branches`); None: laws decide themselves
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
+    events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, np.ndarray] = field(default_factory=dict)
@@ -129,7 +130,7 @@ class Structure:
             tables=self.table_at,
             functions=self.functions,
             derivatives=derivatives,
-            corners=self.branches.of(owner, law, inputs) if self.branches is not None else None,
+            corners=self.branches.of(owner, law, inputs) if self.branches is not None and owner is not None else None,
         )
         self.depth = max(self.depth, depth)
         self.laws[at] = law.where

@@ -12,6 +12,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
+from ...tables.branches import bent_laws
 from ...tables.switches import declared
 from ...tables.system import Q0, SEMIDEFINITE
 from ..assemble import assemble
@@ -98,7 +99,7 @@ def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None) ->
 def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
     """The same with the rows that have modes, all off, if there are any."""
     s = a.compiled.structure
-    if not declared(s.model):
+    if not declared(s.model) and not s.model.events and not bent_laws(s.model):
         return a
     c = compiled(s.model, parameters=parameters, tree=s.tree, switches=True)
     c.follow(a.compiled.hints)
