@@ -27,6 +27,8 @@ from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
+from .motion.events.here import Here
+from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.later import open_until_asked, solved
@@ -86,7 +88,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
     begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
-    follow = o.stabilization == "projection" and leaves_no_freedom(begun)
+    follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
 
@@ -144,12 +146,22 @@ def moved(
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
     later = open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
-    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
+    here = Here(begun, clock)
+    if watched(begun):
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell)
+    else:
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
-    return outcome(begun, clock, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+    return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+
+
+def watched(begun: Start) -> bool:
+    """Whether something may happen at an instant: there are guards, or rows with modes."""
+    s = begun.assembly.compiled.structure
+    return bool(s.guards or s.switches)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:
