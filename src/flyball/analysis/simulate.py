@@ -13,6 +13,7 @@ from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
+from ..laws.breaks import Breaks
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..model.touching import has_contact
@@ -28,9 +29,10 @@ from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
 from .motion.events.here import Here
-from .motion.events.run import run_events
+from .motion.events.run import NO_BREAKS, Legs, run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
+from .motion.known import breaks_of, sampled_laws, told_of
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
@@ -143,14 +145,18 @@ def moved(
     o = o.sized(begun.base.compiled.values.length)
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
-    clock = clock_for(begun, begun.base.t, float(t_end), times, o)
+    c = begun.assembly.compiled
+    breaks = breaks_of(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
+    sampled = sampled_laws(c, breaks)
+    clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if watched(begun):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell)
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, breaks)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine, breaks)
+    here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled) if task == INTEGRATE else "") if x)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -175,8 +181,18 @@ def _refuse_idle(begun: Start, stabilization: str) -> None:
         )
 
 
-def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:
-    """Everything the compiled loop needs to start, and the choices of the solve."""
+def clock_for(
+    start: Start,
+    t: float,
+    t_end: float,
+    times: np.ndarray,
+    o: Integration,
+    sampled: frozenset[int] | None = None,
+) -> ex.Clock:
+    """Everything the compiled loop needs to start, and the choices of the solve.
+
+    ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
+    """
     a, y = start.assembly, start.y
     refuse_unheld(len(times), _width(a))
     s, W = a.compiled.structure, a.compiled.work
@@ -202,7 +218,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     W.option[PASS] = 1e-13
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system, sampled))
 
 
 def _energy_size(a: Assembly, span: float) -> float:
@@ -224,20 +240,28 @@ def _width(a: Assembly) -> int:
 
 
 def run_clock(
-    a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int, engine: Engine | None = None
+    a: Assembly,
+    clock: ex.Clock,
+    method: Tableau,
+    tell: Tell,
+    task: int,
+    engine: Engine | None = None,
+    breaks: Breaks = NO_BREAKS,
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven. Steps
+    end on ``breaks``.
     """
+    legs = Legs(clock, breaks)
     c, engine = a.compiled, engine or Engine(a.compiled, False)
     s, width = c.structure, _width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
-    span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
+    span, reached = legs.end - first or 1.0, 0.0
     forget(c.work.stack)
-    engine.begin(clock)
+    engine.begin(clock, legs.end)
     clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
     try:
         while True:
@@ -248,12 +272,14 @@ def run_clock(
                 rows.append(buffer[:used].copy())
             reached = max(reached, (clock.real[ex.T] - first) / span)
             tell(reached)
-            if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
+            through = clock.count[ex.STATUS] != ex.DONE or not legs.next()
+            if through and clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
             if engine.begins_anew(clock):
                 rows.clear()
+                legs.take(breaks)
                 forget(c.work.stack)
             clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:

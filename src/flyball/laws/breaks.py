@@ -18,7 +18,7 @@ from .intervals.steps import NOTHING, STATE, TIME, Corner, Step, brief, corners,
 from .opcodes import CONSTANT, INPUT
 
 NONE = np.zeros(0)
-NEAR = 64.0  # units in the last place that breaks are apart
+NEAR = 256.0  # units in the last place that breaks are apart
 
 
 class Breaks(NamedTuple):

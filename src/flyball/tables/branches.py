@@ -21,7 +21,7 @@ from ..laws.sides import Corners, meaning
 from ..math.spline import packed
 from ..model.element import Element, LawOf, fields_with
 from ..model.expressions import Expression
-from ..model.force import CoordinateForce
+from ..model.force import CoordinateForce, TwoPointForce
 from ..model.grammar import Node
 from ..model.model import Model
 from ..model.switch import Switch
@@ -74,7 +74,7 @@ class Branches:
     def quantities(self) -> None:
         """Number the lengths and rates that bent laws of forces between frames depend on."""
         for e in bent_laws(self.s.model):
-            if isinstance(e, CoordinateForce) or "F" not in e.ends() or self.key(e) in self.s.measured:
+            if not isinstance(e, TwoPointForce) or self.key(e) in self.s.measured:
                 continue
             m = self.s.measured[self.key(e)] = len(self.s.measured)
             measured_term(self.s, m, frame(self.s, e, "F"), frame(self.s, e, "M"), DISTANCE, 1.0, e)
@@ -94,7 +94,8 @@ class Branches:
             slots |= {inputs[0]: m, inputs[1]: len(s.measured) + m}
 
         def corner(u: Node) -> tuple[int, float]:
-            if u.kind == "table" and (data := self.zigzag(u.value)) is None:
+            data = self.zigzag(u.value) if u.kind == "table" else []
+            if data is None:
                 return 0, 1.0
             key = _named(u, slots)
             if key not in self.known:

@@ -7,18 +7,19 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
 from ....errors import FlyballError, ModelError
+from ....laws.breaks import Breaks, margin
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ...progress import Tell
+from ..known import breaks_of
 from .happen import begin, happen
 from .here import Here
 
@@ -29,19 +30,8 @@ PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
-class Breaks(NamedTuple):
-    """Known times [s] at which a step ends."""
-
-    times: np.ndarray  # ascending
-    sharp: np.ndarray  # whether forces or velocities may jump there
-
-
-NO_BREAKS = Breaks(np.zeros(0), np.zeros(0, bool))
-
-
-def beside(t: float) -> float:
-    """How far [s] from a time a law is on one side of it for sure."""
-    return 8.0 * float(np.spacing(abs(t)))
+NO_BREAKS = Breaks(np.zeros(0), np.zeros(0, bool), ())
+SLIVER = 2e-14  # of the largest time: what is left of a leg is no step
 
 
 class Legs:
@@ -51,30 +41,42 @@ class Legs:
     little behind, with a first width of its own.
     """
 
-    def __init__(self, here: Here, breaks: Breaks) -> None:
-        self.here, self.end = here, float(here.clock.real[ex.T_END])
-        inside = (breaks.times > here.t) & (breaks.times < self.end)
+    def __init__(self, clock: ex.Clock, breaks: Breaks) -> None:
+        self.clock, self.end = clock, float(clock.real[ex.T_END])
+        self.take(breaks)
+
+    def take(self, breaks: Breaks) -> None:
+        """Begin with other breaks, where the motion stands."""
+        inside = (breaks.times > self.clock.real[ex.T]) & (breaks.times < self.end)
         self.times, self.sharp = breaks.times[inside], breaks.sharp[inside]
         self.at = 0
         self._aim()
+        self.passed()
+
+    def passed(self) -> None:
+        """Go on with the next leg where nothing is left of this one."""
+        real = self.clock.real
+        while self.at < len(self.times) and real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+            self.next()
 
     def _aim(self) -> None:
         end = self.end
         if self.at < len(self.times):
             end = float(self.times[self.at])
             if self.sharp[self.at]:
-                end -= beside(end)
-        self.here.clock.real[ex.T_END] = end
+                end -= margin(end)
+        self.clock.real[ex.T_END] = end
 
     def next(self) -> bool:
         """Go on with the next one, if there is one."""
         if self.at == len(self.times):
             return False
-        clock, t, sharp = self.here.clock, float(self.times[self.at]), self.sharp[self.at]
+        clock, t, sharp = self.clock, float(self.times[self.at]), self.sharp[self.at]
         self.at += 1
         self._aim()
         if sharp:
-            clock.real[ex.T], clock.real[ex.H] = t + beside(t), 0.0
+            clock.y[ex.NOW] += 2.0 * margin(t) * clock.K[0]  # as it went on till then
+            clock.real[ex.T], clock.real[ex.H] = t + margin(t), 0.0
             clock.count[ex.STARTED] = 0
         return True
 
@@ -111,12 +113,16 @@ class Run:
         forget(here.c.work.stack)
         try:
             self.begin()
-            legs = Legs(here, breaks)
+            legs, system = Legs(clock, breaks), here.c.system
             while not here.stopped:
                 self.integrate()
                 status = clock.count[ex.STATUS]
                 if status == EVENT:
                     self.event()
+                    if here.c.system is not system:  # other parameters
+                        system = here.c.system
+                        legs.take(breaks_of(here.c, here.t, legs.end))
+                    legs.passed()
                 elif status == ex.DONE:
                     if not legs.next():
                         break
