@@ -83,7 +83,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
-    begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
+    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
     begun.since = started
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)

@@ -39,6 +39,7 @@ def begin(here: Here) -> None:
     corners = Corners(n)
     corners.begin()
     n.look()
+    n.restored()
     refuse_violated(n)
     settled(n, corners, np.zeros(0, np.int64))
 
@@ -120,9 +121,11 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     here = n.here
     parts = of_velocities(n, at, still)
     kick, here.kick = here.kick, None
+    blows, here.blows = tuple(here.blows), []
     if kick is None and not must_jump(n, parts, n.rate):
         return None
     jumped = jump(n, parts, kick)
+    jumped.blows = blows
     if jumped.ended != FOUND:
         n.restored()
         raise no_impulses(n, parts)
