@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ..constraints.modes import BRANCH
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
@@ -84,6 +85,8 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
+    if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
+        begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
@@ -162,6 +165,12 @@ def moved(
         owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
     return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+
+
+def _corners_only(begun: Start) -> bool:
+    """Whether nothing is watched but corners of laws."""
+    s = begun.assembly.compiled.structure
+    return bool(s.switches) and not s.model.events and all(x.switch.kind == BRANCH for x in s.switches)
 
 
 def watched(begun: Start) -> bool:
