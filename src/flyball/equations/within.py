@@ -13,7 +13,8 @@ from collections.abc import Collection
 import numpy as np
 
 from ..compiler.jit import formula
-from ..laws.evaluation import brief, evaluate, evaluate_jet
+from ..laws.evaluation import evaluate, evaluate_jet
+from ..laws.manner import brief
 from ..math.scalar import cos
 from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, TO_RATE
 from ..tables.system import (

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...math.spline import BREAKS, PIECE
+from ..manner import LOW
 from ..opcodes import (
     ABS,
     ACOS,
@@ -44,7 +45,6 @@ from ..opcodes import (
 )
 
 NOTHING, TIME, STATE = range(3)  # what a step depends on
-LOW = 8  # powers up to this are no pulses
 SEAM = 1e-9  # part of their size by which pieces of a table may differ where they meet
 
 
@@ -107,7 +107,7 @@ def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...])
 
 
 def brief(step: Step, steps: Sequence[Step]) -> bool:
-    """Whether a step can do much within a short time, or a short way: see ``evaluation.brief``."""
+    """Whether a step can do much within a short time, or a short way: see ``manner.brief``."""
     if step.operation == CALL:
         return step.operand not in (SIN, COS, NEGATE)
     if step.operation == WHOLE_POWER:
