@@ -14,7 +14,7 @@ from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
-from ..laws.breaks import Breaks
+from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..model.touching import has_contact
@@ -30,14 +30,16 @@ from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
 from .motion.events.here import Here
-from .motion.events.run import NO_BREAKS, Legs, run_events
+from .motion.events.legs import breaks
+from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
-from .motion.known import breaks_of, sampled_laws, told_of
+from .motion.known import sampled_laws, told_of
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
+from .motion.touches import with_places
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
@@ -84,6 +86,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
+    model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
     if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
@@ -111,10 +114,11 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if has_contact(model):
+        if model.bulk or any(not e.switches() for e in model.limits):
+            part = next((e for e in model.limits if not e.switches()), None) or model.bulk[0]
             raise ModelError(
-                f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
-                f"give method='impulse'"
+                f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
+                f"out, or give method='impulse'"
             )
         return o
     for name, usual in IDLE.items():
@@ -148,18 +152,19 @@ def moved(
     o = o.sized(begun.base.compiled.values.length)
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
-    c = begun.assembly.compiled
-    breaks = breaks_of(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
-    sampled = sampled_laws(c, breaks)
+    c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
+    sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if watched(begun):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, breaks)
+    if watched(begun) or len(known.times):
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine, breaks)
-    here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled) if task == INTEGRATE else "") if x)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
+    if task == INTEGRATE:
+        here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -176,7 +181,7 @@ def _corners_only(begun: Start) -> bool:
 def watched(begun: Start) -> bool:
     """Whether something may happen at an instant: there are guards, or rows with modes."""
     s = begun.assembly.compiled.structure
-    return bool(s.guards or s.switches)
+    return bool(s.guards or s.switches or s.model.events)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:
@@ -249,28 +254,20 @@ def _width(a: Assembly) -> int:
 
 
 def run_clock(
-    a: Assembly,
-    clock: ex.Clock,
-    method: Tableau,
-    tell: Tell,
-    task: int,
-    engine: Engine | None = None,
-    breaks: Breaks = NO_BREAKS,
+    a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int, engine: Engine | None = None
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven. Steps
-    end on ``breaks``.
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
     """
-    legs = Legs(clock, breaks)
     c, engine = a.compiled, engine or Engine(a.compiled, False)
     s, width = c.structure, _width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
     first = clock.real[ex.T]
-    span, reached = legs.end - first or 1.0, 0.0
+    span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
-    engine.begin(clock, legs.end)
+    engine.begin(clock)
     clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
     try:
         while True:
@@ -281,14 +278,12 @@ def run_clock(
                 rows.append(buffer[:used].copy())
             reached = max(reached, (clock.real[ex.T] - first) / span)
             tell(reached)
-            through = clock.count[ex.STATUS] != ex.DONE or not legs.next()
-            if through and clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
+            if clock.count[ex.STATUS] != ex.RUNNING and not engine.hands_over(clock):
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
             if engine.begins_anew(clock):
                 rows.clear()
-                legs.take(breaks)
                 forget(c.work.stack)
             clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:

@@ -86,7 +86,7 @@ class Engine:
     def __init__(self, c: Compiled, wish: bool | str, without: str = "") -> None:
         self.c, self.told, self.due = c, f"{TABLES}: asked for", math.inf
         self._first: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None  # the clock as the motion begins
-        self._counted, self._until = 0, math.inf
+        self._counted = 0
         if wish is False:
             return
         if wish is True:
@@ -97,9 +97,8 @@ class Engine:
             self.told, self.due = SHORT, FIRST
             self._kind, self._each = kind(c.structure)
 
-    def begin(self, clock: ex.Clock, until: float) -> None:
-        """The motion begins there, and goes until then [s]."""
-        self._until = until
+    def begin(self, clock: ex.Clock) -> None:
+        """The motion begins there."""
         if self.due < math.inf:
             self._first = clock.real.copy(), clock.count.copy(), clock.y[ex.NOW].copy()
             self._counted = int(self.c.work.info[EVALUATIONS])
@@ -110,7 +109,7 @@ class Engine:
         if steps < self.due or self._first is None:
             return False
         self.due = AGAIN * steps
-        t, end, first = clock.real[ex.T], self._until, self._first[0][ex.T]
+        t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first[0][ex.T]
         if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
             return False
         clock.K[:] = clock.y[:] = clock.seen[:LOOK] = 0.0

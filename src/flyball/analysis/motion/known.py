@@ -1,26 +1,10 @@
-"""What is known of a motion's laws before it begins: times at which steps end, and which laws have to be sampled."""
+"""Which laws of a motion have to be sampled within its steps: what they do follows the state, or is not known."""
 
 from __future__ import annotations
 
-import numpy as np
-
 from ...equations.within import law_starts
-from ...laws.breaks import Breaks, acts_briefly, found_beforehand
-from ...model.kept import bits
-from ...tables.system import SWITCH_LAW
+from ...laws.breaks import Breaks, acts_briefly
 from ..compiled import Compiled
-
-MOST = 8  # spans of the same numbers of which it is kept
-
-
-def breaks_of(c: Compiled, t0: float, t1: float) -> Breaks:
-    """Times [s] between t0 and t1 at which laws have corners, or begin and end brief actions, by time alone."""
-    x, S = c.values, c.system
-    starts = [*law_starts(S), *(S.switch_i[S.switch_i[:, SWITCH_LAW] >= 0, SWITCH_LAW] if len(S.switch_i) else ())]
-    known = set(c.structure.laws)
-    starts = [int(at) for at in starts if int(at) in known]
-    key = bits({"t0": t0, "t1": t1})
-    return x.kept.get("breaks", key, MOST, lambda: found_beforehand(S.code.tolist(), np.real(S.const), starts, t0, t1))
 
 
 def sampled_laws(c: Compiled, breaks: Breaks) -> frozenset[int]:

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
 from ....errors import SimulationError
 from ....model.words import listing
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from .instant import Instant, Part
 from .modes import Decided
 
-ROLES = {STOP: "is closed", FRICTION: "has friction", ONE_WAY: "goes one way only", LOCK: "is locked"}
+ROLES = {
+    STOP: "is closed",
+    FRICTION: "has friction",
+    ONE_WAY: "goes one way only",
+    SLIP: "has friction",
+    LOCK: "is locked",
+}
 
 
 def who(n: Instant, parts: list[Part]) -> str:
@@ -44,10 +50,10 @@ def no_forces(n: Instant, found: Decided) -> SimulationError:
     )
 
 
-def no_end(n: Instant, names: list[str], rounds: int) -> SimulationError:
+def no_end(t: float, names: list[str], rounds: int) -> SimulationError:
     """What happens at an instant has no end."""
     return SimulationError(
-        f"at t = {n.here.t:.9g} s events follow each other without end ({rounds} times at one instant): "
+        f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
         f"{listing(list(dict.fromkeys(names)))}; each undoes what the other did",
-        t=n.here.t,
+        t=t,
     )

@@ -9,7 +9,8 @@ import numpy as np
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND
-from ....tables.system import G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
+from .actions import act, act_at_start
 from .branches import Corners
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
@@ -33,15 +34,17 @@ def begin(here: Here) -> None:
     ModelError
         If a limit starts violated.
     """
-    if not len(here.c.system.switch_i):
-        return
-    n = Instant(here)
-    corners = Corners(n)
-    corners.begin()
-    n.look()
-    n.restored()
-    refuse_violated(n)
-    settled(n, corners, np.zeros(0, np.int64))
+    acts = act_at_start(here)
+    if len(here.c.system.switch_i) or here.kick is not None:
+        n = Instant(here)
+        corners = Corners(n)
+        corners.begin()
+        n.look()
+        n.restored()
+        refuse_violated(n)
+        settled(n, corners, np.zeros(0, np.int64))
+    acts.told(["start"])
+    _happen(here, acts.passed())
 
 
 def happen(here: Here, fired: Sequence[int]) -> None:
@@ -58,22 +61,36 @@ def happen(here: Here, fired: Sequence[int]) -> None:
     SimulationError
         If no forces or impulses go with all that is asked, or there is no end of it.
     """
-    if len(here.c.system.switch_i):
-        n = Instant(here)
-        settled(n, Corners(n), np.array(fired, np.int64))
+    _happen(here, np.array(fired, np.int64))
+
+
+def _happen(here: Here, fired: np.ndarray) -> None:
+    """Events, jumps and modes, as long as expressions of events pass zero by what was done."""
+    for _ in range(ROUNDS if len(fired) else 0):
+        acts = act(here, fired.tolist())
+        if len(here.c.system.switch_i) or here.kick is not None:
+            n = Instant(here)
+            settled(n, Corners(n), fired)
+        acts.told(["start"])
+        fired = acts.passed()
+        here.acted.clear()  # what follows from it comes later
+        if not len(fired) or here.stopped:
+            return
+    if len(fired):
+        raise no_end(here.t, [here.structure.events[int(g)].name for g in fired], ROUNDS)
 
 
 def settled(n: Instant, corners: Corners, fired: np.ndarray) -> None:
     """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
     corners.fired(fired)
-    decided_by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
-    if not len(fired) or decided_by_rows.any():
-        resolve(n, fired[decided_by_rows])
+    by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
+    if not len(fired) or by_rows.any():
+        resolve(n, fired[by_rows])
     for _ in range(ROUNDS):
         if not corners.settle() or not np.isin(n.kind, DECIDED).any():
             return
         resolve(n, fired[:0])
-    raise no_end(n, [n.name(s) for s in sorted(corners.at)], ROUNDS)
+    raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
 def refuse_violated(n: Instant) -> None:
@@ -113,7 +130,7 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
         if not len(fired):
             tell_modes(n, (modes, ways), before, hits)
             return
-    raise no_end(n, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
+    raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
 
 
 def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
@@ -154,6 +171,6 @@ def broken(n: Instant, found: Decided) -> np.ndarray:
     out = [
         k
         for k, (kind, s, _) in enumerate(n.S.guard_i.tolist())
-        if kind in (G_PULL, G_HOLDS) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
+        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
     ]
     return np.array(out, np.int64)

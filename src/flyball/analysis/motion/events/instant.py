@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
 from ....equations.engine import Sheet, engine, through
 from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
 from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
 from ....numerics.cone.dense.problem import ENDED, FREE, Dense, dense
-from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock, T
+from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
     EFFORT,
@@ -23,18 +23,22 @@ from ....tables.system import (
     MODE,
     OFF,
     RATE,
+    SPARE,
     SWITCH_FORCE,
     SWITCH_KIND,
     SWITCH_MEASURED,
     VALUE,
 )
 from .here import Here
+from .holding import GONE
 
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the motion: the same where all is at rest
+NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
-DECIDED = (STOP, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
+DECIDED = (STOP, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
 class Part(NamedTuple):
@@ -71,7 +75,8 @@ class Instant:
         c, self.here = here.c, here
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
-        self.kind, self.m = S.switch_i[:, SWITCH_KIND], S.switch_i[:, SWITCH_MEASURED]
+        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, S.switch_i[:, SWITCH_KIND])
+        self.m = S.switch_i[:, SWITCH_MEASURED]
         self.force = S.switch_i[:, SWITCH_FORCE]
         self.first = self.W.sensed.shape[1] - len(self.kind)
         ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
@@ -109,13 +114,13 @@ class Instant:
         self.ask(MOTION)
         self.x, self.rate = W.sensed[VALUE, self.m].copy(), W.sensed[RATE, self.m].copy()
         self.near = NEAR * self.unit
-        self.still, v = np.zeros(len(self.m)), np.abs(self.here.v)
+        self.still, v = REST * self.unit / self.here.clock.real[SPAN], np.abs(self.here.v)
         most, nr = v.max(initial=0.0), len(S.row_i)
         for s, m in enumerate(self.m.tolist()):
             if m >= 0:
                 at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
                 G = np.abs(W.G[at])
-                self.still[s] = STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
+                self.still[s] += STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
 
     def bared(self) -> None:
         """Switch off what is decided; friction without a load that slides goes on doing so."""
@@ -186,8 +191,9 @@ class Instant:
         return self.sheet.rows[0, : len(self.S.guard_i)].copy()
 
     def name(self, s: int) -> str:
-        """Name of the element that switch s is of."""
-        return str(self.here.structure.switches[s].element.name)
+        """Name of the element that switch s is of; of the coordinate that an event locks."""
+        spec = self.here.structure.switches[s]
+        return str(spec.switch.label if spec.element.category == "events" else spec.element.name)
 
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""

@@ -13,72 +13,21 @@ import numpy as np
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
 from ....errors import FlyballError, ModelError
-from ....laws.breaks import Breaks, margin
+from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ...progress import Tell
-from ..known import breaks_of
+from ..engines import Engine
 from .happen import begin, happen
 from .here import Here
+from .legs import Legs, breaks
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
-LONGEST = 100_000  # steps in one call
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 AT_ONCE = 1e-9  # part of the time span within which so many never end
-
-
-NO_BREAKS = Breaks(np.zeros(0), np.zeros(0, bool), ())
-SLIVER = 2e-14  # of the largest time: what is left of a leg is no step
-
-
-class Legs:
-    """The times between which a motion is integrated, one after the other.
-
-    A law that is sharp at a time may belong to either side there: a step ends a little before, the next begins as
-    little behind, with a first width of its own.
-    """
-
-    def __init__(self, clock: ex.Clock, breaks: Breaks) -> None:
-        self.clock, self.end = clock, float(clock.real[ex.T_END])
-        self.take(breaks)
-
-    def take(self, breaks: Breaks) -> None:
-        """Begin with other breaks, where the motion stands."""
-        inside = (breaks.times > self.clock.real[ex.T]) & (breaks.times < self.end)
-        self.times, self.sharp = breaks.times[inside], breaks.sharp[inside]
-        self.at = 0
-        self._aim()
-        self.passed()
-
-    def passed(self) -> None:
-        """Go on with the next leg where nothing is left of this one."""
-        real = self.clock.real
-        while self.at < len(self.times) and real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
-            self.next()
-
-    def _aim(self) -> None:
-        end = self.end
-        if self.at < len(self.times):
-            end = float(self.times[self.at])
-            if self.sharp[self.at]:
-                end -= margin(end)
-        self.clock.real[ex.T_END] = end
-
-    def next(self) -> bool:
-        """Go on with the next one, if there is one."""
-        if self.at == len(self.times):
-            return False
-        clock, t, sharp = self.clock, float(self.times[self.at]), self.sharp[self.at]
-        self.at += 1
-        self._aim()
-        if sharp:
-            clock.y[ex.NOW] += 2.0 * margin(t) * clock.K[0]  # as it went on till then
-            clock.real[ex.T], clock.real[ex.H] = t + margin(t), 0.0
-            clock.count[ex.STARTED] = 0
-        return True
 
 
 class Run:
@@ -92,9 +41,12 @@ class Run:
         Of a row of output.
     tell : callable
         Is told how far it is.
+    engine : Engine
+        Which loops compute it where nothing is watched.
     """
 
-    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell) -> None:
+    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell, engine: Engine) -> None:
+        self.engine = engine
         self.here, self.method, self.width, self.tell = here, method, width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
@@ -107,26 +59,17 @@ class Run:
         c = self.here.c
         return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
-    def go(self, breaks: Breaks) -> tuple[np.ndarray, bool]:
+    def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
-        here, clock = self.here, self.here.clock
+        here, engine = self.here, self.engine
         forget(here.c.work.stack)
         try:
             self.begin()
-            legs, system = Legs(clock, breaks), here.c.system
+            engine.begin(here.clock)
+            self.legs = Legs(here.clock, known)
             while not here.stopped:
                 self.integrate()
-                status = clock.count[ex.STATUS]
-                if status == EVENT:
-                    self.event()
-                    if here.c.system is not system:  # other parameters
-                        system = here.c.system
-                        legs.take(breaks_of(here.c, here.t, legs.end))
-                    legs.passed()
-                elif status == ex.DONE:
-                    if not legs.next():
-                        break
-                elif status != ex.RUNNING:
+                if self.over():
                     break
             if here.stopped:
                 self.stop()
@@ -137,9 +80,28 @@ class Run:
                 raise
             here.failed = error
         finally:
+            engine.end()
             if self.loop is not None:
                 here.watched = told(self.loop)
         return np.concatenate(self.rows), False
+
+    def over(self) -> bool:
+        """Do what the compiled loop has returned for: whether the motion is over."""
+        clock, engine = self.here.clock, self.engine
+        status = clock.count[ex.STATUS]
+        if status == EVENT:
+            self.event()
+        elif status == ex.DONE:
+            return not self.legs.next()
+        elif status != ex.RUNNING and not engine.hands_over(clock):
+            return True
+        self.legs.whole()
+        if self.loop is None and engine.begins_anew(clock):
+            self.rows = self.rows[:1]
+            forget(self.here.c.work.stack)
+            self.legs.anew()
+        self.legs.aim()
+        return False
 
     def begin(self) -> None:
         """What happens as the motion begins."""
@@ -161,7 +123,7 @@ class Run:
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
             done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            clock.count[ex.QUOTA] = int(min(max(done * SLICE / took, 1.0), LONGEST))
+            clock.count[ex.QUOTA] = self.engine.limited(clock, done * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
@@ -173,7 +135,11 @@ class Run:
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise self.endless()
+        values = here.c.values
         happen(here, self.loop.fired if self.loop else ())
+        if here.c.values is not values:  # other parameters
+            self.legs.take(breaks(here.c, here.t, self.legs.end))
+        self.legs.passed()
         clock.count[ex.STARTED] = 0
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
@@ -207,7 +173,7 @@ def told(loop: Watched) -> str:
 
 
 def run_events(
-    here: Here, method: Tableau, width: int, tell: Tell, breaks: Breaks = NO_BREAKS
+    here: Here, method: Tableau, width: int, tell: Tell, engine: Engine, known: Breaks
 ) -> tuple[np.ndarray, bool]:
     """Integrate from event to event. Returns (output rows, whether the user interrupted).
 
@@ -220,7 +186,9 @@ def run_events(
         Of a row of output.
     tell : callable
         Is told how far it is.
-    breaks : Breaks
-        Known times at which steps end.
+    engine : Engine
+        Which loops compute it where nothing is watched.
+    known : Breaks
+        Times at which steps end.
     """
-    return Run(here, method, width, tell).go(breaks)
+    return Run(here, method, width, tell, engine).go(known)
