@@ -83,7 +83,7 @@ class Legs:
             self.clock.y[ex.NOW] += (behind - real[ex.T]) * self.clock.K[0]
             real[ex.T] = behind
             self.clock.count[ex.STARTED] = 0
-        real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
+            real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
         self.at += 1
         self.aim()
         return True
