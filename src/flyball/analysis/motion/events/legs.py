@@ -43,12 +43,6 @@ class Legs:
         self.at = 0
         self.aim()
 
-    def take(self, found: Breaks) -> None:
-        """Go on with other breaks: parameters have other values."""
-        later = found.times > self.clock.real[ex.T]
-        self.times, self.sharp, self.at = found.times[later], found.sharp[later], 0
-        self.aim()
-
     def passed(self) -> None:
         """Go on with the next one where nothing is left of this one."""
         real = self.clock.real
