@@ -30,9 +30,9 @@ def in_force() -> str:
 def take(layer: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Simulate in that layer until the test ends."""
 
-    def begun(model, t, parameters, before, coordinates) -> Start:
+    def begun(model, t, parameters, before, coordinates, **more) -> Start:
         coordinates = layer if coordinates == AUTO else coordinates
-        start = begin(model, t, parameters, before, coordinates)
+        start = begin(model, t, parameters, before, coordinates, **more)
         if coordinates == "joint" and not start.assembly.compiled.structure.tree:
             pytest.skip("no joint of it can be a tree joint")
         return start

@@ -33,7 +33,7 @@ def names(m):
 
 def moving(m, modes, ways, coordinates="absolute"):
     """Accelerations and multipliers of the tables with these modes and ways of the switches of the first place."""
-    a = begin(with_places(m, None), 0.0, None, None, coordinates).assembly
+    a = begin(with_places(m, None), 0.0, None, None, coordinates, switches=True).assembly
     c = a.compiled
     W, n = c.work, len(c.structure.switches)
     W.switch[MODE, : len(modes)] = modes

@@ -48,7 +48,7 @@ def double(of, coordinates):
     m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
     m.limits.append(Hold("hold", of=of))
     m.by_name["hold"] = m.limits[-1]
-    return begin(m.snapshot(), 0.0, None, None, coordinates).assembly
+    return begin(m.snapshot(), 0.0, None, None, coordinates, switches=True).assembly
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])

@@ -81,7 +81,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
-    begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
+    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
     begun.since = started
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
@@ -161,7 +161,7 @@ def moved(
 def watched(begun: Start) -> bool:
     """Whether something may happen at an instant: there are guards, or rows with modes."""
     s = begun.assembly.compiled.structure
-    return bool(s.guards or s.switches)
+    return bool(s.guards or s.switches or s.model.events)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:

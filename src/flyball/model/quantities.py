@@ -59,7 +59,7 @@ def quantities(model: Model, name: str) -> Table:
     axes = "xy" if model.planar else "xyz"
     touching = bool(getattr(model, "contacts", ()))
     if name == ENERGY:
-        return _of_energy(touching)
+        return _of_energy(touching, switching(model))
     member = MEMBER.fullmatch(name)
     if member and member[1] in model.by_name and model[member[1]].category == "bulk":
         return _of_member(axes)
@@ -132,9 +132,16 @@ def _unit_of(model: Model, text: str) -> str:
     return quantities(model, owner)[what].unit
 
 
-def _of_energy(touching: bool) -> Table:
+def switching(model: Model) -> bool:
+    """Whether there is something that holds at times and lets go at others, or events."""
+    return bool(getattr(model, "events", ())) or any(e.switches() for e in model.elements())
+
+
+def _of_energy(touching: bool, switches: bool) -> Table:
     listed = ["kinetic", "potential", "total", "balance"]
     listed += ["friction_loss", "impact_loss", "surface_work", "contact_elastic"] if touching else []
+    listed += ["impact_loss"] if switches and not touching else []
+    listed += ["event_work"] if switches else []
     return {k: Quantity("J", curve=k in listed, array=True) for k in (*listed, "gravity", "elastic")}
 
 

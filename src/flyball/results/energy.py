@@ -10,6 +10,7 @@ import numpy as np
 from ..math.vec import dot, load9, mtv, mv
 from ..model.quantities import ENERGY, Quantity, quantities
 from ..tables.system import INERTIA, MASS
+from .booked import GIVEN, jumps
 from .views.base import Named
 
 if TYPE_CHECKING:
@@ -43,6 +44,8 @@ class Energy(Named):
     @cached_property
     def kinetic(self) -> np.ndarray:
         """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
+        if self._result.pieces:
+            return self._of_pieces("kinetic")
         r, S = self._result.records, self._result.values.system
         total = r.zeros()
         for b in range(len(S.body_i)):
@@ -54,6 +57,8 @@ class Energy(Named):
     @cached_property
     def gravity(self) -> np.ndarray:
         """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
+        if self._result.pieces:
+            return self._of_pieces("gravity")
         r, S = self._result.records, self._result.values.system
         total = r.zeros()
         for b in range(len(S.body_i)):
@@ -79,19 +84,25 @@ class Energy(Named):
     def work(self) -> dict[str, np.ndarray]:
         """Work that each damper, actuator, motor, given force and driver has put in since the start.
 
-        What a spring inside the same element stores is not counted: it is in the potential energy.
+        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a
+        change of its stiffness gave it, which an event did.
         """
         out = {}
         r = self._result
+        given = jumps(r) if r.pieces else {}
         for name in r.values.structure.states:
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
-                stored = element.energy if hasattr(type(element), "energy") else np.zeros(1)
-                out[element.element.name] = element.work + stored - stored[0]
+                stored = getattr(element, "energy", np.zeros(1))
+                out[element.element.name] = element.work + stored - stored[0] - given.get(element.element.name, 0.0)
         return out
 
+    def _of_pieces(self, name: str) -> np.ndarray:
+        """One of the energies, where parameters changed on the way."""
+        return np.concatenate([getattr(p.energy, name) for p in self._result.pieces])
+
     def exchanged(self, name: str) -> np.ndarray:
-        """Energy since the start that contacts lost or gave, by its name in `EXCHANGED`; zeros without contact."""
+        """Energy since the start that contacts and events lost or gave, by its name; zeros where there are none."""
         found = self._result.exchanged.get(name)
         return self._result.records.zeros() if found is None else found
 
@@ -104,7 +115,7 @@ class Energy(Named):
         if not len(self._result.t):
             return np.zeros(0)
         put_in = sum(self.work.values(), self._result.records.zeros())
-        put_in = sum((sign * self.exchanged(k) for k, sign in EXCHANGED.items()), put_in)
+        put_in = sum((sign * self.exchanged(k) for k, sign in (*EXCHANGED.items(), (GIVEN, 1.0))), put_in)
         residue = self.total - put_in
         return residue - residue[0]
 

@@ -23,6 +23,7 @@ from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
 from .stored_contacts import packed
 from .stored_events import packed as events_packed
+from .stored_stretches import packed as stretches_packed
 
 if TYPE_CHECKING:
     import pandas
@@ -202,7 +203,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
     }
     told, more = packed(result)
     happened, states = events_packed(result)
-    texts, more = texts | told | happened, more | states
+    texts, more = texts | told | happened, more | states | stretches_packed(result)
     for name, text in texts.items():
         group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
     for name, (_, *rest) in ARRAYS.items():

@@ -48,11 +48,14 @@ class Measured:
 
     @cached_property
     def slots(self) -> np.ndarray:
-        """What laws read: (3, slots, n), values first, then rates as values of their own."""
-        n = len(self._result.values.structure.measured)
-        out = self._result.records.zeros(3, 2 * n)
-        if self._result.values.structure.slots:
+        """What laws read: (3, slots, n): values, rates as values of their own, loads (not these), ways of switches."""
+        s = self._result.values.structure
+        n, switches = len(s.measured), len(s.switches)
+        out = self._result.records.zeros(3, 2 * n + len(s.loads) + switches)
+        if s.slots or switches:
             for m in range(n):
                 out[0, m], out[1, m] = self.quantity(m)
                 out[0, n + m] = out[1, m]
+        if switches and self._result.stretches is not None:
+            out[0, -switches:] = self._result.stretches.sigma
         return out

@@ -25,6 +25,8 @@ from .health import Health
 from .result import Result
 from .stored_contacts import unpack
 from .stored_events import unpack as events_unpack
+from .stored_stretches import switched
+from .stored_stretches import unpack as stretches_unpack
 
 M = TypeVar("M", bound=Model)
 
@@ -129,7 +131,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
         with paths_from(Path(where).parent):
             model = loads(stored["model"], cls, where)
         x = values(
-            structure(model, Choices(tree=tuple(json.loads(stored["tree"])))),
+            structure(model, Choices(tree=tuple(json.loads(stored["tree"])), switches=switched(stored))),
             dict(zip(json.loads(stored["parameters"]), stored["parameter_values"].tolist(), strict=True)),
         )
         arrays = {k: stored[k] for k in ARRAYS}
@@ -151,6 +153,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     result.final = (float(final[0]), final[1:])
     unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
+    stretches_unpack(stored, result)
     events_unpack(stored, result)
     return result
 

@@ -22,21 +22,14 @@ from .measured import Measured
 from .numbers import span
 from .reactions import Reactions
 from .records import Records
+from .stretches import Stretches, cut_up
 from .turn import Turn
-from .views import view
+from .views import has_view, view
 from .views.base import Curves
 from .views.bulk import MemberView, SetView
+from .views.spliced import Spliced
 
 TOLD = 12  # curves in a text
-UNSAID = (
-    "initial",
-    "tables",
-    "ground",
-    "materials",
-    "material_pairs",
-    "contacts",
-    "events",
-)  # parts of the description only
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
@@ -70,7 +63,9 @@ class Result:
         What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
-        surfaces that move.
+        surfaces that move, given by kicks and changes of parameters.
+    stretches : Stretches
+        What held between events: modes of what switches, parameters; None where nothing can switch.
     """
 
     def __init__(
@@ -97,6 +92,7 @@ class Result:
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self.stretches: Stretches | None = None
         self._events = Events(())
         self.energy = Energy(self)
 
@@ -171,6 +167,11 @@ class Result:
         return self.model.planar
 
     @cached_property
+    def pieces(self) -> tuple[Result, ...]:
+        """The motion piece by piece, if parameters changed in it, each with its own; else none."""
+        return cut_up(self)
+
+    @cached_property
     def records(self) -> Records:
         """Kinematics of every body and frame at the output times."""
         return Records(self.values, self.q, self.v, self.vdot, self.wound)
@@ -216,6 +217,8 @@ class Result:
         if name == ENERGY:
             return self.energy
         if (found := self._set_of(name)) is None:
+            if self.pieces:
+                return Spliced([p._view(name) for p in self.pieces], [len(p.t) for p in self.pieces])
             return view(self, self.model[name])
         own, k = found
         return SetView(self, own) if k is None else MemberView(self, own, k)
@@ -240,8 +243,7 @@ class Result:
 
     def parts(self) -> list[str]:
         """Names of all that the result says something of."""
-        parts = [e.name for e in self.model.elements() if e.category not in UNSAID]
-        return [*parts, ENERGY]
+        return [*(e.name for e in self.model.elements() if e.category == "bulk" or has_view(e)), ENERGY]
 
     def names(self) -> list[str]:
         """Every name that ``result[name]`` knows: parts, and ``"part.quantity"``."""

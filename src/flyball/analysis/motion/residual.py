@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...equations.engine import MOTION
-from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, NV, PER_COMPACT, PER_MASS, V0
+from ...tables.system import F_APPLIED, G_VALUE, GAMMA, NU, NV, PER_COMPACT, PER_MASS, V0, VALUE
 from ..compiled import Compiled, compiled
 
 if TYPE_CHECKING:
@@ -26,20 +26,29 @@ def acceleration_violation(result: Result) -> float:
     steadily, the accelerations themselves are only the rounding of these. With Baumgarte's stabilization gamma is what
     that makes of it.
     """
-    n = len(result.t)
-    if not n or (not result.model.joints and not result.model.drivers):
+    n, old = len(result.t), result.values.structure
+    if not n or not (result.model.joints or result.model.drivers or old.switches):
         return 0.0
-    own = compiled(result.model, parameters=result.values.told, tree=result.values.structure.tree)
-    c = compiled(result.model, parameters=result.values.told) if own.structure.tree else own
+    if result.pieces:
+        return max(map(acceleration_violation, result.pieces))
+    told = result.values.told
+    own = compiled(result.model, parameters=told, tree=old.tree, switches=bool(old.switches))
+    c = own
+    if old.tree:
+        c = compiled(result.model, parameters=told, switches=bool(old.switches))
     if not len(c.structure.rows):
         return 0.0
     picked = np.unique(np.linspace(0, n - 1, min(n, MOST)).astype(int)).tolist()
     accelerations, sizes = _accelerations(result, c), c.sizes
+    held = None if result.stretches is None else result.stretches.over("switch")
     worst = 0.0
     for k in picked:
         q, v, own.z = result.q[k].copy(), result.v[k].copy(), result.states[k].copy()
         if c is not own:
             q, v = c.take(own, result.t[k], q, v)
+        if held is not None:
+            c.work.switch[:2] = held[:2, :, k]
+            c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.stretches.sigma[:, k]  # type: ignore[union-attr]
         c.at(result.t[k], q, v, MOTION)
         gap, largest, _ = missed(c, v, accelerations[k], sizes, result.health.options)
         worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)

@@ -13,7 +13,7 @@ from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
 from ...tables.switches import declared
-from ...tables.system import Q0, SEMIDEFINITE
+from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
 from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
@@ -56,9 +56,18 @@ def start_time(t_start: float | None, before: Result | None) -> float:
 
 
 def begin(
-    model: Model, t: float, parameters: Mapping[str, float] | None, before: Result | None, coordinates: str
+    model: Model,
+    t: float,
+    parameters: Mapping[str, float] | None,
+    before: Result | None,
+    coordinates: str,
+    *,
+    switches: bool = False,
 ) -> Start:
     """Assemble, or go on from an earlier result; choose coordinates.
+
+    With ``switches`` there are rows for what holds at times (`tables.switches`), all off; else nothing holds, and
+    friction goes by the sign of the rate.
 
     Raises
     ------
@@ -67,32 +76,52 @@ def begin(
     ModelError
         If a body can move without inertia, or the earlier result is of another mechanism.
     """
+    if before is not None and before.stretches is not None:
+        parameters = {**before.stretches.changed(), **(parameters or {})}
     base = _base(model, t, parameters, before)
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base, inertia=True)
-    return begin_at(base, parameters, coordinates, before)
+    return begin_at(base, parameters, coordinates, before, switches=switches)
 
 
 def begin_at(
-    base: Assembly, parameters: Mapping[str, float] | None, coordinates: str, before: Result | None = None
+    base: Assembly,
+    parameters: Mapping[str, float] | None,
+    coordinates: str,
+    before: Result | None = None,
+    *,
+    switches: bool = False,
 ) -> Start:
     """Begin where the mechanism is assembled already; choose coordinates."""
     known(coordinates)
     x = base.compiled.values
-    key = coordinates, float(base.t).hex(), base.y.tobytes()
-    found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters))
+    key = coordinates, float(base.t).hex(), base.y.tobytes(), switches
+    found = x.kept.get("begun", key, MOST, lambda: _begun(base, coordinates, parameters, switches))
     a = base if found.assembly.compiled.values is x else found.assembly.again()
     if before is None:
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
     y = _gone_on(before, a)
+    _holds(before, a)
     return Start(base, a, y, found.coordinates, _wound(base, a, y))
 
 
-def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None) -> Start:
+def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None, switches: bool) -> Start:
     a, why = in_coordinates(base, wish, parameters)
-    a = with_switches(a, parameters)
+    if switches:
+        a = with_switches(a, parameters)
     found = Start(base, a, a.y, why, _wound(base, a, a.y))
     return replace(found, base=base.again(), assembly=a.again())  # without the scratch
+
+
+def _holds(before: Result, a: Assembly) -> None:
+    """What held where an earlier result ended holds on."""
+    s, W = a.compiled.structure, a.compiled.work
+    old = before.values.structure
+    if before.stretches is None or [x.element.name for x in s.switches] != [x.element.name for x in old.switches]:
+        return
+    last = before.stretches.all[-1]
+    W.switch[[MODE, HOLD]] = last.switch[[MODE, HOLD]]
+    W.sensed[VALUE, W.sensed.shape[1] - len(s.switches) :] = last.sigma if last.sigma.ndim == 1 else last.sigma[:, -1]
 
 
 def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
@@ -120,13 +149,14 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     """Where to start from, in absolute coordinates: assembled as described, or where an earlier result ended."""
     if before is None:
         return assemble(model, t=t, parameters=parameters)
-    c = compiled(model, parameters=parameters, tree=before.values.structure.tree)
+    old = before.values.structure
+    c = compiled(model, parameters=parameters, tree=old.tree, switches=bool(old.switches))
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
     refuse_jump(before, c, t, q, v)
     c.at(t, q, v)
-    if not c.structure.tree:
+    if not c.structure.tree and not c.structure.switches:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)
@@ -139,7 +169,7 @@ def _gone_on(before: Result, a: Assembly) -> np.ndarray:
     """The state that an earlier result ended in: to the bit in its own coordinates, works and turns included."""
     s, old = a.compiled.structure, before.values.structure
     y = before.final[1].copy()
-    if s.tree == old.tree:
+    if s.tree == old.tree and s.states == old.states:
         a.compiled.z = y[s.nq + s.nv :].copy()
         return y
     states = dict(zip(old.states, y[old.nq + old.nv :].tolist(), strict=True))

@@ -32,6 +32,11 @@ VIEWS: tuple[tuple[type, type[View]], ...] = (
 )
 
 
+def has_view(element: Any) -> bool:
+    """Whether a result says something of a part."""
+    return isinstance(element, tuple(kind for kind, _ in VIEWS))
+
+
 def view(result: Result, element: Any) -> View:
     """The view of a part.
 

@@ -8,9 +8,10 @@ from ...equations.loads import power, wide
 from ...errors import AnalysisError
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
+from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_M
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD
 from ..records import coordinate_frames, turned
 from .base import Curves, View
 
@@ -42,7 +43,7 @@ class ForceView(View):
         return (i, j), self._frames[1][0], force, torque
 
     def pushes(self) -> tuple[int, np.ndarray]:
-        """Of a force along a measured quantity: number of that, and its effort along it over time."""
+        """Of a force along a measured quantity: number of that, and its effort along it over time; without its row."""
         return int(self._x.system.force_i[self._index(), FORCE_F]), self._along()[2]
 
     def _along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -50,12 +51,45 @@ class ForceView(View):
         e, S = self.element, self._x.system
         k = self._index()
         x, rate = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))
-        laws = (self._law(int(S.force_i[k, FORCE_LAW]), x, rate), 0.0 * x, 0.0 * x)
+        laws = (self._law(int(S.force_i[k, FORCE_LAW]), x, rate), 0.0 * x, self._way(k, rate))
         load = 0.0 * x
-        if hasattr(e, "load"):
+        if S.force_i[k, FORCE_LOAD] >= 0:
             force, torque = self._result.reactions.of(e.joint)
             load = e.load(wide(S.force_x, k), self._result.records.frame(int(S.force_i[k, FORCE_M])), force, torque)
         return x, rate, e.effort(wide(S.force_x, k), x, rate, laws, load) + 0.0 * x
+
+    def _way(self, k: int, rate: np.ndarray) -> np.ndarray:
+        """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
+        s = int(self._x.system.force_i[k, FORCE_SWITCH])
+        stretches = self._result.stretches
+        return sign(rate) if s < 0 or stretches is None else stretches.sigma[s] + 0.0 * rate
+
+    def _rows(self) -> list[int]:
+        """Its switches, by number."""
+        return [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element and x.row >= 0]
+
+    def _whole_along(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """(value, rate, effort, side that is closed): with what its rows carry while they hold.
+
+        What is rigid and has no row, since the motion was not computed with any, has efforts that nothing tells: nan.
+        """
+        s, own = self._x.structure, self._rows()
+        if any(f is self.element for f in s.forces):
+            x, rate, effort = self._along()
+        elif own:
+            x, rate = self._result.measured.quantity(s.switches[own[0]].measured)
+            effort = 0.0 * x
+        else:
+            x = rate = effort = self._result.records.zeros() + np.nan
+        side = sign(effort) * (effort != 0.0)
+        stretches = self._result.stretches
+        if own and stretches is not None:
+            side = 0.0 * x
+            for k in own:
+                held, way = stretches.mode[k] == HELD, stretches.sigma[k]
+                effort = effort + self._result.multipliers[:, s.switches[k].row]
+                side = np.where(held, np.where(way == 0.0, 1.0, way), side)
+        return x, rate, effort, side
 
     def _law(self, at: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
         """Values of a law over time."""
@@ -89,7 +123,8 @@ class ForceView(View):
         if isinstance(self.element, JointForce):
             (k, turn), _, _ = coordinate_frames(self._x, self._x.structure.model[self.element.joint], "angle")
             axis = turned(self._result.records.frame(k), turn)[1]
-            return np.zeros((n, 3)), np.stack([a * self._along()[2] for a in (axis[2], axis[5], axis[8])], axis=1)
+            effort = self._whole_along()[2]
+            return np.zeros((n, 3)), np.stack([a * effort for a in (axis[2], axis[5], axis[8])], axis=1)
         if isinstance(self.element, CoordinateForce):
             raise AttributeError(f"{self.element.title} acts along a coordinate; it has {', '.join(self.names)}")
         _, force, torque = self._between()
@@ -100,7 +135,7 @@ class ForceView(View):
         """For a rope: each of its points over time [m] and the force on the body there [N], world axes, (n, 3)."""
         r, s = self._result.records, self._x.structure
         points = [np.stack(r.frame(s.frame_at[self.element.name, role, ""])[0], axis=1) for role in self.element.ends()]
-        tension = -self._along()[2]
+        tension = -self._whole_along()[2]
         forces = [np.zeros_like(p) for p in points]
         for k in range(len(points) - 1):
             d = points[k + 1] - points[k]
@@ -116,6 +151,8 @@ class ForceView(View):
         if e.energy is None:
             return self._result.records.zeros()
         if isinstance(e, CoordinateForce):
+            if not any(f is e for f in self._x.structure.forces):
+                return self._result.records.zeros()
             return e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
         self._between()
         F, M, par = self._frames
@@ -125,7 +162,7 @@ class ForceView(View):
     def power(self) -> np.ndarray:
         """Power that it gives to the bodies [W]."""
         if isinstance(self.element, CoordinateForce):
-            _, rate, effort = self._along()
+            _, rate, effort, _ = self._whole_along()
             return rate * effort
         _, force, torque = self._between()
         return power(self._frames[0], self._frames[1], force, torque)
@@ -155,8 +192,8 @@ class ForceView(View):
             return self._whole[name == "torque"]
         k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
-            value = self._along()[k]
-            return self.element.sign * value if k == 2 else value
+            value = self._whole_along()[k]
+            return np.abs(value) if name == "taut" else self.element.sign * value if k == 2 else value
         inputs, force, _ = self._between()
         if k < 2:
             return inputs[k]

@@ -18,19 +18,25 @@ from ....tables.system import (
     FORCE_LOAD,
     HELD,
     HOLD,
+    INERTIA,
+    MASS,
     MODE,
     OFF,
     RATE,
+    SPARE,
     SWITCH_FORCE,
     SWITCH_KIND,
     SWITCH_MEASURED,
     VALUE,
 )
 from .here import Here
+from .holding import GONE
 
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+NO_KIND = -1  # of what was released: it takes no part
+IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 DECIDED = (STOP, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
 
 
@@ -68,7 +74,8 @@ class Instant:
         c, self.here = here.c, here
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
-        self.kind, self.m = S.switch_i[:, SWITCH_KIND], S.switch_i[:, SWITCH_MEASURED]
+        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, S.switch_i[:, SWITCH_KIND])
+        self.m = S.switch_i[:, SWITCH_MEASURED]
         self.force = S.switch_i[:, SWITCH_FORCE]
         self.first = self.W.sensed.shape[1] - len(self.kind)
         ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
@@ -77,6 +84,9 @@ class Instant:
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         self.R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
         self.unit = np.array([c.values.length if metric else 1.0 for metric in _metric(here)])
+        mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
+        turning = mass * c.values.length**2 + spin
+        self.inertia = np.array([mass if metric else turning for metric in _metric(here)])
         self.over = np.nan
         self.rooms: dict[int, tuple[Bench, Dense]] = {}
 
@@ -115,7 +125,7 @@ class Instant:
         """Switch off what is decided; friction without a load that slides goes on doing so."""
         ways, rows = self.ways(), self.S.force_i
         for s, kind in enumerate(self.kind.tolist()):
-            if kind in DECIDED:
+            if kind in DECIDED and self.m[s] >= 0:
                 self.W.switch[MODE, s] = OFF
                 if kind == FRICTION and rows[self.force[s], FORCE_LOAD] >= 0:
                     ways[s] = 0.0
@@ -158,7 +168,10 @@ class Instant:
         self.desk.real[T] = self.here.t
         self.desk.y[0] = self.here.y
         given = self.S, self.W, self.R, self.desk, self.sheet
-        return B, P, int(bare_kernel(engine.address(*given), *given, B, P))
+        status = int(bare_kernel(engine.address(*given), *given, B, P))
+        for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
+            P.A[i] = P.A[:, i] = 0.0
+        return B, P, status
 
     def balance(self, B: Bench, P: Dense, impulses: bool) -> int:
         """Solve it. Returns how it ended."""
@@ -177,8 +190,9 @@ class Instant:
         return self.sheet.rows[0, : len(self.S.guard_i)].copy()
 
     def name(self, s: int) -> str:
-        """Name of the element that switch s is of."""
-        return str(self.here.structure.switches[s].element.name)
+        """Name of the element that switch s is of; of the coordinate that an event locks."""
+        spec = self.here.structure.switches[s]
+        return str(spec.switch.label if spec.element.category == "events" else spec.element.name)
 
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""

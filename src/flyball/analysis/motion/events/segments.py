@@ -1,0 +1,52 @@
+"""What held at the output times of a motion with events, collected as the motion goes on."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ....constraints.modes import BRANCH
+from ....equations.engine import MOTION
+from ....results.booked import booked
+from ....results.result import Result
+from ....results.stretches import Stretch, stretched
+from ....tables.system import HELD, MODE, VALUE
+from .here import Here
+
+
+@dataclass
+class Segments:
+    """Rows of output between events, with the modes and parameters that held there."""
+
+    all: list[Stretch] = field(default_factory=list)
+
+    def add(self, here: Here, rows: np.ndarray) -> None:
+        """Take note of rows that the compiled loop has just written, none of them too; modes are those of now."""
+        c, W = here.c, here.c.work
+        n = len(here.structure.switches)
+        ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
+        if any(x.switch.kind == BRANCH and W.switch[MODE, k] == HELD for k, x in enumerate(here.structure.switches)):
+            ways = _ways(here, rows)
+        self.all.append(
+            Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
+        )
+
+    def told(self, result: Result) -> None:
+        """Give a result what held, and what events did to its energy."""
+        result.stretches = stretched(self.all)
+        result.exchanged |= booked(result)
+
+
+def _ways(here: Here, rows: np.ndarray) -> np.ndarray:
+    """The ways of all switches at rows of output, (ns, n), where laws follow their switching surface."""
+    s, c, n = here.structure, here.c, len(here.structure.switches)
+    out = np.zeros((n, len(rows)))
+    again = c.again()
+    again.work.switch[:] = c.work.switch
+    again.work.sensed[:] = c.work.sensed
+    for k, row in enumerate(rows):
+        again.z = row[1 + s.nq + s.nv : 1 + len(here.y)].copy()
+        again.at(row[0], row[1 : 1 + s.nq], row[1 + s.nq : 1 + s.nq + s.nv], MOTION)
+        out[:, k] = again.work.sensed[VALUE, again.work.sensed.shape[1] - n :]
+    return out

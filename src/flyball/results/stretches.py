@@ -1,0 +1,118 @@
+"""Stretches of a motion between events: in each of them modes, what is held where, and parameters are constant.
+
+What is computed from a result later asks these what held at its time: which side friction slid to, which stop was
+closed, what a parameter was. Where parameters changed, a result is several results of one mechanism end to end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+
+from ..tables.values import Values
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Output times in a row between which nothing switched.
+
+    Attributes
+    ----------
+    rows : int
+        How many output times; none is possible.
+    switch : ndarray (5, ns)
+        Mode, what is held, lower and upper bounds of every switch (`Work.switch`).
+    sigma : ndarray (ns,) or (ns, rows)
+        The direction in which each acts.
+    values : Values
+        The tables, with parameters as they were then.
+    lost : float [J]
+        Lost in impacts and sudden locking since the start.
+    given : float [J]
+        Given by kicks since the start.
+    end : ndarray (ny,)
+        The state at its end, before the event.
+    """
+
+    rows: int
+    switch: np.ndarray
+    sigma: np.ndarray
+    values: Values
+    lost: float
+    given: float
+    end: np.ndarray
+
+
+@dataclass(frozen=True)
+class Stretches:
+    """All of a motion, in order."""
+
+    all: tuple[Stretch, ...]
+
+    def over(self, what: str) -> np.ndarray:
+        """A field of the stretches at every output time, times last."""
+        every = [np.asarray(getattr(x, what), float) for x in self.all]
+        return np.concatenate([np.repeat(x[..., None], s.rows, -1) for x, s in zip(every, self.all, strict=True)], -1)
+
+    @cached_property
+    def mode(self) -> np.ndarray:
+        """Mode of every switch, (ns, n)."""
+        return self.over("switch")[0]
+
+    @cached_property
+    def sigma(self) -> np.ndarray:
+        """Direction of every switch, (ns, n)."""
+        every = [(x.sigma.reshape(len(x.sigma), -1), x.rows) for x in self.all]
+        return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
+
+    def pieces(self) -> list[tuple[slice, Stretches]]:
+        """Stretches with the same parameters, and the output times that they take up."""
+        out, first = [], 0
+        for _, group in groupby(self.all, key=lambda x: id(x.values)):
+            found = Stretches(tuple(group))
+            last = first + sum(x.rows for x in found.all)
+            out.append((slice(first, last), found))
+            first = last
+        return out
+
+    def changed(self) -> dict[str, float]:
+        """Parameters that events have set, as they were at the end."""
+        first, last = self.all[0].values, self.all[-1].values
+        if first is last:
+            return {}
+        return {k: x for k, x in last.given.env.items() if first.given.env.get(k) != x}
+
+    def cut(self, rows: int) -> Stretches:
+        """Those of the first so many output times."""
+        out, left = list[Stretch](), rows
+        for x in self.all:
+            n = min(x.rows, left)
+            out.append(replace(x, rows=n, sigma=x.sigma[:, :n] if x.sigma.ndim == 2 else x.sigma))
+            left -= n
+        return Stretches(tuple(out))
+
+
+def stretched(stretches: Sequence[Stretch]) -> Stretches | None:
+    """The stretches of a motion; None where there is none."""
+    return Stretches(tuple(stretches)) if stretches else None
+
+
+def cut_up(result: Any) -> tuple[Any, ...]:
+    """A result piece by piece, if parameters changed in it, each with its own; else none."""
+    cuts = result.stretches.pieces() if result.stretches is not None else []
+    if len(cuts) < 2:
+        return ()
+    names = "t", "q", "v", "states", "vdot", "multipliers"
+    out = []
+    for at, stretches in cuts:
+        parts = (getattr(result, name)[at] for name in names)
+        piece = type(result)(result.model, stretches.all[0].values, *parts, result.health)
+        piece.stretches, piece.wound = stretches, result.wound
+        piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
+        out.append(piece)
+    return tuple(out)
