@@ -146,7 +146,7 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
-    later = open_until_asked(begun, o, task)
+    later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -18,15 +19,19 @@ from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
 from .happen import begin, happen
 from .here import Here
+from .instant import Instant
 from .legs import Legs
+from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
+HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -53,6 +58,7 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
+        here.seen = Segments()
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 
     def _loop(self) -> Watched:
@@ -92,7 +98,12 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            return not self.legs.next()
+            sharp = self.legs.ends_sharply()
+            if not self.legs.next():
+                return True
+            if sharp and self.loop is not None:
+                self.jumped()
+            return False
         elif status != ex.RUNNING and not engine.hands_over(clock):
             return True
         self.legs.whole()
@@ -128,19 +139,33 @@ class Run:
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
         self.rows.append(rows)
+        self.here.seen.add(self.here, rows)
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""
-        here, clock = self.here, self.here.clock
+        here = self.here
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise self.endless()
-        happen(here, self.loop.fired if self.loop else ())
+        self.happens(self.loop.fired if self.loop else ())
+
+    def happens(self, fired: Sequence[int]) -> None:
+        """What happens where these guards fired."""
+        here, clock = self.here, self.here.clock
+        happen(here, fired)
         clock.count[ex.STARTED] = 0
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
         if here.fresh:
             clock.real[ex.H], here.fresh = 0.0, False
+
+    def jumped(self) -> None:
+        """Forces may have jumped: what held may not hold any more, without a guard that passed zero."""
+        here = self.here
+        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
+        if len(against):
+            self.happens(against)
 
     def endless(self) -> FlyballError:
         """What to say where events follow each other without end."""
