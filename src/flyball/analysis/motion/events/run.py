@@ -165,7 +165,7 @@ class Run:
         values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
         if len(against):
-            self.happens(against)
+            self.happens(against.tolist())
 
     def endless(self) -> FlyballError:
         """What to say where events follow each other without end."""
