@@ -107,6 +107,11 @@ def with_forces(where):
     m.add(fb.Brake("hold", "H.angle", capacity="2.0 + rate**2", static=1.2))
     m.add(fb.Clutch("grip", "J.displacement", "a.x", capacity="3 N"))
     m.add(fb.Rope("rope", ("a", "b", "ground"), at=(p, q, r), stiffness=80.0, damping=1.0))
+    m.add(fb.Detent("notches", "H.angle", pitch="40 deg", holding="0.4 N*m", notch=0.1, damping=0.02))
+    m.add(fb.Detent("dimples", "J.displacement", pitch="4 cm", barrier="2 J"))
+    m.add(fb.Limit("soft", "H.angle", lower=-0.1, upper=0.1, stiffness=30.0, damping=0.3))
+    m.add(fb.Limit("buffer", "J.displacement", lower="1 cm", stiffness=30.0))
+    m.add(fb.Backlash("loose", ("H.angle", "a.x"), weights=(2, 3), gap="1 deg", stiffness=20.0, damping=0.1))
     m.add(fb.Rope("cut", ("a", "b"), at=(p, q), stiffness=80.0, length="30 cm"))
     if where == "space":
         m.add(fb.Bushing("mount", "ground", "b", at=q, stiffness=(1.0, 2.0, 3.0), orientation=(0.1, 0.2, 0.3)))

@@ -104,6 +104,11 @@ def _friction(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
     )  # fmt: skip
 
 
+def _detent(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
+    holds = d.pick([{"holding": d.size(0.1, 5.0)}, {"barrier": d.size(0.01, 1.0)}])
+    return fb.Detent(name, along, pitch=d.size(0.05, 0.7), notch=d.number(-1, 1), damping=d.pick([0, 0.1]), **holds)
+
+
 def _brake(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
     return fb.Brake(
         name, along, capacity=d.pick([0.0, d.size(0.01, 10.0), "1 + 0.5*sin(3*t)"]), static=d.pick([1, 1.3])
@@ -121,6 +126,7 @@ def _clutch(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
 
 
 _MAKE = {
+    "Detent": _detent,
     "CoordinateSpring": _coordinate_spring,
     "Actuator": lambda d, m, name, along, stiff: fb.Actuator(name, along, force=law(d, m, 5.0, ("value", "rate"))),
     "TorsionalSpringDamper": lambda d, m, name, along, stiff: fb.TorsionalSpringDamper(
@@ -152,6 +158,7 @@ FORCES = {
     "PointForce": _point_force,
     "PointTorque": _point_torque,
     "CoordinateSpring": _along("CoordinateSpring", "", True),
+    "Detent": _along("Detent", "", True),
     "Actuator": _along("Actuator", "", True),
     "TorsionalSpringDamper": _along("TorsionalSpringDamper", ".angle", False),
     "Motor": _along("Motor", ".angle", False),

@@ -107,11 +107,10 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
                     given = law.evaluate(env)
                     if not given.real >= 0.0:
                         raise ModelError(f"{where} is {given:g} {pair[turning]}; it must be zero or greater")
-    elif isinstance(e, Coupling):
-        for name, kinds in e.dimensions.items():
-            value = getattr(e, name)
-            for x in value if isinstance(value, tuple) else (value,):
-                _one_of(x, kinds, env, f"{name} of {e.title}")
+    for name, kinds in (e.dimensions if isinstance(e, Coupling) else getattr(e, "kinds", {})).items():
+        value = getattr(e, name)
+        for x in value if isinstance(value, tuple) else (value,):
+            _one_of(x, kinds, env, f"{name} of {e.title}")
 
 
 def _one_of(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:

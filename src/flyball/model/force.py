@@ -142,6 +142,10 @@ class CoordinateForce(Force):
         """Coordinates whose sum it acts along, each times its weight (`switch_weights`); none if it has a path."""
         return (self.coordinate_text(),) if self.coordinate_text() else ()
 
+    def outward(self, n: SimpleNamespace) -> float:
+        """1, or -1 where results tell its quantity, rate and effort the other way round than the formulas have them."""
+        return 1.0
+
     def examine(self, model: Model) -> None:
         """Refuse what it cannot act along."""
 

@@ -108,7 +108,7 @@ def _coordinates(model: Model) -> Iterator[tuple[str, Element]]:
     for coupling in model.couplings:
         yield from ((text, coupling) for text in coupling.coupled())
     yield from ((d.coordinate, d) for d in model.drivers)
-    for f in model.forces:
+    for f in (*model.forces, *model.limits):
         if isinstance(f, CoordinateForce):
             yield from ((text, f) for text in f.along())
 
