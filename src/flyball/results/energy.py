@@ -84,8 +84,8 @@ class Energy(Named):
     def work(self) -> dict[str, np.ndarray]:
         """Work that each damper, actuator, motor, given force and driver has put in since the start.
 
-        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a change of
-        its stiffness gave it, which an event did.
+        What a spring inside the same element stores is not counted: it is in the potential energy. Nor is what a
+        change of its stiffness gave it, which an event did.
         """
         out = {}
         r = self._result
