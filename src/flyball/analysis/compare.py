@@ -21,6 +21,7 @@ from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU,
 from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.events.here import Here
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
@@ -202,7 +203,7 @@ def _motion(job: _Task, start: Start, o: Integration) -> tuple[Result | None, st
     """The motion, as far as it goes, and why it goes no further."""
     clock, rows, _ = _run(job, start, o, job.times)
     try:
-        return outcome(start, clock, rows, o), ""
+        return outcome(Here(start, clock), rows, o), ""
     except SimulationError as stopped:
         return stopped.result, str(stopped).partition(" The motion up to")[0]  # type: ignore[return-value]
 

@@ -15,7 +15,7 @@ from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
-from ..model.touching import has_contact
+from ..model.touching import smooth_only
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -27,6 +27,8 @@ from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
+from .motion.events.here import Here
+from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.later import open_until_asked, solved
@@ -86,7 +88,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
     begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
-    follow = o.stabilization == "projection" and leaves_no_freedom(begun)
+    follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
 
@@ -100,16 +102,21 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Stepping() if has_contact(model) else USUAL)
+        o = replace(o, method=Stepping() if model.contacts or model.bulk else USUAL)
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if has_contact(model):
+        if model.contacts or model.bulk:
             raise ModelError(
                 f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
                 f"give method='impulse'"
             )
         return o
+    if unknown := smooth_only(model):
+        raise ModelError(
+            f"steps by impulses do not know {', '.join(e.title for e in unknown)}; the adaptive integrators do: leave "
+            f"method out, or give method={USUAL!r}"
+        )
     for name, usual in IDLE.items():
         if getattr(o, name) != usual:
             raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
@@ -142,14 +149,24 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
-    later = open_until_asked(begun, o, task)
+    later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
-    rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
+    here = Here(begun, clock)
+    if watched(begun):
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell)
+    else:
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
-    return outcome(begun, clock, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+    return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+
+
+def watched(begun: Start) -> bool:
+    """Whether something may happen at an instant: there are guards, or rows with modes."""
+    s = begun.assembly.compiled.structure
+    return bool(s.guards or s.switches)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:

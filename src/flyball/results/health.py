@@ -37,6 +37,7 @@ class Health:
     crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
+    watched: str = ""  # how closely it was looked for events
     events: str = ""  # how many happened at instants, and how often each
     contact: ContactHealth | None = None  # how contacts were solved, where there are any
 
@@ -126,6 +127,8 @@ class Health:
         if crept:
             text = "; ".join(f"{k}: {way:.2e} m at up to {speed:.2e} m/s" for k, (speed, way) in crept.items())
             out.append(("creep of friction", text))
+        if self.watched:
+            out.append(("watched", self.watched))
         if self.events:
             out.append(("events", self.events))
         if self.contact:

@@ -20,10 +20,11 @@ from .start import Start
 def open_until_asked(start: Start, o: Integration, task: int) -> bool:
     """Whether accelerations can be left for later: they would be the same then.
 
-    Friction starts from the loads found last, and a Python function may have a memory.
+    Friction starts from the loads found last, a Python function may have a memory, and events change modes and numbers.
     """
     s = start.assembly.compiled.structure
-    return task == INTEGRATE and o.stabilization == "projection" and not s.loads and not s.functions
+    usual = task == INTEGRATE and o.stabilization == "projection"
+    return usual and not (s.loads or s.functions or s.guards or s.switches)
 
 
 def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

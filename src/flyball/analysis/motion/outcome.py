@@ -16,6 +16,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
+from .events.here import Here
 from .options import Integration
 from .reasons import reason, remarks
 from .residual import acceleration_violation
@@ -23,8 +24,7 @@ from .start import Start
 
 
 def outcome(
-    start: Start,
-    clock: ex.Clock,
+    here: Here,
     rows: np.ndarray,
     o: Integration,
     interrupted: bool = False,
@@ -40,16 +40,21 @@ def outcome(
     SimulationError
         If the integration could not go on.
     """
+    start, clock = here.start, here.clock
     a, model = start.assembly, start.base.compiled.structure.model
     status = int(clock.count[ex.STATUS])
     t = float(clock.real[ex.T])
-    message, cause = "reached the end", None
+    message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+    elif here.failed is not None:
+        message = f"{model.name!r}: {here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
     elif status != ex.DONE:
         message, cause = reason(a, start.base, clock)
     health = _health(start, clock, o)
-    health.message, health.success = message, status == ex.DONE and not interrupted
+    ended = here.failed is None and not interrupted
+    health.message, health.success = message, ended and status == ex.DONE
+    health.watched = here.watched
     s = a.compiled.structure
     cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
@@ -64,7 +69,10 @@ def outcome(
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
     }
-    if status not in (ex.DONE, ex.RUNNING):
+    result.events = here.records
+    if here.seen is not None:
+        here.seen.told(result)
+    if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
 

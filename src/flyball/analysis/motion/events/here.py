@@ -29,16 +29,22 @@ class Here:
         What happened so far, in order.
     lost : float
         Mechanical energy [J] that impacts and sudden changes took so far.
+    given : float
+        Mechanical energy [J] that kicks and changed parameters gave so far.
     stopped : str
         Why the motion ends here, in words; empty: it goes on.
-    given : float
-        Energy [J] that kicks gave so far.
     kick : ndarray, optional
         Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
     fresh : bool
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
+    failed : Exception
+        Why the motion cannot go on here.
+    watched : str
+        How closely it was looked for events, in words.
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
     """
 
     start: Start
@@ -47,9 +53,12 @@ class Here:
     lost: float = 0.0
     stopped: str = ""
     fresh: bool = False
+    failed: Exception | None = None
+    watched: str = ""
     given: float = 0.0
     kick: np.ndarray | None = None
     bounces: dict[int, Any] = field(default_factory=dict)
+    seen: Any = None
 
     @property
     def c(self) -> Compiled:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, STOP
 from ....equations.engine import Sheet, engine, through
 from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
 from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
@@ -31,7 +31,8 @@ from .here import Here
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
-DECIDED = (STOP, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
+STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
+DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
 
 
 class Part(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FREE, GRIPS, HOLDS, PUSHES
 from ....tables.system import (
     FORCE_LOAD,
@@ -16,7 +16,7 @@ from ....tables.system import (
     OFF,
     UPPER,
 )
-from .instant import Instant, Part
+from .instant import STOPS, Instant, Part
 
 SIDES = {G_LOWER: 1.0, G_UPPER: -1.0}
 
@@ -25,7 +25,7 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
     hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
     out = {}
-    for s in np.flatnonzero(n.kind == STOP).tolist():
+    for s in np.flatnonzero(np.isin(n.kind, STOPS)).tolist():
         gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
         held = n.way[s] if n.mode[s] != OFF else 0.0
         at = tuple(w for w, gap in gaps.items() if gap <= n.near[s] or (s, w) in hit or w == held)
@@ -47,7 +47,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
     """Rows that impulses may act along."""
     out = []
     for s, kind in enumerate(n.kind.tolist()):
-        if kind == STOP and s in at:
+        if kind in STOPS and s in at:
             out += _stop(s, at[s])
         elif kind == ONE_WAY:
             out.append(Part(s, PUSHES, state=EVEN))
@@ -65,7 +65,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
     """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
     out = []
     for s, kind in enumerate(n.kind.tolist()):
-        if kind == STOP and s in at and still[s]:
+        if kind in STOPS and s in at and still[s]:
             out += _stop(s, at[s])
         elif kind == ONE_WAY and still[s]:
             out.append(Part(s, PUSHES, state=EVEN if n.mode[s] != OFF else FREE))

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, STOP
 from ....results.events import Happening
 from ....tables.system import MODE, OFF
 from .instant import Instant
 from .jump import Jump
 
 HELD_WORDS = {STOP: ("close", "closes"), FRICTION: ("stick", "sticks"), ONE_WAY: ("lock", "locks"), LOCK: ("lock", "")}
+HELD_WORDS |= {RATCHET: ("latch", "latches"), ELASTIC: ("close", "is pressed")}
 FREE_WORDS = {STOP: ("open", "opens"), FRICTION: ("slip", "slides"), ONE_WAY: ("overrun", "overruns"), LOCK: ("", "")}
+FREE_WORDS |= {RATCHET: ("unlatch", "lets go"), ELASTIC: ("open", "lets go")}
 ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
 
 
@@ -61,6 +63,9 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
             count = n.here.bounces.pop(s).count
             told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
             n.over = max(n.over, over)
+        elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
+            kind, said = words(n, s, n.ways()[s] != FROZEN)
+            told.setdefault(kind, []).append((s, said))
         elif was != now and s not in hits:
             kind, said = words(n, s, now)
             if kind:

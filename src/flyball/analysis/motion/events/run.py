@@ -1,0 +1,223 @@
+"""A motion from event to event: the compiled loop, what is decided where it stops, times at which laws have corners.
+
+Where nothing is watched, steps only end on these times: the engine's own loop runs from one to the next.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from typing import NamedTuple
+
+import numpy as np
+
+from ....equations.engine import INTEGRATE, REPORT, motion_kernel
+from ....equations.watched import Watched
+from ....errors import FlyballError, ModelError
+from ....laws.functions import forget, interrupts_kept
+from ....numerics.integrators import clock as ex
+from ....numerics.integrators.tableaux import Tableau
+from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
+from ...progress import Tell
+from .happen import begin, happen
+from .here import Here
+from .segments import Segments
+
+SLICE = 0.05  # seconds that a call of the compiled loop should take
+LONGEST = 100_000  # steps in one call
+ENDLESS = 2000  # events
+PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
+AT_ONCE = 1e-9  # part of the time span within which so many never end
+
+
+class Breaks(NamedTuple):
+    """Known times [s] at which a step ends."""
+
+    times: np.ndarray  # ascending
+    sharp: np.ndarray  # whether forces or velocities may jump there
+
+
+NO_BREAKS = Breaks(np.zeros(0), np.zeros(0, bool))
+
+
+def beside(t: float) -> float:
+    """How far [s] from a time a law is on one side of it for sure."""
+    return 8.0 * float(np.spacing(abs(t)))
+
+
+class Legs:
+    """The times between which a motion is integrated, one after the other.
+
+    A law that is sharp at a time may belong to either side there: a step ends a little before, the next begins as
+    little behind, with a first width of its own.
+    """
+
+    def __init__(self, here: Here, breaks: Breaks) -> None:
+        self.here, self.end = here, float(here.clock.real[ex.T_END])
+        inside = (breaks.times > here.t) & (breaks.times < self.end)
+        self.times, self.sharp = breaks.times[inside], breaks.sharp[inside]
+        self.at = 0
+        self._aim()
+
+    def _aim(self) -> None:
+        end = self.end
+        if self.at < len(self.times):
+            end = float(self.times[self.at])
+            if self.sharp[self.at]:
+                end -= beside(end)
+        self.here.clock.real[ex.T_END] = end
+
+    def next(self) -> bool:
+        """Go on with the next one, if there is one."""
+        if self.at == len(self.times):
+            return False
+        clock, t, sharp = self.here.clock, float(self.times[self.at]), self.sharp[self.at]
+        self.at += 1
+        self._aim()
+        if sharp:
+            clock.real[ex.T], clock.real[ex.H] = t + beside(t), 0.0
+            clock.count[ex.STARTED] = 0
+        return True
+
+
+class Run:
+    """One motion from event to event.
+
+    Parameters
+    ----------
+    here : Here
+    method : Tableau
+    width : int
+        Of a row of output.
+    tell : callable
+        Is told how far it is.
+    """
+
+    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell) -> None:
+        self.here, self.method, self.width, self.tell = here, method, width, tell
+        clock = here.clock
+        self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
+        self.rows: list[np.ndarray] = [np.zeros((0, width))]
+        self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
+        self.recent: deque[float] = deque(maxlen=ENDLESS)
+        here.seen = Segments()
+        self.loop = self._loop() if len(here.c.system.guard_i) else None
+
+    def _loop(self) -> Watched:
+        c = self.here.c
+        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
+
+    def go(self, breaks: Breaks) -> tuple[np.ndarray, bool]:
+        """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
+        here, clock = self.here, self.here.clock
+        forget(here.c.work.stack)
+        try:
+            self.begin()
+            legs = Legs(here, breaks)
+            while not here.stopped:
+                self.integrate()
+                status = clock.count[ex.STATUS]
+                if status == EVENT:
+                    self.event()
+                elif status == ex.DONE:
+                    if not legs.next():
+                        break
+                elif status != ex.RUNNING:
+                    break
+            if here.stopped:
+                self.stop()
+        except KeyboardInterrupt:
+            return np.concatenate(self.rows), True
+        except FlyballError as error:
+            if isinstance(error, ModelError) and not here.t > self.first:  # the description is wrong
+                raise
+            here.failed = error
+        finally:
+            if self.loop is not None:
+                here.watched = told(self.loop)
+        return np.concatenate(self.rows), False
+
+    def begin(self) -> None:
+        """What happens as the motion begins."""
+        begin(self.here)
+        self.here.fresh = False
+
+    def integrate(self) -> None:
+        """Call the compiled loop once."""
+        c, clock = self.here.c, self.here.clock
+        before = time.perf_counter()
+        steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
+        with interrupts_kept(c.structure.functions):
+            if self.loop is None:
+                used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
+            else:
+                used = self.loop.go_on(c.system, c.work, self.buffer)
+            self.take(self.buffer[:used].copy())
+        self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
+        if clock.count[ex.STATUS] == ex.RUNNING:
+            took = max(time.perf_counter() - before, 1e-6)
+            done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
+            clock.count[ex.QUOTA] = int(min(max(done * SLICE / took, 1.0), LONGEST))
+
+    def take(self, rows: np.ndarray) -> None:
+        """Keep rows of output."""
+        self.rows.append(rows)
+        self.here.seen.add(self.here, rows)
+
+    def event(self) -> None:
+        """Have it decided what happens, and begin anew."""
+        here, clock = self.here, self.here.clock
+        self.recent.append(here.t)
+        if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
+            raise self.endless()
+        happen(here, self.loop.fired if self.loop else ())
+        clock.count[ex.STARTED] = 0
+        if self.loop is not None and here.c.work is not self.loop.W:
+            self.loop = self._loop()
+        if here.fresh:
+            clock.real[ex.H], here.fresh = 0.0, False
+
+    def endless(self) -> FlyballError:
+        """What to say where events follow each other without end."""
+        return FlyballError(f"{ENDLESS} events between t = {self.recent[0]:.9g} and {self.recent[-1]:.9g} s")
+
+    def stop(self) -> None:
+        """The motion ends here: the last row is written."""
+        here, clock = self.here, self.here.clock
+        c = here.c
+        row, y = np.zeros((1, self.width)), here.y.copy()
+        motion_kernel(c.system, c.work, self.method, clock, row, REPORT)
+        here.y[:] = y
+        self.take(row)
+        clock.count[ex.STATUS] = ex.DONE
+
+
+def told(loop: Watched) -> str:
+    """How closely a motion was looked for events: what may have come and gone in between was not seen."""
+    count = loop.desk.count
+    guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
+    what = "1 guard" if guards == 1 else f"{guards} guards"
+    return (
+        f"{what} at {count[LOOKS] / steps:.0f} places a step on average, {PLACES} at least: what passes zero and comes "
+        f"back between two of them is not seen"
+    )
+
+
+def run_events(
+    here: Here, method: Tableau, width: int, tell: Tell, breaks: Breaks = NO_BREAKS
+) -> tuple[np.ndarray, bool]:
+    """Integrate from event to event. Returns (output rows, whether the user interrupted).
+
+    Parameters
+    ----------
+    here : Here
+        Where the motion begins; gets what happens, and in ``failed`` why it could not go on.
+    method : Tableau
+    width : int
+        Of a row of output.
+    tell : callable
+        Is told how far it is.
+    breaks : Breaks
+        Known times at which steps end.
+    """
+    return Run(here, method, width, tell).go(breaks)

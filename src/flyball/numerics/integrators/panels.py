@@ -1,0 +1,301 @@
+"""Where in a step a guard may pass zero, as far as can be told without the equations.
+
+A step is looked at in panels. In each the guards are a polynomial through values at eight places; two more places say
+whether that is so, else the panel is halved. ``look(t, h, x, S, W, row)`` writes the guards expected at t + x h to a
+row of ``W.g``; W is a `Watch`.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from ...math.scalar import cos
+from .watching import (
+    CHECKS,
+    END,
+    FRESH,
+    LOOKS,
+    MARK,
+    NODE,
+    NODES,
+    PANEL,
+    SIDE,
+    START,
+    THERE,
+    WIDTH,
+)
+
+NARROWEST = 2.0**-14  # part of a step that a panel is not narrower than
+ODD = 1e-2  # part of a guard's change over a panel by which it may differ from the polynomial
+BLURRED = 1e-9  # part of its size that is nothing
+QUIET = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
+GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
+PARTS = 16  # of a panel, in which slopes are compared
+CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
+NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
+NOISE = 4.0  # times its value at the start that is about zero as well
+ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
+
+
+@formula
+def node(j):
+    """Place of node j in a panel; the checks come after the nodes."""
+    if j >= NODES:
+        return 0.131 if j == NODES else 0.567
+    return 0.5 - 0.5 * cos(3.141592653589793 * j / (NODES - 1))
+
+
+@formula
+def survey(look, S, W, t, h, first):
+    """The first place after ``first`` where a guard passes zero or comes near: (guard or -1, from, to).
+
+    From and to are parts of the step. Sides go on from W.g[SIDE].
+    """
+    a = first
+    w = 1.0 - first
+    while a < 1.0:
+        w = min(w, 1.0 - a)
+        W.real[PANEL], W.real[WIDTH] = a, w
+        fill(look, S, W, t, h, a, w)
+        smooth = resolved(W)
+        if not smooth and w > NARROWEST:
+            w *= 0.5
+            continue
+        best = -1
+        xa, xb = a, 2.0
+        for i in range(W.way.shape[0]):
+            if W.fired[i] == 0 and restless(W, i):
+                a1, b1 = passing(W, i) if smooth else jumping(W, i)
+                if b1 >= 0.0 and a + w * b1 < xb:
+                    best, xa, xb = i, a + w * a1, a + w * b1
+        if best >= 0:
+            return best, xa, xb
+        if a + w >= 1.0:
+            return -1, 1.0, 1.0
+        a += w
+        w *= 2.0
+    return -1, 1.0, 1.0
+
+
+@formula
+def fill(look, S, W, t, h, a, w):
+    """Guards at the nodes of a panel and where it is checked; at the ends of the step they are known."""
+    for j in range(NODES + CHECKS):
+        x = a + w * node(j)
+        row = NODE + j
+        if x <= 0.0 or x >= 1.0:
+            for i in range(W.way.shape[0]):
+                W.g[row, i] = W.g[START if x <= 0.0 else END, i]
+        else:
+            look(t, h, x, S, W, row)
+            W.count[LOOKS] += 1
+
+
+@formula
+def resolved(W):
+    """Whether every guard is the polynomial through its values at the nodes."""
+    for i in range(W.way.shape[0]):
+        low, high = extent(W, i)
+        if not finite(low, high):
+            continue
+        allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high))
+        for j in range(NODES, NODES + CHECKS):
+            if not abs(W.g[NODE + j, i] - through(W, i, node(j))) <= allowed:
+                return False
+    return True
+
+
+@formula
+def through(W, i, x):
+    """The polynomial through the values at the nodes (barycentric form)."""
+    above = 0.0
+    below = 0.0
+    for j in range(NODES):
+        d = x - node(j)
+        if d == 0.0:
+            return W.g[NODE + j, i]
+        c = (0.5 if j == 0 or j == NODES - 1 else 1.0) / d
+        if j % 2 == 1:
+            c = -c
+        above += c * W.g[NODE + j, i]
+        below += c
+    return above / below
+
+
+@formula
+def extent(W, i):
+    """Least and largest value of a guard in the panel; both nan if it is not a number somewhere."""
+    low = W.g[NODE, i]
+    high = low
+    for j in range(1, NODES + CHECKS):
+        f = W.g[NODE + j, i]
+        if f != f:
+            return f, f
+        low = min(low, f)
+        high = max(high, f)
+    return low, high
+
+
+@formula
+def finite(low, high):
+    """Whether both are numbers."""
+    return low - low == 0.0 and high - high == 0.0
+
+
+@formula
+def restless(W, i):
+    """Whether a guard comes near zero in the panel. One that does not is on the side that it stays on."""
+    low, high = extent(W, i)
+    if not finite(low, high):  # not watched, or not everywhere
+        return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
+    most = QUIET * (high - low)
+    if low > most and W.g[SIDE, i] >= 0.0:
+        W.g[SIDE, i] = 1.0
+        return False
+    if high < -most and W.g[SIDE, i] <= 0.0:
+        W.g[SIDE, i] = -1.0
+        return False
+    return True
+
+
+@formula
+def side_of(f):
+    """On which side of zero a value is; 0 if it is none."""
+    return 1.0 if f > 0.0 else (-1.0 if f < 0.0 else 0.0)
+
+
+@formula
+def fires(way, side):
+    """Whether a guard that leaves that side fires."""
+    return side != 0.0 and way * side <= 0.0
+
+
+@formula
+def passing(W, i):
+    """Where in a panel guard i first passes zero, or may: (from, to), or to < 0. Its side goes on to there."""
+    low, high = extent(W, i)
+    if not finite(low, high):
+        return jumping(W, i)
+    powers(W, i)
+    graze = GRAZE * (high - low)
+    s = W.g[SIDE, i]
+    _, d = value(W, 0.0)
+    for n in range(PARTS):
+        x = n / PARTS
+        y = (n + 1.0) / PARTS
+        f1, d1 = value(W, y)
+        if n == PARTS - 1:
+            f1 = W.g[NODE + NODES - 1, i]
+        if s * d < 0.0 and s * d1 >= 0.0:  # it goes towards zero, and away again
+            z = x + (y - x) * d / (d - d1)
+            fz, _ = value(W, z)
+            if (s * fz <= 0.0 and fires(W.way[i], s)) or (s * fz <= graze and s * f1 > 0.0):
+                W.g[SIDE, i] = s
+                return x, z if s * fz <= 0.0 and fires(W.way[i], s) else y
+        if s * f1 <= 0.0 and s != 0.0 and (f1 != 0.0 or fires(W.way[i], s)):
+            if fires(W.way[i], s):
+                W.g[SIDE, i] = s
+                return x, y
+            s = side_of(f1)
+        elif s == 0.0:
+            s = side_of(f1)
+        d = d1
+    W.g[SIDE, i] = s
+    return 0.0, -1.0
+
+
+@formula
+def jumping(W, i):
+    """As `passing`, of a guard that is no polynomial: by its values at the nodes."""
+    s = W.g[SIDE, i]
+    for j in range(1, NODES):
+        f = W.g[NODE + j, i]
+        if f != f:
+            s = 0.0
+        elif s * f <= 0.0 and s != 0.0 and (f != 0.0 or fires(W.way[i], s)):
+            if fires(W.way[i], s):
+                W.g[SIDE, i] = s
+                return node(j - 1), node(j)
+            s = side_of(f)
+        elif s == 0.0:
+            s = side_of(f)
+    W.g[SIDE, i] = s
+    return 0.0, -1.0
+
+
+@formula
+def powers(W, i):
+    """The polynomial of guard i in powers of the place in the panel."""
+    for p in range(NODES):
+        s = 0.0
+        for j in range(NODES):
+            s += W.basis[p, j] * W.g[NODE + j, i]
+        W.poly[p] = s
+
+
+@formula
+def value(W, x):
+    """That polynomial and its slope."""
+    f = 0.0
+    d = 0.0
+    for p in range(NODES - 1, -1, -1):
+        d = d * x + f
+        f = f * x + W.poly[p]
+    return f, d
+
+
+@formula
+def begin_sides(look, S, W, t, h):
+    """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
+
+    A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is
+    on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
+    soon.
+    """
+    ng = W.way.shape[0]
+    near = False
+    if W.count[FRESH] == 0:
+        for i in range(ng):
+            W.g[SIDE, i] = W.side[i]
+        return -1, 0.0, 0.0, 0.0
+    fill(look, S, W, t, h, 0.0, 1.0)
+    for i in range(ng):
+        low, high = extent(W, i)
+        W.g[SIDE, i] = side_of(W.g[START, i])
+        W.g[MARK, i] = -1.0
+        size = max(abs(low), abs(high))
+        now = abs(W.g[START, i])
+        just = W.side[i] == 0.0
+        if finite(low, high) and now <= (NEAR if just else ROUNDING) * size:
+            W.g[SIDE, i] = 0.0
+            W.g[MARK, i] = NOISE * now if just else ROUNDING * size
+            near = True
+    if not near:
+        return -1, 0.0, 0.0, 0.0
+    before = 0.0
+    for n in range(CLOSEST, FARTHEST - 1, -1):
+        x = 0.5**n
+        look(t, h, x, S, W, THERE)
+        W.count[LOOKS] += 1
+        i = begun(W)
+        if i >= 0:
+            return i, before, x, x
+        before = x
+    return -1, 0.0, 0.0, before
+
+
+@formula
+def begun(W):
+    """A guard that leaves at once the side that it first went to, as W.g[THERE] has it; or -1."""
+    for i in range(W.way.shape[0]):
+        f = W.g[THERE, i]
+        s = W.g[SIDE, i]
+        if W.g[MARK, i] < 0.0 or W.fired[i] != 0:
+            continue
+        if s == 0.0:
+            if abs(f) > W.g[MARK, i]:
+                W.g[SIDE, i] = side_of(f)
+        elif s * f < 0.0:
+            if fires(W.way[i], s):
+                return i
+            W.g[SIDE, i] = side_of(f)
+    return -1

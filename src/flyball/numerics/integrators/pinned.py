@@ -1,0 +1,315 @@
+"""A step that ends on the first event in it.
+
+Where a guard may pass zero (`panels.survey`) it is looked for with the equations, on the dense output: bracketed, or
+shown not to get there. Then the step is taken again, by the secant of its width, until it ends on the event: what is
+found is as good as the integration, not as its interpolant. ``watch(t, y, S, W, row)`` evaluates the equations and
+writes the guards there, ``note(S, W, row)`` keeps what the guards depend on at the state last evaluated, and writes
+them.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from .clock import BETWEEN, LARGEST, T
+from .panels import begin_sides, fires, survey
+from .step import attempt, extend, interpolate
+from .watching import AGAIN, END, EXTENDED, SAME, SIDE, STAGE, START, THERE, TRUE
+
+GOLDEN = 0.381966011250105
+ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
+CLOSE = 1e-13  # part of the step that a bracket is closed to
+FLAT = 1e-8  # part of the step to which the place of an extremum is found
+TRIES = 80  # times that a step is taken again
+ULP = 2.3e-16
+REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
+AT_ONCE = 1e-11  # part of the step within which events are at the same instant
+OTHERS = 20  # guards that may turn out to be earlier
+
+
+@formula
+def true_guard(derivative, watch, S, W, R, c, h, x, i):
+    """Guard i on the projected dense output at a place in the step. Returns (status, value)."""
+    if x <= 0.0:
+        return 0, W.g[START, i]
+    if x >= 1.0:
+        return 0, W.g[END, i]
+    if W.count[EXTENDED] == 0:
+        if extend(derivative, S, W, R, c, h) != 0:
+            return 1, 0.0
+        W.count[EXTENDED] = 1
+    interpolate(R, c, x, h, c.y[BETWEEN])
+    if watch(c.real[T] + x * h, c.y[BETWEEN], S, W, TRUE) != 0:
+        return 1, 0.0
+    return 0, W.g[TRUE, i]
+
+
+@formula
+def crossing(derivative, watch, S, W, R, c, h, i, a, b, s):
+    """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
+
+    Where it only fires as it comes back to that side, it has to be on the other one in between.
+    """
+    status, fa = true_guard(derivative, watch, S, W, R, c, h, a, i)
+    wide = b - a
+    while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
+        b = a
+        a = max(0.0, a - wide)
+        wide *= 4.0
+        status, fa = true_guard(derivative, watch, S, W, R, c, h, a, i)
+    if status != 0:
+        return status, -1.0
+    status, fb = true_guard(derivative, watch, S, W, R, c, h, b, i)
+    if status != 0:
+        return status, -1.0
+    if s * fb > 0.0:  # it may come back in between
+        status, m, fm = lowest(derivative, watch, S, W, R, c, h, i, a, b, s)
+        if status != 0 or s * fm > 0.0:
+            return status, -1.0
+        if fires(W.way[i], s):
+            b, fb = m, fm
+        else:
+            a, fa = m, fm
+    return bracketed(derivative, watch, S, W, R, c, h, i, (a, fa, b, fb))
+
+
+@formula
+def lowest(derivative, watch, S, W, R, c, h, i, a, b, s):
+    """The least of s times guard i between a and b, or a place where it is not above zero: (status, place, value).
+
+    Golden section with parabolas (Brent 1973, chapter 5).
+    """
+    x = w = v = a + GOLDEN * (b - a)
+    status, f = true_guard(derivative, watch, S, W, R, c, h, x, i)
+    fx = fw = fv = s * f
+    e = d = 0.0
+    for _ in range(ROUNDS):
+        if status != 0 or fx <= 0.0:
+            break
+        m = 0.5 * (a + b)
+        tol = FLAT * max(abs(x), b - a, FLAT)
+        if abs(x - m) <= 2.0 * tol - 0.5 * (b - a):
+            break
+        p = q = 0.0
+        if abs(e) > tol:
+            r = (x - w) * (fx - fv)
+            q = (x - v) * (fx - fw)
+            p = (x - v) * q - (x - w) * r
+            q = 2.0 * (q - r)
+            if q > 0.0:
+                p = -p
+            q = abs(q)
+        if q != 0.0 and abs(p) < abs(0.5 * q * e) and q * (a - x) < p and p < q * (b - x):
+            e = d
+            d = p / q
+        else:
+            e = (b if x < m else a) - x
+            d = GOLDEN * e
+        u = x + (d if abs(d) >= tol else (tol if d > 0.0 else -tol))
+        status, f = true_guard(derivative, watch, S, W, R, c, h, u, i)
+        fu = s * f
+        if fu <= fx:
+            if u < x:
+                b = x
+            else:
+                a = x
+            v, fv, w, fw, x, fx = w, fw, x, fx, u, fu
+        else:
+            if u < x:
+                a = u
+            else:
+                b = u
+            if fu <= fw or w == x:
+                v, fv, w, fw = w, fw, u, fu
+            elif fu <= fv or v == x or v == w:
+                v, fv = u, fu
+    return status, x, s * fx
+
+
+@formula
+def bracketed(derivative, watch, S, W, R, c, h, i, bracket):
+    """Where in a bracket (a, f, b, f) guard i passes zero: (status, place). Chandrupatla (1997)."""
+    x2, f2, x1, f1 = bracket  # the newest is 1; 1 and 2 are on two sides
+    x3, f3 = x2, f2
+    t = 0.5
+    for n in range(ROUNDS):
+        if f1 == 0.0:
+            return 0, x1
+        if n == 0 and f1 != f2:
+            t = f1 / (f1 - f2)
+        tol = CLOSE / max(abs(x2 - x1), CLOSE)
+        if tol > 0.5:
+            break
+        t = min(max(t, tol), 1.0 - tol)
+        x = x1 + t * (x2 - x1)
+        status, f = true_guard(derivative, watch, S, W, R, c, h, x, i)
+        if status != 0:
+            return status, -1.0
+        if (f > 0.0) == (f1 > 0.0):
+            x3, f3 = x1, f1
+        else:
+            x3, f3, x2, f2 = x2, f2, x1, f1
+        x1, f1 = x, f
+        u = (x1 - x2) / (x3 - x2) if x3 != x2 else 0.5
+        p = (f1 - f2) / (f3 - f2) if f3 != f2 else 0.5
+        t = 0.5
+        if p * p < u and (1.0 - p) * (1.0 - p) < 1.0 - u:
+            t = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+    return 0, (x1 if abs(f1) < abs(f2) else x2)
+
+
+@formula
+def retake(derivative, arrive, tangent, note, S, W, R, c, h):
+    """Take the step again with width h, and note its end. Returns (status, error)."""
+    W.count[STAGE] = 0
+    W.count[EXTENDED] = 0
+    W.count[AGAIN] += 1
+    status, error = attempt(derivative, arrive, tangent, S, W, R, c, h)
+    if status == 0:
+        note(S, W, END)
+    return status, error
+
+
+@formula
+def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
+    """Take the step again until it ends where guard i leaves side s, near width h: (status, width, error).
+
+    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``most``: the width of the
+    step as it was.
+    """
+    ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
+    near = 2.0 * ulp + REACHED * h
+    low, high = 0.0, most
+    bound = False  # whether a step that does not reach the event is known
+    rough = stride = CLOSE * most + 4.0 * ulp
+    last, before, gone = 0.0, 0.0, 1e300
+    status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+    for n in range(TRIES):
+        f = W.g[END, i]
+        if status != 0 or f == 0.0:
+            break
+        if n > 0 and h != before and f != last:
+            slope = (f - last) / (h - before)
+        way = -f / slope if slope * s < 0.0 else 1e300
+        if abs(way) <= near or (n > 2 and abs(way) >= 0.5 * gone and abs(way) < rough):
+            break
+        if s * f > 0.0:
+            low, bound = h, True
+        else:
+            high = h
+        if high - low <= 4.0 * ulp:
+            if s * f > 0.0 and high < most:
+                h = high
+                status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+            break
+        last, before = f, h
+        if abs(way) < 0.5 * gone and low < h + way and h + way < high:
+            gone = abs(way)
+            h += way
+        else:
+            h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
+            stride *= 8.0
+        status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+    return status, h, error
+
+
+@formula
+def halved(h, low, high, stride, lower, upper, onward):
+    """A width between those known to fall short of the event and to reach it; ``lower``, ``upper``: which are known."""
+    if lower and upper:
+        return 0.5 * (low + high)
+    if onward:
+        return min(h + stride, 0.5 * (h + high)) if h + stride >= high else h + stride
+    return max(h - stride, 0.5 * (low + h))
+
+
+@formula
+def first_event(callbacks, S, W, R, c, h, error):
+    """End the step on the first event in it, if there is one: (status, width, error, whether there is one).
+
+    Callbacks: derivative, arrive, tangent, watch, note, look.
+    """
+    derivative, arrive, tangent, watch, note, look = callbacks
+    most = h
+    hit = False
+    for i in range(W.fired.shape[0]):
+        W.fired[i] = 0
+    W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
+    for _ in range(OTHERS):
+        status, i, x, s = next_event(callbacks, S, W, R, c, h)
+        if status != 0 or i < 0:
+            return status, h, error, hit
+        if hit and x * h >= h - W.real[SAME]:
+            W.fired[i] = 1
+            continue
+        for j in range(W.fired.shape[0]):
+            W.fired[j] = 0
+        slope = expected_slope(look, S, W, c.real[T], h, x, i)
+        W.fired[i] = 1
+        status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, most)
+        if status != 0:
+            return status, h, error, False
+        hit = True
+        at_once(look, S, W, c.real[T], h, i, s)
+    return 0, h, error, hit
+
+
+@formula
+def next_event(callbacks, S, W, R, c, h):
+    """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
+    derivative, _, _, watch, _, look = callbacks
+    i, a, b, at = begin_sides(look, S, W, c.real[T], h)
+    if i < 0:
+        i, a, b = survey(look, S, W, c.real[T], h, at)
+    while i >= 0:
+        s = W.g[SIDE, i]
+        status, x = crossing(derivative, watch, S, W, R, c, h, i, a, b, s)
+        if status != 0 or x > 0.0:
+            return status, i, x, (s if fires(W.way[i], s) else -s)
+        if b >= 1.0:
+            break
+        resume(look, S, W, c.real[T], h, b)
+        i, a, b = survey(look, S, W, c.real[T], h, b)
+    return 0, -1, 0.0, 0.0
+
+
+@formula
+def resume(look, S, W, t, h, x):
+    """Sides at a place in the step up to which nothing happened."""
+    look(t, h, x, S, W, THERE)
+    for i in range(W.way.shape[0]):
+        f = W.g[THERE, i]
+        if f > 0.0:
+            W.g[SIDE, i] = 1.0
+        elif f < 0.0:
+            W.g[SIDE, i] = -1.0
+
+
+@formula
+def expected_slope(look, S, W, t, h, x, i):
+    """How fast guard i is expected to change there [1/s]."""
+    d = 1e-4
+    a, b = max(0.0, x - d), min(1.0, x + d)
+    f = W.g[START, i]
+    if a > 0.0:
+        look(t, h, a, S, W, THERE)
+        f = W.g[THERE, i]
+    g = W.g[END, i]
+    if b < 1.0:
+        look(t, h, b, S, W, THERE)
+        g = W.g[THERE, i]
+    return (g - f) / ((b - a) * h)
+
+
+@formula
+def at_once(look, S, W, t, h, first, s):
+    """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
+    d = 1e-4
+    look(t, h, 1.0 - d, S, W, THERE)
+    for i in range(W.way.shape[0]):
+        if i == first:
+            continue
+        f = W.g[END, i]
+        slope = (f - W.g[THERE, i]) / (d * h)
+        came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
+        if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
+            W.fired[i] = 1

@@ -1,0 +1,116 @@
+"""What a watched integration keeps besides its `Clock`: guards, the sides they are on, what they depend on."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+# what a guard's way means: which passing of zero is an event
+FALLING, EITHER, RISING = -1, 0, 1
+# rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
+# making; what is zero of those that begin near it; then at the nodes of a panel, and where these are checked
+START, END, TRUE, THERE, SIDE, MARK, NODE = range(7)
+NODES, CHECKS = 8, 2
+GUARDS = NODE + NODES + CHECKS
+# entries of Watch.real: panel's begin and width; time within which events are at the same instant
+PANEL, WIDTH, SAME, REAL = range(4)
+# entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
+# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events
+STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, COUNT = range(8)
+EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
+
+
+class Watch(NamedTuple):
+    """What a watched integration keeps besides its clock."""
+
+    way: np.ndarray  # (ng,): which passing of zero is an event
+    side: (
+        np.ndarray
+    )  # (ng,): 1 where the guard is above zero now, -1 below; in the first step 0 where it has just fired
+    fired: np.ndarray  # (ng,): 1 for those that the step ends on
+    g: np.ndarray  # (GUARDS, ng)
+    poly: np.ndarray  # (NODES,): a guard over a panel, in powers
+    basis: np.ndarray  # (NODES, NODES): powers from values at the nodes
+    real: np.ndarray  # (REAL,)
+    count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
+    stages: np.ndarray  # of a step, where levels are kept
+    moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
+    levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
+    places: np.ndarray  # (2 + stages,): where in the step these were seen
+    rows: np.ndarray  # multipliers that guards depend on
+    spots: np.ndarray  # (..., 2): rows and columns of what else is sensed
+    sensed: np.ndarray  # what is expected to be sensed: values and rates in its first rows; then rates as values
+    lam: np.ndarray  # multipliers expected
+
+
+def nodes() -> np.ndarray:
+    """Places of a panel's nodes in it: Chebyshev's, ends included."""
+    return 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
+
+
+def basis() -> np.ndarray:
+    """What takes values at the nodes to powers of the place in the panel."""
+    return np.linalg.inv(np.vander(nodes(), increasing=True))
+
+
+def kept_stages(c: np.ndarray, stages: int) -> list[int]:
+    """Stages of a method at which levels are kept: not the first, whose order is low; as evenly apart as there are."""
+    good = range(max(2, stages // 3), stages)
+    found: list[int] = []
+    for x in (0.25, 0.6, 0.857):
+        best = min(good, key=lambda i: (abs(c[i] - x), -i))
+        if c[best] < 0.95 and best not in found:
+            found.append(best)
+    return sorted(found, key=lambda i: c[i])
+
+
+def watching(
+    way: np.ndarray,
+    c: np.ndarray,
+    stages: int,
+    measured: int,
+    rows: np.ndarray,
+    spots: np.ndarray,
+    expected: tuple[np.ndarray, np.ndarray],
+) -> Watch:
+    """What a watched integration keeps, empty.
+
+    Parameters
+    ----------
+    way : ndarray (ng,)
+        Of the guards.
+    c : ndarray
+        Where in a step a method's stages are.
+    stages : int
+        How many stages a step has.
+    measured : int
+        Quantities with rates.
+    rows : ndarray
+        Multipliers that guards depend on.
+    spots : ndarray (..., 2)
+        Rows and columns of what else is sensed.
+    expected : tuple of ndarray
+        Where expected values of what is sensed, and of multipliers, are written.
+    """
+    ng = len(way)
+    kept = np.array(kept_stages(c, stages), np.int64)
+    spots = np.asarray(spots, np.int64).reshape(-1, 2)
+    return Watch(
+        way=np.array(way, np.int64),
+        side=np.ones(ng),
+        fired=np.zeros(ng, np.int64),
+        g=np.full((GUARDS, ng), np.nan),
+        poly=np.zeros(NODES),
+        basis=np.ascontiguousarray(basis()),
+        real=np.zeros(REAL),
+        count=np.zeros(COUNT, np.int64),
+        stages=kept,
+        moving=np.zeros((2, 3, measured)),
+        levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
+        places=np.r_[0.0, c[kept], 1.0],
+        rows=np.array(rows, np.int64),
+        spots=spots,
+        sensed=expected[0],
+        lam=expected[1],
+    )

@@ -1,0 +1,96 @@
+"""The watched loop on equations of a test's own, run as plain Python: no mechanism, nothing compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from flyball.numerics.integrators import clock as ex
+from flyball.numerics.integrators.expected import expect
+from flyball.numerics.integrators.tableaux import tableau
+from flyball.numerics.integrators.watched import advance_watched
+from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
+
+
+class Equations(NamedTuple):
+    """y'' = f(t, q, v) with y = (q, v), and guards g(t, q, v)."""
+
+    f: Callable
+    g: Callable
+    latest: list  # time and state last evaluated
+
+
+def derivative(t, y, dy, S, W):
+    n = len(y) // 2
+    dy[:n], dy[n:] = y[n:], S.f(t, y[:n], y[n:])
+    S.latest[:] = [t, y.copy()]
+    return 0
+
+
+def arrive(t, y, dy, S, W):
+    return derivative(t, y, dy, S, W), 0.0
+
+
+def tangent(y, e, S, W):
+    return None
+
+
+def inspect(t, h, span, first, seen, S, W):
+    return 0, 0.0, 0.0
+
+
+def report(t, y, out, S, W):
+    out[0], out[1:] = t, y
+    return 0
+
+
+def watch(t, y, S, W, row):
+    S.latest[:] = [t, y.copy()]
+    n = len(y) // 2
+    W.g[row] = S.g(t, y[:n], y[n:])
+    return 0
+
+
+def note(S, W, row):
+    t, y = S.latest
+    n = len(y) // 2
+    W.moving[0 if row == START else 1] = y[:n], y[n:], S.f(t, y[:n], y[n:])
+    W.g[row] = S.g(t, y[:n], y[n:])
+
+
+def look(t, h, x, S, W, row):
+    expect(W, x, h)
+    W.g[row] = S.g(t + x * h, W.sensed[0, : W.moving.shape[2]], W.sensed[1, : W.moving.shape[2]])
+
+
+def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", most=10_000, h_max=np.inf):
+    """Events (t, fired, y before) of y'' = f(t, q, v), rows of output; ``act(t, y, fired)`` changes y, True: stop."""
+    R, y = tableau(method), np.array(y, float)
+    n = len(y) // 2
+    S = Equations(f, lambda *a: np.asarray(g(*a), float), [0.0, y])
+    W: Watch = watching(np.array(way), R.c, R.order_i[1], n, [], [], (np.zeros((2, 2 * n)), np.zeros(0)))
+    real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
+    real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
+    real[ex.H_MAX] = min(h_max, t_end)
+    count[[ex.QUOTA, ex.LIMIT, ex.CONTROLLED]] = 1000, most, 2 * n
+    Y = np.zeros((ex.STATES, 2 * n))
+    Y[0] = y
+    K = np.zeros((len(R.c) + 1, 2 * n))
+    c = ex.Clock(real, count, np.array(times, float), Y, K, np.zeros(0, np.int64), np.zeros((6, 0)))
+    out, rows, events = np.zeros((64, 1 + 2 * n)), [], []
+    callbacks = derivative, arrive, tangent, watch, note, look
+    while True:
+        used = advance_watched(callbacks, inspect, report, S, W, R, c, out)
+        rows.append(out[:used].copy())
+        status = count[ex.STATUS]
+        if status == EVENT:
+            events.append((real[ex.T], tuple(np.flatnonzero(W.fired)), Y[0].copy()))
+            if act is not None and act(real[ex.T], Y[0], events[-1][1]):
+                break
+            count[ex.STARTED] = 0
+        elif status != ex.RUNNING:
+            assert status == ex.DONE, status
+            break
+    return events, np.concatenate(rows), W, c
