@@ -6,7 +6,7 @@ What only a result can compute is known by name already when a part is described
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ModelError, UnitError
 from .body import GROUND, Body, Frame
@@ -23,7 +23,14 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def measured(model: Model, e: Sensor) -> tuple[str, str, int] | None:
+class Curve(NamedTuple):
+    """A curve such as A.angle where nobody has given it a name, and what asks for it."""
+
+    title: str
+    of: str
+
+
+def measured(model: Model, e: Sensor | Curve) -> tuple[str, str, int] | None:
     """What a sensor measures; see `Model.measured`."""
     owner, _, what = e.of.partition(".")
     found = model.find(owner)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
 from .element import LawOf, limited
-from .examine import measured
+from .examine import Curve, measured
 from .expressions import Expression, folded, law_expression
 from .function import function_name
 from .sensor import Sensor
@@ -66,7 +65,7 @@ def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:
 
 def _check_curve(model: Model, name: str, where: str) -> None:
     """Whether a curve is one of positions or velocities."""
-    if measured(model, SimpleNamespace(title=where, of=name)) is None:  # type: ignore[arg-type]
+    if measured(model, Curve(where, name)) is None:
         raise ModelError(
             f"{where}: {name!r} is known only after the accelerations are; use positions, angles, lengths and their "
             f"rates"

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ..constraints.blocks import DISTANCE, turning
 from ..model.element import LawOf, fields_with
+from ..model.event import Event
+from ..model.examine import Curve, measured
 from ..model.force import CoordinateForce, Force
 from ..model.sensor import Sensor
 from ..model.touch import Touch
@@ -14,19 +18,26 @@ from .system import SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
-def measured_quantities(s: Structure) -> None:
-    """Number every quantity that a force acts along or that a law names; the slots in which laws find them."""
+def measured_quantities(s: Structure, watched: Mapping[str, Event]) -> None:
+    """Number every quantity that a force acts along or that a law names; the slots in which laws find them.
+
+    ``watched``: names in expressions of events, curves such as A.angle among them, and whose they are.
+    """
     for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
-    if not sensors:
+    curves = sorted(name for name in watched if "." in name)
+    if not sensors and not curves:
         return
-    named = _names(s)
+    named = _names(s) | set(watched)
     found = {}
     for sensor in sensors:
         if sensor.name in named and (what := s.model.measured(sensor)) is not None:
             found[sensor.name] = _sensed(s, sensor, *what[:2]), what[2]
+    for name in curves:
+        if (what := measured(s.model, Curve(watched[name].title, name))) is not None:
+            found[name] = _sensed(s, watched[name], *what[:2]), what[2]
     values = len(s.measured)
     s.slots = {name: m + (values if order else 0) for name, (m, order) in found.items()}
 
@@ -61,8 +72,8 @@ def _along(s: Structure, e: CoordinateForce) -> int:
     return m
 
 
-def _sensed(s: Structure, e: Sensor, kind: str, text: str) -> int:
-    """The quantity that a sensor measures."""
+def _sensed(s: Structure, e: Sensor | Event, kind: str, text: str) -> int:
+    """The quantity that a sensor measures, or that an event names."""
     force = s.model[text] if kind == "force" else None
     if isinstance(force, CoordinateForce):
         return _along(s, force)

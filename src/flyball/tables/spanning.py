@@ -12,6 +12,7 @@ from collections.abc import Collection
 from ..model.body import GROUND
 from ..model.joint import Joint
 from ..model.model import Model
+from .events import parting
 from .forest import ends
 from .points import single
 
@@ -24,10 +25,11 @@ def saved(joint: Joint, planar: bool) -> int:
 
 
 def candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
-    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows, and those of
-    point masses, which turn with nothing.
+    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows, those that an
+    event releases, and those of point masses, which turn with nothing.
     """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
+    needed |= {joint.name for joint in parting(model)}
     alone = single(model)
     out = {}
     for joint in model.joints:

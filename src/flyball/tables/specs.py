@@ -85,6 +85,7 @@ class Structure:
     forces: list[Force] = field(default_factory=list)
     switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
+    events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, np.ndarray] = field(default_factory=dict)

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
-from . import forces, patterns, switches, terms
+from . import events, forces, patterns, switches, terms
 from .forest import body_table
 from .points import single
 from .specs import FrameSpec, Structure
@@ -85,11 +85,14 @@ def _decided(model: Model, choices: Choices) -> Structure:
     s.frames.append(FrameSpec(-1, None, "world"))
     if c.switches:
         switches.quantities(s)
-    forces.measured_quantities(s)
+        events.quantities(s)
+    forces.measured_quantities(s, events.names(model) if c.switches else {})
     terms.rows(s, c.holds)
     if c.switches:
         switches.rows(s)
     forces.forces(s)
+    if c.switches:
+        events.guards(s)
     switches.table(s)
     for e in s.loads:
         if (joint := getattr(e, "joint", "")) in s.tree_joints:

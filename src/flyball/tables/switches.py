@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, ELASTIC, FRICTION, ONE_WAY, RATCHET, SLIP, STOP
+from ..constraints.modes import BRANCH, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
+from . import events
 from .specs import RowSpec, Structure, frame, ints
 from .system import (
     EITHER,
@@ -58,11 +59,12 @@ class SwitchSpec:
     law: int = -1
     other: int = -1
     partner: int = -1
+    held: bool = False  # from the start
 
 
 def declared(model: Model) -> list[tuple[Element, Switch]]:
     """All that the model's elements declare."""
-    return [(e, w) for e in model.elements() for w in e.switches()]
+    return [*((e, w) for e in model.elements() for w in e.switches()), *events.locks(model)]
 
 
 def quantity(e: Element, w: Switch) -> str:
@@ -108,6 +110,13 @@ def rows(s: Structure) -> None:
             spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
             like = [i for i in one if i != k and s.switches[i].switch.other == spec.switch.other]
             spec.partner = like[0] if like else -1
+
+    for joint in events.parting(s.model):
+        at = s.slices[joint.name]
+        for k, row in enumerate(range(at.start, at.stop)):
+            spec = SwitchSpec(joint, Switch(LOCK, f"row {k}"), row, s.measured[events.own_row(joint, k)])
+            spec.held = True
+            s.switches.append(spec)
 
 
 def table(s: Structure) -> None:

@@ -127,7 +127,7 @@ def _holds(before: Result, a: Assembly) -> None:
 def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
     """The same with the rows that have modes, all off, if there are any."""
     s = a.compiled.structure
-    if not declared(s.model):
+    if not declared(s.model) and not s.model.events:
         return a
     c = compiled(s.model, parameters=parameters, tree=s.tree, switches=True)
     c.follow(a.compiled.hints)
