@@ -8,13 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
-from ..constraints.modes import ELASTIC, FRICTION
+from ..constraints.modes import ELASTIC
 from ..errors import ModelError
 from ..model.element import Element
 from ..model.model import Model
 
-SLIPPING = frozenset({FRICTION})
-"""Kinds that are plain forces while they slip, whose way an analysis of a motion knows."""
 TOUCH = ("contacts", "limits", "bulk")
 INSTEAD = {"stick_speed": "regularised", "stiffness": "elastic"}
 """Numbers that make a part a plain force if they are given, and what it is then called."""

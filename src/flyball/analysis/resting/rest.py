@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...constraints.modes import FRICTION
 from ...errors import AnalysisError, ModelError, NotConverged
 from ...model.model import Model
 from ...model.touching import smooth_only
@@ -54,21 +55,11 @@ def rest(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) 
     """
     refuse_bulk(model, "equilibrium")
     model = model.snapshot()
-    unknown = smooth_only(model)
-    place = closed(model, begin if unknown else settled(model, begin, parameters))
+    place = _place(model, begin, parameters)
     bare, held = open_copy(model, place.at)
     place, judged, missing = _judged(model, bare, place, parameters)
-    c = compiled(bare, parameters=parameters)
-    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
-    x = Rest(c, place.at.t, q, np.zeros(len(c.structure.rows)))
+    x = _resting(bare, place, parameters)
     found, bears = supported(model, place, x, held)
-    if unknown and found.unbalanced > BALANCED:
-        raise NotConverged(
-            f"{model.name!r} does not rest where it is described: {found.unbalanced:.2g} of what acts is left unbalanced. "
-            f"The way to where it rests is found by steps of impulses, which do not know "
-            f"{', '.join(e.title for e in unknown)}: describe it where it rests, or simulate it with damping",
-            {},
-        )
     if found.unbalanced > BALANCED:
         raise NotConverged(
             f"{model.name!r} came to rest where contacts and joints leave {found.unbalanced:.2g} of what acts "
@@ -76,6 +67,38 @@ def rest(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) 
             {},
         )
     return _told(x, place, found, judged, missing, (held, bears))
+
+
+def _place(model: Model, begin: Assembly, parameters: Mapping[str, float] | None) -> Place:
+    """Where it comes to rest: where it is described, if what holds it bears that; else by steps of impulses.
+
+    Raises
+    ------
+    NotConverged
+        If it does not rest there, and has parts that steps by impulses do not know.
+    """
+    unknown = smooth_only(model)
+    if unknown or any(w.kind == FRICTION for e in model.elements() for w in e.switches()):
+        place = closed(model, begin)
+        bare, held = open_copy(model, place.at)
+        left = supported(model, place, _resting(bare, place, parameters), held)[0].unbalanced
+        if left <= BALANCED:
+            return place
+        if unknown:
+            raise NotConverged(
+                f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
+                f"to where it rests is found by steps of impulses, which do not know "
+                f"{', '.join(e.title for e in unknown)}: describe it where it rests, or simulate it with damping",
+                {},
+            )
+    return closed(model, settled(model, begin, parameters))
+
+
+def _resting(bare: Model, place: Place, parameters: Mapping[str, float] | None) -> Rest:
+    """The model with what holds as constraints, at rest at a place."""
+    c = compiled(bare, parameters=parameters)
+    q, _ = c.take(place.at.compiled, place.at.t, place.at.q, 0.0 * place.at.v)
+    return Rest(c, place.at.t, q, np.zeros(len(c.structure.rows)))
 
 
 def refuse_bulk(model: Model, analysis: str) -> None:
