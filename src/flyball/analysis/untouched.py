@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
-from ..constraints.modes import ELASTIC
+from ..constraints.modes import ELASTIC, FRICTION
 from ..errors import ModelError
 from ..model.element import Element
 from ..model.model import Model
 
+SLIDING = frozenset({FRICTION})
+"""Kinds that are forces while they slide: what has no modes takes them for sliding, by the sign of the rate."""
 TOUCH = ("contacts", "limits", "bulk")
 INSTEAD = {"stick_speed": "regularised", "stiffness": "elastic"}
 """Numbers that make a part a plain force if they are given, and what it is then called."""

@@ -31,7 +31,7 @@ def packed(result: Result) -> dict[str, np.ndarray]:
 
 def switched(stored: dict[str, Any]) -> bool:
     """Whether the result of a file was computed with rows that have modes."""
-    return FIRST + "switch" in stored
+    return FIRST + "rows" in stored
 
 
 def unpack(stored: dict[str, Any], result: Result) -> None:

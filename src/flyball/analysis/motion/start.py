@@ -150,13 +150,13 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
-    c = compiled(model, parameters=parameters, tree=old.tree, switches=bool(old.switches))
+    c = compiled(model, parameters=parameters, tree=old.tree, switches=before.stretches is not None)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
     refuse_jump(before, c, t, q, v)
     c.at(t, q, v)
-    if not c.structure.tree and not c.structure.switches:
+    if not c.structure.tree and before.stretches is None:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)
