@@ -78,7 +78,10 @@ def shafts(capacity):
     """Two rotors, 2 and 3 kg m^2, the first on a spring of 100 N m; a clutch between them."""
     m = fb.Mechanism("shafts", planar=True)
     for name, inertia, x in (("one", 2, 0), ("two", 3, 1)):
-        m.add(fb.Body(name, mass=1, inertia=inertia, position=(x, 0)), fb.Revolute(f"{name} pin", "ground", name, at=(x, 0)))
+        m.add(
+            fb.Body(name, mass=1, inertia=inertia, position=(x, 0)),
+            fb.Revolute(f"{name} pin", "ground", name, at=(x, 0)),
+        )
     m.add(fb.CoordinateSpring("spring", "one pin.angle", stiffness=100))
     m.add(fb.Clutch("clutch", "one pin.angle", "two pin.angle", capacity=capacity))
     return m
@@ -92,5 +95,5 @@ def test_a_clutch_joins_shafts_or_does_not(capacity, wanted):
 
 def test_a_rope_over_eyes_that_is_taut_is_refused_by_name():
     m = double(fb.Rope("line", bodies=("ground", "a", "ground"), at=((0.5, 1), (1, 0), (1.5, 1))))
-    with pytest.raises(fb.ModelError, match="Rope 'line' is taut.*stiffness"):
+    with pytest.raises(fb.ModelError, match=r"Rope 'line' is taut.*stiffness"):
         m.modes()

@@ -66,7 +66,8 @@ def _instead(parts: list[Element]) -> str:
     for name, becomes in INSTEAD.items():
         able = [e.title for e in parts if hasattr(e, name)]
         if able:
-            out.append(f"; or give {', '.join(able)} a {name}: {'it is' if len(able) == 1 else 'they are'} {becomes} then")
+            they = "it is" if len(able) == 1 else "they are"
+            out.append(f"; or give {', '.join(able)} a {name}: {they} {becomes} then")
     return "".join(out)
 
 

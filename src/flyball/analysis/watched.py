@@ -12,7 +12,7 @@ from ..constraints.modes import FRICTION, ONE_WAY, STOP
 from ..errors import ModelError
 from ..results.result import Result
 from ..tables.switches import SwitchSpec
-from ..tables.system import RATE, SWITCH_LOWER, SWITCH_UPPER, VALUE
+from ..tables.system import SWITCH_LOWER, SWITCH_UPPER, VALUE
 from .compiled import compiled
 
 KNOWN = frozenset({FRICTION, STOP, ONE_WAY})
@@ -82,7 +82,7 @@ def _remarks(specs: list[SwitchSpec], rate: np.ndarray) -> list[str]:
         still = np.abs(rate[n]) <= NEAR * fastest
         if s.switch.kind == FRICTION and still.any():
             out.append(
-                f"{s.element.title} is taken as nothing where it does not slide: what it carries there of what the drives "
-                f"need is not determined"
+                f"{s.element.title} is taken as nothing where it does not slide: what it carries there of what the "
+                f"drives need is not determined"
             )
     return out

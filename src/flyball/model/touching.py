@@ -27,7 +27,7 @@ def has_contact(model: Model) -> bool:
 
 
 def holds_at_times(model: Model) -> bool:
-    """Whether there is something that holds at times: the same, and what sticks, locks, latches or goes taut; events."""
+    """Whether something holds at times: the same, and what sticks, locks, latches or goes taut; or events."""
     held = any(w.kind != ELASTIC for e in model.elements() for w in e.switches())
     return has_contact(model) or held or any(e.category == "events" for e in model.elements())
 

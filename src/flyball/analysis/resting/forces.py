@@ -41,9 +41,7 @@ class Carried:
     unique: bool
 
 
-def carried(
-    place: Place, x: Rest, signs: Mapping[str, float], bears: Mapping[str, float] | None = None
-) -> Carried:
+def carried(place: Place, x: Rest, signs: Mapping[str, float], bears: Mapping[str, float] | None = None) -> Carried:
     """Forces that balance what acts, of those that contacts can bear.
 
     Parameters

@@ -1,7 +1,7 @@
-"""What holds a mechanism where it is: stops that are reached, what sticks, ropes that are taut, latches, as constraints.
+"""What holds a mechanism where it is, as constraints: reached stops, what sticks, taut ropes, latches.
 
-What may push one way only has a sign, what sticks bears so much and no more. Which of them hold is decided by the forces
-(`forces.carried`), as it is of contacts.
+What may push one way only has a sign, what sticks bears so much and no more. Which of them hold is decided by the
+forces (`forces.carried`), as it is of contacts.
 """
 
 from __future__ import annotations
@@ -117,13 +117,13 @@ def constraint(e: Any, w: Switch, n: Any, value: float) -> Element:
     if len(w.path) == 1:
         return Distance(e.name, *e.bodies, at=e.at, length=value)
     raise ModelError(
-        f"{e.title} is taut, and runs over {len(w.path) - 1} more points: nothing here holds the sum of its parts. Give it "
-        f"a stiffness"
+        f"{e.title} is taut, and runs over {len(w.path) - 1} more points: nothing here holds the sum of its parts. "
+        f"Give it a stiffness"
     )
 
 
 def capacity(model: Model, at: Assembly, e: Any, reaction: Callable[[str], tuple]) -> float:
-    """The most that something sticks with at rest [N] or [N m]; ``reaction`` of a joint gives force and torque, (3,)."""
+    """The most that something sticks with at rest [N] or [N m]; ``reaction`` of a joint: force and torque, (3,)."""
     c = compiled(model, parameters=at.compiled.parameters)
     q, v = c.take(at.compiled, at.t, at.q, 0.0 * at.v)
     c.at(at.t, q, v, MOTION)

@@ -58,8 +58,8 @@ def closed_instant(model: Model, o: O, analysis: str) -> tuple[Model, O, tuple[s
     found, bears = supported(model, place, x, held)
     if found.unbalanced > BALANCED:
         raise AnalysisError(
-            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what acts "
-            f"unbalanced. Ask about=m.equilibrium()"
+            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what "
+            f"acts unbalanced. Ask about=m.equilibrium()"
         )
     notes = _notes(touching(place, found, x, held, bears), base.t)
     joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()

@@ -17,7 +17,9 @@ from ..untouched import holding_parts
 from .holds import constraint
 
 
-def frozen_modes(model: Model, about: Result, parameters: dict[str, float], analysis: str) -> tuple[Model, Assembly, tuple]:
+def frozen_modes(
+    model: Model, about: Result, parameters: dict[str, float], analysis: str
+) -> tuple[Model, Assembly, tuple]:
     """The model with what held where a motion ended as constraints, that state of it, and what has to be said.
 
     Raises

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...constraints.modes import FRICTION
 from ...errors import AnalysisError, ModelError, NotConverged
 from ...model.model import Model
 from ...model.touching import smooth_only
@@ -23,10 +22,10 @@ from ..linear.rest import Rest
 from ..linear.search import newton
 from .closed import Place, closed
 from .copy import joined_copy, open_copy, told
-from .holds import Holds, supported
 from .forces import LIMIT as NEAR
 from .forces import PARTING as NOTHING
 from .forces import Carried, as_contacts
+from .holds import Holds, supported
 from .settle import settled
 
 Held = tuple[Holds, Mapping[str, float]]
@@ -77,20 +76,18 @@ def _place(model: Model, begin: Assembly, parameters: Mapping[str, float] | None
     NotConverged
         If it does not rest there, and has parts that steps by impulses do not know.
     """
-    unknown = smooth_only(model)
-    if unknown or any(w.kind == FRICTION for e in model.elements() for w in e.switches()):
-        place = closed(model, begin)
-        bare, held = open_copy(model, place.at)
-        left = supported(model, place, _resting(bare, place, parameters), held)[0].unbalanced
-        if left <= BALANCED:
-            return place
-        if unknown:
-            raise NotConverged(
-                f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
-                f"to where it rests is found by steps of impulses, which do not know "
-                f"{', '.join(e.title for e in unknown)}: describe it where it rests, or simulate it with damping",
-                {},
-            )
+    place = closed(model, begin)
+    bare, held = open_copy(model, place.at)
+    left = supported(model, place, _resting(bare, place, parameters), held)[0].unbalanced
+    if left <= BALANCED:
+        return place
+    if unknown := smooth_only(model):
+        raise NotConverged(
+            f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
+            f"to where it rests is found by steps of impulses, which do not know {', '.join(e.title for e in unknown)}: "
+            f"describe it where it rests, or simulate it with damping",
+            {},
+        )
     return closed(model, settled(model, begin, parameters))
 
 
@@ -102,7 +99,13 @@ def _resting(bare: Model, place: Place, parameters: Mapping[str, float] | None) 
 
 
 def refuse_bulk(model: Model, analysis: str) -> None:
-    """Refuse many bodies."""
+    """Refuse many bodies, and events."""
+    if model.events:
+        without = ", ".join(f"{e.name!r}: None" for e in model.events)
+        raise ModelError(
+            f"{analysis} knows no events, and {model.name!r} has {', '.join(e.title for e in model.events)}; simulate "
+            f"does. Without them: m.changed({{{without}}}).{analysis}(...)"
+        )
     if model.bulk:
         names = ", ".join(e.title for e in model.bulk)
         raise ModelError(f"{analysis} does not know {names}; describe what touches as single bodies, or simulate it")
@@ -141,9 +144,7 @@ def _judged(
         return place, None, str(error)
 
 
-def _told(
-    x: Rest, place: Place, found: Carried, judged: Equilibrium | None, missing: str, held: Held
-) -> Equilibrium:
+def _told(x: Rest, place: Place, found: Carried, judged: Equilibrium | None, missing: str, held: Held) -> Equilibrium:
     c = x.c
     touches = touching(place, found, x, *held)
     result = snapshot(State.resting(c, x.t, x.q, found.lam))
@@ -169,9 +170,7 @@ def _told(
     )
 
 
-def touching(
-    place: Place, found: Carried, x: Rest, held: Holds, bears: Mapping[str, float]
-) -> tuple[Touch, ...]:
+def touching(place: Place, found: Carried, x: Rest, held: Holds, bears: Mapping[str, float]) -> tuple[Touch, ...]:
     """What every closed contact does, and all else that holds."""
     out = []
     lam = {name: float(found.lam[x.c.structure.slices[name]].sum()) for name in held.signs}
