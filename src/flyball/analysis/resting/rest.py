@@ -84,7 +84,8 @@ def _place(model: Model, begin: Assembly, parameters: Mapping[str, float] | None
     if unknown := smooth_only(model):
         raise NotConverged(
             f"{model.name!r} does not rest where it is described: {left:.2g} of what acts is left unbalanced. The way "
-            f"to where it rests is found by steps of impulses, which do not know {', '.join(e.title for e in unknown)}: "
+            f"to where it rests is found by steps of impulses, which do not know "
+            f"{', '.join(e.title for e in unknown)}: "
             f"describe it where it rests, or simulate it with damping",
             {},
         )
@@ -178,8 +179,8 @@ def touching(place: Place, found: Carried, x: Rest, held: Holds, bears: Mapping[
     most = max([*found.force[:, 0].tolist(), 0.0])
     for c, f in zip(place.contacts, found.force, strict=True):
         slides = float(np.hypot(f[1], f[2]))
-        bears = c.friction * float(f[0])
-        used = slides / bears if bears > 0.0 else 0.0
+        most_of_it = c.friction * float(f[0])
+        used = slides / most_of_it if most_of_it > 0.0 else 0.0
         state = PARTING if f[0] <= NOTHING * most else SMOOTH if c.friction == 0.0 else STICKS
         state = LIMIT if state == STICKS and used >= 1.0 - NEAR else state
         out.append(Touch(c.name, state, float(f[0]), slides, used, c.gap))
