@@ -39,5 +39,5 @@ def run(m, t_end, coordinates, outputs=101, **more):
 
 
 def times(r, name):
-    """When something happened to an element."""
-    return np.array([e.t for e in r.events if name in e.name])
+    """When something happened to an element, what holds as the motion begins left out."""
+    return np.array([e.t for e in r.events if name in e.name and e.t > 0.0])

@@ -14,11 +14,11 @@ TIGHT = {"rtol": 1e-11, "atol": 1e-12}
 J1, J2, W1, W2 = 0.4, 0.9, 30.0, -5.0
 
 
-def shafts(planar=True, **clutch):
+def shafts(planar=True, speeds=(W1, W2), **clutch):
     """Two flywheels on one axis that turn at different speeds, and a clutch between them."""
     m = fb.Mechanism("drive", planar=planar)
     axis = {} if planar else {"axis": (0, 0, 1)}
-    for k, (J, w) in enumerate(((J1, W1), (J2, W2))):
+    for k, (J, w) in enumerate(zip((J1, J2), speeds, strict=True)):
         at = (0, 0) if planar else (0, 0, float(k))
         name = f"wheel {k + 1}"
         m.add(fb.Body(name, mass=1.0, inertia=J if planar else (J, J, J), position=at))
@@ -38,7 +38,7 @@ def test_two_flywheels_come_to_one_speed(planar):
     M = 6.0
     r = shafts(planar, capacity=M).simulate(4.0, outputs=41, **TIGHT)
     locks = (W1 - W2) / (M * (1 / J1 + 1 / J2))
-    assert [e.t for e in r.events] == pytest.approx([locks], abs=1e-9)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([locks], abs=1e-9)
     before, late = r.t < locks, r.t > locks
     assert r["A"].rate[before] == pytest.approx(W1 - M / J1 * r.t[before], abs=1e-9)
     assert r["B"].rate[before] == pytest.approx(W2 + M / J2 * r.t[before], abs=1e-9)
@@ -56,7 +56,7 @@ def test_a_capacity_that_grows():
     c = 2.5
     r = shafts(capacity=f"{c}*t").simulate(6.0, outputs=13, **TIGHT)
     locks = math.sqrt(2 * (W1 - W2) / (c * (1 / J1 + 1 / J2)))
-    assert [e.t for e in r.events if e.name == "clutch"] == pytest.approx([locks], abs=1e-8)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([locks], abs=1e-8)
     assert r["A"].rate[-1] == pytest.approx(LOCKED, abs=1e-9)
     assert r["clutch"].work[-1] == pytest.approx(-LOST, rel=1e-9)
 
@@ -71,7 +71,7 @@ def test_a_locked_clutch_slips_when_too_much_is_asked_of_it(static):
     r = m.simulate(12.0, outputs=121, **TIGHT)
     locks = (W1 - W2) / (M * (1 / J1 + 1 / J2))
     slips = start + static * M * (J1 + J2) / J2 / rise
-    assert [e.t for e in r.events if e.name == "clutch"] == pytest.approx([locks, slips], abs=1e-8)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([locks, slips], abs=1e-8)
     held = (r.t > start) & (r.t < slips)
     assert r["clutch"].friction[held] == pytest.approx(rise * (r.t[held] - start) * J2 / (J1 + J2), abs=1e-8)
     after = r.t > slips + 1e-9
@@ -87,13 +87,12 @@ def test_an_open_clutch_carries_nothing():
 
 def test_a_clutch_that_opens():
     """Locked under a load until its capacity has fallen to what it carries."""
-    m = shafts(capacity="10 - t")
-    m.replace(fb.Initial("A.angle", value=0.0, rate=2.0), fb.Initial("B.angle", value=0.0, rate=2.0))
+    m = shafts(speeds=(2.0, 2.0), capacity="10 - t")
     T = 8.0
     m.add(fb.Motor("motor", "A", torque=T))
     r = m.simulate(7.0, outputs=71, **TIGHT)
     opens = 10.0 - T * J2 / (J1 + J2)
-    assert [e.t for e in r.events if e.name == "clutch"] == pytest.approx([opens], abs=1e-8)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([opens], abs=1e-8)
     late = r.t > opens
     assert r["clutch"].friction[late] == pytest.approx(10.0 - r.t[late], abs=1e-9)
     assert r["B"].rate[-1] == pytest.approx(
@@ -110,7 +109,7 @@ def test_a_clutch_of_displacements():
         m.add(fb.Initial(f"{name.upper()}.displacement", value=0.0, rate=v))
     m.add(fb.Clutch("grip", "A.displacement", "B.displacement", capacity="4 N"))
     r = m.simulate(1.0, outputs=3, **TIGHT)
-    assert [e.t for e in r.events] == pytest.approx([0.5], abs=1e-10)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([0.5], abs=1e-10)
     assert r["B"].rate[-1] == pytest.approx(1.0, abs=1e-10)
     assert r["A"].rate[-1] - r["B"].rate[-1] == pytest.approx(0.0, abs=1e-13)
 
@@ -123,7 +122,7 @@ def test_a_brake_holds_a_shaft_against_a_torque(torque):
     m.add(fb.Brake("brake", "axle.angle", capacity=2.0), fb.Motor("motor", "axle", torque=torque))
     r = m.simulate(1.0, outputs=3)
     if torque < 2.0:
-        assert (r["axle"].angle == 0.0).all()
+        assert np.abs(r["axle"].angle).max() < 1e-15
         assert r["brake"].friction == pytest.approx(np.full(3, -torque), abs=1e-12)
     else:
         assert r["axle"].rate == pytest.approx((torque - 2.0) / 0.5 * r.t, abs=1e-10)
@@ -140,7 +139,7 @@ def test_a_lift_is_caught_by_its_safety_brake():
     m.add(fb.Event("overspeed", when=f"-shaft.rate - {v}", direction="rising", do=[fb.Set("grip", F)]))
     r = m.simulate(2.0, outputs=201, **TIGHT)
     falls, brakes = v / G, v / (F / mass - G)
-    assert [e.t for e in r.events] == pytest.approx([falls, falls + brakes], abs=1e-8)
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([falls, falls + brakes], abs=1e-8)
     assert r["shaft"].displacement[-1] == pytest.approx(-(v**2) / (2 * G) - v**2 / 2 / (F / mass - G), abs=1e-8)
     assert r["shaft"].rate[-1] == 0.0
     assert r["safety"].friction[-1] == pytest.approx(mass * G, rel=1e-9)

@@ -38,7 +38,7 @@ def test_coulomb_oscillator(planar, kinetic, start):
     swings = 0
     while abs(start) - 2 * d * swings > hold:
         swings += 1
-    left = (-1) ** swings * math.copysign(abs(start) - 2 * d * swings, start)
+    left = (-1) ** swings * (abs(start) - 2 * d * swings) * math.copysign(1.0, start)
     m = sled(planar, mass, k, start, static=static, kinetic=kinetic)
     r = m.simulate((swings + 1) * math.pi / w, outputs=401, **TIGHT)
     reference = np.empty_like(r.t)
@@ -49,13 +49,22 @@ def test_coulomb_oscillator(planar, kinetic, start):
         reference[i] = left if n == swings else middle + swing * math.cos(w * t - n * math.pi)
     assert r["rail"].displacement == pytest.approx(reference, abs=1e-8)
     late = r.t > swings * math.pi / w * (1 + 1e-6)
-    assert (r["rail"].rate[late] == 0.0).all()
-    assert np.ptp(r["rail"].displacement[late]) == 0.0
+    assert at_rest(r["rail"], late)
     assert r["rub"].friction[late] == pytest.approx(np.full(late.sum(), k * left), abs=1e-7)
     way = sum(2 * (abs(start) - (2 * n + 1) * d) for n in range(swings))
     assert r["rub"].work[-1] == pytest.approx(-kinetic * mass * G * way, abs=1e-8)
     assert r.health.energy_drift < 1e-8
     assert r.health.creep == {}
+
+
+def at_rest(joint, when):
+    """Whether it does not move at all, but for rounding."""
+    return np.abs(joint.rate[when]).max() < 1e-14 and np.ptp(joint.displacement[when]) < 1e-14
+
+
+def changes(r):
+    """Times at which something sticks or slips, those of the start apart."""
+    return [e.t for e in r.events if e.t > 0.0]
 
 
 def on_belt(static, kinetic, speed, k, mass=1.0):
@@ -86,7 +95,7 @@ def test_stick_slip_on_a_belt(static, kinetic, speed):
     m.add(fb.Initial("block.x", value=0.0, rate=speed))
     r = m.simulate(first + 2.5 * (slip + stick), outputs=501, **TIGHT)
     times = [first + n * (slip + stick) + d for n in range(3) for d in (0.0, slip)]
-    assert [e.t for e in r.events][:6] == pytest.approx([t for t in times if t < r.t[-1]][:6], abs=1e-8)
+    assert changes(r)[:6] == pytest.approx([t for t in times if t < r.t[-1]][:6], abs=1e-8)
     x = np.empty_like(r.t)
     for i, t in enumerate(r.t):
         n, s = divmod(t - first, slip + stick)
@@ -97,7 +106,7 @@ def test_stick_slip_on_a_belt(static, kinetic, speed):
         else:
             x[i] = kinetic * N / k - A + speed * (s - slip)
     assert r["block"].x == pytest.approx(x, abs=1e-8)
-    stuck = r["top"].rate == 0.0
+    stuck = np.abs(r["top"].rate) < 1e-14
     assert stuck.sum() > 50
     assert r["rub"].friction[stuck] == pytest.approx(k * x[stuck], abs=1e-6)
     assert r.health.energy_drift < 1e-8
@@ -116,12 +125,11 @@ def test_flywheel_braked_to_rest(planar):
     m.add(fb.Brake("brake", "axle.angle", capacity="2 N*m"))
     m.add(fb.Initial("axle.angle", value=0.0, rate=12.0))
     r = m.simulate(5.0, outputs=51, **TIGHT)
-    (stop,) = r.events
-    assert stop.t == pytest.approx(12.0 * 0.5 / 2.0, abs=1e-9)
+    assert changes(r) == pytest.approx([12.0 * 0.5 / 2.0], abs=1e-9)
     late = r.t > 3.0 + 1e-6
-    assert (r["axle"].rate[late] == 0.0).all()
+    assert np.abs(r["axle"].rate[late]).max() < 1e-14
     assert r["axle"].angle[late] == pytest.approx(np.full(late.sum(), 144.0 * 0.5 / 4.0), abs=1e-9)
-    assert np.ptp(r["axle"].angle[late]) == 0.0
+    assert np.ptp(r["axle"].angle[late]) < 1e-14
     assert r["brake"].friction[late] == pytest.approx(np.zeros(late.sum()), abs=1e-12)
     assert r["brake"].work[-1] == pytest.approx(-0.5 * 0.5 * 144.0, rel=1e-9)
 
@@ -137,8 +145,8 @@ def test_block_on_a_tilting_plane_slips_at_the_angle_of_friction():
     m.add(fb.JointFriction("rub", "slope", static=static, kinetic=kinetic))
     r = m.simulate(2.2, outputs=45, **TIGHT)
     slips = math.atan(static) / w
-    assert [e.t for e in r.events] == pytest.approx([slips], abs=1e-8)
-    assert (r["slope"].displacement[r.t < slips] == 0.0).all()
+    assert changes(r) == pytest.approx([slips], abs=1e-8)
+    assert np.abs(r["slope"].displacement[r.t < slips]).max() < 1e-14
 
     def moves(t, y):
         # the axis turns by -w t, so the block's own coordinate is down the slope; Coriolis lifts or presses it
@@ -172,14 +180,14 @@ def test_wedge_lifts_lowers_and_locks_itself(mu):
     phi = math.atan(mu)
     inwards = wedge(angle, mu, f"{load * math.tan(angle)} + {rise}*t").simulate(4.0, outputs=41, **TIGHT)
     slips = load * (math.tan(angle + phi) - math.tan(angle)) / rise
-    assert [e.t for e in inwards.events] == pytest.approx([slips], abs=1e-8)
-    assert (inwards["bed"].displacement[inwards.t < slips] == 0.0).all()
+    assert changes(inwards) == pytest.approx([slips], abs=1e-8)
+    assert np.abs(inwards["bed"].displacement[inwards.t < slips]).max() < 1e-14
     assert inwards["follower"].y[-1] > 0.1
     out = wedge(angle, mu, f"{load * math.tan(angle)} - {rise}*t").simulate(4.0, outputs=41, **TIGHT)
     slips = load * (math.tan(angle) - math.tan(angle - phi)) / rise
-    assert [e.t for e in out.events] == pytest.approx([slips], abs=1e-8)
+    assert changes(out) == pytest.approx([slips], abs=1e-8)
     left = wedge(angle, mu, "0").simulate(1.0, outputs=11)
-    assert (left["follower"].y == 0.0).all() if phi > angle else left["follower"].y[-1] < -0.03
+    assert np.abs(left["follower"].y).max() < 1e-14 if phi > angle else left["follower"].y[-1] < -0.03
 
 
 def test_wedge_accelerates_by_friction_of_its_own_load():
@@ -223,11 +231,10 @@ def test_stribeck_and_viscous_friction_while_it_slides():
         lambda t, y: (y[1], -law(y[1]) / 2.0), (0, 3), [0, 3.0], events=rests, rtol=1e-12, atol=1e-13, method="DOP853"
     )
     slips = 3.0 + 0.4 * N / 4.0
-    changes = [e.t for e in r.events if e.kind != "break"]
-    assert changes == pytest.approx([found.t[-1], slips], abs=1e-8)
+    assert changes(r) == pytest.approx([found.t[-1], slips], abs=1e-8)
     stuck = (r.t > found.t[-1] + 1e-6) & (r.t < slips)
     assert r["rail"].displacement[stuck] == pytest.approx(np.full(stuck.sum(), found.y[0, -1]), abs=1e-8)
-    assert np.ptp(r["rail"].displacement[stuck]) == 0.0
+    assert np.ptp(r["rail"].displacement[stuck]) < 1e-14
     sliding = r.t > slips + 1e-3
     expected = [-law(v) for v in r["rail"].rate[sliding]]
     assert r["rub"].friction[sliding] == pytest.approx(expected, rel=1e-9)

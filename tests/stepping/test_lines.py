@@ -150,5 +150,5 @@ def test_a_clutch_and_a_brake(coordinates):
     assert s.v[turn] == pytest.approx([10.0, 10.0], rel=1e-9)
     lost = s.z[s.structure.state_at["clutch.work"]]
     assert lost == pytest.approx(-0.5 * 0.2 * 0.4 / 0.6 * 900.0, rel=1e-6)
-    s.step(400)
+    s.step(500)
     assert np.abs(s.v[turn]).max() < 1e-12

@@ -215,6 +215,10 @@ class Element:
     def check(self, n: SimpleNamespace) -> None:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
+    def acts(self) -> bool:
+        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
+        return True
+
     def switches(self) -> tuple[Any, ...]:
         """Rows with modes that it has in a motion (`model.switch.Switch`)."""
         return ()

@@ -60,10 +60,6 @@ class Force(Element):
         """Whether its energy is all that it ever takes or gives."""
         return False
 
-    def acts(self) -> bool:
-        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
-        return True
-
     def on_points(self) -> bool:
         """Whether it sees of its frames no more than where their origins are, and makes no torque about them."""
         return False
@@ -145,6 +141,10 @@ class CoordinateForce(Force):
     def along(self) -> tuple[str, ...]:
         """Coordinates whose sum it acts along, each times its weight (`switch_weights`); none if it has a path."""
         return (self.coordinate_text(),) if self.coordinate_text() else ()
+
+    def outward(self, n: SimpleNamespace) -> float:
+        """1, or -1 where results tell its quantity, rate and effort the other way round than the formulas have them."""
+        return 1.0
 
     def examine(self, model: Model) -> None:
         """Refuse what it cannot act along."""

@@ -56,6 +56,10 @@ class Latch(Unilateral):
         way = float(n.direction.real)
         return (way, -way)[: len(self.along())]
 
+    def outward(self, n: SimpleNamespace) -> float:
+        """As the user's coordinate goes."""
+        return float(n.direction.real)
+
     def examine(self, model: Model) -> None:
         """Its coordinates are there, and of one kind."""
         for text in self.along():

@@ -159,7 +159,7 @@ class Model:
 
     def acting(self) -> list[Force]:
         """All that acts by a formula: forces, and limits that are elastic."""
-        return [e for e in (*self.forces, *self.limits) if e.acts()]
+        return [e for e in (*self.forces, *self.limits) if isinstance(e, Force) and e.acts()]
 
     def __eq__(self, other: object) -> bool:
         """Equal if every part, parameter and setting is."""

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.words import listing, shortened, suggest
 from .moment import Moment
+from .struck import Struck
 
 if TYPE_CHECKING:
     import pandas
@@ -180,4 +181,7 @@ class Events(Sequence):
 def _bound(h: Happening, result: Result) -> Happening:
     """With states that can be read by name."""
     before, after = (Moment(result, h.t, y) if isinstance(y, np.ndarray) else y for y in (h.before, h.after))
-    return dataclasses.replace(h, before=before, after=after)
+    impulses = h.impulses
+    if isinstance(impulses, Struck) and isinstance(before, Moment) and isinstance(after, Moment):
+        impulses = impulses.bound(before, after)
+    return dataclasses.replace(h, before=before, after=after, impulses=impulses)

@@ -37,6 +37,7 @@ def begin(here: Here) -> None:
         return
     n = Instant(here)
     n.look()
+    n.restored()
     refuse_violated(n)
     resolve(n, np.zeros(0, np.int64))
 
@@ -80,8 +81,9 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
     hits: dict[int, bool] = {}
     for _ in range(ROUNDS):
         n.look()
-        teeth(n)
-        at, still = sides(n, fired), at_rest(n, fired)
+        still = at_rest(n, fired)
+        teeth(n, still)
+        at = sides(n, fired)
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
@@ -91,7 +93,7 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still[list(jumped.even)] = True
         pressed(n, fired)
         found = decided(n, at, still, fired)
-        turned(n)
+        turned(n, hits)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
@@ -107,9 +109,11 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     here = n.here
     parts = of_velocities(n, at, still)
     kick, here.kick = here.kick, None
+    blows, here.blows = tuple(here.blows), []
     if kick is None and not must_jump(n, parts, n.rate):
         return None
     jumped = jump(n, parts, kick)
+    jumped.blows = blows
     if jumped.ended != FOUND:
         n.restored()
         raise no_impulses(n, parts)

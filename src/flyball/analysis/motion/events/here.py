@@ -35,6 +35,8 @@ class Here:
         Why the motion ends here, in words; empty: it goes on.
     kick : ndarray, optional
         Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
+    blows : list
+        What it is made of; see `results.struck.Struck`.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
     fresh : bool
@@ -57,6 +59,7 @@ class Here:
     watched: str = ""
     given: float = 0.0
     kick: np.ndarray | None = None
+    blows: list[Any] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
     seen: Any = None
 

@@ -18,6 +18,8 @@ from ....tables.system import (
     FORCE_LOAD,
     HELD,
     HOLD,
+    INERTIA,
+    MASS,
     MODE,
     OFF,
     RATE,
@@ -31,6 +33,7 @@ from .here import Here
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
 
@@ -78,6 +81,9 @@ class Instant:
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         self.R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
         self.unit = np.array([c.values.length if metric else 1.0 for metric in _metric(here)])
+        mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
+        turning = mass * c.values.length**2 + spin
+        self.inertia = np.array([mass if metric else turning for metric in _metric(here)])
         self.over = np.nan
         self.rooms: dict[int, tuple[Bench, Dense]] = {}
 
@@ -116,7 +122,7 @@ class Instant:
         """Switch off what is decided; friction without a load that slides goes on doing so."""
         ways, rows = self.ways(), self.S.force_i
         for s, kind in enumerate(self.kind.tolist()):
-            if kind in DECIDED:
+            if kind in DECIDED and self.m[s] >= 0:
                 self.W.switch[MODE, s] = OFF
                 if kind == FRICTION and rows[self.force[s], FORCE_LOAD] >= 0:
                     ways[s] = 0.0
@@ -159,7 +165,10 @@ class Instant:
         self.desk.real[T] = self.here.t
         self.desk.y[0] = self.here.y
         given = self.S, self.W, self.R, self.desk, self.sheet
-        return B, P, int(bare_kernel(engine.address(*given), *given, B, P))
+        status = int(bare_kernel(engine.address(*given), *given, B, P))
+        for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
+            P.A[i] = P.A[:, i] = 0.0
+        return B, P, status
 
     def balance(self, B: Bench, P: Dense, impulses: bool) -> int:
         """Solve it. Returns how it ended."""

@@ -9,12 +9,13 @@ Neither may make energy: what goes beyond the inelastic impact goes only as far 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from ....equations.instant import Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
-from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, V0
+from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, SWITCH_ROW, V0
 from .instant import STOPS, Instant, Part
 
 REST = 1e-12  # of the terms of a rate after the jump: none
@@ -34,7 +35,7 @@ class Jump:
     lost, given : float
         Energy [J] that the impacts took, and that kicks gave.
     rows, along : ndarray
-        Impulses of all rows, (nr,), and change of the velocities, (nv,).
+        Impulses of all rows, then of drivers that prescribe coordinates; and change of the velocities, (nv,).
     """
 
     impulse: dict[int, float] = field(default_factory=dict)
@@ -43,6 +44,7 @@ class Jump:
     given: float = 0.0
     rows: np.ndarray = field(default_factory=lambda: np.zeros(0))
     along: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    blows: tuple[Any, ...] = ()
     even: frozenset[int] = frozenset()  # switches whose quantities are at rest afterwards
     ended: int = FOUND
 
@@ -83,7 +85,7 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
             out.closing[p.switch] = (b, a)
     size = np.abs(P.A) @ np.abs(x) + np.abs(before)
     out.even = frozenset(B.which[np.abs(u) <= REST * size + n.still[B.which]].tolist())
-    driven(n, out.rows, drive)
+    driven(n, out, drive)
     n.here.v[:] += out.along
     return out
 
@@ -143,12 +145,17 @@ def by_velocities(
     return P.x.copy(), P.u - back
 
 
-def driven(n: Instant, rows: np.ndarray, drive: np.ndarray) -> None:
-    """What drivers do in the jump: their impulses times the rates that they prescribe."""
-    S, W, y = n.S, n.W, n.here.y
+def driven(n: Instant, out: Jump, drive: np.ndarray) -> None:
+    """What drivers do: their impulses, which go behind those of the rows, times the rates that they prescribe."""
+    S, W, y, rows = n.S, n.W, n.here.y, out.rows
+    for s, x in out.impulse.items():
+        rows[S.switch_i[s, SWITCH_ROW]] = x
     z = y[n.here.structure.nq + n.here.structure.nv :]
     for k in np.flatnonzero(S.row_i[:, ROW_WORK] >= 0).tolist():
         z[S.row_i[k, ROW_WORK]] += rows[k] * W.row[NU, k]
+    efforts: list[float] = []
     for b in np.flatnonzero(S.body_i[:, BODY_LAW] >= 0).tolist():
         d = S.body_i[b, V0]
         z[S.body_i[b, BODY_WORK]] += drive[d] * n.here.v[d]
+        efforts.append(drive[d])
+    out.rows = np.r_[rows, efforts]

@@ -100,7 +100,7 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     """Modes, ways and places to hold into the motion."""
     W, ways = n.W, n.ways()
     for s, kind in enumerate(n.kind.tolist()):
-        if kind in DECIDED:
+        if kind in DECIDED and n.m[s] >= 0:
             W.switch[MODE, s] = OFF
             ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0
     for i, p in enumerate(found.parts):

@@ -51,7 +51,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
             out += _stop(s, at[s])
         elif kind == ONE_WAY:
             out.append(Part(s, PUSHES, state=EVEN))
-        elif kind == LOCK and n.mode[s] != OFF:
+        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
             out.append(Part(s, HOLDS))
         elif kind == FRICTION and n.S.force_i[n.force[s], FORCE_LOAD] >= 0:
             held = bool(still[s]) or n.mode[s] != OFF
@@ -69,7 +69,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
             out += _stop(s, at[s])
         elif kind == ONE_WAY and still[s]:
             out.append(Part(s, PUSHES, state=EVEN if n.mode[s] != OFF else FREE))
-        elif kind == LOCK and n.mode[s] != OFF:
+        elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
             out.append(Part(s, HOLDS))
         elif kind == FRICTION:
             if still[s]:

@@ -7,6 +7,8 @@ acceleration where it has none. Where it has neither the force is left to look w
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ....constraints.modes import ELASTIC, FROZEN, RATCHET
@@ -32,14 +34,13 @@ TOOTH = 1e-9  # of the pitch: as good as at a tooth
 BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
 
 
-def teeth(n: Instant) -> None:
-    """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``n`` has looked."""
+def teeth(n: Instant, still: np.ndarray) -> None:
+    """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
     for s in np.flatnonzero(n.kind == RATCHET).tolist():
         n.W.switch[UPPER, s] = np.inf
         if n.mode[s] != OFF:
             continue
-        way = _sign(n, s)
-        if way > 0.0:
+        if (_acceleration(n, s) > -SLOW * n.unit[s]) if still[s] else (n.rate[s] > 0.0):
             _goes_on(n, s)
         elif n.way[s] >= 0.0:
             tooth, pitch = n.S.switch_x[s, SWITCH_TOOTH], n.S.switch_x[s, SWITCH_PITCH]
@@ -47,12 +48,12 @@ def teeth(n: Instant) -> None:
             n.ways()[s] = n.way[s] = -1.0
 
 
-def turned(n: Instant) -> None:
-    """Ratchets whose tooth let go, or was bounced off, go on; of others the way is as it was; modes are decided."""
+def turned(n: Instant, hit: Collection[int]) -> None:
+    """Ratchets whose tooth let go, or that it was ``hit`` and threw back, go on; of others the way is as it was."""
     for s in np.flatnonzero(n.kind == RATCHET).tolist():
         if n.W.switch[MODE, s] != OFF:
             continue
-        if n.mode[s] != OFF or n.rate[s] > n.still[s]:
+        if n.mode[s] != OFF or s in hit:
             _goes_on(n, s)
         else:
             n.ways()[s] = n.way[s]
@@ -62,13 +63,6 @@ def _goes_on(n: Instant, s: int) -> None:
     """No tooth is in the way until it turns round."""
     n.ways()[s] = n.way[s] = 1.0
     n.W.switch[LOWER, s] = -np.inf
-
-
-def _sign(n: Instant, s: int) -> float:
-    """Which way a quantity goes: by its rate, where there is none by its acceleration."""
-    if abs(n.rate[s]) > n.still[s]:
-        return 1.0 if n.rate[s] > 0.0 else -1.0
-    return -1.0 if _acceleration(n, s) < -SLOW * n.unit[s] else 1.0
 
 
 def _acceleration(n: Instant, s: int) -> float:

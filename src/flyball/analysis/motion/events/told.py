@@ -6,6 +6,7 @@ import numpy as np
 
 from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, STOP
 from ....results.events import Happening
+from ....results.struck import Struck
 from ....tables.system import MODE, OFF
 from .instant import Instant
 from .jump import Jump
@@ -62,7 +63,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
         if now and not np.isnan(over):
             count = n.here.bounces.pop(s).count
             told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
-            n.over = max(n.over, over)
+            n.over = float(np.fmax(n.over, over))
         elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
             kind, said = words(n, s, n.ways()[s] != FROZEN)
             told.setdefault(kind, []).append((s, said))
@@ -83,4 +84,5 @@ def record(
     """Append a record."""
     t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
     lost = jumped.lost if jumped else 0.0
-    n.here.records.append(Happening(t, names, kind, done, lost, impulses, before.copy(), n.here.y.copy()))
+    known = Struck(impulses, jumped.rows, jumped.blows) if jumped else impulses
+    n.here.records.append(Happening(t, names, kind, done, lost, known, before.copy(), n.here.y.copy()))

@@ -1,0 +1,59 @@
+"""A motion that stands at its start, with the rows that have modes: what is decided there is tested by itself."""
+
+from __future__ import annotations
+
+import inspect
+
+import numpy as np
+
+from flyball.analysis.motion.events.here import Here
+from flyball.analysis.motion.start import begin
+from flyball.analysis.simulate import SimulateOptions, clock_for
+from flyball.tables.system import MODE, VALUE
+
+ASKED = {
+    "method": "dop853", "t_end": 1.0, "t_start": None, "outputs": 2, "parameters": None, "start": None,
+    "specialize": False, "progress": False, "rtol": 1e-9, "atol": None, "max_step": np.inf, "max_steps": 1000,
+    "stabilization": "projection", "alpha": None, "beta": None,
+}  # fmt: skip
+
+
+def standing(m, coordinates) -> Here:
+    """Of a mechanism, at t = 0, nothing decided yet."""
+    more = {"switches": True} if "switches" in inspect.signature(begin).parameters else {}
+    start = begin(m.snapshot(), 0.0, None, None, coordinates, **more)
+    clock = clock_for(start, 0.0, 1.0, np.array([0.0, 1.0]), SimulateOptions(**ASKED, coordinates=coordinates))
+    return Here(start, clock)
+
+
+def modes(here: Here) -> list[float]:
+    """Of all switches."""
+    return here.c.work.switch[MODE].tolist()
+
+
+def ways(here: Here) -> list[float]:
+    """Ways of all switches."""
+    n = len(here.c.system.switch_i)
+    return here.c.work.sensed[VALUE, here.c.work.sensed.shape[1] - n :].tolist()
+
+
+def moving(here: Here) -> dict[str, np.ndarray]:
+    """(vx, vy, turning rate) of every body."""
+    c = here.c
+    bodies = c.moving(here.t, here.q, here.v)
+    return {name: np.array([b.v[0], b.v[1], b.w[2]]) for name, b in bodies.items()}
+
+
+def kicked(here: Here, body: str, at, impulse) -> np.ndarray:
+    """Generalised impulse of a blow on a body at a point of the plane, by virtual work."""
+    c = here.c
+    before, v = here.v.copy(), np.zeros(c.structure.nv)
+    out = np.zeros(c.structure.nv)
+    for d in range(len(out)):
+        v[:] = 0.0
+        v[d] = 1.0
+        b = c.moving(here.t, here.q, v)[body]
+        arm = np.asarray(at, float) - b.p[:2]
+        out[d] = impulse[0] * (b.v[0] - b.w[2] * arm[1]) + impulse[1] * (b.v[1] + b.w[2] * arm[0])
+    here.v[:] = before
+    return out
