@@ -13,6 +13,7 @@ from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
 from ..errors import ModelError, StartWarning, warn
+from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
 from ..model.touching import smooth_only
@@ -28,6 +29,7 @@ from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
 from .motion.events.here import Here
+from .motion.events.legs import breaks
 from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
@@ -152,10 +154,12 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if watched(begun):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell)
+    c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    known = breaks(c, here.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
+    if watched(begun) or len(known.times):
+        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, begun.engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
@@ -166,7 +170,7 @@ def moved(
 def watched(begun: Start) -> bool:
     """Whether something may happen at an instant: there are guards, or rows with modes."""
     s = begun.assembly.compiled.structure
-    return bool(s.guards or s.switches)
+    return bool(s.guards or s.switches or s.model.events)
 
 
 def _refuse_idle(begun: Start, stabilization: str) -> None:

@@ -29,6 +29,9 @@ class Breaks(NamedTuple):
     given_up: tuple[int, ...]
 
 
+NO_BREAKS = Breaks(NONE, np.zeros(0, bool), ())
+
+
 def found_beforehand(code: Sequence[int], const: np.ndarray, starts: Iterable[int], t0: float, t1: float) -> Breaks:
     """Where laws that start at ``starts`` in the code have corners or act briefly between two times [s].
 

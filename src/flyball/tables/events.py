@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from ..constraints.modes import LOCK
-from ..model.actions import Lock, Release
+from ..model.actions import Impulse, Lock, Release
+from ..model.body import Body, Frame
 from ..model.event import Event
+from ..model.event_check import coordinate_of
 from ..model.held import held_by
 from ..model.joint import Joint
 from ..model.model import Model
@@ -53,11 +55,14 @@ def quantities(s: Structure) -> None:
 
 
 def names(model: Model) -> dict[str, Event]:
-    """Every name in expressions of events, and an event that uses it."""
+    """Every name in expressions of events, coordinates that they strike too, and an event that uses it."""
     out: dict[str, Event] = {}
     for e in model.events:
         for where, law in e.laws():
             out |= dict.fromkeys(model.law(law, e.of, where).names, e)
+        for a in e.do:
+            if isinstance(a, Impulse) and not isinstance(model.find(a.on), (Body, Frame)):
+                out[coordinate_of(model, e, a)] = e
     return out
 
 

@@ -44,10 +44,10 @@ def no_forces(n: Instant, found: Decided) -> SimulationError:
     )
 
 
-def no_end(n: Instant, names: list[str], rounds: int) -> SimulationError:
+def no_end(t: float, names: list[str], rounds: int) -> SimulationError:
     """What happens at an instant has no end."""
     return SimulationError(
-        f"at t = {n.here.t:.9g} s events follow each other without end ({rounds} times at one instant): "
+        f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
         f"{listing(list(dict.fromkeys(names)))}; each undoes what the other did",
-        t=n.here.t,
+        t=t,
     )

@@ -10,6 +10,7 @@ from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND
 from ....tables.system import G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from .actions import act, act_at_start
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant
@@ -33,13 +34,15 @@ def begin(here: Here) -> None:
     ModelError
         If a limit starts violated.
     """
-    if not len(here.c.system.switch_i):
-        return
-    n = Instant(here)
-    n.look()
-    n.restored()
-    refuse_violated(n)
-    resolve(n, np.zeros(0, np.int64))
+    acts = act_at_start(here)
+    if len(here.c.system.switch_i) or here.kick is not None:
+        n = Instant(here)
+        n.look()
+        n.restored()
+        refuse_violated(n)
+        resolve(n, np.zeros(0, np.int64))
+    acts.told(["start"])
+    _happen(here, acts.passed())
 
 
 def happen(here: Here, fired: Sequence[int]) -> None:
@@ -56,8 +59,22 @@ def happen(here: Here, fired: Sequence[int]) -> None:
     SimulationError
         If no forces or impulses go with all that is asked, or there is no end of it.
     """
-    if len(here.c.system.switch_i):
-        resolve(Instant(here), np.array(fired, np.int64))
+    _happen(here, np.array(fired, np.int64))
+
+
+def _happen(here: Here, fired: np.ndarray) -> None:
+    """Events, jumps and modes, as long as expressions of events pass zero by what was done."""
+    for _ in range(ROUNDS if len(fired) else 0):
+        acts = act(here, fired.tolist())
+        if len(here.c.system.switch_i) or here.kick is not None:
+            resolve(Instant(here), fired)
+        acts.told(["start"])
+        fired = acts.passed()
+        here.acted.clear()  # what follows from it comes later
+        if not len(fired) or here.stopped:
+            return
+    if len(fired):
+        raise no_end(here.t, [here.structure.events[int(g)].name for g in fired], ROUNDS)
 
 
 def refuse_violated(n: Instant) -> None:
@@ -101,7 +118,7 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
         if not len(fired):
             tell_modes(n, (modes, ways), before, hits)
             return
-    raise no_end(n, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
+    raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
 
 
 def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:

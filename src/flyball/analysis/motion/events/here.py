@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from ....equations.engine import MOTION, evaluate
 from ....numerics.integrators.clock import NOW, Clock, T
 from ....tables.specs import Structure
+from ....tables.system import VALUE
 from ...compiled import Compiled
 from ..start import Start
 
@@ -39,6 +41,10 @@ class Here:
         What it is made of; see `results.struck.Struck`.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
+    counts : dict
+        Event -> how often it happened so far.
+    acted : dict
+        What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
         Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
     failed : Exception
@@ -62,6 +68,9 @@ class Here:
     blows: list[Any] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
     seen: Any = None
+    counts: dict[str, int] = field(default_factory=dict)
+    acted: dict[str, Any] = field(default_factory=dict)
+    acted_at: float = float("nan")
 
     @property
     def c(self) -> Compiled:
@@ -92,3 +101,12 @@ class Here:
     def v(self) -> np.ndarray:
         """Its velocities, in place, (nv,)."""
         return self.y[self.structure.nq : self.structure.nq + self.structure.nv]
+
+    def evaluate(self) -> None:
+        """Have kinematics, rows, forces and what is measured at the state of the instant in the scratch."""
+        evaluate(self.c.system, self.c.work, self.t, self.y.copy(), MOTION)
+
+    def names(self) -> dict[str, float]:
+        """Values of all that expressions of events may name, at the state last evaluated."""
+        c, sensed = self.c, self.c.work.sensed
+        return {"t": self.t, **c.values.env, **{k: float(sensed[VALUE, m]) for k, m in self.structure.slots.items()}}

@@ -23,16 +23,19 @@ from ....tables.system import (
     MODE,
     OFF,
     RATE,
+    SPARE,
     SWITCH_FORCE,
     SWITCH_KIND,
     SWITCH_MEASURED,
     VALUE,
 )
 from .here import Here
+from .holding import GONE
 
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
@@ -72,7 +75,8 @@ class Instant:
         c, self.here = here.c, here
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
-        self.kind, self.m = S.switch_i[:, SWITCH_KIND], S.switch_i[:, SWITCH_MEASURED]
+        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, S.switch_i[:, SWITCH_KIND])
+        self.m = S.switch_i[:, SWITCH_MEASURED]
         self.force = S.switch_i[:, SWITCH_FORCE]
         self.first = self.W.sensed.shape[1] - len(self.kind)
         ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
@@ -187,8 +191,9 @@ class Instant:
         return self.sheet.rows[0, : len(self.S.guard_i)].copy()
 
     def name(self, s: int) -> str:
-        """Name of the element that switch s is of."""
-        return str(self.here.structure.switches[s].element.name)
+        """Name of the element that switch s is of; of the coordinate that an event locks."""
+        spec = self.here.structure.switches[s]
+        return str(spec.switch.label if spec.element.category == "events" else spec.element.name)
 
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""

@@ -7,77 +7,28 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from typing import NamedTuple
 
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
 from ....errors import FlyballError, ModelError
+from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ...progress import Tell
+from ..engines import Engine
 from .happen import begin, happen
 from .here import Here
+from .legs import Legs
 from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
-LONGEST = 100_000  # steps in one call
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 AT_ONCE = 1e-9  # part of the time span within which so many never end
-
-
-class Breaks(NamedTuple):
-    """Known times [s] at which a step ends."""
-
-    times: np.ndarray  # ascending
-    sharp: np.ndarray  # whether forces or velocities may jump there
-
-
-NO_BREAKS = Breaks(np.zeros(0), np.zeros(0, bool))
-
-
-def beside(t: float) -> float:
-    """How far [s] from a time a law is on one side of it for sure."""
-    return 8.0 * float(np.spacing(abs(t)))
-
-
-class Legs:
-    """The times between which a motion is integrated, one after the other.
-
-    A law that is sharp at a time may belong to either side there: a step ends a little before, the next begins as
-    little behind, with a first width of its own.
-    """
-
-    def __init__(self, here: Here, breaks: Breaks) -> None:
-        self.here, self.end = here, float(here.clock.real[ex.T_END])
-        inside = (breaks.times > here.t) & (breaks.times < self.end)
-        self.times, self.sharp = breaks.times[inside], breaks.sharp[inside]
-        self.at = 0
-        self._aim()
-
-    def _aim(self) -> None:
-        end = self.end
-        if self.at < len(self.times):
-            end = float(self.times[self.at])
-            if self.sharp[self.at]:
-                end -= beside(end)
-        self.here.clock.real[ex.T_END] = end
-
-    def next(self) -> bool:
-        """Go on with the next one, if there is one."""
-        if self.at == len(self.times):
-            return False
-        clock, t, sharp = self.here.clock, float(self.times[self.at]), self.sharp[self.at]
-        self.at += 1
-        self._aim()
-        if sharp:
-            clock.real[ex.T], clock.real[ex.H] = t + beside(t), 0.0
-            clock.count[ex.STARTED] = 0
-        return True
 
 
 class Run:
@@ -91,9 +42,12 @@ class Run:
         Of a row of output.
     tell : callable
         Is told how far it is.
+    engine : Engine
+        Which loops compute it where nothing is watched.
     """
 
-    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell) -> None:
+    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell, engine: Engine) -> None:
+        self.engine = engine
         self.here, self.method, self.width, self.tell = here, method, width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
@@ -107,22 +61,17 @@ class Run:
         c = self.here.c
         return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
-    def go(self, breaks: Breaks) -> tuple[np.ndarray, bool]:
+    def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
-        here, clock = self.here, self.here.clock
+        here, engine = self.here, self.engine
         forget(here.c.work.stack)
         try:
             self.begin()
-            legs = Legs(here, breaks)
+            engine.begin(here.clock)
+            self.legs = Legs(here.clock, known)
             while not here.stopped:
                 self.integrate()
-                status = clock.count[ex.STATUS]
-                if status == EVENT:
-                    self.event()
-                elif status == ex.DONE:
-                    if not legs.next():
-                        break
-                elif status != ex.RUNNING:
+                if self.over():
                     break
             if here.stopped:
                 self.stop()
@@ -133,9 +82,29 @@ class Run:
                 raise
             here.failed = error
         finally:
+            engine.end()
             if self.loop is not None:
                 here.watched = told(self.loop)
         return np.concatenate(self.rows), False
+
+    def over(self) -> bool:
+        """Do what the compiled loop has returned for: whether the motion is over."""
+        clock, engine = self.here.clock, self.engine
+        status = clock.count[ex.STATUS]
+        if status == EVENT:
+            self.event()
+        elif status == ex.DONE:
+            return not self.legs.next()
+        elif status != ex.RUNNING and not engine.hands_over(clock):
+            return True
+        self.legs.whole()
+        if self.loop is None and engine.begins_anew(clock):
+            self.rows = self.rows[:1]
+            self.here.seen.anew()
+            forget(self.here.c.work.stack)
+            self.legs.anew()
+        self.legs.aim()
+        return False
 
     def begin(self) -> None:
         """What happens as the motion begins."""
@@ -157,7 +126,7 @@ class Run:
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
             done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            clock.count[ex.QUOTA] = int(min(max(done * SLICE / took, 1.0), LONGEST))
+            clock.count[ex.QUOTA] = self.engine.limited(clock, done * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
@@ -204,7 +173,7 @@ def told(loop: Watched) -> str:
 
 
 def run_events(
-    here: Here, method: Tableau, width: int, tell: Tell, breaks: Breaks = NO_BREAKS
+    here: Here, method: Tableau, width: int, tell: Tell, engine: Engine, known: Breaks
 ) -> tuple[np.ndarray, bool]:
     """Integrate from event to event. Returns (output rows, whether the user interrupted).
 
@@ -217,7 +186,9 @@ def run_events(
         Of a row of output.
     tell : callable
         Is told how far it is.
-    breaks : Breaks
-        Known times at which steps end.
+    engine : Engine
+        Which loops compute it where nothing is watched.
+    known : Breaks
+        Times at which steps end.
     """
-    return Run(here, method, width, tell).go(breaks)
+    return Run(here, method, width, tell, engine).go(known)

@@ -1,0 +1,243 @@
+"""What the model's events do at an instant, before velocities jump and modes are decided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ....errors import SimulationError
+from ....model.actions import Action, Impulse, Lock, Note, Release, Set, Stop, listed
+from ....model.body import Body, Frame
+from ....model.element import LawOf
+from ....model.event import Event
+from ....model.event_check import coordinate_of
+from ....model.held import held_by
+from ....results.events import Happening
+from ....tables.system import GUARD_WAY, HELD, MODE
+from .blows import generalised
+from .here import Here
+from .holding import hold, let_go
+from .setting import set_parameters
+
+CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
+
+
+@dataclass
+class Acts:
+    """What events do at one instant.
+
+    Attributes
+    ----------
+    here : Here
+    events : tuple of Event
+        Those that happen.
+    words : dict
+        Event -> what was done.
+    values : dict
+        Guard -> value of its event's expression before anything was done.
+    """
+
+    here: Here
+    events: tuple[Event, ...]
+    words: dict[str, list[str]] = field(default_factory=dict)
+    values: dict[int, float] = field(default_factory=dict)
+    before: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    first: int = 0
+
+    def told(self, own: Sequence[str] = ()) -> None:
+        """Record the events, each with what was done; what only it did (locking, a blow) is told with it.
+
+        ``own``: names under which jumps that events ask for are recorded.
+        """
+        here = self.here
+        if not self.events:
+            return
+        since, here.records[self.first :] = here.records[self.first :], []
+        mine = [h for h in since if h.kind in ("impact", "kick") and set(h.name.split(", ")) <= {*own, *_own(here)}]
+        cause = next((e for e in self.events if any(isinstance(a, (Lock, Impulse)) for a in e.do)), self.events[0])
+        for e in self.events:
+            lost = sum(h.lost for h in mine) if e is cause else 0.0
+            impulses = {k: x for h in mine for k, x in h.impulses.items()} if e is cause else {}
+            done = tuple(self.words.get(e.name, ()))
+            here.records.append(Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy()))
+        here.records += [h for h in since if not any(h is x for x in mine)]
+
+    def passed(self) -> np.ndarray:
+        """Guards of events whose expressions went through zero by the jump itself, (n,)."""
+        here, out = self.here, []
+        if not self.events or not self.values:
+            return np.zeros(0, np.int64)
+        here.evaluate()
+        for g, before in self.values.items():
+            after, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
+            most = CLEAR * max(abs(before), abs(after))
+            rises, falls = before <= -most and after > most, before >= most and after < -most
+            if (rises and way >= 0) or (falls and way <= 0):
+                out.append(g)
+        return np.array(out, np.int64)
+
+
+def _own(here: Here) -> set[str]:
+    """Names of all that events lock and let go."""
+    every = here.structure.switches
+    return {x.switch.label for x in every if isinstance(x.element, Event)} | {x.element.name for x in every if x.held}
+
+
+def act(here: Here, fired: Sequence[int]) -> Acts:
+    """Do what the events of these guards say: parameters, what is released and locked, blows, an end.
+
+    Velocities do not change here: `Here.kick` says what struck, the modes what is held.
+
+    Parameters
+    ----------
+    here : Here
+    fired : sequence of int
+        Rows of `System.guard_i`, those of events among them.
+
+    Raises
+    ------
+    SimulationError
+        If actions contradict one another, or cannot be done; it names the events and the time.
+    """
+    guards = [int(g) for g in fired if int(g) in here.structure.events]
+    events = [here.structure.events[g] for g in guards]
+    events = [e for e in events if e.times is None or here.counts.get(e.name, 0) < e.times]
+    return _acted(here, tuple(events), guards)
+
+
+def act_at_start(here: Here) -> Acts:
+    """Do what events say at the start; joints that may let go hold."""
+    for k, spec in enumerate(here.structure.switches):
+        if spec.held:
+            here.c.work.switch[MODE, k] = HELD
+    return _acted(here, tuple(e for e in here.structure.model.events if e.at_start), [])
+
+
+def _acted(here: Here, events: tuple[Event, ...], fired: Sequence[int]) -> Acts:
+    acts = Acts(here, events, before=here.y.copy(), first=len(here.records))
+    for e in events:
+        here.counts[e.name] = here.counts.get(e.name, 0) + 1
+    every = [(e, a) for e in events for a in e.do]
+    if not every:
+        return acts
+    here.evaluate()
+    for g in here.structure.events:
+        acts.values[g] = 0.0 if g in fired else expression(here, g)
+    refuse_contradictions(here, every)
+    reckoned = [(e, a, [_reckoned(here, e, a, k, x) for k, x in a.laws()]) for e, a in every]
+    for kind, do in DO.items():
+        if found := [(e, a, x) for e, a, x in reckoned if type(a) is kind]:
+            for e, words in do(here, found):
+                acts.words.setdefault(e.name, []).append(words)
+    return acts
+
+
+def expression(here: Here, g: int) -> float:
+    """Value of the expression of an event, by its guard, at the state last evaluated."""
+    model, e = here.structure.model, here.structure.events[g]
+    law = model.law(e.law, e.of, f"when of {e.title}")
+    return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
+
+
+def _reckoned(here: Here, e: Event, a: Action, what: str, law: Any) -> float:
+    """Value of an expression of an action at the instant, as everything is before it."""
+    model = here.structure.model
+    of = LawOf(_unit(here, e, a, what), curves=True)
+    tables = {x.name: x for x in model.tables}
+    value = model.law(law, of, f"{what} of {a.title} in {e.title}").evaluate(here.names(), tables)
+    if not np.isfinite(value):
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {what} of {a.title} in {e.title} is {value}: '{law}' has no value there", t=here.t
+        )
+    return float(value)
+
+
+def _unit(here: Here, e: Event, a: Action, what: str) -> str | None:
+    """Unit of a number of an action, where there is one that it must have."""
+    if not isinstance(a, Impulse):
+        return None
+    model = here.structure.model
+    if not isinstance(model.find(a.on), (Body, Frame)):
+        return "N*m*s" if model.unit(coordinate_of(model, e, a), e) == "rad" else "N*s"
+    return {"impulse": "N*s", "torque": "N*m*s"}[what]
+
+
+def refuse_contradictions(here: Here, every: Sequence[tuple[Event, Action]]) -> None:
+    """Refuse that events of one instant lock and release the same, or set a parameter twice."""
+    if here.acted_at != here.t:
+        here.acted_at, here.acted = here.t, {}
+    for e, a in every:
+        for key in keys(here, e, a):
+            first, other = here.acted.setdefault(key, (e, a))
+            if first is not e and a != other:
+                raise SimulationError(
+                    f"at t = {here.t:.9g} s actions contradict each other: {other.title} of {first.title} and "
+                    f"{a.title} of {e.title}; let one of the events come later, or once (times=1)",
+                    t=here.t,
+                )
+
+
+def keys(here: Here, e: Event, a: Action) -> tuple[str, ...]:
+    """What an action settles, for this instant."""
+    if isinstance(a, (Lock, Release)):
+        return held_by(here.structure.model, e, a).keys()
+    return (f"parameter {a.parameter}",) if isinstance(a, Set) else ()
+
+
+Done = list[tuple[Event, str]]
+Found = Sequence[tuple[Event, Any, list[float]]]
+
+
+def _set(here: Here, found: Found) -> Done:
+    old = dict(here.c.values.env)
+    who = " and ".join(f"{a.title} in {e.title}" for e, a, _ in found)
+    set_parameters(here, {a.parameter: x[0] for _, a, x in found}, who)
+    return [(e, f"{a.parameter} = {x[0]:g}, was {old[a.parameter]:g}") for e, a, x in found]
+
+
+def _released(here: Here, found: Found) -> Done:
+    return [(e, let_go(here, e, a)) for e, a, _ in found]
+
+
+def _locked(here: Here, found: Found) -> Done:
+    return [(e, hold(here, e, a)) for e, a, _ in found]
+
+
+def _struck(here: Here, found: Found) -> Done:
+    out = []
+    for e, a, x in found:
+        n = len(listed(a.impulse))
+        kick = generalised(here, e, a, x[:n], x[n:])
+        here.kick = kick if here.kick is None else here.kick + kick
+        told = [f"{_vector(x[:n])} N s" if n > 1 else f"{x[0]:g}"] if n else []
+        told += [f"{_vector(x[n:])} N m s"] if x[n:] else []
+        out.append((e, f"struck {a.on}: {', '.join(told)}"))
+    return out
+
+
+def _vector(x: Sequence[float]) -> str:
+    return f"{x[0]:g}" if len(x) == 1 else f"({', '.join(f'{c:g}' for c in x)})"
+
+
+def _noted(here: Here, found: Found) -> Done:
+    return [(e, a.text) for e, a, _ in found]
+
+
+def _stopped(here: Here, found: Found) -> Done:
+    names = " and ".join(repr(e.name) for e, _, _ in found)
+    here.stopped = f"event {names} ended the motion at t = {here.t:.6g} s"
+    return [(e, "ended the motion") for e, _, _ in found]
+
+
+DO: Mapping[type[Action], Callable[[Here, Found], Done]] = {
+    Set: _set,
+    Release: _released,
+    Lock: _locked,
+    Impulse: _struck,
+    Note: _noted,
+    Stop: _stopped,
+}
+"""How each kind of action is done, in this order: another kind needs a function here."""

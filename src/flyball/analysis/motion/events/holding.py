@@ -1,0 +1,82 @@
+"""Locking and releasing: modes of rows. What velocities do then is decided with everything else at the instant."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....constraints.modes import LOCK
+from ....errors import SimulationError
+from ....model.actions import Lock, Release
+from ....model.event import Event
+from ....model.held import held_by
+from ....tables.system import (
+    HELD,
+    HOLD,
+    LOWER,
+    MODE,
+    OFF,
+    SPARE,
+    SWITCH_KIND,
+    SWITCH_LOWER,
+    SWITCH_MEASURED,
+    SWITCH_UPPER,
+    UPPER,
+    VALUE,
+)
+from .here import Here
+
+CLOSED = 1e-6  # of the mechanism's length, or a radian: a joint that is let go holds again where it is closed
+GONE = 1.0  # in row SPARE of Work.switch: an element that was released; whatever it does, it does not
+
+
+def hold(here: Here, e: Event, a: Lock) -> str:
+    """Hold coordinates where they are, a joint where it is closed, or have a limit or rope in force again.
+
+    Raises
+    ------
+    SimulationError
+        If the joint is open.
+    """
+    W, S = here.c.work, here.c.system
+    held = held_by(here.structure.model, e, a)
+    for k in switches(here, held.coordinates, held.joint, held.element):
+        if held.element:
+            W.switch[SPARE, k] = 0.0
+            W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_x[k, SWITCH_LOWER], S.switch_x[k, SWITCH_UPPER]
+            continue
+        x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
+        if held.joint and abs(x) > CLOSED * here.c.values.length:
+            raise SimulationError(
+                f"at t = {here.t:.9g} s {a.title} in {e.title}: it is open by {abs(x):.3g}, and holds again only where "
+                f"its bodies meet; let the event be where they do",
+                t=here.t,
+            )
+        if W.switch[MODE, k] == OFF:
+            W.switch[HOLD, k] = 0.0 if held.joint else x
+        W.switch[MODE, k] = HELD
+    return f"{a.what} is in force" if held.element else f"locked {a.what}"
+
+
+def let_go(here: Here, e: Event, a: Release) -> str:
+    """Let coordinates, a joint, a limit or a rope go."""
+    W = here.c.work
+    ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
+    held = held_by(here.structure.model, e, a)
+    for k in switches(here, held.coordinates, held.joint, held.element):
+        W.switch[MODE, k], ways[k] = OFF, 0.0
+        if held.element:
+            W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
+    return f"released {a.what}"
+
+
+def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
+    """Numbers of the rows that hold these coordinates, or are those of a joint or element."""
+    kinds = here.c.system.switch_i[:, SWITCH_KIND]
+    out = []
+    for k, spec in enumerate(here.structure.switches):
+        own = isinstance(spec.element, Event)
+        if (own and spec.switch.label in coordinates) or (
+            not own and spec.element.name == (joint or element) and (kinds[k] == LOCK) == bool(joint)
+        ):
+            out.append(k)
+    return out

@@ -1,0 +1,74 @@
+"""Times known beforehand at which steps end: corners of laws of time, begins and ends of what they do briefly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....laws.breaks import Breaks, found_beforehand, margin
+from ....numerics.integrators import clock as ex
+from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW
+from ...compiled import Compiled
+
+LAWS = 3  # of a force
+
+
+def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
+    """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
+    S = c.system
+    guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
+    forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
+    starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards])
+    return found_beforehand(S.code.tolist(), S.const, starts.tolist(), t0, t1)
+
+
+class Legs:
+    """The stretches of time between breaks, one after the other.
+
+    A law that is sharp at a time may belong to either side there: a step ends a little before, the next begins as
+    little behind, with what the equations are there.
+
+    Parameters
+    ----------
+    clock : Clock
+        As the motion begins.
+    found : Breaks
+    """
+
+    def __init__(self, clock: ex.Clock, found: Breaks) -> None:
+        self.clock, self.end = clock, float(clock.real[ex.T_END])
+        self.times, self.sharp = found.times, found.sharp
+        self.at = 0
+        self.aim()
+
+    def aim(self) -> None:
+        """Have the clock run to the end of the stretch."""
+        end = self.end
+        if self.at < len(self.times):
+            end = float(self.times[self.at])
+            if self.sharp[self.at]:
+                end -= margin(end)
+        self.clock.real[ex.T_END] = end
+
+    def whole(self) -> None:
+        """Have it run to the end of the motion."""
+        self.clock.real[ex.T_END] = self.end
+
+    def anew(self) -> None:
+        """Begin with the first one."""
+        self.at = 0
+        self.aim()
+
+    def next(self) -> bool:
+        """Go on with the next one, if there is one."""
+        if self.at == len(self.times):
+            return False
+        real, t = self.clock.real, float(self.times[self.at])
+        if self.sharp[self.at]:
+            behind = t + margin(t)
+            self.clock.y[ex.NOW] += (behind - real[ex.T]) * self.clock.K[0]
+            real[ex.T] = behind
+            self.clock.count[ex.STARTED] = 0
+        real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
+        self.at += 1
+        self.aim()
+        return True
