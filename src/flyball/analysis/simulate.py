@@ -37,6 +37,7 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
+from .motion.touches import with_places
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
@@ -83,6 +84,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
+    model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
     begun.since = started
     if o.stabilization != "projection":
@@ -108,10 +110,11 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if model.contacts or model.bulk:
+        if model.bulk or any(not e.switches() for e in model.limits):
+            part = next((e for e in model.limits if not e.switches()), None) or model.bulk[0]
             raise ModelError(
-                f"method={o.method!r} integrates smooth motion, and {model.name!r} has contact: leave method out, or "
-                f"give method='impulse'"
+                f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
+                f"out, or give method='impulse'"
             )
         return o
     if unknown := smooth_only(model):

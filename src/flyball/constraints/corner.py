@@ -15,6 +15,7 @@ from .touch import face, outward, slip
 
 KIND_HEIGHT = 14
 KIND_SLIDE = 15
+SINGLE = True
 ALIKE = 1e-9  # of its distance from the middle: nearer by less is as near
 
 

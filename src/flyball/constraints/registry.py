@@ -6,6 +6,7 @@ A file says ``KIND``, its number (or ``ROWS``, several numbers and their formula
 - ``TURNS = True``: its value is an angle, of which whole turns are counted (parameter 0 says whether to);
 - ``POINTS``: of which of its frames, ``"F"``, ``"M"`` or both, it sees the origin only and makes no
   torque there;
+- ``SINGLE = True``: it decides by its numbers, so results ask for one time after another;
 - ``foot`` and ``progress``: it leans on a place on a curve: where that is, and how fast it moves. Parameters 1 and 2
   then say where the curve's two splines stand.
 """
@@ -32,6 +33,7 @@ class Kind:
     points: str = ""
     foot: Callable | None = None
     progress: Callable | None = None
+    single: bool = False
 
     @property
     def place(self) -> bool:
@@ -45,7 +47,8 @@ def _kinds_of(module: ModuleType) -> list[Kind]:
     points = getattr(module, "POINTS", "")
     foot = getattr(module, "foot", None)
     progress = module.progress if foot is not None else None
-    return [Kind(number, row, often, turns, points, foot, progress) for number, row in rows.items()]
+    single = getattr(module, "SINGLE", False)
+    return [Kind(number, row, often, turns, points, foot, progress, single) for number, row in rows.items()]
 
 
 def ordered(found: list[Kind]) -> tuple[Kind, ...]:

@@ -19,6 +19,7 @@ from ..math.vec import add, cross, dot, mtv, mv, neg, scale, sub
 
 KIND_GAP = 12
 KIND_SLIP = 13
+SINGLE = True
 
 
 @formula

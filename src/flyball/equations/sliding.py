@@ -73,7 +73,10 @@ def slide(S, W, k, work, f):
     if not slides(S, W, s):
         return
     d, e, speed = heading(S, W, W.sensed, s)
-    push = -S.switch_x[s, SWITCH_SLIDING] * W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]
+    pressed, mu = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]], S.switch_x[s, SWITCH_SLIDING]
+    if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
+        mu = 1.0 + 0.0 * mu
+    push = -mu * pressed
     for side in range(2):
         m = S.force_i[k, FORCE_F] if side == 0 else S.force_i[k, FORCE_M]
         if m < 0:

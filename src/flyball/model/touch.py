@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ..constraints import along
 from ..constraints.blocks import Row
 from ..constraints.corner import foot
 from ..constraints.modes import SLIP, STOP
@@ -56,6 +57,11 @@ class Touch(TwoFrameForce):
     kind: ClassVar[int] = 1000  # behind all others; no formula of its own: it acts by its switches
     outputs: ClassVar[dict[str, str]] = {"gap": "m", "normal": "N", "friction": "N", "slip": "m/s"}
     sliding: ClassVar[bool] = True
+
+    @property
+    def radius(self) -> float:
+        """Of the ball about M's origin; 0 of a corner."""
+        return self.gap[7] if int(self.gap[0]) == along.KIND else self.gap[4]
 
     def placed(self, n: SimpleNamespace, planar: bool) -> dict[str, WorldFrame]:
         """Its frames."""

@@ -133,4 +133,4 @@ def creep(result: Result) -> dict[str, tuple[float, float]]:
 
 def _with_loads(result: Result) -> list[Any]:
     """Forces that follow what a joint carries: friction."""
-    return result.values.structure.loads
+    return [e for e in result.values.structure.loads if hasattr(e, "load")]

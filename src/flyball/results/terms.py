@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..constraints.registry import KINDS
 from ..equations.rows import COEFFICIENT, parameters
 from ..math.vec import neg, scale
@@ -26,7 +28,21 @@ def term(result: Result, k: int) -> tuple[Record, Record, tuple]:
     t = x.structure.terms[k]
     F, M = result.records.frame(t.F), result.records.frame(t.M)
     hint: Any = result.states[:, t.hint] if t.hint >= 0 else 0.0
-    return F, M, KINDS[t.formula.kind].row(parameters(x.system.term_x, k), F, M, hint, x.system.const)
+    kind, par = KINDS[t.formula.kind], parameters(x.system.term_x, k)
+    if kind.single:
+        return F, M, _one_by_one(kind.row, par, (F, M, hint + result.records.zeros()), x.system.const)
+    return F, M, kind.row(par, F, M, hint, x.system.const)
+
+
+def _one_by_one(row: Any, par: tuple, over: tuple[Record, Record, np.ndarray], const: np.ndarray) -> tuple:
+    """What a formula gives at one time after another, as arrays over time."""
+    F, M, hint = over
+    n = len(hint)
+    sides = [[tuple(np.broadcast_to(np.stack(np.broadcast_arrays(*x), -1), (n, len(x)))) for x in r] for r in (F, M)]
+    one = [row(par, *(tuple(tuple(x[i]) for x in r) for r in sides), hint[i], const) for i in range(n)]
+    parts = zip(*one, strict=True) if one else ((), (), (), (), ())
+    value, force, on_M, on_F, bias = (np.array(x, hint.dtype) for x in parts)
+    return value, *(tuple(x.reshape(n, 3).T) for x in (force, on_M, on_F)), bias
 
 
 def coefficient(result: Result, k: int) -> float:

@@ -191,6 +191,6 @@ def _force_frames(s: Structure, new: np.ndarray) -> None:
     """New numbers of frames in the force table."""
     table = s.tables["force_i"]
     for k, e in enumerate(s.forces):
-        for column in (1,) if hasattr(e, "effort") else (0, 1):
+        for column in frame_columns(e):
             if table[k, column] >= 0:
                 table[k, column] = new[table[k, column]]

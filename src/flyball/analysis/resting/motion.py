@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from ...constraints.modes import BRANCH, ELASTIC, FRICTION
@@ -18,7 +20,7 @@ from .holds import constraint
 
 
 def frozen_modes(
-    model: Model, about: Result, parameters: dict[str, float], analysis: str
+    model: Model, about: Result, parameters: Mapping[str, float], analysis: str
 ) -> tuple[Model, Assembly, tuple]:
     """The model with what held where a motion ended as constraints, that state of it, and what has to be said.
 

@@ -48,7 +48,10 @@ def got(W, m, rows):
 def quintic(ends, m, x, h):
     """Value and rate at a part x of the step of what has values, rates and accelerations ``ends[end, :, m]``."""
     f, u, a = ends[0, 0, m], h * ends[0, 1, m], h * h * ends[0, 2, m]
-    d0 = ends[1, 0, m] - f - u - 0.5 * a
+    last = ends[1, 0, m]
+    if f == 0.0 and last == 0.0:  # a velocity that is no rate of anything: the integral of its own cubic
+        last = 0.5 * (u + h * ends[1, 1, m]) + (a - h * h * ends[1, 2, m]) / 12.0
+    d0 = last - f - u - 0.5 * a
     d1 = h * ends[1, 1, m] - u - a
     d2 = h * h * ends[1, 2, m] - a
     c3 = 10.0 * d0 - 4.0 * d1 + 0.5 * d2

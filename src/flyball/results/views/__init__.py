@@ -10,12 +10,14 @@ from ...model.coupling import Coupling
 from ...model.force import Force
 from ...model.joint import Joint
 from ...model.sensor import IMU, Sensor
+from ...model.touch import Touch
 from .base import View as View
 from .drivers import CouplingView, DriverView
 from .forces import ForceView
 from .joints import JointView
 from .points import PointView
 from .sensors import IMUView, SensorView
+from .touches import TouchView
 
 if TYPE_CHECKING:
     from ..result import Result
@@ -25,6 +27,7 @@ VIEWS: tuple[tuple[type, type[View]], ...] = (
     (Frame, PointView),
     (Joint, JointView),
     (Coupling, CouplingView),
+    (Touch, TouchView),
     (Force, ForceView),
     (Driver, DriverView),
     (Sensor, SensorView),

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
 from ....errors import SimulationError
 from ....model.words import listing
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from .instant import Instant, Part
 from .modes import Decided
 
-ROLES = {STOP: "is closed", FRICTION: "has friction", ONE_WAY: "goes one way only", LOCK: "is locked"}
+ROLES = {
+    STOP: "is closed",
+    FRICTION: "has friction",
+    ONE_WAY: "goes one way only",
+    SLIP: "has friction",
+    LOCK: "is locked",
+}
 
 
 def who(n: Instant, parts: list[Part]) -> str:

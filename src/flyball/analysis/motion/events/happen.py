@@ -9,7 +9,7 @@ import numpy as np
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND
-from ....tables.system import G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
 from .actions import act, act_at_start
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
@@ -159,6 +159,6 @@ def broken(n: Instant, found: Decided) -> np.ndarray:
     out = [
         k
         for k, (kind, s, _) in enumerate(n.S.guard_i.tolist())
-        if kind in (G_PULL, G_HOLDS) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
+        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
     ]
     return np.array(out, np.int64)

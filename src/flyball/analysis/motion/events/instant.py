@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....equations.engine import Sheet, engine, through
 from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
 from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
 from ....numerics.cone.dense.problem import ENDED, FREE, Dense, dense
-from ....numerics.integrators.clock import COUNTS, REALS, STATES, Clock, T
+from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
     EFFORT,
@@ -35,10 +35,11 @@ from .holding import GONE
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
 STILL = 1e-11  # of the terms of a rate: their rounding
 SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the motion: the same where all is at rest
 NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
-DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK)  # kinds whose modes follow from the small problem
+DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
 class Part(NamedTuple):
@@ -114,13 +115,13 @@ class Instant:
         self.ask(MOTION)
         self.x, self.rate = W.sensed[VALUE, self.m].copy(), W.sensed[RATE, self.m].copy()
         self.near = NEAR * self.unit
-        self.still, v = np.zeros(len(self.m)), np.abs(self.here.v)
+        self.still, v = REST * self.unit / self.here.clock.real[SPAN], np.abs(self.here.v)
         most, nr = v.max(initial=0.0), len(S.row_i)
         for s, m in enumerate(self.m.tolist()):
             if m >= 0:
                 at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
                 G = np.abs(W.G[at])
-                self.still[s] = STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
+                self.still[s] += STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
 
     def bared(self) -> None:
         """Switch off what is decided; friction without a load that slides goes on doing so."""

@@ -16,6 +16,7 @@ from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
+from .slips import loose, slide_on, write_slips
 
 TIED = 1e-7  # of the forces that a force is the difference of: as good as none
 CASCADE = 20  # times that others are asked again after some began to slide
@@ -46,27 +47,28 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     """
     parts = of_accelerations(n, at, still)
     found = solved(n, parts)
-    if found.ended == FOUND and (loose := _loose(n, found, fired)):
-        other = solved(n, [_let_go(p, found.x[i]) if i in loose else p for i, p in enumerate(parts)])
+    if found.ended == FOUND and (let_go := _loose(n, found, fired)):
+        other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
         found = other if other.ended == FOUND else found
     if found.ended == FOUND:
         write(n, found, still)
     return found
 
 
-def _loose(n: Instant, found: Decided, fired: np.ndarray) -> set[int]:
-    """Rows that hold at the very end of what they can, by guards that fired."""
+def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
+    """Rows that hold at the very end of what they can, by guards that fired, as they are when they do not."""
     ends = {int(s): int(kind) for kind, s, _ in n.S.guard_i[fired] if int(kind) in (G_PULL, G_HOLDS)}
-    out = set()
+    little = np.array([TIED * found.sizes[p.switch] for p in found.parts])
+    out = loose(n, found.parts, (found.x, found.state, found.reach, little), fired)
     for i, p in enumerate(found.parts):
         kind = ends.get(p.switch)
-        least = TIED * found.sizes[p.switch]
+        least = little[i]
         if kind is None or found.state[i] != EVEN:
             continue
         if (kind == G_PULL and p.rule == PUSHES and found.x[i] <= least) or (
             kind == G_HOLDS and p.rule == GRIPS and abs(found.x[i]) >= found.reach[i] - least
         ):
-            out.add(i)
+            out[i] = _let_go(p, found.x[i])
     return out
 
 
@@ -85,11 +87,11 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     for _ in range(CASCADE):
         ended = n.balance(B, P, False)
         slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN))
-        if ended != FOUND or not len(slips):
+        if ended != FOUND or not (slide_on(n, parts, P) or len(slips)):
             break
         for i in slips.tolist():
             P.rule[i], P.lean[i] = DRIVEN, 1.0 if P.state[i] == LOW else -1.0
-            B.way[i] = P.lean[i]
+            B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
@@ -113,5 +115,6 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
             ways[s] = p.sign if p.rule == PUSHES else 0.0
         elif kind == FRICTION:
             ways[s] = found.lean[i]
+    write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     if len(n.S.load_i):
         W.info[LEARNT] = FORGOTTEN

@@ -17,6 +17,8 @@ from ....tables.system import (
     UPPER,
 )
 from .instant import STOPS, Instant, Part
+from .slips import astray, ended
+from .slips import parts_of as slips_at
 
 SIDES = {G_LOWER: 1.0, G_UPPER: -1.0}
 
@@ -25,7 +27,10 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
     hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
     out = {}
+    gone = astray(n, fired)
     for s in np.flatnonzero(np.isin(n.kind, STOPS)).tolist():
+        if s in gone:
+            continue
         gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
         held = n.way[s] if n.mode[s] != OFF else 0.0
         at = tuple(w for w, gap in gaps.items() if gap <= n.near[s] or (s, w) in hit or w == held)
@@ -40,6 +45,7 @@ def at_rest(n: Instant, fired: np.ndarray) -> np.ndarray:
     for kind, s, _ in n.S.guard_i[fired]:
         if int(kind) in (G_SLIDES, G_BACK):
             still[int(s)] = True
+    ended(n, fired, still)
     return still
 
 
@@ -49,6 +55,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
     for s, kind in enumerate(n.kind.tolist()):
         if kind in STOPS and s in at:
             out += _stop(s, at[s])
+            out += slips_at(n, s, len(out) - 1, still, led=False)
         elif kind == ONE_WAY:
             out.append(Part(s, PUSHES, state=EVEN))
         elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:
@@ -67,6 +74,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
     for s, kind in enumerate(n.kind.tolist()):
         if kind in STOPS and s in at and still[s]:
             out += _stop(s, at[s])
+            out += slips_at(n, s, len(out) - 1, still, led=True)
         elif kind == ONE_WAY and still[s]:
             out.append(Part(s, PUSHES, state=EVEN if n.mode[s] != OFF else FREE))
         elif kind == LOCK and n.m[s] >= 0 and n.mode[s] != OFF:

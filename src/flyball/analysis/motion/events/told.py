@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, STOP
+from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ....model.touch import Touch
 from ....results.events import Happening
 from ....results.struck import Struck
-from ....tables.system import MODE, OFF
+from ....tables.system import MODE, OFF, SWITCH_PARTNER
 from .instant import Instant
 from .jump import Jump
 
@@ -15,14 +16,17 @@ HELD_WORDS = {STOP: ("close", "closes"), FRICTION: ("stick", "sticks"), ONE_WAY:
 HELD_WORDS |= {RATCHET: ("latch", "latches"), ELASTIC: ("close", "is pressed")}
 FREE_WORDS = {STOP: ("open", "opens"), FRICTION: ("slip", "slides"), ONE_WAY: ("overrun", "overruns"), LOCK: ("", "")}
 FREE_WORDS |= {RATCHET: ("unlatch", "lets go"), ELASTIC: ("open", "lets go")}
+HELD_WORDS |= {SLIP: ("stick", "sticks")}
+FREE_WORDS |= {SLIP: ("slip", "slides")}
 ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
+PLACE_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
 
 
 def words(n: Instant, s: int, held: bool) -> tuple[str, str]:
     """Kind and words of what switch s did."""
     kind, said = (HELD_WORDS if held else FREE_WORDS).get(int(n.kind[s]), ("", ""))
     if n.here.structure.switches[s].switch.path and kind in ROPE_WORDS:
-        return ROPE_WORDS[kind]
+        return (PLACE_WORDS if isinstance(n.here.structure.switches[s].element, Touch) else ROPE_WORDS)[kind]
     return kind, said
 
 
@@ -71,11 +75,16 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
             kind, said = words(n, s, now)
             if kind:
                 told.setdefault(kind, []).append((s, said))
-        elif not was and not now and n.kind[s] == FRICTION and ways[s] * n.ways()[s] < 0.0:
+        elif not was and not now and _goes_both_ways(n, s) and ways[s] * n.ways()[s] < 0.0:
             told.setdefault("turn", []).append((s, "slides the other way"))
     for kind, all_of in told.items():
         names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
         record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
+
+
+def _goes_both_ways(n: Instant, s: int) -> bool:
+    """Whether a switch slides one way or the other: not a tangent of a place in space."""
+    return bool(n.kind[s] == FRICTION or (n.kind[s] == SLIP and n.S.switch_i[s, SWITCH_PARTNER] < 0))
 
 
 def record(

@@ -1,0 +1,124 @@
+"""Slips of places of contact in the small problem: what sticks or slides at a gap that is closed, by its own force.
+
+In the plane a slip is one row that GRIPS, in space two that are TURNS and WITH; what they hold is mu times the force of
+the gap. What slides with a speed slides a known way: DRIVEN.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....constraints.modes import SLIP
+from ....numerics.cone.dense.problem import DRIVEN, EVEN, GRIPS, SLIPS, TURNS, WITH, Dense
+from ....tables.system import (
+    G_ASTRAY,
+    G_CONE,
+    G_TURNS,
+    HELD,
+    HOLD,
+    MODE,
+    OFF,
+    SWITCH_OTHER,
+    SWITCH_PARTNER,
+    SWITCH_REST,
+    SWITCH_SLIDING,
+)
+from .instant import Instant, Part
+
+SLOW = 1e3  # times what is still: slower where the end of a slip in space was found, it is over
+
+
+def slips_of(n: Instant, gap: int) -> list[int]:
+    """Slips of the place of a gap: none, one or two in a row."""
+    return np.flatnonzero((n.kind == SLIP) & (n.S.switch_i[:, SWITCH_OTHER] == gap)).tolist()
+
+
+def astray(n: Instant, fired: np.ndarray) -> set[int]:
+    """Gaps of corners that have left their face."""
+    return {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_ASTRAY}
+
+
+def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:
+    """Whether slips are over, into ``still``: of a pair both or none."""
+    done = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_TURNS}
+    for s in np.flatnonzero(n.kind == SLIP).tolist():
+        other = int(n.S.switch_i[s, SWITCH_PARTNER])
+        if other < 0:
+            still[s] |= s in done
+        elif s < other:
+            slow = np.hypot(n.rate[s], n.rate[other]) <= SLOW * (n.still[s] + n.still[other])
+            still[[s, other]] = (still[s] and still[other]) or (slow and s in done)
+
+
+def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> list[Part]:
+    """Rows of the slips of a gap, which is row ``at``.
+
+    What slides does so its known way if ``led``; else it is asked where to, as in an impact.
+    """
+    own = slips_of(n, gap)
+    if not own:
+        return []
+    held = bool(still[own].all())
+    mu = float(n.S.switch_x[own[0], SWITCH_REST if held else SWITCH_SLIDING])
+    if held or not led:
+        rules = (GRIPS,) if len(own) == 1 else (TURNS, WITH)
+        return [Part(s, rule, state=EVEN, gain=mu, of=at) for s, rule in zip(own, rules, strict=True)]
+    d = n.rate[own] / np.linalg.norm(n.rate[own])
+    return [Part(s, DRIVEN, lean=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
+
+
+def slide_on(n: Instant, parts: Sequence[Part], P: Dense) -> bool:
+    """Let what begins to slip hold what it carries in motion. Returns whether that is another problem."""
+    other = False
+    for i, p in enumerate(parts):
+        if n.kind[p.switch] == SLIP and P.rule[i] != WITH and P.state[i] != EVEN:
+            mu = float(n.S.switch_x[p.switch, SWITCH_SLIDING])
+            other |= P.gain[i, p.of] != mu
+            P.gain[i, p.of] = mu
+    return other
+
+
+def loose(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...], fired: np.ndarray) -> dict[int, Part]:
+    """Rows that stick at the very end of what they hold, by guards that fired, as what slides.
+
+    ``found`` are forces, states, reaches, and forces that are nothing.
+    """
+    x, state, reach, least = found
+    ends = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_CONE}
+    out = {}
+    for i, p in enumerate(parts):
+        own = [i] if p.rule == GRIPS else [i, i + 1]
+        if p.switch not in ends or p.rule not in (GRIPS, TURNS) or n.kind[p.switch] != SLIP or state[i] != EVEN:
+            continue
+        size = float(np.linalg.norm(x[own]))
+        if size >= reach[i] - least[i]:
+            mu = float(n.S.switch_x[p.switch, SWITCH_SLIDING])
+            for k in own:
+                out[k] = parts[k]._replace(rule=DRIVEN, lean=-float(x[k]) / size if size else 0.0, gain=mu)
+    return out
+
+
+def write_slips(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...]) -> None:
+    """Modes and ways of all slips: they stick or slide where the gap is closed.
+
+    ``found`` are states, forces, rates, and ways that are known.
+    """
+    state, x, u, lean = found
+    W, ways = n.W, n.ways()
+    slips = np.flatnonzero(n.kind == SLIP)
+    W.switch[MODE, slips], W.switch[HOLD, slips] = OFF, 0.0
+    for i, p in enumerate(parts):
+        own = slips_of(n, int(n.S.switch_i[p.switch, SWITCH_OTHER])) if n.kind[p.switch] == SLIP else [-1]
+        if p.switch != own[0] or state[p.of] != EVEN:
+            continue
+        rows = np.arange(i, i + len(own))
+        if (state[rows] == EVEN).all():
+            W.switch[MODE, own], ways[own] = HELD, 0.0
+            continue
+        d = lean[rows]
+        if state[i] == SLIPS:  # the way it accelerates; against its friction, where that is none
+            d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
+            d = d / np.linalg.norm(d)
+        ways[own] = d
