@@ -89,6 +89,9 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if not all(np.isfinite(x).all() for x in (r.q, r.v, r.vdot, r.multipliers, r.states)):
         return Verdict("broken", "the result is not finite")
     str(r.health)
+    lost = r.exchanged.get("impact_loss", np.zeros(1))
+    if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):
+        return Verdict("broken", f"an impact gives energy: {np.diff(lost, prepend=0.0).min():.3g} J")
     moved = energy_moved(r)
     energy = r.health.energy_drift / moved if moved > 0.0 else 0.0
     out = Verdict("healthy", "", r.health.violation / r.values.length, energy, r.health.acceleration_violation)
