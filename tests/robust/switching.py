@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -60,7 +61,7 @@ def rope(d: Dice, m: fb.Mechanism, name: str):
     bodies = d.random.sample(["ground", *(b.name for b in m.bodies)], d.whole(2, min(3, len(m.bodies) + 1)))
     first = m[bodies[0]].position if bodies[0] != "ground" else (0.0,) * (2 if m.planar else 3)
     points = [d.near(m[b].position if b != "ground" else first, 0.4) for b in bodies]
-    drawn = sum(math.dist(a, b) for a, b in zip(points, points[1:], strict=False))
+    drawn = sum(math.dist(a, b) for a, b in itertools.pairwise(points))
     length = d.pick([{}, {"length": drawn * d.number(1.0, 1.3)}])
     return fb.Rope(name, bodies=bodies, at=points, **length, **_bounce(d))
 
