@@ -106,12 +106,13 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Stepping() if model.contacts or model.bulk else USUAL)
+        stepped = (model.contacts or model.bulk) and not smooth_only(model)
+        o = replace(o, method=Stepping() if stepped else USUAL)
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if model.bulk or any(not e.switches() for e in model.limits):
-            part = next((e for e in model.limits if not e.switches()), None) or model.bulk[0]
+        if model.bulk:
+            part = model.bulk[0]
             raise ModelError(
                 f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
                 f"out, or give method='impulse'"

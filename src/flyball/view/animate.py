@@ -17,6 +17,7 @@ from .arrows import arrows, rope_ends
 from .facts import facts
 from .gears import Wheel
 from .looks import Looks
+from .marks import marks
 from .places import Places, three
 from .recording import (
     SHOW,
@@ -119,6 +120,7 @@ def record(
         down=_down(result),
         sets=sets,
         contacts=contacts,
+        marks=marks(result) if told else (),
     )
 
 

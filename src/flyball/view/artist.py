@@ -31,7 +31,7 @@ def draw(pictures: Sequence[Picture], folder: Path) -> list[Path]:
     with styled():
         for picture, path in zip(pictures, written, strict=True):
             shown = picture.shown
-            drawing = _over_time(picture.t, shown) if isinstance(shown, Figure) else _paths(shown)
+            drawing = _over_time(picture, shown) if isinstance(shown, Figure) else _paths(shown)
             headed(drawing, picture.title)
             handed_out(drawing, path)
     return written
@@ -53,10 +53,10 @@ def main() -> None:
         sys.exit(1)
 
 
-def _over_time(t: np.ndarray, figure: Figure) -> Drawing:
+def _over_time(picture: Picture, figure: Figure) -> Drawing:
     """A figure of curves over time; the balance of energies takes less room than they do."""
     ratios = [*([1.6] if len(figure.panels) == 2 else [1.0] * (len(figure.panels) - 1)), 0.8]
-    drawing = stacked(t, figure.panels, ratios if figure.name == "energy" else [])
+    drawing = stacked(picture.t, figure.panels, ratios if figure.name == "energy" else [], picture.marks)
     if figure.note:
         drawing.supxlabel(figure.note, fontsize=8, x=0.012, ha="left")
     return drawing

@@ -13,7 +13,8 @@ import numpy as np
 
 from ..errors import ModelError
 from .figures import hidden
-from .recording import Panel
+from .marks import draw_marks
+from .recording import Mark, Panel
 from .writing import cannot
 
 if TYPE_CHECKING:
@@ -158,8 +159,8 @@ def _plain_numbers() -> Any:
     return PlainNumbers
 
 
-def stacked(t: np.ndarray, parts: Sequence[Panel], ratios: Sequence[float] = ()) -> Drawing:
-    """Panels over the times ``t``, one below the other; high enough for their legends."""
+def stacked(t: np.ndarray, parts: Sequence[Panel], ratios: Sequence[float] = (), marks: Sequence[Mark] = ()) -> Drawing:
+    """Panels over the times ``t``, one below the other; high enough for their legends. Marks of events through all."""
     each = [max(2.3, 0.5 + 0.19 * len(p.curves)) for p in parts]
     heights = [h * r for h, r in zip(each, ratios or [1.0] * len(each), strict=False)]
     drawing = new_figure(0.9 + sum(heights))
@@ -167,6 +168,7 @@ def stacked(t: np.ndarray, parts: Sequence[Panel], ratios: Sequence[float] = ())
     for ax, panel in zip(axes, parts, strict=True):
         _over_time(ax, t, panel)
     axes[-1].set_xlabel("time [s]")
+    draw_marks(list(axes), marks)
     return drawing
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..model.body import GROUND
 from .figures import centre, few, figures, movers, some
+from .marks import marks
 from .recording import Figure, Picture, PointPaths
 
 if TYPE_CHECKING:
@@ -25,7 +26,8 @@ def standard_pictures(result: Result) -> list[Picture]:
     found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(result)}
     if len(result.t):
         found["paths"] = _paths(result)
-    return [Picture(k, f"{result.model.name}: {k}", result.t, found[k]) for k in ORDER if k in found]
+    when = marks(result)
+    return [Picture(k, f"{result.model.name}: {k}", result.t, found[k], when) for k in ORDER if k in found]
 
 
 def _paths(result: Result) -> PointPaths:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from .artist import draw
 from .drawing import handed_out, headed, stacked, styled
 from .figures import panels
+from .marks import marks
 from .pictures import standard_pictures
 from .recording import Channel
 
@@ -39,7 +40,7 @@ def plot(result: Result, *names: str, path: str | os.PathLike | None = None) -> 
     """
     curves = {c.name: c for name in names or ("energy",) for c in _curves(result, name)}
     with styled():
-        drawing = stacked(result.t, tuple(panels(list(curves.values()), len(curves))))
+        drawing = stacked(result.t, tuple(panels(list(curves.values()), len(curves))), marks=marks(result))
         headed(drawing, result.model.name)
         return handed_out(drawing, path)
 

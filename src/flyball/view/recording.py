@@ -216,6 +216,15 @@ class Figure:
 
 
 @dataclass(frozen=True)
+class Mark:
+    """What happened at an instant ``t`` [s], as a mark on a time axis: its text, and whether it is a line or a tick."""
+
+    t: float
+    text: str
+    line: bool = True
+
+
+@dataclass(frozen=True)
 class PointPaths:
     """Paths of points by name, each (n, 3) [m], world axes."""
 
@@ -232,6 +241,7 @@ class Picture:
     title: str
     t: np.ndarray
     shown: Figure | PointPaths
+    marks: tuple[Mark, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -277,6 +287,7 @@ class Recording:
     modes: tuple[RecordedMode, ...] = ()  # to choose from, in place of one motion
     sets: tuple[RecordedSet, ...] = ()
     contacts: RecordedContacts | None = None
+    marks: tuple[Mark, ...] = ()  # of what happened at instants
 
 
 SHOW = {

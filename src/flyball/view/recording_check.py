@@ -46,6 +46,9 @@ def check(recording: Recording) -> None:
     for mode in recording.modes:
         if not t[0] <= mode.begin < mode.end <= t[-1]:
             raise ValueError(f"mode {mode.name!r}: from {mode.begin} to {mode.end} is no stretch of the recorded times")
+    for mark in recording.marks:
+        if not np.isfinite(mark.t):
+            raise ValueError(f"mark {mark.text!r}: its time is {mark.t}")
     for name in recording.show:
         _check_kind(f"recording {recording.name!r}: show", name, tuple(SHOW))
     _check_riders(recording)

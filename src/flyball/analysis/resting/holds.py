@@ -18,14 +18,15 @@ from ...equations.loads import wide
 from ...equations.records import load as record
 from ...errors import ModelError
 from ...joints.coupler import Coupler
-from ...joints.distance import Distance
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
 from ...model.element import Element, element
 from ...model.model import Model
 from ...model.switch import Switch
 from ...results.result import Result
+from ...tables.specs import FrameSpec
 from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, SWITCH_LOWER, SWITCH_UPPER, VALUE
+from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..linear.curves import snapshot
@@ -34,6 +35,7 @@ from ..linear.rest import Rest
 from ..untouched import holding_parts
 from .closed import CLOSED, Place
 from .forces import Carried, carried
+from .joints import Centres
 
 LOADS, SETTLED = 30, 1e-10  # rounds for friction that follows its load, and a part of it that is no change
 BOTH = 0.0
@@ -89,7 +91,7 @@ def holds(model: Model, at: Assembly) -> Holds:
         lower, upper = (float(S.switch_x[k, n]) for n in (SWITCH_LOWER, SWITCH_UPPER))
         sign = _sign(x.switch.kind, value, lower, upper, CLOSED * size)
         if sign is not None:
-            out.parts.append(constraint(x.element, x.switch, c.values.numbers[x.element.name], value))
+            out.parts.append(constraint(x.element, x.switch, c.values, value))
             out.signs[x.element.name] = sign
             if x.switch.kind == FRICTION:
                 out.sticks[x.element.name] = x.element
@@ -109,13 +111,16 @@ def _sign(kind: int, x: float, lower: float, upper: float, near: float) -> float
     return {FRICTION: BOTH, LOCK: None, ONE_WAY: 1.0}.get(kind)
 
 
-def constraint(e: Any, w: Switch, n: Any, value: float) -> Element:
+def constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
     """The constraint that holds a switch's quantity where it is."""
     if w.along:
-        weights = e.switch_weights(n, w.label) if w.summed else (1.0,)
+        weights = e.switch_weights(x.numbers[e.name], w.label) if w.summed else (1.0,)
         return Held(e.name, w.along, weights=tuple(float(np.real(x)) for x in weights), value=value)
     if len(w.path) == 1:
-        return Distance(e.name, *e.bodies, at=e.at, length=value)
+        ends = [x.poses.world(FrameSpec(0, e, role)) for role in e.ends()]
+        frames = [tuple(np.real(np.r_[p, np.ravel(R)]).tolist()) for p, R in ends]
+        at = frames[0][: 2 if x.structure.model.planar else 3]
+        return Centres(e.name, *e.bodies, at=at, frames=tuple(frames), radii=(0.0, value))
     raise ModelError(
         f"{e.title} is taut, and runs over {len(w.path) - 1} more points: nothing here holds the sum of its parts. "
         f"Give it a stiffness"

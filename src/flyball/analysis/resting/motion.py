@@ -46,7 +46,7 @@ def frozen_modes(
             slides.append(e.title)
         elif not off:
             value = float(c.work.sensed[VALUE, c.structure.switches[k].measured])
-            parts.append(constraint(e, x.switch, c.values.numbers[e.name], value))
+            parts.append(constraint(e, x.switch, c.values, value))
     out = model.changed(gone)
     out.add(*parts)
     joined = compiled(out.snapshot(), parameters=base.compiled.parameters)

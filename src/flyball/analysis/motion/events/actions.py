@@ -60,7 +60,9 @@ class Acts:
         cause = next((e for e in self.events if any(isinstance(a, (Lock, Impulse)) for a in e.do)), self.events[0])
         for e in self.events:
             lost = sum(h.lost for h in mine) if e is cause else 0.0
-            impulses = {k: x for h in mine for k, x in h.impulses.items()} if e is cause else {}
+            impulses: Any = {} if e is not cause or not mine else mine[0].impulses
+            if e is cause and len(mine) > 1:
+                impulses = {k: x for h in mine for k, x in h.impulses.items()}
             done = tuple(self.words.get(e.name, ()))
             here.records.append(Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy()))
         here.records += [h for h in since if not any(h is x for x in mine)]
@@ -102,10 +104,9 @@ def act(here: Here, fired: Sequence[int]) -> Acts:
     SimulationError
         If actions contradict one another, or cannot be done; it names the events and the time.
     """
-    guards = [int(g) for g in fired if int(g) in here.structure.events]
-    events = [here.structure.events[g] for g in guards]
+    events = [here.structure.events[int(g)] for g in fired if int(g) in here.structure.events]
     events = [e for e in events if e.times is None or here.counts.get(e.name, 0) < e.times]
-    return _acted(here, tuple(events), guards)
+    return _acted(here, tuple(events))
 
 
 def act_at_start(here: Here) -> Acts:
@@ -113,10 +114,10 @@ def act_at_start(here: Here) -> Acts:
     for k, spec in enumerate(here.structure.switches):
         if spec.held:
             here.c.work.switch[MODE, k] = HELD
-    return _acted(here, tuple(e for e in here.structure.model.events if e.at_start), [])
+    return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
 
-def _acted(here: Here, events: tuple[Event, ...], fired: Sequence[int]) -> Acts:
+def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
     acts = Acts(here, events, before=here.y.copy(), first=len(here.records))
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
@@ -125,7 +126,7 @@ def _acted(here: Here, events: tuple[Event, ...], fired: Sequence[int]) -> Acts:
         return acts
     here.evaluate()
     for g in here.structure.events:
-        acts.values[g] = 0.0 if g in fired else expression(here, g)
+        acts.values[g] = expression(here, g)
     refuse_contradictions(here, every)
     reckoned = [(e, a, [_reckoned(here, e, a, k, x) for k, x in a.laws()]) for e, a in every]
     for kind, do in DO.items():

@@ -54,7 +54,8 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
-        here.seen = Segments()
+        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i)
+        here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 
     def _loop(self) -> Watched:
@@ -100,7 +101,7 @@ class Run:
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
-            self.here.seen.anew()
+            self.here.seen = self.here.seen and Segments()
             forget(self.here.c.work.stack)
             self.legs.anew()
         self.legs.aim()
@@ -131,7 +132,8 @@ class Run:
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
         self.rows.append(rows)
-        self.here.seen.add(self.here, rows)
+        if self.here.seen is not None:
+            self.here.seen.add(self.here, rows)
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""

@@ -12,12 +12,24 @@ from ....tables.system import MODE, OFF, SWITCH_PARTNER
 from .instant import Instant
 from .jump import Jump
 
-HELD_WORDS = {STOP: ("close", "closes"), FRICTION: ("stick", "sticks"), ONE_WAY: ("lock", "locks"), LOCK: ("lock", "")}
-HELD_WORDS |= {RATCHET: ("latch", "latches"), ELASTIC: ("close", "is pressed")}
-FREE_WORDS = {STOP: ("open", "opens"), FRICTION: ("slip", "slides"), ONE_WAY: ("overrun", "overruns"), LOCK: ("", "")}
-FREE_WORDS |= {RATCHET: ("unlatch", "lets go"), ELASTIC: ("open", "lets go")}
-HELD_WORDS |= {SLIP: ("stick", "sticks")}
-FREE_WORDS |= {SLIP: ("slip", "slides")}
+HELD_WORDS = {
+    STOP: ("close", "closes"),
+    FRICTION: ("stick", "sticks"),
+    SLIP: ("stick", "sticks"),
+    ONE_WAY: ("lock", "locks"),
+    LOCK: ("lock", ""),
+    RATCHET: ("latch", "latches"),
+    ELASTIC: ("close", "is pressed"),
+}
+FREE_WORDS = {
+    STOP: ("open", "opens"),
+    FRICTION: ("slip", "slides"),
+    SLIP: ("slip", "slides"),
+    ONE_WAY: ("overrun", "overruns"),
+    LOCK: ("", ""),
+    RATCHET: ("unlatch", "lets go"),
+    ELASTIC: ("open", "lets go"),
+}
 ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
 PLACE_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
 

@@ -1,10 +1,11 @@
 // The control bar: play, scrub, speed, loop, and the keys that do the same.
-import { timeDigits } from "./format.js";
+import { element, shortNumber, timeDigits } from "./format.js";
 
+const DENSE = 60; // marks that leave little room to point at one
 const STEP = 1 / 200; // of the whole span, for the arrow keys
 
 /** Wire the bar to the clock; returns what brings the bar up to date. */
-export function controlBar(bar, clock, keys) {
+export function controlBar(bar, clock, keys, marks = []) {
   const part = (name) => bar.querySelector(`[name=${name}]`);
   const [play, scrub, speed, loop] = ["play", "scrub", "speed", "loop"].map(part);
   const read = bar.querySelector("output");
@@ -17,6 +18,7 @@ export function controlBar(bar, clock, keys) {
     return digits;
   };
   span();
+  addMarks(scrub, clock, marks);
 
   play.addEventListener("click", () => clock.play(!clock.playing));
   part("start").addEventListener("click", () => clock.seek(clock.begin));
@@ -47,6 +49,22 @@ export function controlBar(bar, clock, keys) {
     play.setAttribute("aria-label", clock.playing ? "Pause" : "Play");
     play.classList.toggle("playing", clock.playing);
   };
+}
+
+/** Ticks above the track where something happened: pointing at one tells what, a click goes there. */
+function addMarks(scrub, clock, marks) {
+  const inside = clock.still ? [] : marks.filter(({ t }) => t >= clock.begin && t <= clock.end);
+  if (!inside.length) return;
+  const holder = element("span", { className: "track" });
+  scrub.replaceWith(holder);
+  holder.append(scrub);
+  holder.classList.toggle("dense", inside.length > DENSE);
+  for (const { t, text } of inside) {
+    const tick = element("button", { type: "button", className: "event", tabIndex: -1, title: `${text}, ${shortNumber(t)} s` });
+    tick.style.setProperty("--at", (t - clock.begin) / (clock.end - clock.begin));
+    tick.addEventListener("click", () => clock.seek(t));
+    holder.append(tick);
+  }
 }
 
 /** The keys that do the same. */

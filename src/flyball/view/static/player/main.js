@@ -280,10 +280,10 @@ export function start(buffer) {
   const { mechanism, stage } = picture;
   const clock = new Clock(t[0], t.at(-1), () => update());
   const seek = (time) => clock.seek(time);
-  const plots = new Plots(find(".plots"), t, seek);
+  const plots = new Plots(find(".plots"), t, seek, recording.marks);
   const figures = drawFigures(recording, seek);
   const keys = new Keys(find(".player"), find(".help"), !find(".report"));
-  const refreshBar = controlBar(find(".bar"), clock, keys);
+  const refreshBar = controlBar(find(".bar"), clock, keys, recording.marks);
   plots.picker = channelPicker(
     find(".picker"),
     find(".pick"),

@@ -101,8 +101,8 @@ export function hidden(channels) {
 
 export class Plot {
   /** One plot with its own head line, cursor and markers; `title` says what its axis shows. */
-  constructor(parent, channels, times, onSeek, title = "") {
-    Object.assign(this, { channels, times, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
+  constructor(parent, channels, times, onSeek, title = "", marks = []) {
+    Object.assign(this, { channels, times, marks, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
     this.values = channels.map(() => element("output", { className: "value" }));
     const names = channels.map((channel, k) => {
       const swatch = element("span", { className: "swatch" });
@@ -140,6 +140,7 @@ export class Plot {
       padding: [8, 12, 0, 0],
       cursor: { show: false },
       legend: { show: false },
+      hooks: { drawClear: [(chart) => this.#drawMarks(chart)] },
       scales: {
         x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
         y: { range: valueRange },
@@ -159,6 +160,25 @@ export class Plot {
         })),
       ],
     };
+  }
+
+  /** Thin lines where something happened, or short ticks. */
+  #drawMarks(chart) {
+    const { ctx, bbox } = chart;
+    const inside = this.marks.filter(({ t }) => t >= chart.scales.x.min && t <= chart.scales.x.max);
+    if (!inside.length) return;
+    ctx.save();
+    ctx.strokeStyle = css("--muted");
+    ctx.globalAlpha = 0.5;
+    ctx.lineWidth = devicePixelRatio;
+    ctx.beginPath();
+    for (const { t, line } of inside) {
+      const x = Math.round(chart.valToPos(t, "x", true)) + 0.5;
+      ctx.moveTo(x, bbox.top);
+      ctx.lineTo(x, bbox.top + (line ? 1 : 0.05) * bbox.height);
+    }
+    ctx.stroke();
+    ctx.restore();
   }
 
   #addCursor(onSeek) {
@@ -207,8 +227,8 @@ export class Plot {
 
 export class Plots {
   /** All plots in an element; `onSeek(time)` is called when the user points at a time. */
-  constructor(box, times, onSeek) {
-    Object.assign(this, { box, times, onSeek, plots: [], last: null });
+  constructor(box, times, onSeek, marks = []) {
+    Object.assign(this, { box, times, onSeek, marks, plots: [], last: null });
     this.empty = element("p", { className: "empty", textContent: "No channel is shown. Choose some above." });
     new ResizeObserver(() => this.resize()).observe(box);
   }
@@ -217,7 +237,7 @@ export class Plots {
   show(channels, together) {
     const groups = grouped(channels, together);
     for (const plot of this.plots) plot.destroy();
-    this.plots = groups.map((group) => new Plot(this.box, group, this.times, this.onSeek));
+    this.plots = groups.map((group) => new Plot(this.box, group, this.times, this.onSeek, "", this.marks));
     if (groups.length) this.empty.remove();
     else this.box.append(this.empty);
     this.resize();

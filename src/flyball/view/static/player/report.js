@@ -6,9 +6,9 @@ const HEIGHT = 190; // px
 
 /** One figure of the report: its panels, each a plot, sized with the page. */
 class Chart {
-  constructor(box, figure, times, onSeek) {
+  constructor(box, figure, times, onSeek, marks) {
     this.plots = figure.panels.map(({ label, note, curves }) => {
-      const plot = new Plot(box, curves, times, onSeek, label);
+      const plot = new Plot(box, curves, times, onSeek, label, marks);
       if (note) plot.root.append(element("figcaption", { textContent: note }));
       return plot;
     });
@@ -36,7 +36,7 @@ class Chart {
 export function drawFigures(recording, onSeek) {
   return [...document.querySelectorAll("[data-figure]")].flatMap((box) => {
     const figure = recording.figures.find(({ name }) => name === box.dataset.figure);
-    return figure ? [new Chart(box, figure, recording.t, onSeek)] : [];
+    return figure ? [new Chart(box, figure, recording.t, onSeek, recording.marks)] : [];
   });
 }
 
