@@ -118,7 +118,7 @@ def constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
         return Held(e.name, w.along, weights=tuple(float(np.real(x)) for x in weights), value=value)
     if len(w.path) == 1:
         ends = [x.poses.world(FrameSpec(0, e, role)) for role in e.ends()]
-        frames = [tuple(np.real(np.r_[p, np.ravel(R)]).tolist()) for p, R in ends]
+        frames = [tuple(np.real(np.r_[p, np.ravel(R)]).tolist()) for p, R, _ in ends]
         at = frames[0][: 2 if x.structure.model.planar else 3]
         return Centres(e.name, *e.bodies, at=at, frames=tuple(frames), radii=(0.0, value))
     raise ModelError(

@@ -32,10 +32,6 @@ class Segments:
             Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
         )
 
-    def anew(self) -> None:
-        """The motion begins anew: what was seen of it is forgotten."""
-        self.all.clear()
-
     def told(self, result: Result) -> None:
         """Give a result what held, and what events did to its energy, if anything can switch."""
         s = result.values.structure
