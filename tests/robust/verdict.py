@@ -94,6 +94,9 @@ def _healthy(r: Result, case: Case) -> Verdict:
         return Verdict("broken", f"an impact gives energy: {np.diff(lost, prepend=0.0).min():.3g} J")
     moved = energy_moved(r)
     energy = r.health.energy_drift / moved if moved > 0.0 else 0.0
+    for f in case.mechanism.forces:
+        if f.single == "friction" and np.diff(r[f.name].work).max(initial=0.0) > 1e-6 * (1e-6 + moved):
+            return Verdict("broken", f"{f.title} gives {np.diff(r[f.name].work).max():.3g} J")
     out = Verdict("healthy", "", r.health.violation / r.values.length, energy, r.health.acceleration_violation)
     if out.violation > VIOLATION and case.options.get("stabilization") != "baumgarte":
         return Verdict("broken", f"violation {out.violation:.2e}", out.violation, energy, out.residual)
