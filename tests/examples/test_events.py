@@ -130,3 +130,21 @@ def test_rocking_block():
     before, after = first.before["block.angular_velocity"], first.after["block.angular_velocity"]
     assert after / before == pytest.approx(left, rel=1e-8)
     assert r.health.energy_drift < 1e-6 * 100 * G
+
+
+def test_geneva_drive():
+    """In the slot the wheel stands at atan(sin a / (sqrt(2) - cos a)) for the crank at a from the line of centres, and turns
+    1 / (sqrt(2) - 1) times as fast as the crank half way; between, it stands still."""
+    r = example("geneva_drive.toml").simulate(3.0, outputs=601, **TIGHT)
+    a = 2 * np.pi * r.t - np.pi / 4
+    turn, a = np.divmod(a + np.pi, 2 * np.pi)
+    a = a - np.pi
+    inside = np.abs(a) < np.pi / 4
+    beta = -np.arctan2(np.sin(a), np.sqrt(2) - np.cos(a))
+    wanted = -np.pi / 4 - turn * np.pi / 2 + np.where(inside, beta, np.where(a > 0, -np.pi / 4, np.pi / 4))
+    assert np.allclose(r["axle.angle"], wanted, atol=1e-7)
+    fastest = np.abs(r["axle.angle_rate"]).max()
+    assert fastest == pytest.approx(2 * np.pi / (math.sqrt(2) - 1), rel=1e-6)
+    assert np.abs(r["axle.angle_rate"][~inside & (np.abs(a) > np.pi / 4 + 1e-6)]).max() < 1e-9
+    assert len(r.events["enter"]) + len(r.events["enter the other"]) == 2
+    assert sum(e.lost for e in r.events) < 1e-8
