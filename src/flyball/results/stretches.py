@@ -67,7 +67,7 @@ class Stretches:
     @cached_property
     def sigma(self) -> np.ndarray:
         """Direction of every switch, (ns, n)."""
-        every = [(x.sigma.reshape(len(x.sigma), -1), x.rows) for x in self.all]
+        every = [(x.sigma if x.sigma.ndim == 2 else x.sigma[:, None], x.rows) for x in self.all]
         return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
 
     def pieces(self) -> list[tuple[slice, Stretches]]:
