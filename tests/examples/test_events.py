@@ -63,7 +63,6 @@ def test_gears_with_backlash():
     assert min(abs(e.t - back) for e in r.events["teeth"]) < 1e-8
 
 
-@pytest.mark.xfail(reason="no opening is seen at tight tolerances", strict=False)
 def test_cam_follower():
     """It leaves where e w^2 sin(w t) is what weight and spring give, flies on the spring, and lands."""
     e, w, m, k, F = 0.008, 1200 * 2 * math.pi / 60, 0.3, 800.0, 20.0
