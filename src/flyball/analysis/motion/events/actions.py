@@ -19,7 +19,7 @@ from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
 from .blows import generalised
 from .here import Here
-from .holding import hold, let_go
+from .holding import gone_on, hold, let_go
 from .setting import set_parameters
 
 CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
@@ -110,10 +110,16 @@ def act(here: Here, fired: Sequence[int]) -> Acts:
 
 
 def act_at_start(here: Here) -> Acts:
-    """Do what events say at the start; joints that may let go hold."""
+    """Do what events say at the start; joints that may let go hold.
+
+    Where a motion goes on nothing starts: what was locked or released stays so.
+    """
     for k, spec in enumerate(here.structure.switches):
         if spec.held:
             here.c.work.switch[MODE, k] = HELD
+    if here.start.before is not None:
+        gone_on(here, here.start.before)
+        return Acts(here, (), before=here.y.copy())
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
 

@@ -9,6 +9,7 @@ from ....errors import SimulationError
 from ....model.actions import Lock, Release
 from ....model.event import Event
 from ....model.held import held_by
+from ....results.result import Result
 from ....tables.system import (
     HELD,
     HOLD,
@@ -80,3 +81,20 @@ def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str)
         ):
             out.append(k)
     return out
+
+
+def gone_on(here: Here, before: Result) -> None:
+    """Lock and release as an earlier motion ended."""
+    stretches = getattr(before, "stretches", None)
+    if stretches is None or not stretches.all:
+        return
+    last, W = stretches.all[-1], here.c.work
+    old = {(x.element.name, x.switch.label): k for k, x in enumerate(last.values.structure.switches)}
+    for k, spec in enumerate(here.structure.switches):
+        j = old.get((spec.element.name, spec.switch.label))
+        if j is None:
+            continue
+        if spec.switch.kind == LOCK:
+            W.switch[[MODE, HOLD], k] = last.switch[[MODE, HOLD], j]
+        elif last.switch[SPARE, j] == GONE:
+            W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
