@@ -69,17 +69,7 @@ class Acts:
 
     def passed(self) -> np.ndarray:
         """Guards of events whose expressions went through zero by the jump itself, (n,)."""
-        here, out = self.here, []
-        if not self.events or not self.values:
-            return np.zeros(0, np.int64)
-        here.evaluate()
-        for g, before in self.values.items():
-            after, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
-            most = CLEAR * max(abs(before), abs(after))
-            rises, falls = before <= -most and after > most, before >= most and after < -most
-            if (rises and way >= 0) or (falls and way <= 0):
-                out.append(g)
-        return np.array(out, np.int64)
+        return crossed(self.here, self.values if self.events else {})
 
 
 def _own(here: Here) -> set[str]:
@@ -147,6 +137,27 @@ def expression(here: Here, g: int) -> float:
     model, e = here.structure.model, here.structure.events[g]
     law = model.law(e.law, e.of, f"when of {e.title}")
     return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
+
+
+def expressions(here: Here) -> dict[int, float]:
+    """Values of the expressions of all events, by their guards, at the state of the instant."""
+    if here.structure.events:
+        here.evaluate()
+    return {g: expression(here, g) for g in here.structure.events}
+
+
+def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:
+    """Guards of events whose expressions went through zero without being followed there, (n,)."""
+    out = []
+    if before:
+        here.evaluate()
+    for g, was in before.items():
+        now, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
+        most = CLEAR * max(abs(was), abs(now))
+        rises, falls = was <= -most and now > most, was >= most and now < -most
+        if (rises and way >= 0) or (falls and way <= 0):
+            out.append(g)
+    return np.array(out, np.int64)
 
 
 def _reckoned(here: Here, e: Event, a: Action, what: str, law: Any) -> float:
