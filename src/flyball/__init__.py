@@ -10,14 +10,15 @@ Describe a mechanism
     contact       Contact lets bodies touch by their shapes; Ground stands still, with Plane or HeightField as a
                   floor; Bodies are many equal ones in arrays; Material and MaterialPair say friction, restitution,
                   moving surfaces
-    Limit         hard stops of a coordinate
+    limits        Limit stops a coordinate, Backlash is play between some, OneWay a freewheel, Ratchet holds at teeth;
+                  rigid or elastic, as Rope is; Detent (a force) has notches
     Event         what is done when a quantity passes zero: Stop, Set, Lock, Release, Impulse, Note
     joints        Revolute, Prismatic, Cylindrical, Spherical, Universal, GeneralUniversal, Fixed, Planar, Screw,
                   Translational, Orientation, Distance, PointOnLine, PinInSlot, PointInPlane, Cam, WheelOnLine,
                   RollingDisk, RollingBall, KnifeEdge
     couplings     GearPair, RackAndPinion, Coupler
-    forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Actuator, Motor,
-                  JointFriction, PointForce, PointTorque
+    forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
+                  JointFriction, Clutch, Brake, PointForce, PointTorque
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one
@@ -116,7 +117,6 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .model.contact import Contact as Contact
     from .model.event import Event as Event
     from .model.ground import Ground as Ground
-    from .model.limit import Limit as Limit
     from .model.material import Material as Material
     from .model.material import MaterialPair as MaterialPair
     from .model.sensor import IMU as IMU
@@ -166,7 +166,6 @@ _HOME = {
     "Stop": "model.actions",
     "Stepping": "analysis.motion.impulse.settings",
     "Ground": "model.ground",
-    "Limit": "model.limit",
     "Material": "model.material",
     "MaterialPair": "model.material",
     "Sensor": "model.sensor",

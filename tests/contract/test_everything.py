@@ -49,6 +49,9 @@ def everything():
     m.add(fb.RackAndPinion("rack", rack="D", pinion="E", radius=0.1))
     m.add(fb.Coupler("sum", coordinates=("A.angle", "B.displacement", "tip.z"), weights=(0.5, 1.0, 0.7)))
     m.add(fb.Actuator("actuator", coordinate="D.displacement", force="3*sin(t) - c*rate + 0.1*speed"))
+    m.add(fb.Detent("notches", "C.angle", pitch="40 deg", holding="0.4 N*m", notch=0.1, damping=0.02))
+    m.add(fb.Limit("soft", "E.angle", lower=0.05, upper=0.1, stiffness=30.0, damping=0.3))
+    m.add(fb.Backlash("loose", ("A.angle", "C.angle"), weights=(2, 3), gap="1 deg", stiffness=20.0, damping=0.1))
     m.add(
         fb.Bushing(
             "bushing", "c", "e", at=(1.5, 0, 0.1), stiffness=(40, 60, 50), damping=1.0, torsional_stiffness=(2, 3, 4)
@@ -57,6 +60,8 @@ def everything():
     m.add(fb.CoordinateSpring("height", coordinate="tip.z", stiffness=30.0, damping=0.5, rest=0.2))
     m.add(fb.JointFriction("friction", joint="E", static=0.2, kinetic=0.1, radius=0.05, bending_length=0.3))
     m.add(fb.JointFriction("collar", joint="B", coordinate="angle", static=0.2, radius=0.05, twist_length=0.3))
+    m.add(fb.Clutch("clutch", "A.angle", "E.angle", capacity="0.02 + 0.01*t"))
+    m.add(fb.Brake("brake", "C.angle", capacity=0.03, static=1.2))
     m.add(fb.Motor("motor", joint="A", torque="0.5 - 0.1*rate + 0.2*turned"))
     m.add(fb.PointForce("wind", "e", force=("1 + speed", "2*t", 0.5), at=(2, 0.5, -0.7), axes="body"))
     m.add(fb.PointTorque("twist", "d", torque=(0.1, "0.2*cos(t)", 0.3)))
@@ -112,7 +117,7 @@ def test_energy_is_accounted_for():
     r = everything().simulate(0.5, outputs=101, rtol=1e-9, atol=1e-11)
     assert r.health.energy_drift < 1e-6
     assert r.health.violation < 1e-12
-    for e in r.model.forces:
+    for e in (*r.model.forces, *r.model.limits):
         power, work = r[e.name].power, r[e.name].work
         moved = np.r_[0.0, np.cumsum((power[1:] + power[:-1]) / 2 * np.diff(r.t))]
         assert work == pytest.approx(moved, abs=2e-3 * max(1.0, np.abs(work).max())), e.name
@@ -128,7 +133,7 @@ def test_a_model_file_holds_it():
 def test_order_of_forces_and_bodies_changes_nothing():
     """Described in the reverse order the same happens."""
     m, n = everything(), fb.Mechanism("reversed", gravity=(0.3, -0.5, -9.7), parameters={"c": 2.0})
-    parts = (m.bodies, m.frames, m.joints, m.sensors, m.couplings, m.forces)
+    parts = (m.bodies, m.frames, m.joints, m.sensors, m.couplings, m.forces, m.limits)
     n.add(*(e for part in parts for e in reversed(part)))
     one, two = (x.simulate(0.2, outputs=3, rtol=1e-10, atol=1e-12) for x in (m, n))
     for body in m.bodies:

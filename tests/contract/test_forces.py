@@ -5,12 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flyball import forces
+from flyball.constraints.modes import FROZEN, STATIC
 from flyball.math.rotation import log_gradient, rotation_vector
 from flyball.model.force import CoordinateForce
 from tests.contract.frames import moved, random_motion, record, stepped
 
 BETWEEN = [k for k in forces.ALL if not issubclass(k, CoordinateForce)]
-ALONG = [k for k in forces.ALL if issubclass(k, CoordinateForce)]
+ALONG = [k for k in (*forces.ALL, *forces.LIMITS) if issubclass(k, CoordinateForce) and hasattr(k, "effort")]
 LAWS = (1.0, -2.0, 0.5)
 NO_LAWS = (0.0, 0.0, 0.0)
 PARAMETERS = {
@@ -19,8 +20,13 @@ PARAMETERS = {
     "PointTorque": (1.0,),
     "SpringDamper": (30.0, 2.0, 0.4),
     "Actuator": (),
+    "Backlash": (30.0, 2.0, 30.0, 2.0, -0.1, 0.1),
     "CoordinateSpring": (30.0, 2.0, 0.4),
-    "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0),
+    "Detent": (3.0, 20.0, 0.1, 0.2),
+    "Limit": (30.0, 2.0, 70.0, 1.0, -0.1, 0.4),
+    "Brake": (1.0, 1.2),
+    "Clutch": (1.0, 1.2),
+    "JointFriction": (0.7, 0.4, 0.3, 0.01, 0.001, 0.2, 1.0, 0.5, 2.0, 3.0, 1.0, 1.0),
     "Motor": (),
     "Rope": (30.0, 2.0, 0.4),
     "TorsionalSpringDamper": (30.0, 2.0, 0.4),
@@ -28,6 +34,9 @@ PARAMETERS = {
 UNDAMPED = {  # of those that store energy and damp as well
     "Bushing": (*PARAMETERS["Bushing"][:3], 0.0, 0.0, 0.0, *PARAMETERS["Bushing"][6:9], 0.0, 0.0, 0.0),
     **dict.fromkeys(("SpringDamper", "CoordinateSpring", "Rope", "TorsionalSpringDamper"), (30.0, 0.0, 0.4)),
+    "Limit": (30.0, 0.0, 70.0, 0.0, -0.1, 0.4),
+    "Backlash": (30.0, 0.0, 30.0, 0.0, -0.1, 0.1),
+    "Detent": (3.0, 20.0, 0.1, 0.0),
 }
 COORDINATES = [-3.0, -0.2, 0.0, 0.35, 0.45, 12.0]
 
@@ -61,8 +70,9 @@ def power(out, F, M):
 
 
 def test_every_kind_has_its_cases():
-    assert set(PARAMETERS) == {k.__name__ for k in forces.ALL}
-    assert set(UNDAMPED) <= {k.__name__ for k in forces.ALL if k.energy is not None}
+    kinds = {*forces.ALL, *ALONG}
+    assert set(PARAMETERS) == {k.__name__ for k in kinds}
+    assert set(UNDAMPED) <= {k.__name__ for k in kinds if k.energy is not None}
 
 
 @between
@@ -159,6 +169,54 @@ def test_complex_numbers_and_arrays_change_nothing_along_a_coordinate(kind):
         other = kind.effort(full(kind), complex(x[k]), complex(rate[k]), LAWS, complex(5.0 + x[k] ** 2))
         assert one == pytest.approx(many[k], rel=1e-14)
         assert complex(one) == pytest.approx(other, rel=1e-14)
+
+
+@pytest.mark.parametrize("kind", [forces.Limit, forces.Backlash], ids=lambda k: k.__name__)
+def test_an_elastic_stop_pushes_and_never_pulls(kind):
+    par = padded((30.0, 2.0, 70.0, 1.0, -0.1, 0.4))
+    assert kind.effort(par, -0.2, 0.0, NO_LAWS, 0.0) == pytest.approx(3.0)
+    assert kind.effort(par, -0.2, -1.0, NO_LAWS, 0.0) == pytest.approx(5.0)
+    assert kind.effort(par, -0.2, 5.0, NO_LAWS, 0.0) == 0.0, "it leaves faster than the stop springs back"
+    assert kind.effort(par, 0.5, 1.0, NO_LAWS, 0.0) == pytest.approx(-8.0)
+    assert kind.effort(par, 0.5, -9.0, NO_LAWS, 0.0) == 0.0
+    assert kind.effort(par, 0.1, 9.0, NO_LAWS, 0.0) == 0.0, "between them nothing"
+
+
+def test_frozen_a_side_goes_on_beyond_its_corner():
+    par = padded((30.0, 2.0, 70.0, 1.0, -0.1, 0.4))
+    for side, wanted in ((0.0, 0.0), (1.0, 30 * -0.2 - 2.0), (-1.0, -(70 * -0.3 + 1.0))):
+        assert forces.Limit.effort(par, 0.1, 1.0, (0.0, 0.0, FROZEN + side), 0.0) == pytest.approx(wanted)
+    rope = padded((30.0, 2.0, 0.4))
+    assert forces.Rope.effort(rope, 0.5, -9.0, (0.0, 0.0, FROZEN - 1.0), 0.0) == pytest.approx(15.0)
+    assert forces.Rope.effort(rope, 0.5, 0.0, (0.0, 0.0, FROZEN), 0.0) == 0.0
+
+
+@pytest.mark.parametrize("rate", [-0.3, 1e-9, 2.0])
+@pytest.mark.parametrize("way", [-1.0, 0.0, 1.0])
+def test_friction_that_sticks_slides_the_way_it_is_told(rate, way):
+    """By its switch, not by the sign of the rate; what is viscous goes by the rate. At rest static friction holds."""
+    r, static, kinetic, viscous, preload, load = 0.7, 0.4, 0.3, 0.2, 1.0, 5.0
+    par = padded((r, static, kinetic, 1.0, 1.0, viscous, preload, 0.5, 2.0, 3.0))
+    effort = forces.JointFriction.effort
+    slides = -r * kinetic * (load + preload) * way - viscous * rate
+    assert effort(par, 0.1, rate, (0.0, 0.0, way), load) == pytest.approx(slides, rel=1e-14)
+    held = effort(par, 0.1, 0.0, (0.0, 0.0, STATIC), load)
+    assert abs(held) == pytest.approx(r * static * (load + preload), rel=1e-14)
+    fall = padded((r, static, kinetic, 0.02, 1.0, viscous, preload, 0.5, 2.0, 3.0, 1.0))
+    mu = kinetic + (static - kinetic) * np.exp(-((r * rate / 0.02) ** 2))
+    slides = -r * mu * (load + preload) * way - viscous * rate
+    assert effort(fall, 0.1, rate, (0.0, 0.0, way), load) == pytest.approx(slides, rel=1e-14)
+    assert effort(fall, 0.1, 0.0, (0.0, 0.0, STATIC), load) == held
+
+
+@pytest.mark.parametrize("kind", [forces.Clutch, forces.Brake])
+def test_a_clutch_carries_its_capacity_and_holds_more(kind):
+    par = full(kind)
+    for way in (-1.0, 0.0, 1.0):
+        assert kind.effort(par, 0.3, 5.0, (7.0, 0.0, way), 0.0) == -7.0 * way
+    assert abs(kind.effort(par, 0.3, 0.0, (7.0, 0.0, STATIC), 0.0)) == pytest.approx(1.2 * 7.0)
+    assert np.isnan(kind.effort(par, 0.3, 5.0, (-1e-9, 0.0, 1.0), 0.0)), "a negative capacity is no number"
+    assert np.isnan(kind.effort(par, 0.3, 0.0, (-1e-9, 0.0, 0.0), 0.0)), "at rest too"
 
 
 def test_a_rope_pulls_and_never_pushes():

@@ -32,6 +32,10 @@ def others() -> fb.Mechanism:
     m.add(fb.Frame("f", "a", position=(1, 2), angle=0.2), fb.Sensor("s", "A.angle"), fb.IMU("imu", "f"))
     m.add(fb.Table("curve", x=(0, 1, 2), y=(0, 1, 3)), fb.Driver("d", "A.angle", "2*t"))
     m.add(fb.Initial("B.angle", value=0.2, rate=1))
+    m.add(fb.Limit("soft", "B.angle", lower=0.1, upper=0.3, stiffness=10.0, damping=1.0))
+    m.add(fb.Backlash("play", ("B.angle", "c.x"), weights=(2.0, 1.0), gap=0.1, middle=0.2, restitution=0.5))
+    m.add(fb.OneWay("wheel", "B.angle", relative_to="A.angle", direction=-1))
+    m.add(fb.Ratchet("pawl", "C.displacement", pitch=0.1, tooth=0.02, restitution=0.1))
     return m
 
 
@@ -87,7 +91,7 @@ CASES = {f"{where} {name}": (one, where, name) for where, name in zoo.CASES}
 CASES |= {f"forces in the {w}": (lambda w: all_of(with_forces(w), Force), w) for w in ("space", "plane")}
 CASES |= {f"touching in the {w}": (lambda p: all_of(touching(p)), w == "plane") for w in ("space", "plane")}
 CASES |= {"others": (lambda: all_of(others()),), "bodies": (lambda: all_of(bodies()),)}
-TEXTS = ("body", "body_i", "body_j", "bodies", "coordinate", "coordinates", "joint", "of", "frame")
+TEXTS = ("relative_to", "body", "body_i", "body_j", "bodies", "coordinate", "coordinates", "joint", "of", "frame")
 NO_NUMBERS = ("name", "color", "shape", "interpolation", "beyond", "axes", "x_unit", "y_unit")
 LATER = {("JointFriction", "radius")}  # decides what the friction is about, and the joint has no such coordinate
 

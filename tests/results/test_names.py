@@ -23,7 +23,7 @@ def flat() -> fb.Result:
     m.add(fb.GearPair("G", "A", "W", teeth=(1, 2)), fb.Driver("D", "S.displacement", "0.1*t"), fb.IMU("imu", "eye"))
     m.add(fb.Sensor("s", "A.angle"), fb.Sensor("again", "s.value"), fb.Motor("M", "A", torque=1))
     m.add(
-        fb.JointFriction("F", "S", static=0.1),
+        fb.JointFriction("F", "S", static=0.1, stick_speed=1e-3),
         fb.PointForce("push", "cart", force=(1, 2)),
         fb.Table("u", x=[0, 1], y=[0, 1]),
     )

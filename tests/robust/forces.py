@@ -100,11 +100,33 @@ def _friction(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
     turning = {"radius": d.size(0.005, 0.1)} if what == "angle" else {}
     return fb.JointFriction(
         name, joint, coordinate=what, static=static, kinetic=d.pick([None, 0.7 * static]), preload=d.pick([0, 5.0]),
-        stick_speed=d.size(1e-3, 0.1), bending_length=d.pick([None, 0.1]), viscous=d.pick([0, 0.1]), **turning,
+        stick_speed=d.pick([None, d.size(1e-3, 0.1)]), bending_length=d.pick([None, 0.1]), viscous=d.pick([0, 0.1]), **turning,
     )  # fmt: skip
 
 
+def _detent(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
+    holds = d.pick([{"holding": d.size(0.1, 5.0)}, {"barrier": d.size(0.01, 1.0)}])
+    return fb.Detent(name, along, pitch=d.size(0.05, 0.7), notch=d.number(-1, 1), damping=d.pick([0, 0.1]), **holds)
+
+
+def _brake(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
+    return fb.Brake(
+        name, along, capacity=d.pick([0.0, d.size(0.01, 10.0), "1 + 0.5*sin(3*t)"]), static=d.pick([1, 1.3])
+    )
+
+
+def _clutch(d: Dice, m: fb.Mechanism, name: str, along: str, stiff: bool):
+    turning = "angle" in along.partition(".")[2]
+    others = [x for x in coordinates(m) if x != along and ("angle" in x.partition(".")[2]) == turning]
+    if not others:
+        return None
+    return fb.Clutch(
+        name, along, d.pick(others), capacity=d.pick([0.0, d.size(0.01, 10.0), "2*t"]), static=d.pick([1, 1.2])
+    )
+
+
 _MAKE = {
+    "Detent": _detent,
     "CoordinateSpring": _coordinate_spring,
     "Actuator": lambda d, m, name, along, stiff: fb.Actuator(name, along, force=law(d, m, 5.0, ("value", "rate"))),
     "TorsionalSpringDamper": lambda d, m, name, along, stiff: fb.TorsionalSpringDamper(
@@ -114,6 +136,8 @@ _MAKE = {
         name, along.partition(".")[0], torque=law(d, m, 3.0, ("angle", "rate"))
     ),
     "JointFriction": _friction,
+    "Brake": _brake,
+    "Clutch": _clutch,
 }
 
 
@@ -134,8 +158,11 @@ FORCES = {
     "PointForce": _point_force,
     "PointTorque": _point_torque,
     "CoordinateSpring": _along("CoordinateSpring", "", True),
+    "Detent": _along("Detent", "", True),
     "Actuator": _along("Actuator", "", True),
     "TorsionalSpringDamper": _along("TorsionalSpringDamper", ".angle", False),
     "Motor": _along("Motor", ".angle", False),
     "JointFriction": _along("JointFriction", "", False),
+    "Brake": _along("Brake", "", True),
+    "Clutch": _along("Clutch", "", False),
 }

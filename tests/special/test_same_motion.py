@@ -58,7 +58,7 @@ def test_integrators_and_coordinates():
 
 def test_friction_in_joints():
     m = four_bar()
-    m.add(fb.JointFriction("dry", joint="D", static=0.2, radius=0.02))
+    m.add(fb.JointFriction("dry", joint="D", static=0.2, radius=0.02, stick_speed=1e-3))
     same(m, 0.3, tolerance=1e-6)
 
 

@@ -114,3 +114,41 @@ def test_a_pendulum_on_a_stiff_spring_keeps_its_length_and_energy(ratio):
         energy = 0.5 * s.v[:2] @ s.v[:2] + 9.81 * s.q[1] + 0.5 * k * stretch[-1] ** 2
         assert abs(energy) < 0.004 * 9.81
     assert max(np.abs(stretch)) < 1.1 * 3 * 9.81 / k + 1e-5
+
+
+@pytest.mark.parametrize("share", [0.9, 1.1])
+def test_what_holds_at_rest_is_more_than_what_brakes(share):
+    """Static friction holds 1.25 of kinetic; once it turns it is braked by the kinetic one."""
+    m = fb.Mechanism("bearing", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("wheel", mass=10.0, inertia=0.05))
+    m.add(fb.Revolute("shaft", "ground", "wheel", at=(0, 0)))
+    most = 0.25 * 0.02 * 98.1
+    m.add(fb.JointFriction("f", "shaft", static=0.25, kinetic=0.2, radius=0.02))
+    m.add(fb.Motor("motor", "shaft", torque=share * most))
+    s = Stepped(m, 0.005, "absolute")
+    s.step(100)
+    if share < 1.0:
+        assert abs(s.q[2]) < 1e-14
+    else:
+        assert s.v[2] == pytest.approx((share - 0.8) * most / 0.05 * 0.5, rel=0.02)  # a step of static friction
+
+
+@pytest.mark.parametrize("coordinates", LAYERS)
+def test_a_clutch_and_a_brake(coordinates):
+    """Two flywheels come to one speed after (w1 - w2) / (M (1/J1 + 1/J2)) = 0.9 s; a brake stops both, exactly."""
+    m = fb.Mechanism("drive", planar=True)
+    for k, (J, w) in enumerate(((0.2, 30.0), (0.4, 0.0))):
+        m.add(fb.Body(f"w{k}", mass=1.0, inertia=J), fb.Revolute("AB"[k], "ground", f"w{k}", at=(0, 0)))
+        m.add(fb.Initial(f"{'AB'[k]}.angle", rate=w))
+    m.add(fb.Clutch("clutch", "A.angle", "B.angle", capacity=40.0 / 9.0))
+    m.add(fb.Brake("brake", "B.angle", capacity="6*where(t < 2, 0, 1)"))
+    s = Stepped(m, 0.005, coordinates)
+    turn = [0, 1] if coordinates == "joint" else [2, 5]
+    s.step(178)
+    assert s.v[turn[0]] > s.v[turn[1]] + 0.1
+    s.step(4)
+    assert s.v[turn] == pytest.approx([10.0, 10.0], rel=1e-9)
+    lost = s.z[s.structure.state_at["clutch.work"]]
+    assert lost == pytest.approx(-0.5 * 0.2 * 0.4 / 0.6 * 900.0, rel=1e-6)
+    s.step(500)
+    assert np.abs(s.v[turn]).max() < 1e-12

@@ -126,8 +126,8 @@ def _touched(model: Model) -> tuple[set[str], set[str]]:
         held |= {getattr(owner, "body", getattr(owner, "name", ""))}
     for force in model.forces:
         pushed |= {model.carrier(name, force) for name in force.ends().values()}
-        if isinstance(force, CoordinateForce) and force.coordinate_text():
-            owner, _ = model.coordinate(force.coordinate_text(), force)
+        for text in force.along() if isinstance(force, CoordinateForce) else ():
+            owner, _ = model.coordinate(text, force)
             pushed |= {getattr(owner, "body", getattr(owner, "name", ""))}
     return held - {GROUND}, pushed - {GROUND}
 

@@ -16,7 +16,7 @@ from ..errors import ModelError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
-from ..model.touching import has_contact
+from ..model.touching import smooth_only
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -106,17 +106,23 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         If there is contact and the method does not know it, or options have no effect on steps by impulses.
     """
     if o.method == AUTO:
-        o = replace(o, method=Stepping() if has_contact(model) else USUAL)
+        stepped = (model.contacts or model.bulk) and not smooth_only(model)
+        o = replace(o, method=Stepping() if stepped else USUAL)
     elif o.method == IMPULSE:
         o = replace(o, method=Stepping())
     if not isinstance(o.method, Stepping):
-        if model.bulk or any(not e.switches() for e in model.limits):
-            part = next((e for e in model.limits if not e.switches()), None) or model.bulk[0]
+        if model.bulk:
+            part = model.bulk[0]
             raise ModelError(
                 f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
                 f"out, or give method='impulse'"
             )
         return o
+    if unknown := smooth_only(model):
+        raise ModelError(
+            f"steps by impulses do not know {', '.join(e.title for e in unknown)}; the adaptive integrators do: leave "
+            f"method out, or give method={USUAL!r}"
+        )
     for name, usual in IDLE.items():
         if getattr(o, name) != usual:
             raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
@@ -149,7 +155,7 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o)
-    later = open_until_asked(begun, o, task)
+    later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)

@@ -1,36 +1,34 @@
 """What analyses say of parts that hold at times and let go at others, where they do not know them.
 
-Each analysis names the parts that it knows (`docs/events.md` has the table, `tests/events/test_every_analysis.py` asks
-every one for every part): it answers for what holds at the place that it is asked about, or refuses the part by name.
+Each analysis names the kinds that it knows: it answers for what holds at the place that it is asked about, or refuses
+the part by name (`docs/events.md` has the table; `tests/events/test_every_analysis.py` asks every one of every part).
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 
-from ..constraints.modes import FRICTION
+from ..constraints.modes import ELASTIC, FRICTION
 from ..errors import ModelError
 from ..model.element import Element
 from ..model.model import Model
 
-FRICTIONS = frozenset({FRICTION})
-"""Kinds of switches that are forces while they slip: an analysis that knows which way knows them."""
+SLIPPING = frozenset({FRICTION})
+"""Kinds that are plain forces while they slip, whose way an analysis of a motion knows."""
+TOUCH = ("contacts", "limits", "bulk")
+INSTEAD = {"stick_speed": "regularised", "stiffness": "elastic"}
+"""Numbers that make a part a plain force if they are given, and what it is then called."""
 
 
-def switching_parts(model: Model) -> Iterator[Element]:
-    """Parts that hold at times: what sticks, stops, locks, latches, goes taut; and events."""
-    seen = {e.name for e in (*model.contacts, *model.limits, *model.bulk)}
-    yield from (e for e in model.elements() if e.name not in seen and (e.switches() or e.category == "events"))
+def holding_parts(model: Model, knows: Collection[int] = ()) -> Iterator[Element]:
+    """Parts that only a motion knows: contacts, many bodies, events, and what holds at times.
 
-
-def touching_parts(model: Model, knows: Collection[int] = ()) -> Iterator[Element]:
-    """Parts that only a motion knows: contacts, limits, many bodies, and what else holds at times.
-
-    ``knows`` are kinds of switches (`constraints.modes`): parts with no others are left out.
+    What is elastic is a force anywhere; ``knows`` are other kinds (`constraints.modes`) that are left out.
     """
-    for e in (*model.contacts, *model.limits, *model.bulk, *switching_parts(model)):
-        kinds = {w.kind for w in e.switches()}
-        if not kinds or not kinds <= set(knows):
+    known = {ELASTIC, *knows}
+    yield from (*model.contacts, *model.bulk)
+    for e in model.elements():
+        if e.category == "events" or any(w.kind not in known for w in e.switches()):
             yield e
 
 
@@ -40,10 +38,10 @@ def refuse_contact(model: Model, analysis: str, knows: Collection[int] = ()) -> 
     Raises
     ------
     ModelError
-        If the mechanism has a contact, a limit, many bodies, or another part that holds at times, of no kind that the
+        If the mechanism has a contact, many bodies, an event, or another part that holds at times, of no kind that the
         analysis ``knows``.
     """
-    parts = list(touching_parts(model, knows))
+    parts = list(holding_parts(model, knows))
     if not parts:
         return
     without = ", ".join(f"{e.name!r}: None" for e in parts)
@@ -56,28 +54,27 @@ def refuse_contact(model: Model, analysis: str, knows: Collection[int] = ()) -> 
 def _unknown(parts: list[Element]) -> str:
     """What is not known, in words."""
     kinds = {e.category for e in parts}
-    said = ["no contact, limits or Bodies"] if kinds & {"contacts", "limits", "bulk"} else []
-    said += ["nothing that sticks, locks or goes taut"] if kinds - {"contacts", "limits", "bulk", "events"} else []
+    said = ["no contact, limits or Bodies"] if kinds & set(TOUCH) else []
+    said += ["nothing that sticks, locks or goes taut"] if kinds - {*TOUCH, "events"} else []
     said += ["no events"] if "events" in kinds else []
     return ", and ".join(said)
 
 
 def _instead(parts: list[Element]) -> str:
     """What could be given in its place."""
-    smooth = {"stick_speed": "regularised", "stiffness": "elastic"}
     out = []
-    for name, becomes in smooth.items():
-        able = [e.title for e in parts if e.switches() and getattr(e, name, 0.0) is None]
+    for name, becomes in INSTEAD.items():
+        able = [e.title for e in parts if hasattr(e, name)]
         if able:
             out.append(
-                f"; or give {', '.join(able)} a {name}, which makes {'it' if len(able) == 1 else 'them'} {becomes}"
+                f"; or give {', '.join(able)} a {name}: {'it is' if len(able) == 1 else 'they are'} {becomes} then"
             )
     return "".join(out)
 
 
 def left_out(model: Model) -> str:
     """What freedoms are counted without, as a sentence; empty if that is nothing."""
-    parts = [e.title for e in (*model.contacts, *model.limits, *switching_parts(model))]
+    parts = [e.title for e in holding_parts(model) if e.category != "bulk"]
     out = f"{', '.join(parts)}: freedoms and the start are those without" if parts else ""
     bulk = [f"the {e.count} bodies of {e.title}" for e in model.bulk]
     return "; ".join(x for x in (out, f"{', '.join(bulk)}: not counted in freedoms" if bulk else "") if x)

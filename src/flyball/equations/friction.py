@@ -9,13 +9,16 @@ before that there is none: friction outweighs what causes it and the joint jams.
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..forces.joint_friction import coefficient
+from ..constraints.modes import STATIC
 from ..forces.joint_friction import load as pressed
+from ..math.scalar import sign
 from ..math.vec import add, load3, scale
 from ..tables.system import (
     DIAGONAL,
     F_APPLIED,
     FORCE_ALONG,
+    FORCE_F,
+    FORCE_KIND,
     FORCE_LOAD,
     FORCE_M,
     FORCE_SWITCH,
@@ -34,8 +37,10 @@ from ..tables.system import (
     SWITCH_ROW,
     TERM_ROW,
     TOLD,
+    VALUE,
 )
-from .loads import wide
+from .dispatch import effort
+from .loads import law, wide
 from .records import load
 from .rows import COEFFICIENT, measured
 from .sliding import slides
@@ -82,10 +87,24 @@ def reaction_loads(S, W):
 
 
 @formula
-def most_friction(S, k, arm, rate, load):
-    """What friction of force k can hold along its coordinate, where surfaces slide by ``arm`` times the rate."""
-    par = wide(S.force_x, k)
-    return arm * coefficient(par, arm * rate) * (load + par[6])
+def held_at_rest(S, W, k, t, arm, load):
+    """The most that friction of force k, with this arm and load, holds along its quantity at rest."""
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], 0.0), arm, load, STATIC)
+
+
+@formula
+def dry(S, W, k, t, rate, arm, load):
+    """How much of it there is while it slides, without what is viscous."""
+    return dry_part(S, W, k, (t, W.sensed[VALUE, S.force_i[k, FORCE_F]], rate), arm, load, sign(rate))
+
+
+@formula
+def dry_part(S, W, k, x, arm, load, way):
+    """What the arm adds to the effort of force k for the inputs x = (t, value, rate) of its law."""
+    par, kind = wide(S.force_x, k), S.force_i[k, FORCE_KIND]
+    laws = (law(S, W, k, 0, x), 0.0, way)
+    whole = effort(kind, (arm, *par[1:]), x[1], x[2], laws, load)
+    return abs(whole - effort(kind, (0.0, *par[1:]), x[1], x[2], laws, load))
 
 
 @formula

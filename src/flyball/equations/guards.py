@@ -7,6 +7,8 @@
     friction that slides           way * rate
     a freewheel that overruns      rate
     a corner of a law              way * u
+    an elastic stop that is open   how far it is, past it -(k d + c ddot)
+    one that is pressed            what it pushes with, k d + c ddot
     a place of contact             see `sliding.watched_place`
 
 A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
@@ -15,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import STATIC
+from ..constraints.modes import FROZEN, STATIC
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -28,6 +30,8 @@ from ..tables.system import (
     G_HOLDS,
     G_LAW,
     G_LOWER,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
     G_PULL,
     G_SLIDES,
     G_UPPER,
@@ -39,10 +43,12 @@ from ..tables.system import (
     OFF,
     RATE,
     RETURNED,
+    SWITCH_DAMPING,
     SWITCH_FORCE,
     SWITCH_LAW,
     SWITCH_MEASURED,
     SWITCH_ROW,
+    SWITCH_STIFFNESS,
     UPPER,
     VALUE,
 )
@@ -71,6 +77,8 @@ def watched(S, W, t, kind, s):
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
         return way * corner(S, W, t, s)
+    if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
+        return pressing(S, W, s, kind, way - FROZEN)
     if kind >= G_CONE:
         return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
     m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
@@ -90,6 +98,20 @@ def watched(S, W, t, kind, s):
     if kind == G_HOLDS:
         return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
     return NOT_WATCHED
+
+
+@formula
+def pressing(S, W, s, kind, way):
+    """Of an elastic switch that is pressed at a side: what it pushes with there; of an open side: how far that is."""
+    m, side = S.switch_i[s, SWITCH_MEASURED], 1.0 if kind == G_PRESS_LOWER else -1.0
+    bound = W.switch[LOWER, s] if kind == G_PRESS_LOWER else W.switch[UPPER, s]
+    depth = side * (bound - W.sensed[VALUE, m])
+    push = S.switch_x[s, SWITCH_STIFFNESS] * depth - S.switch_x[s, SWITCH_DAMPING] * side * W.sensed[RATE, m]
+    if way * side > 0.5:  # an interpolated one is not exact
+        return push
+    if way * side < -0.5 and way > -1.5:
+        return NOT_WATCHED
+    return -push if depth > 0.0 else -depth
 
 
 @formula

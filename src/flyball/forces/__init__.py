@@ -10,10 +10,13 @@ from ..model.force import Force
 for _module in pkgutil.iter_modules(__path__):
     importlib.import_module(f"{__name__}.{_module.name}")
 
-ALL = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
+_HERE = [c for c in Force.registry.values() if issubclass(c, Force) and c.__module__.startswith(f"{__name__}.")]
+ALL = [c for c in _HERE if c.category == Force.category]
 """Every force element that a file of this folder defines; all are public."""
+LIMITS = [c for c in _HERE if c.category != Force.category]
+"""Every one-sided element: stops, plays, latches. What is elastic of them acts by a formula as forces do."""
 
-globals().update({c.__name__: c for c in ALL})
+globals().update({c.__name__: c for c in _HERE})
 
 
 def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
@@ -31,15 +34,22 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
     return out
 
 
-INPUTS, WRENCHES, EFFORTS = (formulas(ALL, name) for name in ("inputs", "wrench", "effort"))
+INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here
+    from .backlash import Backlash as Backlash
     from .bushing import Bushing as Bushing
+    from .clutch import Brake as Brake
+    from .clutch import Clutch as Clutch
     from .coordinate_spring import Actuator as Actuator
     from .coordinate_spring import CoordinateSpring as CoordinateSpring
+    from .detent import Detent as Detent
     from .joint_friction import JointFriction as JointFriction
+    from .limit import Limit as Limit
     from .motor import Motor as Motor
+    from .one_way import OneWay as OneWay
+    from .one_way import Ratchet as Ratchet
     from .point_force import PointForce as PointForce
     from .point_torque import PointTorque as PointTorque
     from .rope import Rope as Rope

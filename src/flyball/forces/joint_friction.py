@@ -8,18 +8,23 @@ from types import SimpleNamespace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from ..compiler.jit import formula
+from ..constraints.modes import FRICTION
 from ..errors import ModelError
-from ..math.scalar import absolute, exp, sqrt, tanh
+from ..math.scalar import absolute, choose, exp, sqrt, tanh
 from ..math.vec import col, dot, scale, sub
 from ..model.element import Length, Number, Unit, element, nonnegative, positive
 from ..model.force import CoordinateForce
 from ..model.joint import Joint
+from ..model.switch import Switch
 
 if TYPE_CHECKING:
     from ..model.model import Model
 
 KIND = 6
+SLIDING = 1.5  # ways of sliding are -1, 0 and 1; `constraints.modes.STATIC` is more, and asks for what holds at rest
+FALLS, CREEPS = 10, 11  # parameters that are 1 where there is a Stribeck speed, a stick speed; else 0
 STICKING = 3.0  # times the stick speed: slower than this counts as sticking (the law is then within 0.5 % of full)
+FALL = 0.01  # m/s: Stribeck speed of the regularised law
 
 
 @formula
@@ -35,28 +40,36 @@ def load(par, axes, force, torque):
 
 
 @formula
-def coefficient(par, v):
-    """Stribeck law: mu_k + (mu_s - mu_k) exp(-(v / v_s)^2)."""
+def coefficient(par, v, way):
+    """Stribeck's law mu_k + (mu_s - mu_k) exp(-(v / v_s)^2); without v_s it is mu_k; at rest, if asked for, mu_s."""
     s = v / par[3]
-    return par[2] + (par[1] - par[2]) * exp(-s * s)
+    fall = choose(way - SLIDING, 1.0, choose(par[FALLS], exp(-s * s), 0.0))
+    return par[2] + (par[1] - par[2]) * fall
 
 
 @formula
 def effort(par, x, rate, laws, load):
-    """Along the coordinate: -r mu(v) (N + preload) tanh(v / v_0) - c rate, with the sliding speed v = r rate."""
+    """Along the coordinate: -r mu(v) (N + preload) d - c rate, with the sliding speed v = r rate.
+
+    The direction d is that of its switch; with a stick speed v_0 it is tanh(v / v_0).
+    """
     v = par[0] * rate
-    return -par[0] * coefficient(par, v) * (load + par[6]) * tanh(v / par[4]) - par[5] * rate
+    way = choose(laws[2] - SLIDING, 1.0, choose(par[CREEPS], tanh(v / par[4]), laws[2]))
+    return -par[0] * coefficient(par, v, laws[2]) * (load + par[6]) * way - par[5] * rate
 
 
 @element
 class JointFriction(CoordinateForce):
-    """Coulomb friction with Stribeck effect in a joint, proportional to the load that the joint carries.
+    """Coulomb friction in a joint, proportional to the load that the joint carries: it sticks, or slips.
 
     The load is N = |radial force| + thrust_factor |thrust| + |bending moment| / bending_length + |twist| /
-    twist_length, from the joint's actual reaction at every instant. The law is regularised: what would stick creeps
-    at ``stick_speed`` times artanh(part of the full friction that holds it); ``result.health.creep`` says how far it
-    crept. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models for the control of machines with
-    friction*, 1994.)
+    twist_length, from the joint's actual reaction at every instant. What sticks is held by a constraint and does not
+    move at all, until that carries more than static (N + preload); then it slips, against kinetic (N + preload).
+
+    With a ``stick_speed`` the law is regularised instead: friction is tanh(v / stick_speed) of the full one, and what
+    would stick creeps at ``stick_speed`` times artanh(part of the full friction that holds it);
+    ``result.health.creep`` says how far it crept. (Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models
+    for the control of machines with friction*, 1994.)
 
     Parameters
     ----------
@@ -70,9 +83,11 @@ class JointFriction(CoordinateForce):
     radius : number [m]
         Radius of the bearing, where the friction acts; needed for an angle.
     stribeck_speed : number [m/s]
-        Sliding speed over which the coefficient falls from static to kinetic.
+        Sliding speed over which the coefficient falls from static to kinetic. Not given: it falls as soon as the
+        surfaces slide; of the regularised law, 0.01 m/s.
     stick_speed : number [m/s]
-        Sliding speed that counts as rest: smaller is nearer to true sticking, and stiffer.
+        Not given: friction sticks. Given: the regularised law, in which slower sliding than this counts as rest;
+        smaller is nearer to sticking, and stiffer.
     viscous : number [N s/m] or [N m s/rad]
         Viscous friction along the coordinate.
     preload : number [N]
@@ -88,8 +103,8 @@ class JointFriction(CoordinateForce):
     static: Annotated[Number, Unit("1")]
     kinetic: Annotated[Number | None, Unit("1")] = None
     radius: Length | None = None
-    stribeck_speed: Annotated[Number, Unit("m/s")] = 0.01
-    stick_speed: Annotated[Number, Unit("m/s")] = 0.001
+    stribeck_speed: Annotated[Number | None, Unit("m/s")] = None
+    stick_speed: Annotated[Number | None, Unit("m/s")] = None
     viscous: Annotated[Number, Unit(None)] = 0.0
     preload: Annotated[Number, Unit("N")] = 0.0
     thrust_factor: Annotated[Number, Unit("1")] = 1.0
@@ -109,6 +124,10 @@ class JointFriction(CoordinateForce):
     def _coordinate(self) -> str:
         return ("displacement" if self.radius is None else "angle") if self.coordinate is None else self.coordinate
 
+    def switches(self) -> tuple[Switch, ...]:
+        """It sticks, or slides; the regularised law knows no difference."""
+        return () if self.stick_speed is not None else (Switch(FRICTION, along=self.along(), slides=True),)
+
     def examine(self, model: Model) -> None:
         """It needs a joint that carries something, and the radius of a bearing that turns."""
         found = model.find(self.joint)
@@ -124,7 +143,8 @@ class JointFriction(CoordinateForce):
     def check(self, n: SimpleNamespace) -> None:
         """Coefficients and lengths make sense."""
         nonnegative(self, n, "static", "kinetic", "viscous", "preload", "thrust_factor")
-        positive(self, n, "radius", "stribeck_speed", "stick_speed", "bending_length", "twist_length")
+        positive(self, n, "radius", "stribeck_speed", "bending_length", "twist_length")
+        positive(self, n, "stick_speed", why="Leave it out, and it sticks")
         if n.kinetic is not None and n.kinetic.real > n.static.real:
             raise ModelError(
                 f"{self.title}: kinetic friction {n.kinetic:g} is greater than static friction {n.static:g}; it must "
@@ -147,7 +167,9 @@ class JointFriction(CoordinateForce):
         """Numbers that the formulas see."""
         turning = self._coordinate().startswith("angle")
         kinetic = n.static if n.kinetic is None else n.kinetic
-        bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
         arm = n.radius if turning else 1.0
-        speeds = n.stribeck_speed, n.stick_speed
-        return (arm, n.static, kinetic, *speeds, n.viscous, n.preload, n.thrust_factor, bending, twist)
+        fall = FALL if n.stribeck_speed is None and n.stick_speed is not None else n.stribeck_speed
+        bending, twist = (0.0 if x is None else 1.0 / x for x in (n.bending_length, n.twist_length))
+        fall, falls, stick, creeps = (y for x in (fall, n.stick_speed) for y in ((1.0, 0.0) if x is None else (x, 1.0)))
+        laws = n.viscous, n.preload, n.thrust_factor, bending, twist
+        return (arm, n.static, kinetic, fall, stick, *laws, falls, creeps)

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ..math import scalar
+from .branch import taken
 from .function import Function, Functions
 from .operations import ADD, CALL, DIVIDE, EVEN, FUNCTIONS, MULTIPLY, NUMBER, ODD, OPERATIONS, POWER, SYMBOL
 
@@ -335,11 +336,8 @@ class Graph:
         nodes = tuple(self.node(x) for x in args)
         if all(x.op == NUMBER for x in nodes):
             return self.number(FUNCTIONS[name](*(x.value for x in nodes)))
-        if name == "choose":
-            if nodes[1] is nodes[2]:
-                return nodes[1]
-            if nodes[0].op == NUMBER:
-                return nodes[1] if nodes[0].value > 0.0 else nodes[2]
+        if name == "choose" and (one := taken(*nodes)) is not None:
+            return one
         if name in ("minimum", "maximum") and nodes[0] is nodes[1]:
             return nodes[0]
         if len(nodes) == 1 and (name in ODD or name in EVEN):

@@ -215,12 +215,19 @@ class Element:
     def check(self, n: SimpleNamespace) -> None:
         """Refuse numbers that make no sense; ``n`` holds the resolved fields."""
 
+    def acts(self) -> bool:
+        """Whether its formula says what it does; if not, it is a row that holds at times (`switches`) and no more."""
+        return True
+
     def switches(self) -> tuple[Any, ...]:
         """Rows with modes that it has in a motion (`model.switch.Switch`)."""
         return ()
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
-        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind."""
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
+        """Numbers of such a row: least and greatest value of its quantity, restitution, more by its kind.
+
+        ``separation`` is how far its points are apart as drawn.
+        """
         return ()
 
     def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:

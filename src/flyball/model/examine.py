@@ -92,8 +92,8 @@ def but_is(model: Model, name: str, wanted: str) -> str:
 
 def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
     """Refuse units that do not fit the coordinate that an element acts along or couples."""
-    if isinstance(e, CoordinateForce) and e.coordinate_text():
-        turning = model.unit(e.coordinate_text(), e) == "rad"
+    if isinstance(e, CoordinateForce) and e.along():
+        turning = model.unit(e.along()[0], e) == "rad"
         for name, pair in e.dimensions.items():
             value = getattr(e, name, None)
             if value is not None and name in fields_with(e.__class__, Unit):
@@ -101,12 +101,16 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
             elif value is not None and name in fields_with(e.__class__, LawOf):
                 tables = {x.name: x for x in model.tables}
                 names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
-                law_expression(value, pair[turning], f"{name} of {e.title}", tables, names)
-    elif isinstance(e, Coupling):
-        for name, kinds in e.dimensions.items():
-            value = getattr(e, name)
-            for x in value if isinstance(value, tuple) else (value,):
-                _one_of(x, kinds, env, f"{name} of {e.title}")
+                where = f"{name} of {e.title}"
+                law = law_expression(value, pair[turning], where, tables, names)
+                if name in e.not_negative and law.names <= set(env) and not law.tables and law.function is None:
+                    given = law.evaluate(env)
+                    if not given.real >= 0.0:
+                        raise ModelError(f"{where} is {given:g} {pair[turning]}; it must be zero or greater")
+    for name, kinds in (e.dimensions if isinstance(e, Coupling) else getattr(e, "kinds", {})).items():
+        value = getattr(e, name)
+        for x in value if isinstance(value, tuple) else (value,):
+            _one_of(x, kinds, env, f"{name} of {e.title}")
 
 
 def _one_of(value: Any, kinds: tuple[str, ...], env: Mapping[str, float], where: str) -> None:

@@ -127,6 +127,7 @@ class CoordinateForce(Force):
         "rest": ("m", "rad"),
         "force": ("N", "N*m"),
     }
+    not_negative: ClassVar[tuple[str, ...]] = ()  # laws that must not be
     sign: ClassVar[float] = 1.0  # of the output that follows value and rate, relative to the effort
 
     def ends(self) -> dict[str, str]:
@@ -136,6 +137,14 @@ class CoordinateForce(Force):
     def coordinate_text(self) -> str:
         """The coordinate that it acts along: ``"A.angle"``."""
         return ""
+
+    def along(self) -> tuple[str, ...]:
+        """Coordinates whose sum it acts along, each times its weight (`switch_weights`); none if it has a path."""
+        return (self.coordinate_text(),) if self.coordinate_text() else ()
+
+    def outward(self, n: SimpleNamespace) -> float:
+        """1, or -1 where results tell its quantity, rate and effort the other way round than the formulas have them."""
+        return 1.0
 
     def examine(self, model: Model) -> None:
         """Refuse what it cannot act along."""

@@ -25,7 +25,7 @@ from .force import Force
 from .function import function_name
 from .ground import Ground
 from .joint import Joint
-from .limit import Limit
+from .limit import Unilateral
 from .material import Material, MaterialPair
 from .model import Model, suggest
 from .sensor import IMU, Sensor
@@ -46,11 +46,16 @@ ONE_KIND = {
     "drivers": Driver,
     "initial": Initial,
     "contacts": Contact,
-    "limits": Limit,
     "events": Event,
 }
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
-MANY_KINDS = {"joints": (Joint, "joints"), "couplings": (Coupling, "joints"), "forces": (Force, "forces")}
+MANY_KINDS = {
+    "joints": (Joint, "joints"),
+    "couplings": (Coupling, "joints"),
+    "forces": (Force, "forces"),
+    "limits": (Unilateral, "forces"),
+}
+USUAL = {"sensors": "Sensor", "limits": "Limit"}  # where no type is said
 SENSORS = {"Sensor": Sensor, "IMU": IMU}
 WIDTH = 100  # a list of shapes longer than this is written one shape a line
 _HEADER = re.compile(r"^\s*\[\[\s*\"?(\w+)\"?\s*\]\]")
@@ -83,7 +88,8 @@ def dumps(model: Model, folder: str | os.PathLike | None = None) -> str:
     for category in CATEGORIES:
         for e in getattr(model, category):
             lines += ["", f"[[{category}]]"]
-            kind = {"type": type(e).__name__} if category in MANY_KINDS or isinstance(e, IMU) else {}
+            told = category in MANY_KINDS or category in USUAL
+            kind = {"type": type(e).__name__} if told and type(e).__name__ != USUAL.get(category) else {}
             fields = kind | _written(e, folder)
             _refuse_functions(e, fields)
             lines += [f"{k} = {_value(v)}" for k, v in fields.items()]
@@ -282,15 +288,15 @@ def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> N
 
 def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
     """The class that the table's ``type`` names."""
+    if category in USUAL:
+        fields.setdefault("type", USUAL[category])
     if category == "sensors":
         known = sorted(SENSORS)
-        fields.setdefault("type", "Sensor")
     else:
         base, room = MANY_KINDS[category]
         importlib.import_module(f"..{room}", __package__)
-        known = sorted(
-            k for k, c in Element.registry.items() if issubclass(c, base) and c.__module__.count(f".{room}.")
-        )
+        kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
+        known = sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}."))
     name = fields.pop("type", None)
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"

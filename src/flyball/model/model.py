@@ -24,7 +24,7 @@ from .ground import Ground
 from .joint import Joint
 from .kept import Kept
 from .lawful import law_of
-from .limit import Limit
+from .limit import Unilateral
 from .material import Material, MaterialPair
 from .references import check_references
 from .sensor import IMU, Sensor
@@ -94,7 +94,7 @@ class Model:
         self.ground: list[Ground] = []
         self.bulk: list[Bodies] = []
         self.contacts: list[Contact] = []
-        self.limits: list[Limit] = []
+        self.limits: list[Unilateral] = []
         self.events: list[Event] = []
         self.by_name: dict[str, Element] = {}
 
@@ -156,6 +156,10 @@ class Model:
         """Every part, category by category, in the order they were added."""
         for category in CATEGORIES:
             yield from getattr(self, category)
+
+    def acting(self) -> list[Force]:
+        """All that acts by a formula: forces, and limits that are elastic."""
+        return [e for e in (*self.forces, *self.limits) if isinstance(e, Force) and e.acts()]
 
     def __eq__(self, other: object) -> bool:
         """Equal if every part, parameter and setting is."""

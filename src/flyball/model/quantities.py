@@ -227,7 +227,7 @@ def _output(model: Model, e: Force, unit: str) -> str:
     """Unit of one of a force's outputs, where it follows from the coordinate that it acts along."""
     if not isinstance(e, CoordinateForce) or unit not in ("", "/s", "effort"):
         return unit
-    base = model.unit(e.coordinate_text(), e)
+    base = model.unit(e.along()[0], e)
     return {"": base, "/s": f"{base}/s", "effort": _effort(base)}[unit]
 
 

@@ -16,7 +16,6 @@ from .event_check import check_event
 from .force import BodyForce, CoordinateForce, TwoFrameForce, TwoPointForce
 from .ground import Ground
 from .joint import Joint
-from .limit import Limit
 from .material import MaterialPair
 from .sensor import IMU, Sensor
 from .touching import check_touching
@@ -53,14 +52,14 @@ def check_references(model: Model, e: Element) -> None:
     elif isinstance(e, IMU):
         if model.carrier(e.frame, e) == GROUND:
             raise ModelError(f"{e.title}: it is fixed on ground, which never moves; name a body or a frame on one")
-    elif isinstance(e, (Driver, Initial, Limit)):
+    elif isinstance(e, (Driver, Initial)):
         model.coordinate(e.name if isinstance(e, Initial) else e.coordinate, e)
 
 
 def _check_path(model: Model, e: CoordinateForce) -> None:
     """What it acts along exists, and can move."""
-    if e.coordinate_text() or hasattr(e, "coordinate"):
-        model.coordinate(e.coordinate_text(), e)
+    for text in e.along() or ((e.coordinate,) if hasattr(e, "coordinate") else ()):
+        model.coordinate(text, e)
     carriers = [model.carrier(name, e) for name in e.ends().values()]
     for k, (a, b) in enumerate(itertools.pairwise(carriers)):
         if a == b:

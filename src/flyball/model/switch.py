@@ -14,11 +14,11 @@ class Switch:
     Attributes
     ----------
     kind : int
-        STOP, FRICTION, ONE_WAY, LOCK or SLIP of `constraints.modes`.
+        STOP, FRICTION, ONE_WAY, LOCK, ELASTIC, RATCHET or SLIP of `constraints.modes`.
     label : str
         Which of the element's it is; empty if it has one.
     along : tuple of str
-        Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity; weights are `Switching.weights`.
+        Coordinates (``"A.angle"``, ``"block.x"``) whose sum is the quantity, with weights if there are several.
     path : tuple of (role, role, Row)
         Or terms between frames of the element's own, such as the parts of a rope.
     seen : tuple of (role, role, Row)
@@ -26,7 +26,10 @@ class Switch:
     other : str
         Label of the element's switch that it belongs to: of a slip, the gap.
     slides : bool
-        Whether the element is a force along the same quantity that acts while the row is off: friction.
+        Whether the element is a force along the same quantity that acts while the row is off (friction), or whose
+        corners are watched (what is elastic).
+    weighted : bool
+        Whether a single coordinate has a weight too.
     """
 
     kind: int
@@ -36,3 +39,9 @@ class Switch:
     seen: tuple[tuple[str, str, Row], ...] = ()
     other: str = ""
     slides: bool = False
+    weighted: bool = False
+
+    @property
+    def summed(self) -> bool:
+        """Whether the quantity is a sum with weights (`Element.switch_weights`), and so the element's own."""
+        return self.weighted or len(self.along) > 1

@@ -90,7 +90,7 @@ class Touch(TwoFrameForce):
             out.append(Switch(SLIP, f"slip_{k + 1}", path=path, slides=k == 0, other="gap"))
         return tuple(out)
 
-    def switched(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Of the gap its least value and the restitution, of a slip both coefficients."""
         return (0.0, np.inf, self.restitution) if label == "gap" else self.friction
 

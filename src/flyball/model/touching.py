@@ -21,8 +21,14 @@ Owner = Body | Bodies | Ground
 
 
 def has_contact(model: Model) -> bool:
-    """Whether there is something that only a motion by impulses knows: contacts, stops, many bodies."""
-    return bool(model.contacts or model.limits or model.bulk)
+    """Whether there is something that only a motion by impulses knows: contacts, rigid stops, many bodies."""
+    return bool(model.contacts or model.bulk or any(not e.acts() for e in model.limits))
+
+
+def smooth_only(model: Model) -> list[Element]:
+    """One-sided elements that steps by impulses do not know: latches, rigid play, ropes that do not stretch."""
+    known = "Limit"
+    return [e for e in (*model.forces, *model.limits) if not e.acts() and type(e).__name__ != known]
 
 
 def nothing_touches(model: Model) -> tuple[str, ...]:

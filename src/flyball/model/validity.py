@@ -14,7 +14,7 @@ from .geometry import vector
 from .ground import Ground
 from .inertia import mass_properties
 from .joint import Joint
-from .limit import Limit
+from .limit import Unilateral
 from .weighing import checked
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
         check_frame(model, e, n)
     elif isinstance(e, Joint):
         check_joint(model, e, n)
+    elif isinstance(e, Unilateral):
+        e.check_sides(n, model.unit(e.along()[0], e))
     elif isinstance(e, Force):
         e.placed(n, model.planar)
         if isinstance(e, TwoFrameForce) and n.at is None:
@@ -48,11 +50,6 @@ def check_kind(model: Model, e: Element, n: Any, env: dict[str, float]) -> None:
     elif isinstance(e, Initial):
         unit = model.unit(e.name, e)
         told(e, env, {"value": unit, "rate": f"{unit}/s"})
-    elif isinstance(e, Limit):
-        unit = model.unit(e.coordinate, e)
-        low, high = told(e, env, {"lower": unit, "upper": unit})
-        if low is not None and high is not None and not low.real < high.real:
-            raise ModelError(f"{e.title}: lower is {low:g} {unit}; it must be less than upper, {high:g} {unit}")
 
 
 def told(e: Element, env: Mapping[str, float], units: Mapping[str, str]) -> list[Any]:

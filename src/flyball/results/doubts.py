@@ -111,12 +111,14 @@ def _creep(result: Result) -> list[str]:
 def creep(result: Result) -> dict[str, tuple[float, float]]:
     """Joint friction -> (largest speed [m/s], distance [m]) of its surfaces while it should stick.
 
-    It should stick while it slides at less than three times its stick speed, for two output times running or more;
-    what passes through rest between two output times is no creep.
+    Of the regularised law: it should stick while it slides at less than three times its stick speed, for two output
+    times running or more; what passes through rest between two output times is no creep.
     """
     found = {}
     S, forces = result.values.system, result.values.structure.forces
     for f in _with_loads(result):
+        if f.stick_speed is None:
+            continue
         k = next(k for k, e in enumerate(forces) if e is f)
         arm, limit = f.sticking(wide(S.force_x, k))
         x, rate = result.measured.quantity(int(S.force_i[k, FORCE_F]))

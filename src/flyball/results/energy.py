@@ -68,7 +68,7 @@ class Energy(Named):
     @cached_property
     def elastic(self) -> np.ndarray:
         """Energy stored in springs, and in contacts that give way."""
-        return sum((self._result[f.name].energy for f in self._result.model.forces), self.exchanged(STORED))
+        return sum((self._result[f.name].energy for f in self._result.model.acting()), self.exchanged(STORED))
 
     @property
     def potential(self) -> np.ndarray:

@@ -2,18 +2,19 @@
 
 - A stop: velocity and impulse are complementary, as at a contact; it bounces off by Newton's law.
 - A rope pulls or is slack within one step, and is taken implicitly as springs are (`implicit.py`).
-- Friction in a joint is bounded by its load, which the reactions of the last step tell: what sticks, sticks.
+- Friction is bounded by its own law, at the load that the reactions of the last step tell: what sticks, sticks.
 """
 
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..equations.friction import most_friction, reaction_loads
+from ..equations.friction import dry, held_at_rest, reaction_loads
 from ..numerics.cone.problem import BIAS, HIGH, LOW, SOFT
 from ..tables.system import BIAS as BEND_OF
 from ..tables.system import COORDINATES, FORCE_LOAD, FORCE_WORK, LAM, RETURNED, VALUE
 from .joined import (
     CHANGE,
+    FRICTION,
     LEAST,
     LINE_AT,
     LINE_GROUP,
@@ -32,11 +33,13 @@ from .joined import (
     SHORTEST,
     STEP,
     STOP,
+    TIME,
     V_AFTER,
     V_BEFORE,
     WHAT,
 )
 
+AT_REST = 1e-9  # part of what friction slows down within a step below which a rate is none
 AHEAD = 4.0  # a stop is a line where what it stops may reach it within as many steps
 INFINITE = 1e300
 
@@ -132,8 +135,23 @@ def line_laws(A, P, n):
         elif A.line[k, WHAT] == ROPE:
             rope_law(A, P, i, k, x)
         else:
-            held = h * most_friction(A.S, A.line[k, OF_FORCE], A.line_x[k, LEAST], rate, A.line_x[k, PRESSED])
-            x[LOW], x[HIGH] = -held, held
+            friction_law(A, P, i, k, x)
+
+
+@formula
+def friction_law(A, P, i, k, x):
+    """Between -h F and h F. What moves no faster than rounding would have it is at rest, and held by more."""
+    h = A.real[STEP]
+    g, at = A.active[i, LINE_GROUP], A.active[i, LINE_AT]
+    w = 0.0
+    for d in range(A.group[g + 1] - A.group[g]):
+        w += P.J[at + d] * P.Y[at + d]
+    t, arm, load = A.real[TIME] + 0.5 * h, A.line_x[k, LEAST], A.line_x[k, PRESSED]
+    rate = rate_of(A, k, A.wide[V_BEFORE])
+    held = h * held_at_rest(A.S, A.W, A.line[k, OF_FORCE], t, arm, load)
+    if abs(rate) > AT_REST * held * w:
+        held = h * dry(A.S, A.W, A.line[k, OF_FORCE], t, rate, arm, load)
+    x[LOW], x[HIGH] = -held, held
 
 
 @formula
@@ -182,7 +200,7 @@ def press(A):
         A.W.row[LAM, r] = A.lam[0, r] + (A.lam[1, r] + A.lam[2, r]) / A.real[STEP]
     reaction_loads(A.S, A.W)
     for k in range(A.line.shape[0]):
-        if A.line[k, WHAT] != STOP and A.line[k, WHAT] != ROPE:
+        if A.line[k, WHAT] == FRICTION and A.S.force_i[A.line[k, OF_FORCE], FORCE_LOAD] >= 0:
             A.line_x[k, PRESSED] = A.W.sensed[RETURNED, A.S.force_i[A.line[k, OF_FORCE], FORCE_LOAD]]
 
 

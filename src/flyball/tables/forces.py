@@ -23,7 +23,7 @@ def measured_quantities(s: Structure, watched: Mapping[str, Event]) -> None:
 
     ``watched``: names in expressions of events, curves such as A.angle among them, and whose they are.
     """
-    for e in s.model.forces:
+    for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
@@ -45,7 +45,7 @@ def measured_quantities(s: Structure, watched: Mapping[str, Event]) -> None:
 def _names(s: Structure) -> set[str]:
     """Names that some law uses."""
     out: set[str] = set()
-    for e in [*s.model.forces, *s.model.drivers]:
+    for e in [*s.model.acting(), *s.model.drivers]:
         for field, of in _laws(e).items():
             value = getattr(e, field)
             for law in value if isinstance(value, tuple) else (value,):
@@ -64,8 +64,9 @@ def _along(s: Structure, e: CoordinateForce) -> int:
     if text in s.measured:
         return s.measured[text]
     m = s.measured[text] = len(s.measured)
-    if e.coordinate_text():
-        coordinate_term(s, text, e, m, measured=True)
+    for k, one in enumerate(e.along()):
+        term = coordinate_term(s, one, e, m, measured=True)
+        term.index, term.switch = k, None if e.coordinate_text() else ""
     for a, b, formula in e.path():
         measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
     return m
@@ -93,7 +94,7 @@ def _sensed(s: Structure, e: Sensor | Event, kind: str, text: str) -> int:
 
 def forces(s: Structure) -> None:
     """Force table, sorted by kind."""
-    s.forces = sorted((f for f in s.model.forces if _acts(s, f)), key=lambda f: f.kind)
+    s.forces = sorted((f for f in s.model.acting() if _acts(s, f)), key=lambda f: f.kind)
     table = np.full((len(s.forces), 10), -1, np.int64)
     for k, e in enumerate(s.forces):
         table[k, 7:9] = e.kind, isinstance(e, CoordinateForce)

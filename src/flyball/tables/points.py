@@ -108,9 +108,9 @@ def _coordinates(model: Model) -> Iterator[tuple[str, Element]]:
     for coupling in model.couplings:
         yield from ((text, coupling) for text in coupling.coupled())
     yield from ((d.coordinate, d) for d in model.drivers)
-    for f in model.forces:
-        if isinstance(f, CoordinateForce) and f.coordinate_text():
-            yield f.coordinate_text(), f
+    for f in (*model.forces, *model.limits):
+        if isinstance(f, CoordinateForce):
+            yield from ((text, f) for text in f.along())
 
 
 class _Places:

@@ -87,6 +87,10 @@ class Poses:
         points = [self.world(FrameSpec(0, e, role))[0] for role in e.ends()]
         return sum(np.sqrt(((b - a) ** 2).sum()) for a, b in itertools.pairwise(points))
 
+    def apart(self, e: Any) -> float:
+        """The same of an element that has several frames; 0 of others."""
+        return self.separation(e) if hasattr(e, "ends") and len(e.ends()) > 1 else 0.0
+
     def ends(self, e: Any) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Drawn frames F and M of a joint."""
         F, M = (self.world(FrameSpec(0, e, role))[:2] for role in "FM")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ..constraints.modes import BRANCH, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
@@ -26,6 +26,8 @@ from .system import (
     G_CORNER,
     G_HOLDS,
     G_LOWER,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
     G_PULL,
     G_SLIDES,
     G_TURNS,
@@ -37,6 +39,8 @@ GUARDS = {
     STOP: (G_LOWER, G_UPPER, G_PULL),
     FRICTION: (G_HOLDS, G_SLIDES),
     ONE_WAY: (G_BACK, G_PULL),
+    ELASTIC: (G_PRESS_LOWER, G_PRESS_UPPER),
+    RATCHET: (G_LOWER, G_SLIDES, G_PULL),
     BRANCH: (G_CORNER,),
     SLIP: (G_CONE, G_TURNS),
 }
@@ -65,7 +69,7 @@ def declared(model: Model) -> list[tuple[Element, Switch]]:
 
 def quantity(e: Element, w: Switch) -> str:
     """Name of the quantity that a switch acts along, among what is measured."""
-    if len(w.along) == 1:
+    if w.along and not w.summed:
         return w.along[0]
     return f"{e.name}:{w.label or 'length'}"
 
@@ -79,7 +83,7 @@ def quantities(s: Structure) -> None:
         m = s.measured[key] = len(s.measured)
         for k, text in enumerate(w.along):
             coordinate_term(s, text, e, m, measured=True).index = k
-            s.terms[-1].switch = w.label if len(w.along) > 1 else None
+            s.terms[-1].switch = w.label if w.summed else None
         for a, b, formula in w.seen or w.path:
             measured_term(s, m, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
 
@@ -87,10 +91,13 @@ def quantities(s: Structure) -> None:
 def rows(s: Structure) -> None:
     """The rows, behind all others."""
     for e, w in declared(s.model):
+        if w.kind == ELASTIC:
+            s.switches.append(SwitchSpec(e, w, -1, s.measured[quantity(e, w)]))
+            continue
         row, first = len(s.rows), len(s.rows)
         for k, text in enumerate(w.along):
             coordinate_term(s, text, e, row, counted=True).index = k
-            s.terms[-1].switch = w.label if len(w.along) > 1 else None
+            s.terms[-1].switch = w.label if w.summed else None
         for a, b, formula in w.path:
             measured_term(s, row, frame(s, e, a), frame(s, e, b), formula, 1.0, e)
             s.terms[-1].measured = False
@@ -133,11 +140,11 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
     return (*GUARDS.get(x.switch.kind, ()), *((G_ASTRAY,) if x.switch.seen else ()))
 
 
-def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any) -> np.ndarray:
-    """Parameters of the switches, from the numbers of their elements."""
+def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:
+    """Parameters of the switches, from the numbers of their elements; ``apart``: how far points of each are apart."""
     for k, spec in enumerate(s.switches):
         if asks(spec.element):
-            par = spec.element.switched(of[spec.element.name], spec.switch.label)
+            par = spec.element.switched(of[spec.element.name], spec.switch.label, apart(spec.element))
             x[k] = 0.0
             x[k, :2] = -np.inf, np.inf
             x[k, : len(par)] = par

@@ -37,14 +37,15 @@ FORCE_F, FORCE_M, FORCE_LAW, FORCE_WORK, FORCE_LOAD, FORCE_KIND, FORCE_ALONG, FO
 # columns of System.switch_i, and of switch_x; kinds of switches: see `model/switch.py`
 SWITCH_ROW, SWITCH_MEASURED, SWITCH_KIND, SWITCH_FORCE, SWITCH_LAW, SWITCH_OTHER = range(6)
 SWITCH_PARTNER = SWITCH_LAW  # of a slip: that along the other tangent, or -1
-SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE = range(3)
+SWITCH_LOWER, SWITCH_UPPER, SWITCH_BOUNCE, SWITCH_STIFFNESS, SWITCH_DAMPING = range(5)
+SWITCH_TOOTH, SWITCH_PITCH = 0, 1  # of a ratchet
 SWITCH_REST, SWITCH_SLIDING = range(2)  # coefficients of friction of a slip
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # columns of System.guard_i; kinds of guards; what a guard's zero is watched for
 GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
-G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER = range(8)
+G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_ASTRAY = 10, 11, 12
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Work.row, each (nr,)

@@ -18,7 +18,6 @@ from ..constraints.registry import KINDS
 from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.coupling import Coupling
-from ..model.force import TwoPointForce
 from ..model.joint import Joint
 from ..model.kept import Kept, bits
 from . import switches
@@ -113,7 +112,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     const, curve_at = _constants(s, numbers, env, dtype)
     term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
-    switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks)
+    switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks, pose.apart)
     semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
     glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
     t = s.tables
@@ -202,7 +201,8 @@ def _term_x(
         elif t.owner is not None:
             if t.switch is not None and (weights := e.switch_weights(n, t.switch)):
                 x[k, 7] *= weights[t.index]
-            x[k, 6] = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
+            held = t.sign * (holds.get(e.name, 0.0) - _offset(t, numbers))
+            x[k, 6] = _coupled(e, n, t, pose) if hasattr(e, "total") else held
     return x
 
 
@@ -211,7 +211,7 @@ def _offset(t: TermSpec, numbers: Mapping) -> float:
     return t.owner.offset(numbers[t.owner.name], t.what) if isinstance(t.owner, Joint) else 0.0
 
 
-def _coupled(e: Coupling, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
+def _coupled(e: Any, n: SimpleNamespace, t: TermSpec, pose: Poses) -> float:
     """What a coupled coordinate is compared with: what it is as drawn, unless the sum is given."""
     total = e.total(n)
     if total is None:
@@ -224,7 +224,6 @@ def _force_x(s: Structure, pose: Poses, x: np.ndarray, new: Afresh) -> np.ndarra
     for k, e in enumerate(s.forces):
         if not new.asks(e):
             continue
-        separation = pose.separation(e) if isinstance(e, TwoPointForce) or len(e.ends()) > 1 else 0.0
-        par = e.parameters(pose.numbers[e.name], separation)
+        par = e.parameters(pose.numbers[e.name], pose.apart(e))
         x[k], x[k, : len(par)] = 0.0, par
     return x

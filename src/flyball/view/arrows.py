@@ -49,7 +49,7 @@ def _all(result: Result, places: Places, most: int) -> Iterator[Found]:
         if M is not None:
             force, torque = result[joint.name].reaction()
             yield from _pair(joint.name, "reaction", M, force, torque)
-    for e in some(result.model.forces, most):
+    for e in some([*result.model.forces, *result.model.limits], most):
         yield from _force(result, places, e)
     for driver in result.model.drivers:
         yield from _along(result, places, driver.name, driver.coordinate, result[driver.name].effort)
@@ -69,9 +69,11 @@ def _force(result: Result, places: Places, e: Any) -> Iterator[Found]:
         return
     M = places.end(e.name, "M")
     if M is None:
-        coordinate = e.coordinate_text() if isinstance(e, CoordinateForce) else ""
-        if coordinate:
-            yield from _along(result, places, e.name, coordinate, getattr(view, list(e.outputs)[-1]))
+        texts = e.along() if isinstance(e, CoordinateForce) else ()
+        effort = getattr(view, list(e.outputs)[2]) if texts else None
+        weights = e.switch_weights(result.values.numbers[e.name], "") if texts else ()
+        for text, weight in zip(texts, weights or (1.0,) * len(texts), strict=True):
+            yield from _along(result, places, e.name, text, weight * effort)
         return
     force, torque = view.wrench
     if isinstance(e, BodyForce):

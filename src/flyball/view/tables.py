@@ -132,7 +132,7 @@ def _largest(view: Any) -> tuple[float, float]:
 def forces(result: Result) -> Table:
     """What forces act on, their constants and laws as written, and the largest that they gave."""
     rows = []
-    for e in result.model.forces:
+    for e in (*result.model.forces, *result.model.limits):
         curves = result[e.name].channels()
         sizes = [f"{fixed(np.nanmax(np.abs(v), initial=0.0))} {u}" for k, (u, v) in curves.items() if u in ("N", "N*m")]
         rows.append((e.name, type(e).__name__, between(e), _given(e), ", ".join(sizes).replace("N*m", "N m")))

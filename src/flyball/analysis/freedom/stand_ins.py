@@ -174,7 +174,7 @@ def _used(model: Model, e: Any) -> set[str]:
     """Coordinates of a joint that drivers, couplings, forces, sensors or initial conditions name."""
     texts = [d.coordinate for d in model.drivers] + [i.name for i in model.initial]
     texts += [x for c in model.couplings if isinstance(c, Coupling) for x in c.coupled()]
-    texts += [f.coordinate_text() for f in model.forces if isinstance(f, CoordinateForce)]
+    texts += [x for f in model.forces if isinstance(f, CoordinateForce) for x in f.along()]
     texts += [x.of for x in model.sensors if isinstance(x, Sensor)]
     if isinstance(e, Driver):
         return set()

@@ -70,6 +70,8 @@ def outcome(
         "warnings": partial(doubts.warnings, result),
     }
     result.events = here.records
+    if here.seen is not None:
+        here.seen.told(result)
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result

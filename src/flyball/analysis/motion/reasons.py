@@ -211,7 +211,8 @@ def _not_finite(a: Assembly, clock: ex.Clock) -> str:
     if clock.count[ex.STATUS] != ex.NOT_FINITE and a.compiled.work.info[STATUS] != motion.NOT_FINITE:
         return ""
     t = float(clock.real[ex.T])
-    force = broken_force(a.compiled, t)
+    span = float(clock.real[ex.LARGEST])
+    force = next((x for d in (0.0, *AHEAD) if (x := broken_force(a.compiled, t + d * span))), "")
     if force:
         return f"the equations of motion are not finite just after t = {t:.6g} s: {force}"
     wrong = ~np.isfinite(np.r_[clock.K, clock.y]).all(axis=0)

@@ -27,7 +27,7 @@ def open_copy(model: Model, at: Assembly) -> tuple[Model, dict[str, float]]:
     signs : dict
         Name of a closed stop -> +1 if it pushes upwards, -1 downwards.
     """
-    gone = {e.name: None for e in (*model.contacts, *model.limits)}
+    gone = {e.name: None for e in (*model.contacts, *(e for e in model.limits if not e.acts()))}
     out, signs = model.changed(gone), dict[str, float]()
     here = snapshot(State.resting(at.compiled, at.t, at.q)) if model.limits else None
     for stop in stops(model, at.compiled.values.given):

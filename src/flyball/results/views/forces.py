@@ -193,7 +193,10 @@ class ForceView(View):
         k = outputs.index(name)
         if isinstance(self.element, CoordinateForce):
             value = self._whole_along()[k]
-            return np.abs(value) if name == "taut" else self.element.sign * value if k == 2 else value
+            if k > 2:
+                return np.abs(value) if name == "taut" else value
+            seen = self.element.outward(self._x.numbers[self.element.name])
+            return (self.element.sign if k == 2 else 1.0) * seen * value
         inputs, force, _ = self._between()
         if k < 2:
             return inputs[k]

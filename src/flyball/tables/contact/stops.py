@@ -6,9 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model.limit import Limit
+from ...forces.limit import Limit
 from ...model.model import Model
-from ...model.validity import told
 from ..numbers import Numbers
 
 
@@ -23,17 +22,10 @@ class Stop:
 
 
 def stops(model: Model, given: Numbers) -> list[Stop]:
-    """Every stop of a model."""
+    """Every rigid stop of a model."""
     out = []
     for e in model.limits:
-        unit = model.unit(e.coordinate, e)
-        low, high = told(e, given.env, {"lower": unit, "upper": unit})
-        out.append(
-            Stop(
-                e,
-                -np.inf if low is None else float(np.real(low)),
-                np.inf if high is None else float(np.real(high)),
-                float(np.real(given.of[e.name].restitution)),
-            )
-        )
+        if isinstance(e, Limit) and not e.acts():
+            lower, upper, bounce, *_ = e.switched(given.of[e.name], "", 0.0)
+            out.append(Stop(e, float(np.real(lower)), float(np.real(upper)), float(np.real(bounce))))
     return out

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import SimulationError
 from ....model.words import listing
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
@@ -11,6 +11,7 @@ from .modes import Decided
 
 ROLES = {
     STOP: "is closed",
+    RATCHET: "is latched",
     FRICTION: "has friction",
     ONE_WAY: "goes one way only",
     SLIP: "has friction",

@@ -18,6 +18,7 @@ from .jump import Jump, jump, must_jump
 from .modes import Decided, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
+from .sides import pressed, teeth, turned
 from .told import tell_jump, tell_modes
 
 ROUNDS = 100
@@ -97,7 +98,9 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
     hits: dict[int, bool] = {}
     for _ in range(ROUNDS):
         n.look()
-        at, still = sides(n, fired), at_rest(n, fired)
+        still = at_rest(n, fired)
+        teeth(n, still)
+        at = sides(n, fired)
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
@@ -105,7 +108,9 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             hits |= {s: s in jumped.even for s in jumped.closing}
             still = at_rest(n, fired[:0])
             still[list(jumped.even)] = True
+        pressed(n, fired)
         found = decided(n, at, still, fired)
+        turned(n, hits)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)

@@ -51,6 +51,8 @@ class Here:
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    seen : Segments, optional
+        What held at the rows of output so far (`events.segments`).
     """
 
     start: Start
@@ -65,6 +67,7 @@ class Here:
     kick: np.ndarray | None = None
     blows: list[Any] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
+    seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....equations.engine import Sheet, engine, through
 from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
 from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
@@ -38,7 +38,8 @@ SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
 REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the motion: the same where all is at rest
 NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
-DECIDED = (STOP, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
+STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
+DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
 class Part(NamedTuple):

@@ -13,11 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from ....constraints.modes import STOP
 from ....equations.instant import Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
 from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, SWITCH_ROW, V0
-from .instant import Instant, Part
+from .instant import STOPS, Instant, Part
 
 REST = 1e-12  # of the terms of a rate after the jump: none
 NEWTON = 3  # column of switch_x: 1 where restitution is by Newton's law
@@ -107,7 +106,7 @@ def expanded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Impulses and velocities with what restitution gives back."""
     x, u = hit
-    bounce = np.array([n.S.switch_x[p.switch, SWITCH_BOUNCE] if n.kind[p.switch] == STOP else 0.0 for p in parts])
+    bounce = np.array([n.S.switch_x[p.switch, SWITCH_BOUNCE] if n.kind[p.switch] in STOPS else 0.0 for p in parts])
     least = np.where((P.rule == PUSHES) & (x > 0.0), bounce * x, 0.0)
     if not least.any():
         return x, u

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, STOP
+from ....constraints.modes import FRICTION
 from ....equations.friction import FORGOTTEN
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
-from .instant import DECIDED, Instant, Part
+from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
 from .slips import loose, slide_on, write_slips
 
@@ -110,7 +110,7 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
         if found.state[i] == EVEN:
             W.switch[MODE, s] = HELD
             W.switch[HOLD, s] = n.hold[s] if n.mode[s] == HELD else n.x[s]
-            if kind == STOP:
+            if kind in STOPS:
                 W.switch[HOLD, s] = W.switch[LOWER if p.sign > 0.0 else UPPER, s]
             ways[s] = p.sign if p.rule == PUSHES else 0.0
         elif kind == FRICTION:

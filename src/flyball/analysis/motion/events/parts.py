@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC, STOP
+from ....constraints.modes import FRICTION, LOCK, ONE_WAY, STATIC
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FREE, GRIPS, HOLDS, PUSHES
 from ....tables.system import (
     FORCE_LOAD,
@@ -16,7 +16,7 @@ from ....tables.system import (
     OFF,
     UPPER,
 )
-from .instant import Instant, Part
+from .instant import STOPS, Instant, Part
 from .slips import astray, ended
 from .slips import parts_of as slips_at
 
@@ -28,7 +28,7 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
     out = {}
     gone = astray(n, fired)
-    for s in np.flatnonzero(n.kind == STOP).tolist():
+    for s in np.flatnonzero(np.isin(n.kind, STOPS)).tolist():
         if s in gone:
             continue
         gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
@@ -53,7 +53,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
     """Rows that impulses may act along."""
     out = []
     for s, kind in enumerate(n.kind.tolist()):
-        if kind == STOP and s in at:
+        if kind in STOPS and s in at:
             out += _stop(s, at[s])
             out += slips_at(n, s, len(out) - 1, still, led=False)
         elif kind == ONE_WAY:
@@ -72,7 +72,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
     """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
     out = []
     for s, kind in enumerate(n.kind.tolist()):
-        if kind == STOP and s in at and still[s]:
+        if kind in STOPS and s in at and still[s]:
             out += _stop(s, at[s])
             out += slips_at(n, s, len(out) - 1, still, led=True)
         elif kind == ONE_WAY and still[s]:

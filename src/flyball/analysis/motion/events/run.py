@@ -23,6 +23,7 @@ from ..engines import Engine
 from .happen import begin, happen
 from .here import Here
 from .legs import Legs
+from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
@@ -53,6 +54,8 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
+        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i)
+        here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 
     def _loop(self) -> Watched:
@@ -98,6 +101,7 @@ class Run:
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
+            self.here.seen = self.here.seen and Segments()
             forget(self.here.c.work.stack)
             self.legs.anew()
         self.legs.aim()
@@ -128,6 +132,8 @@ class Run:
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
         self.rows.append(rows)
+        if self.here.seen is not None:
+            self.here.seen.add(self.here, rows)
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import FRICTION, LOCK, ONE_WAY, SLIP, STOP
+from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....model.touch import Touch
 from ....results.events import Happening
 from ....results.struck import Struck
@@ -18,6 +18,8 @@ HELD_WORDS = {
     SLIP: ("stick", "sticks"),
     ONE_WAY: ("lock", "locks"),
     LOCK: ("lock", ""),
+    RATCHET: ("latch", "latches"),
+    ELASTIC: ("close", "is pressed"),
 }
 FREE_WORDS = {
     STOP: ("open", "opens"),
@@ -25,6 +27,8 @@ FREE_WORDS = {
     SLIP: ("slip", "slides"),
     ONE_WAY: ("overrun", "overruns"),
     LOCK: ("", ""),
+    RATCHET: ("unlatch", "lets go"),
+    ELASTIC: ("open", "lets go"),
 }
 ROPE_WORDS = {"close": ("taut", "goes taut"), "open": ("slack", "goes slack")}
 PLACE_WORDS = {"close": ("touch", "touches"), "open": ("part", "parts")}
@@ -76,6 +80,9 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
             count = n.here.bounces.pop(s).count
             told.setdefault("rest", []).append((s, f"came to rest after {count} bounces"))
             n.over = float(np.fmax(n.over, over))
+        elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
+            kind, said = words(n, s, n.ways()[s] != FROZEN)
+            told.setdefault(kind, []).append((s, said))
         elif was != now and s not in hits:
             kind, said = words(n, s, now)
             if kind:

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ....forces.coordinate_spring import measuring
+from ....forces.limit import Limit
 from ....model.model import Model
 from ....tables.contact.stops import stops
 from ....tables.values import Values
@@ -17,8 +18,9 @@ from .mechanism import Stop
 def with_stops(model: Model) -> Model:
     """A copy in which springs of no stiffness stand for stops."""
     out = model.copy()
-    limits, out.limits = list(out.limits), []
-    for e in limits:
+    rigid = [e for e in out.limits if isinstance(e, Limit) and not e.acts()]
+    out.limits = [e for e in out.limits if e.acts()]
+    for e in rigid:
         del out.by_name[e.name]
         out.add(measuring(e.name, e.coordinate))
     return out.snapshot()

@@ -97,7 +97,7 @@ def held_apart(
 
 def acting_values(model: Model, values: Values, parameters: Mapping[str, float] | None) -> Values:
     """Tables in which stops are forces, so that what they stop counts as held."""
-    if not model.limits:
+    if all(e.acts() for e in model.limits):
         return values
     from ...compiled import compiled
 

@@ -1,0 +1,103 @@
+"""What needs no problem to be solved: elastic stops that are pressed or let go, ratchets that turn round.
+
+An elastic stop is pressed at a side where it is d > 0 deep in it and its push k d + c ddot is positive. Between events
+its force is frozen (`constraints.modes.FROZEN`), so what decides here is how d goes on from a zero: by its rate, by its
+acceleration where it has none. Where it has neither the force is left to look where it is by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from ....constraints.modes import ELASTIC, FROZEN, RATCHET
+from ....equations.tasks import MOTION
+from ....tables.system import (
+    BIAS,
+    COORDINATES,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
+    LOWER,
+    MODE,
+    OFF,
+    SWITCH_DAMPING,
+    SWITCH_PITCH,
+    SWITCH_STIFFNESS,
+    SWITCH_TOOTH,
+    UPPER,
+)
+from .instant import Instant
+
+SLOW = 1e-9  # of the mechanism's length (of a radian) a second squared: an acceleration that is none
+TOOTH = 1e-9  # of the pitch: as good as at a tooth
+BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
+
+
+def teeth(n: Instant, still: np.ndarray) -> None:
+    """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
+    for s in np.flatnonzero(n.kind == RATCHET).tolist():
+        n.W.switch[UPPER, s] = np.inf
+        if n.mode[s] != OFF:
+            continue
+        if (_acceleration(n, s) > -SLOW * n.unit[s]) if still[s] else (n.rate[s] > 0.0):
+            _goes_on(n, s)
+        elif n.way[s] >= 0.0:
+            tooth, pitch = n.S.switch_x[s, SWITCH_TOOTH], n.S.switch_x[s, SWITCH_PITCH]
+            n.W.switch[LOWER, s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
+            n.ways()[s] = n.way[s] = -1.0
+
+
+def turned(n: Instant, hit: Collection[int]) -> None:
+    """Ratchets whose tooth let go, or that it was ``hit`` and threw back, go on; of others the way is as it was."""
+    for s in np.flatnonzero(n.kind == RATCHET).tolist():
+        if n.W.switch[MODE, s] != OFF:
+            continue
+        if n.mode[s] != OFF or s in hit:
+            _goes_on(n, s)
+        else:
+            n.ways()[s] = n.way[s]
+
+
+def _goes_on(n: Instant, s: int) -> None:
+    """No tooth is in the way until it turns round."""
+    n.ways()[s] = n.way[s] = 1.0
+    n.W.switch[LOWER, s] = -np.inf
+
+
+def _acceleration(n: Instant, s: int) -> float:
+    """Second derivative of a quantity with the modes as they stand."""
+    n.ask(MOTION)
+    nq = n.S.kinds[COORDINATES]
+    vdot = n.desk.K[0, nq : nq + n.here.structure.nv]
+    return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
+
+
+def pressed(n: Instant, fired: np.ndarray) -> None:
+    """Which sides of elastic stops are pressed now; ``n`` has looked there."""
+    for s in np.flatnonzero(n.kind == ELASTIC).tolist():
+        n.ways()[s] = FROZEN + _side(n, s, {int(k) for k, of, _ in n.S.guard_i[fired] if of == s})
+
+
+def _side(n: Instant, s: int, hit: set[int]) -> float:
+    """1 if pressed at the lower side, -1 at the upper, 0 if open; `BY_ITSELF` less `FROZEN` where nothing tells."""
+    k, c = n.S.switch_x[s, SWITCH_STIFFNESS], n.S.switch_x[s, SWITCH_DAMPING]
+    old, now = n.way[s] - FROZEN, 0.0
+    for side, bound, guard in ((1.0, LOWER, G_PRESS_LOWER), (-1.0, UPPER, G_PRESS_UPPER)):
+        depth, rate = side * (n.W.switch[bound, s] - n.x[s]), -side * n.rate[s]
+        if not np.isfinite(depth):
+            continue
+        if guard in hit:
+            on = old != side
+        elif abs(depth) > n.near[s]:
+            on = depth > 0.0 and k * depth + c * rate > 0.0
+        elif abs(rate) > n.still[s]:
+            on = rate > 0.0
+        else:
+            n.ways()[s] = FROZEN
+            rise = -side * _acceleration(n, s)
+            if abs(rise) <= SLOW * n.unit[s]:
+                return BY_ITSELF - FROZEN
+            on = rise > 0.0
+        now = side if on else now
+    return now

@@ -1,0 +1,123 @@
+"""Backlash: the play of gears, couplings and joints."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from ..constraints.modes import ELASTIC, STOP
+from ..errors import ModelError
+from ..model.element import Number, Numbers, Ratio, Unit, element, positive
+from ..model.limit import Unilateral, check_elastic
+from ..model.material import check_restitution
+from ..model.switch import Switch
+from .limit import KIND, effort, energy, sides, switched
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+WEIGHTS = ("1", "m", "m/rad", "rad/m", "1/m")  # units that weights may have
+
+
+@element
+class Backlash(Unilateral):
+    """Coordinates in a linear relation with play: gears that mesh loosely, a dog clutch, a worn key, a slack fork.
+
+    A `Coupler` holds weight_1 q_1 + weight_2 q_2 + ... constant; here the sum may move freely by the ``gap``, and is
+    stopped at either end of it: rigidly, with a restitution, or elastically. It takes the place of the coupling.
+    Gears on parallel axes that point the same way: the radii (or numbers of teeth) are the weights, both positive for
+    external gears, the second negative for a ring with its teeth inside.
+
+    Parameters
+    ----------
+    name : str
+    coordinates : list of str
+        One or more: ``"A.angle"``, ``"slide.displacement"``, ``"block.x"``.
+    weights : list of numbers
+        One for each coordinate. Not given: 1 for the first and -1 for the second of two.
+    gap : number [rad] or [m]
+        How far the first coordinate can go from one end of the play to the other while the others rest.
+    middle : number [rad] or [m]
+        Sum q_1 + (weight_2 / weight_1) q_2 + ... in the middle of the play; as drawn if not given.
+    restitution : number [1]
+        Of a rigid one, from 0 (dead, and what stands if it is not given) to 1 (no energy lost).
+    stiffness : number [N/m] or [N m/rad]
+        Of the flanks, as seen at the first coordinate: makes it elastic.
+    damping : number [N s/m] or [N m s/rad]
+        Of elastic flanks.
+
+    Notes
+    -----
+    A result tells ``value``: q_1 + (weight_2 / weight_1) q_2 + ... from the middle of the play, its ``rate``, the
+    ``force`` along it, which is what acts on the first coordinate, and ``closed``: 1 at the lower end, -1 at the
+    upper, 0 between.
+    """
+
+    coordinates: tuple[str, ...] = field(kw_only=False)
+    weights: Annotated[Numbers | None, Unit(None)] = None
+    gap: Annotated[Number, Unit(None)]
+    middle: Annotated[Number | None, Unit(None)] = None
+    restitution: Ratio | None = None
+    stiffness: Annotated[Number | None, Unit(None)] = None
+    damping: Annotated[Number, Unit(None)] = 0.0
+
+    kind: ClassVar[int] = KIND
+    kinds: ClassVar[dict[str, tuple[str, ...]]] = {"weights": WEIGHTS}
+    effort: ClassVar = staticmethod(effort)
+    energy: ClassVar = staticmethod(energy)
+    dimensions: ClassVar = Unilateral.dimensions | {"gap": ("m", "rad"), "middle": ("m", "rad")}
+
+    def along(self) -> tuple[str, ...]:
+        """The coordinates."""
+        return self.coordinates
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[float, ...]:
+        """Weights relative to the first."""
+        given = n.weights if n.weights is not None else (1.0, -1.0)[: len(self.coordinates)]
+        return tuple(w / given[0] for w in given)
+
+    def total(self, n: SimpleNamespace) -> Any:
+        """What the sum is in the middle of the play; as drawn if None."""
+        return n.middle
+
+    def first_weight(self, n: SimpleNamespace) -> float:
+        """Weights are relative to the first."""
+        return 1.0
+
+    def examine(self, model: Model) -> None:
+        """Its coordinates are there."""
+        for text in self.coordinates:
+            model.coordinate(text, self)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A gap, and a weight for each of different coordinates, none of them zero."""
+        positive(self, n, "gap", why="Without any play it is a Coupler or a GearPair")
+        check_restitution(self, n)
+        check_elastic(self, n)
+        if not self.coordinates:
+            raise ModelError(f"{self.title}: it names no coordinates; give one or more")
+        twice = [c for k, c in enumerate(self.coordinates) if c in self.coordinates[:k]]
+        if twice:
+            raise ModelError(f"{self.title}: it names {twice[0]!r} twice; name it once, with both weights added up")
+        if n.weights is None and len(self.coordinates) > 2:
+            raise ModelError(f"{self.title}: {len(self.coordinates)} coordinates need weights; give weights=")
+        if n.weights is not None and len(n.weights) != len(self.coordinates):
+            raise ModelError(
+                f"{self.title}: {len(self.coordinates)} coordinates need as many weights, got {len(n.weights)}"
+            )
+        if n.weights is not None and not all(w != 0.0 for w in n.weights):
+            raise ModelError(f"{self.title}: a weight is 0, which couples nothing; got {n.weights}")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return sides(n, -0.5 * n.gap, 0.5 * n.gap)
+
+    def switches(self) -> tuple[Switch, ...]:
+        """One along the sum."""
+        kind = ELASTIC if self.acts() else STOP
+        return (Switch(kind, along=self.coordinates, slides=self.acts()),)
+
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
+        """Half the gap to either side."""
+        return switched(n, -0.5 * n.gap, 0.5 * n.gap)

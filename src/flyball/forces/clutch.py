@@ -1,0 +1,155 @@
+"""Clutch and brake: friction whose capacity follows a law, between two coordinates or along one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import field
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from ..compiler.jit import formula
+from ..constraints.modes import FRICTION
+from ..errors import ModelError
+from ..math.scalar import choose
+from ..model.element import Law, LawOf, Ratio, element
+from ..model.force import CoordinateForce
+from ..model.switch import Switch
+from .joint_friction import SLIDING
+
+if TYPE_CHECKING:
+    from ..model.model import Model
+
+KIND = 7
+
+
+@formula
+def effort(par, x, rate, laws, load):
+    """Along the slip: -capacity against the direction of sliding; ``static`` times that where rest is asked for."""
+    o = 0.0 * x
+    capacity = choose(-laws[0], o + math.nan, laws[0])
+    return -par[0] * capacity * choose(laws[2] - SLIDING, par[1] + o, laws[2] + o)
+
+
+class ByCapacity:
+    """What clutches and brakes share: a capacity by law, and how much more than that holds at rest."""
+
+    title: str
+    capacity: Law
+    along: Callable[[], tuple[str, ...]]
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    single: ClassVar[str] = "friction"
+    fails: ClassVar[str] = "Its capacity is negative there; a law such as 'max(0, ...)' never is"
+    dimensions: ClassVar[dict[str, tuple[str, str]]] = {"capacity": ("N", "N*m")}
+    not_negative: ClassVar[tuple[str, ...]] = ("capacity",)
+
+    def switches(self) -> tuple[Switch, ...]:
+        """It holds, or slips."""
+        return (Switch(FRICTION, along=self.along(), slides=True),)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """What holds at rest is no less than what holds in sliding."""
+        if not n.static.real >= 1.0:
+            raise ModelError(
+                f"{self.title}: static is {n.static:g}; it must be 1 or greater: what it holds at rest, relative to "
+                f"what it carries while it slips"
+            )
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return (1.0, n.static)
+
+    def laws(self) -> tuple[Law | None, ...]:
+        """The capacity."""
+        return (self.capacity,)
+
+
+@element
+class Brake(ByCapacity, CoordinateForce):
+    """A brake along a coordinate: it holds it, or slips where more than its capacity pulls.
+
+    What it carries while it slips is its capacity, against the motion; what it holds at rest is ``static`` times that.
+    What it holds does not move at all. Friction that follows from what a joint carries is `JointFriction`.
+
+    Parameters
+    ----------
+    name : str
+    coordinate : str
+        ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
+    capacity : law [N m] or [N]
+        An expression of ``t``, ``value``, ``rate``, sensors and parameters; never negative.
+    static : number [1]
+        What it holds at rest as a multiple of that; 1 or greater.
+
+    Raises
+    ------
+    ModelError
+        If the capacity is a negative number.
+    SimulationError
+        If it becomes negative in a motion.
+    """
+
+    coordinate: str = field(kw_only=False)
+    capacity: Annotated[Law, LawOf(None, ("value", "rate"))]
+    static: Ratio = 1.0
+
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "friction": "effort"}
+
+    def coordinate_text(self) -> str:
+        """As given."""
+        return self.coordinate
+
+
+@element
+class Clutch(ByCapacity, CoordinateForce):
+    """A clutch between two coordinates, such as the angles of two shafts: it locks them together, slips, or is open.
+
+    Slip is the second coordinate less the first one. While it slips it carries its capacity, against the slip, as a
+    torque on the second and its reverse on the first; once the slip is over it locks, and slips again where more than
+    ``static`` times its capacity pulls. With a capacity of zero it is open. Heat is its ``work``, reversed.
+
+    Parameters
+    ----------
+    name : str
+    coordinate_i, coordinate_j : str
+        ``"joint.coordinate"``, or world coordinates of bodies or frames: both angles, or both displacements.
+    capacity : law [N m] or [N]
+        An expression of ``t``, ``slip``, ``rate``, sensors and parameters; never negative.
+    static : number [1]
+        What it holds when locked as a multiple of that; 1 or greater.
+
+    Raises
+    ------
+    ModelError
+        If the capacity is a negative number.
+    SimulationError
+        If it becomes negative in a motion.
+    """
+
+    coordinate_i: str = field(kw_only=False)
+    coordinate_j: str = field(kw_only=False)
+    capacity: Annotated[Law, LawOf(None, ("slip", "rate"))]
+    static: Ratio = 1.0
+
+    outputs: ClassVar[dict[str, str]] = {"slip": "", "rate": "/s", "friction": "effort"}
+
+    def along(self) -> tuple[str, ...]:
+        """The coordinates."""
+        return (self.coordinate_i, self.coordinate_j)
+
+    def switch_weights(self, n: SimpleNamespace, label: str) -> tuple[Any, ...]:
+        """Slip is the second less the first."""
+        return (-1.0, 1.0)
+
+    def examine(self, model: Model) -> None:
+        """Two different coordinates of one kind."""
+        if self.coordinate_i == self.coordinate_j:
+            raise ModelError(f"{self.title}: both its coordinates are {self.coordinate_i!r}; name two")
+        first, second = (model.unit(x, self) for x in self.along())
+        if first != second:
+            raise ModelError(
+                f"{self.title}: {self.coordinate_i!r} is in {first} and {self.coordinate_j!r} in {second}; a clutch "
+                f"needs two angles or two displacements"
+            )

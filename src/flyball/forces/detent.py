@@ -1,0 +1,93 @@
+"""Detent: notches that hold a coordinate until enough force takes it on."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from types import SimpleNamespace
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from ..compiler.jit import formula
+from ..errors import ModelError
+from ..math.scalar import cos, sin
+from ..model.element import Number, Unit, element, nonnegative, positive
+from ..model.force import CoordinateForce
+
+KIND = 9
+
+
+@formula
+def effort(par, x, rate, laws, load):
+    """Along x: -T sin(2 pi (x - x_0) / p) - c rate."""
+    return -par[0] * sin(par[1] * (x - par[2])) - par[3] * rate
+
+
+@formula
+def energy(par, x):
+    """Potential energy T p / (2 pi) (1 - cos(2 pi (x - x_0) / p)) [J]."""
+    return par[0] / par[1] * (1.0 - cos(par[1] * (x - par[2])))
+
+
+@element
+class Detent(CoordinateForce):
+    """Notches at a pitch: a click wheel, a stepping motor at rest, a ball that a spring presses into a row of dimples.
+
+    The law is the smooth one of a sine: -holding sin(2 pi (x - notch) / pitch) - damping rate. The coordinate rests in
+    any notch, with the stiffness 2 pi holding / pitch there; a force greater than ``holding`` takes it out; a quarter
+    of a pitch from a notch it is held most, and half way between two notches it may tip to either. From notch to notch
+    stands a barrier of the energy holding pitch / pi. Friction, which notches with edges have too, is `JointFriction`.
+
+    Parameters
+    ----------
+    name : str
+    coordinate : str
+        ``"joint.coordinate"``, or a world coordinate of a body's or frame's origin.
+    pitch : number [rad] or [m]
+        From notch to notch.
+    holding : number [N] or [N m]
+        Greatest force or torque that it holds against; or give ``barrier``.
+    barrier : number [J]
+        Energy that takes it from one notch to the next.
+    notch : number [rad] or [m]
+        Value of the coordinate in one of the notches.
+    damping : number [N s/m] or [N m s/rad]
+        Against the rate, everywhere.
+    """
+
+    coordinate: str = field(kw_only=False)
+    pitch: Annotated[Number, Unit(None)]
+    holding: Annotated[Number | None, Unit(None)] = None
+    barrier: Annotated[Number | None, Unit("J")] = None
+    notch: Annotated[Number, Unit(None)] = 0.0
+    damping: Annotated[Number, Unit(None)] = 0.0
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    energy: ClassVar = staticmethod(energy)
+    dimensions: ClassVar = CoordinateForce.dimensions | {
+        "pitch": ("m", "rad"),
+        "notch": ("m", "rad"),
+        "holding": ("N", "N*m"),
+    }
+    outputs: ClassVar[dict[str, str]] = {"value": "", "rate": "/s", "force": "effort"}
+
+    def coordinate_text(self) -> str:
+        """As given."""
+        return self.coordinate
+
+    def check(self, n: SimpleNamespace) -> None:
+        """A pitch, and one of holding and barrier."""
+        positive(self, n, "pitch", "holding", "barrier")
+        nonnegative(self, n, "damping")
+        if (n.holding is None) == (n.barrier is None):
+            raise ModelError(f"{self.title}: give holding= or barrier=, one of them")
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        holding = n.holding if n.barrier is None else np.pi * n.barrier / n.pitch
+        return (holding, 2.0 * np.pi / n.pitch, n.notch, n.damping)
+
+    def conservative(self) -> bool:
+        """Whether its energy is all that it ever takes or gives."""
+        return self.damping == 0.0

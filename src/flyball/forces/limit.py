@@ -1,0 +1,129 @@
+"""Limit: stops of a coordinate, rigid or elastic."""
+
+from __future__ import annotations
+
+from dataclasses import field
+from types import SimpleNamespace
+from typing import Annotated, ClassVar
+
+import numpy as np
+
+from ..compiler.jit import formula
+from ..constraints.modes import ELASTIC, FROZEN, STOP
+from ..errors import ModelError
+from ..math.scalar import choose, maximum
+from ..model.element import Number, Ratio, Unit, element
+from ..model.limit import Unilateral, check_elastic
+from ..model.material import check_restitution
+from ..model.switch import Switch
+
+KIND = 8
+
+
+@formula
+def effort(par, x, rate, laws, load):
+    """Along x: max(0, k (lower - x) - c rate) below the lower stop, -max(0, k (x - upper) + c rate) above the upper.
+
+    A side without a stop has k = c = 0. Where the side is frozen (`constraints.modes.FROZEN`) the formula of that side
+    goes on beyond its corner.
+    """
+    o = 0.0 * x
+    below, above = par[4] - x, x - par[5]
+    low, high = par[0] * below - par[1] * rate, par[2] * above + par[3] * rate
+    pushed = choose(below, maximum(low, o), o) - choose(above, maximum(high, o), o)
+    side = laws[2] - FROZEN
+    return choose(side + 1.5, choose(side, low, choose(-side, -high, o)), pushed)
+
+
+@formula
+def energy(par, x):
+    """Potential energy k d^2 / 2 [J] of how far it is past either stop."""
+    o = 0.0 * x
+    below, above = maximum(par[4] - x, o), maximum(x - par[5], o)
+    return 0.5 * (par[0] * below * below + par[2] * above * above)
+
+
+def sides(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
+    """Numbers that the formulas see: stiffness and damping of either side, and where they begin."""
+    out: list[float] = []
+    for side in (lower, upper):
+        out += (0.0, 0.0) if side is None else (n.stiffness, n.damping)
+    return (*out, 0.0 if lower is None else lower, 0.0 if upper is None else upper)
+
+
+def switched(n: SimpleNamespace, lower: float | None, upper: float | None) -> tuple[float, ...]:
+    """Numbers of its switch: least and greatest value, restitution, stiffness, damping."""
+    bounds = -np.inf if lower is None else lower, np.inf if upper is None else upper
+    elastic = (0.0, 0.0) if n.stiffness is None else (n.stiffness, n.damping)
+    return (*bounds, 0.0 if n.restitution is None else n.restitution, *elastic)
+
+
+@element
+class Limit(Unilateral):
+    """Stops of a coordinate: it stays between ``lower`` and ``upper``.
+
+    A rigid stop lets nothing pass: what comes with the speed v leaves with ``restitution`` times v. An elastic one
+    (``stiffness``) pushes back with k d + c ddot while it is d deep in it and that is positive: it never pulls.
+
+    Parameters
+    ----------
+    name : str
+    coordinate : str
+        ``"joint.coordinate"`` such as ``"knee.angle"``, or a world coordinate of a body's or frame's origin such as
+        ``"slider.x"``.
+    lower, upper : number [rad] or [m]
+        Least and greatest value; no stop on a side that is not given.
+    restitution : number [1]
+        Of a rigid one, from 0 (dead, and what stands if it is not given) to 1 (no energy lost).
+    stiffness : number [N/m] or [N m/rad]
+        Makes it elastic.
+    damping : number [N s/m] or [N m s/rad]
+        Of an elastic one.
+
+    Notes
+    -----
+    A result tells ``value``, ``rate``, the ``force`` along the coordinate, positive where it pushes it up, and
+    ``closed``: 1 at the lower stop, -1 at the upper, 0 between. ``run.events`` lists each hit.
+    """
+
+    coordinate: str = field(kw_only=False)
+    lower: Annotated[Number | None, Unit(None)] = None
+    upper: Annotated[Number | None, Unit(None)] = None
+    restitution: Ratio | None = None
+    stiffness: Annotated[Number | None, Unit(None)] = None
+    damping: Annotated[Number, Unit(None)] = 0.0
+
+    kind: ClassVar[int] = KIND
+    effort: ClassVar = staticmethod(effort)
+    energy: ClassVar = staticmethod(energy)
+    dimensions: ClassVar = Unilateral.dimensions | {"lower": ("m", "rad"), "upper": ("m", "rad")}
+
+    def coordinate_text(self) -> str:
+        """As given."""
+        return self.coordinate
+
+    def check(self, n: SimpleNamespace) -> None:
+        """One stop at least, rigid or elastic."""
+        check_restitution(self, n)
+        check_elastic(self, n)
+        if self.lower is None and self.upper is None:
+            raise ModelError(f"{self.title}: it stops nothing; give lower=..., upper=... or both")
+
+    def check_sides(self, n: SimpleNamespace, unit: str) -> None:
+        """The lower one is below the upper."""
+        if n.lower is not None and n.upper is not None and not n.lower.real < n.upper.real:
+            raise ModelError(
+                f"{self.title}: lower is {n.lower:g} {unit}; it must be less than upper, {n.upper:g} {unit}"
+            )
+
+    def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
+        """Numbers that the formulas see."""
+        return sides(n, n.lower, n.upper)
+
+    def switches(self) -> tuple[Switch, ...]:
+        """One along the coordinate."""
+        return (Switch(ELASTIC if self.acts() else STOP, along=(self.coordinate,), slides=self.acts()),)
+
+    def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
+        """Where it stops, and how."""
+        return switched(n, n.lower, n.upper)

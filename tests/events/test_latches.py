@@ -1,0 +1,116 @@
+"""Freewheels and ratchets, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.events.one_sided import LAYERS, run, times, wheels
+
+layers = pytest.mark.parametrize("coordinates", LAYERS)
+
+
+@layers
+def test_a_freewheel_coasts(coordinates):
+    """Driven by T (1 - t): together until the torque is gone, then the hub slows down and the wheel goes on for good."""
+    J1, J2, T = 0.3, 0.5, 2.0
+    m = wheels(J1, J2, torques=("2.0*(1 - t)", None))
+    m.add(fb.OneWay("freewheel", "B.angle", relative_to="A.angle"))
+    r = run(m, 2.0, coordinates)
+    t = r.t
+    together = T * (t - t**2 / 2) / (J1 + J2)
+    coasting = T * 0.5 / (J1 + J2)
+    assert r["B"].rate == pytest.approx(np.where(t < 1, together, coasting), abs=1e-9)
+    assert r["A"].rate == pytest.approx(np.where(t < 1, together, coasting - T * (t - 1) ** 2 / 2 / J1), abs=1e-9)
+    assert r["freewheel"].force == pytest.approx(np.where(t < 1, J2 * T * (1 - t) / (J1 + J2), 0), abs=1e-8)
+    assert times(r, "freewheel") == pytest.approx([1.0], abs=1e-8)
+    assert (r["freewheel"].closed == np.where(t < 1 - 1e-9, 1.0, 0.0)).all()
+
+
+@layers
+def test_a_freewheel_takes_hold(coordinates):
+    """The hub catches up with the wheel at J1 w / T; from then on they turn together, without a jerk."""
+    J1, J2, T, w = 0.3, 0.5, 2.0, 4.0
+    m = wheels(J1, J2, rates=(0.0, w), torques=(T, None))
+    m.add(fb.OneWay("freewheel", "B.angle", relative_to="A.angle"))
+    r = run(m, 1.0, coordinates)
+    on = J1 * w / T
+    assert times(r, "freewheel") == pytest.approx([on], abs=1e-8)
+    assert r["A"].rate == pytest.approx(np.where(r.t < on, T * r.t / J1, w + T * (r.t - on) / (J1 + J2)), abs=1e-8)
+    assert r["freewheel"].force[-1] == pytest.approx(J2 * T / (J1 + J2), rel=1e-9)
+    slip = r["B"].angle - r["A"].angle
+    assert np.ptp(slip[r.t > on]) < 1e-11
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_freewheel_that_begins_the_wrong_way_is_refused(direction):
+    m = wheels(0.3, 0.5, rates=(4.0 * direction, 1.0 * direction))
+    m.add(fb.OneWay("freewheel", "B.angle", relative_to="A.angle", direction=direction))
+    with pytest.raises(fb.ModelError, match=r"OneWay 'freewheel': the motion begins beyond it: its rate is -3"):
+        m.simulate(0.5)
+
+
+@layers
+def test_a_backstop_holds(coordinates):
+    """A load on a drum that may only go up does not move at all, and the backstop carries it."""
+    m = wheels(0.4, torques=(-3.0,))
+    m.add(fb.OneWay("backstop", "A.angle"))
+    r = run(m, 1.0, coordinates)
+    assert np.abs(r["A"].angle).max() < 1e-12
+    assert r["backstop"].force == pytest.approx(3.0, rel=1e-9)
+    assert (r["backstop"].closed == 1.0).all()
+
+
+@layers
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_ratchet_holds_a_load(coordinates, way):
+    """Up by w^2 / 2 a, back to the last tooth that was passed; there it stops dead and holds."""
+    J, T, w = 0.4, 3.0, 8.0
+    m = wheels(J, rates=(way * w,), torques=(-way * T,))
+    m.add(fb.Ratchet("pawl", "A.angle", teeth=12, direction=way))
+    a, pitch = T / J, 2 * np.pi / 12
+    top = w**2 / (2 * a)
+    tooth = pitch * np.floor(top / pitch)
+    lands = w / a + np.sqrt(2 * (top - tooth) / a)
+    r = run(m, 3.0, coordinates)
+    rests = r.t > lands
+    assert way * r["A"].angle[rests] == pytest.approx(tooth, abs=1e-9)
+    assert way * r["pawl"].force[-1] == pytest.approx(T, rel=1e-9)
+    assert r["pawl"].closed[-1] == 1.0
+    assert times(r, "pawl")[-1] == pytest.approx(lands, abs=1e-8)
+    assert sum(e.lost for e in r.events) == pytest.approx(T * (top - tooth), rel=1e-8)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@layers
+def test_a_ratchet_lifts_step_by_step(coordinates):
+    """T cos ft: up by 2 T / J f^2, back to the last tooth, on from there as soon as the torque turns."""
+    J, T, f, pitch = 0.2, 4.0, 5.0, 0.3
+    m = wheels(J, torques=(f"{T}*cos({f}*t)",))
+    m.add(fb.Ratchet("pawl", "A.angle", pitch=pitch))
+    a = T / (J * f * f)
+    tooth = pitch * np.floor(2 * a / pitch)
+    r = run(m, 2 * np.pi / f, coordinates, outputs=201)
+    up = f * r.t < np.pi
+    assert r["A"].angle[up] == pytest.approx(a * (1 - np.cos(f * r.t[up])), abs=1e-9)
+    assert times(r, "pawl")[-1] == pytest.approx(1.5 * np.pi / f, abs=1e-8)
+    on = f * r.t > 1.5 * np.pi
+    assert r["A"].angle[on] == pytest.approx(tooth + a * (f * r.t[on] - 1.5 * np.pi - np.cos(f * r.t[on])), abs=1e-8)
+    held = r["pawl"].closed == 1.0
+    assert r["pawl"].force[held] == pytest.approx(-T * np.cos(f * r.t[held]), abs=1e-8)
+
+
+@layers
+def test_a_ratchet_bounces_on_its_tooth(coordinates):
+    J, T, e = 0.4, 3.0, 0.5
+    m = wheels(J, rates=(2.0,), torques=(-T,))
+    m.add(fb.Ratchet("pawl", "A.angle", pitch=10.0, restitution=e))
+    a = T / J
+    first = 2 * 2.0 / a
+    wanted = first + np.r_[0.0, np.cumsum(2 * 2.0 / a * e ** np.arange(1, 4))]
+    r = run(m, float(wanted[-1]) + 1e-3, coordinates)
+    hits = times(r, "pawl")
+    for t in wanted:
+        assert np.abs(hits - t).min() < 1e-8

@@ -1,0 +1,135 @@
+"""Stops of coordinates, rigid and elastic, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+import flyball as fb
+from tests.events.one_sided import LAYERS, G, run, slider, times
+
+layers = pytest.mark.parametrize("coordinates", LAYERS)
+
+
+@layers
+def test_a_bouncing_slider(coordinates):
+    """Times t_n+1 = t_n + 2 e^n v / g, heights e^2n h, losses (1 - e^2) m v^2 / 2 at each hit."""
+    h, e, mass = 1.3, 0.8, 2.0
+    r = run(
+        slider(fb.Limit("floor", "guide.displacement", lower=0, restitution=e), height=h, mass=mass), 3.0, coordinates
+    )
+    v = np.sqrt(2 * G * h)
+    wanted = v / G + np.r_[0.0, np.cumsum(2 * v / G * e ** np.arange(1, 20))]
+    wanted = wanted[wanted < 3.0]
+    assert times(r, "floor") == pytest.approx(wanted, abs=1e-8)
+    lost = [x.lost for x in r.events]
+    assert lost == pytest.approx([0.5 * mass * v**2 * e ** (2 * n) * (1 - e**2) for n in range(len(wanted))], rel=1e-8)
+    top = r["guide"].displacement[(r.t > wanted[1]) & (r.t < wanted[2])].max()
+    assert top <= h * e**4 + 1e-9
+    assert np.abs(r.energy.balance).max() < 1e-8
+    assert r["guide"].displacement.min() > -1e-9
+
+
+@layers
+def test_it_comes_to_rest_on_its_stop(coordinates):
+    """The sum of its series: v/g (1 + e) / (1 - e), after which it rests and the stop carries its weight."""
+    h, e, mass = 0.4, 0.5, 2.0
+    r = run(
+        slider(fb.Limit("floor", "guide.displacement", lower=0, restitution=e), height=h, mass=mass), 2.0, coordinates
+    )
+    end = np.sqrt(2 * h / G) * (1 + e) / (1 - e)
+    rests = r.t > end + 1e-6
+    assert np.abs(r["guide"].displacement[rests]).max() < 1e-10
+    assert (r["guide"].rate[rests] == 0.0).all() or np.abs(r["guide"].rate[rests]).max() < 1e-12
+    assert r["floor"].force[-1] == pytest.approx(mass * G, rel=1e-9)
+    assert r["floor"].closed[-1] == 1.0
+    assert times(r, "floor")[-1] == pytest.approx(end, abs=1e-6)
+
+
+@layers
+def test_it_rests_on_its_stop_from_the_start(coordinates):
+    r = run(slider(fb.Limit("floor", "guide.displacement", lower=0)), 0.5, coordinates)
+    assert r["guide"].displacement == pytest.approx(0.0, abs=1e-12)
+    assert r["floor"].force == pytest.approx(2.0 * G, rel=1e-9)
+    assert (r["floor"].closed == 1.0).all()
+
+
+@layers
+def test_a_pendulum_against_a_stop(coordinates):
+    """Quarter of a period to the stop, half a period of the smaller swing between hits: 1 - cos falls by e^2 each time."""
+    mass, length, inertia, e, start = 1.5, 0.7, 0.2, 0.6, 2.0
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -G))
+    at = (length * np.sin(start), -length * np.cos(start))
+    m.add(fb.Body("rod", mass=mass, inertia=inertia, position=at, angle=start))
+    m.add(fb.Revolute("pin", "ground", "rod", at=(0, 0), angle=start))
+    m.add(fb.Limit("stop", "pin.angle", lower=0.0, restitution=e))
+    slow = np.sqrt((inertia + mass * length**2) / (mass * length * G))
+
+    def quarter(swing):
+        return slow * ellipk(np.sin(swing / 2) ** 2)
+
+    swings = np.arccos(1 - e ** (2 * np.arange(1, 5)) * (1 - np.cos(start)))
+    wanted = quarter(start) + np.r_[0.0, np.cumsum([2 * quarter(x) for x in swings])]
+    r = run(m, float(wanted[-1]) + 0.05, coordinates)
+    assert times(r, "stop") == pytest.approx(wanted, abs=1e-8)
+
+
+@layers
+def test_a_mass_on_an_elastic_stop(coordinates):
+    """Half an oscillation: it is pressed for pi sqrt(m/k) and leaves as fast as it came."""
+    mass, k, v, gap = 2.0, 300.0, 1.5, 0.2
+    m = slider(fb.Limit("buffer", "guide.displacement", upper=gap, stiffness=k), gravity=0.0, mass=mass, speed=v)
+    r = run(m, 1.0, coordinates)
+    on = gap / v
+    assert times(r, "buffer") == pytest.approx([on, on + np.pi * np.sqrt(mass / k)], abs=1e-9)
+    assert r["guide"].rate[-1] == pytest.approx(-v, abs=1e-9)
+    pressed = (r.t > on) & (r.t < on + np.pi * np.sqrt(mass / k))
+    w = np.sqrt(k / mass)
+    assert r["buffer"].force[pressed] == pytest.approx(-mass * v * w * np.sin(w * (r.t[pressed] - on)), abs=1e-7)
+    assert (r["buffer"].closed == np.where(pressed, -1.0, 0.0)).all()
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@layers
+def test_a_damped_buffer_lets_go_before_it_pulls(coordinates):
+    """x = v/w e^-dt sin wt until k x + c xdot = 0, at tan wt = -c w / (k - c d): then it leaves for good."""
+    mass, k, c, v = 2.0, 300.0, 20.0, 1.5
+    m = slider(
+        fb.Limit("buffer", "guide.displacement", lower=-0.3, stiffness=k, damping=c), gravity=0.0, mass=mass, speed=-v
+    )
+    r = run(m, 1.0, coordinates)
+    d = c / (2 * mass)
+    w = np.sqrt(k / mass - d * d)
+    last = (np.pi - np.arctan2(c * w, k - c * d)) / w
+    assert times(r, "buffer") == pytest.approx([0.2, 0.2 + last], abs=1e-9)
+    leaves = v * np.exp(-d * last) * (np.cos(w * last) - d / w * np.sin(w * last))
+    assert r["guide"].rate[-1] == pytest.approx(-leaves, abs=1e-8)
+    assert r["buffer"].force.min() >= 0.0, "it never pulls"
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@layers
+def test_between_two_stops_without_loss(coordinates):
+    """To and fro at constant speed: hits at even times, all found."""
+    m = slider(fb.Limit("walls", "guide.displacement", lower=-1, upper=1, restitution=1), gravity=0.0, speed=3.0)
+    r = run(m, 20.0, coordinates)
+    assert times(r, "walls") == pytest.approx((1 + 2 * np.arange(30)) / 3, abs=1e-8)
+    assert np.abs(r["guide"].rate) == pytest.approx(3.0, abs=1e-9)
+
+
+def test_world_coordinate_of_a_body():
+    """A ball thrown at a wall bounces off it as from a stop of its x."""
+    m = fb.Mechanism("wall", planar=True, gravity=(0, -G))
+    m.add(fb.Body("ball", mass=1.0, inertia=0.01, velocity=(2.0, 3.0)))
+    m.add(fb.Limit("wall", "ball.x", upper=1.0, restitution=0.5))
+    r = run(m, 1.0, "absolute")
+    assert times(r, "wall") == pytest.approx([0.5], abs=1e-9)
+    assert r["ball"].velocity[-1] == pytest.approx([-1.0, 3.0 - G], abs=1e-8)
+    assert r.events[0].impulses["wall"] == pytest.approx(-3.0, abs=1e-8)
+
+
+def test_a_stop_that_starts_violated_is_refused():
+    m = slider(fb.Limit("floor", "guide.displacement", lower=0.1), height=0.05)
+    with pytest.raises(fb.FlyballError, match=r"Limit 'floor'.*0\.05.*0\.1"):
+        m.simulate(0.1)
