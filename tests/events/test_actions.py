@@ -96,7 +96,6 @@ def test_lock_and_release(layer):
     m = slide()
     m.add(fb.Initial("A.displacement", rate=3.0), fb.Event("hold", "t - 0.5", do=fb.Lock("A")))
     m.add(fb.Event("free", "t - 1", do=[fb.Release("A"), fb.Impulse("A", 4)]))
-    m.add(fb.PointForce("f", "b", force=("where(t < 1, 5, 0)*where(t > 0.5, 1, 0)", 0)))
     r = m.simulate(2, outputs=201, coordinates=layer)
     x = np.where(r.t < 0.5, 3 * r.t, np.where(r.t < 1, 1.5, 1.5 + 2 * (r.t - 1)))
     assert np.abs(r["A.displacement"] - x).max() < 1e-9
