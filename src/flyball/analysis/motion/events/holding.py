@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import LOCK
+from ....constraints.modes import ELASTIC, FROZEN, LOCK
 from ....errors import SimulationError
 from ....model.actions import Lock, Release
 from ....model.event import Event
@@ -62,9 +62,9 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     """Let coordinates, a joint, a limit or a rope go."""
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
-    held = held_by(here.structure.model, e, a)
+    held, kinds = held_by(here.structure.model, e, a), here.c.system.switch_i[:, SWITCH_KIND]
     for k in switches(here, held.coordinates, held.joint, held.element):
-        W.switch[MODE, k], ways[k] = OFF, 0.0
+        W.switch[MODE, k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
         if held.element:
             W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
     return f"released {a.what}"
@@ -98,3 +98,4 @@ def gone_on(here: Here, before: Result) -> None:
             W.switch[[MODE, HOLD], k] = last.switch[[MODE, HOLD], j]
         elif last.switch[SPARE, j] == GONE:
             W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
+            W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] + k] = FROZEN if spec.switch.kind == ELASTIC else 0.0
