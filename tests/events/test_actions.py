@@ -270,3 +270,65 @@ def test_a_motion_that_goes_on_keeps_what_was_locked_and_set(layer):
     assert [h.name for h in again.events] == ["free"]
     late = m.simulate(2, outputs=11, coordinates=layer, start=m.simulate(1.0, outputs=2, coordinates=layer))
     assert late["A.displacement"] == pytest.approx(whole["A.displacement"][10:], abs=1e-6)
+
+
+def test_before_and_after_are_by_the_parameters_of_their_time(layer, tmp_path):
+    """Stretched by 1 m a spring of 8 N/m stores 4 J, of 16 N/m 8 J; in files too."""
+    m = slide()
+    m.add(fb.CoordinateSpring("s", "A.displacement", stiffness="k"), fb.Initial("A.displacement", value=1.0))
+    m.add(fb.Event("note", "t - 0.5"), fb.Event("softer", "t - 1", do=fb.Set("k", 2)), fb.Event("late", "t - 1.5"))
+    m.add(fb.Event("harder", "start", do=fb.Set("k", 16)))
+    r = m.simulate(2, outputs=21, coordinates=layer)
+    r.save(tmp_path / "r.nc")
+    for run in (r, fb.load_result(tmp_path / "r.nc")):
+        first, note, softer, late = run.events
+        assert first.before["s.energy"] == pytest.approx(4.0, abs=1e-9)
+        assert first.after["s.energy"] == pytest.approx(8.0, abs=1e-9)
+        assert note.before["energy.total"] == pytest.approx(8.0, abs=1e-5)
+        x = softer.before["b.x"]
+        assert x == pytest.approx(math.cos(math.sqrt(8)), abs=1e-6)
+        assert (softer.before["s.energy"], softer.after["s.energy"]) == pytest.approx((8 * x**2, x**2), abs=1e-9)
+        assert late.after["energy.total"] == pytest.approx(8.0 - 7 * x**2, abs=1e-5)
+        assert run["energy.event_work"][-1] == pytest.approx(-7 * x**2, abs=1e-6)
+
+
+@pytest.mark.parametrize("stiffness", [None, 1000.0])
+def test_a_rope_is_cut(layer, stiffness):
+    """It carries 10 N until then; what it stores is gone with it."""
+    m = fb.Mechanism("cut", planar=True, gravity=(0, -10))
+    elastic = {} if stiffness is None else {"stiffness": stiffness, "length": 0.99}
+    m.add(fb.Body("b", mass=1, inertia=0, position=(0, -1)))
+    m.add(fb.Rope("line", ("ground", "b"), at=((0, 0), (0, -1)), **elastic))
+    m.add(fb.Event("cut", "t - 1", do=fb.Release("line")))
+    r = m.simulate(2, outputs=21, coordinates=layer)
+    assert r["b.y"] == pytest.approx(np.where(r.t < 1, -1.0, -1 - 5 * (r.t - 1) ** 2), abs=1e-8)
+    assert r["line.tension"] == pytest.approx(np.where(r.t < 0.999999, 10.0, 0.0), abs=1e-6)
+    assert r.events["cut"][0].done == ("released line",)
+    assert r["energy.event_work"][-1] == pytest.approx(0.0 if stiffness is None else -0.05, abs=1e-9)
+    assert r.energy.drift < 1e-8
+
+
+def test_a_limit_opens_and_holds_again(layer):
+    """A floor that is taken away and put back: the body falls past it, to where it was, and is stopped from above."""
+    m = fb.Mechanism("floor", planar=True, gravity=(0, -10))
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(0, 1)))
+    m.add(fb.Limit("floor", "A.displacement", lower=-0.2), fb.Event("open", "t - 1", do=fb.Release("floor")))
+    r = m.simulate(1.5, outputs=16, coordinates=layer)
+    y = np.where(r.t < 0.2, -5 * r.t**2, np.where(r.t < 1, -0.2, -0.2 - 5 * (r.t - 1) ** 2))
+    assert r["b.y"] == pytest.approx(y, abs=1e-8)
+
+
+def test_a_driver_whose_speed_jumps(layer):
+    m = fb.Mechanism("d", planar=True, parameters={"w": 2.0})
+    m.add(fb.Body("b", mass=1, inertia=1, position=(1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Driver("motor", "A.angle", "w*(t - 1)"), fb.Initial("A.angle", value=-2.0))
+    m.add(fb.Event("fast", "t > 1", do=fb.Set("w", 3)))
+    with pytest.raises(fb.SimulationError, match=r"Set of 'w' in Event 'fast' would change the velocity of .* by 1 in"):
+        m.simulate(2, coordinates=layer)
+
+
+def test_steps_by_impulses_know_none():
+    m = slide()
+    m.add(fb.Event("e", "t - 0.5"))
+    with pytest.raises(fb.ModelError, match="'slide' has Event 'e', and steps by impulses know no events"):
+        m.simulate(1, method="impulse")

@@ -17,6 +17,7 @@ from ....model.event_check import coordinate_of
 from ....model.held import held_by
 from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
+from ....tables.values import Values
 from .blows import generalised
 from .here import Here
 from .holding import gone_on, hold, let_go
@@ -46,6 +47,7 @@ class Acts:
     values: dict[int, float] = field(default_factory=dict)
     before: np.ndarray = field(default_factory=lambda: np.zeros(0))
     first: int = 0
+    tables: Values | None = None  # before
 
     def told(self, own: Sequence[str] = ()) -> None:
         """Record the events, each with what was done; what only it did (locking, a blow) is told with it.
@@ -64,7 +66,10 @@ class Acts:
             if e is cause and len(mine) > 1:
                 impulses = {k: x for h in mine for k, x in h.impulses.items()}
             done = tuple(self.words.get(e.name, ()))
-            here.records.append(Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy()))
+            both = None if self.tables is here.c.values else (self.tables, here.c.values)
+            here.records.append(
+                Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy(), both)
+            )
         here.records += [h for h in since if not any(h is x for x in mine)]
 
     def passed(self) -> np.ndarray:
@@ -109,12 +114,12 @@ def act_at_start(here: Here) -> Acts:
             here.c.work.switch[MODE, k] = HELD
     if here.start.before is not None:
         gone_on(here, here.start.before)
-        return Acts(here, (), before=here.y.copy())
+        return Acts(here, (), before=here.y.copy(), tables=here.c.values)
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
 
 def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
-    acts = Acts(here, events, before=here.y.copy(), first=len(here.records))
+    acts = Acts(here, events, before=here.y.copy(), first=len(here.records), tables=here.c.values)
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
     every = [(e, a) for e in events for a in e.do]

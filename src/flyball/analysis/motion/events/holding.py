@@ -20,6 +20,7 @@ from ....tables.system import (
     SWITCH_KIND,
     SWITCH_LOWER,
     SWITCH_MEASURED,
+    SWITCH_STIFFNESS,
     SWITCH_UPPER,
     UPPER,
     VALUE,
@@ -44,6 +45,7 @@ def hold(here: Here, e: Event, a: Lock) -> str:
         if held.element:
             W.switch[SPARE, k] = 0.0
             W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_x[k, SWITCH_LOWER], S.switch_x[k, SWITCH_UPPER]
+            here.given += stored(here, k)
             continue
         x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
         if held.joint and abs(x) > CLOSED * here.c.values.length:
@@ -64,10 +66,22 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
     held, kinds = held_by(here.structure.model, e, a), here.c.system.switch_i[:, SWITCH_KIND]
     for k in switches(here, held.coordinates, held.joint, held.element):
+        if held.element:
+            here.given -= stored(here, k)
         W.switch[MODE, k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
         if held.element:
             W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
     return f"released {a.what}"
+
+
+def stored(here: Here, k: int) -> float:
+    """Energy [J] in an elastic switch at the state last evaluated; it goes when that is released."""
+    S, W = here.c.system, here.c.work
+    if S.switch_i[k, SWITCH_KIND] != ELASTIC:
+        return 0.0
+    x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
+    depth = max(W.switch[LOWER, k] - x, x - W.switch[UPPER, k], 0.0)
+    return float(0.5 * S.switch_x[k, SWITCH_STIFFNESS] * depth**2)
 
 
 def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:

@@ -99,7 +99,7 @@ def _refuse_moved(here: Here, who: str, before: Places, after: Places) -> None:
     worst = max(fast, key=lambda name: fast[name] if np.isfinite(fast[name]) else np.inf)
     if not fast[worst] <= NEAR * quick:
         raise SimulationError(
-            f"at t = {here.t:.9g} s {who} would change the velocity of {worst} by {fast[worst]:.3g} in no time, since a "
-            f"driver's law jumps: let the law rise smoothly, as by step(t, ...)",
+            f"at t = {here.t:.9g} s {who} would change the velocity of {worst} by {fast[worst]:.3g} in no time, since "
+            f"a driver's law jumps: let the law rise smoothly, as by step(t, ...)",
             t=here.t,
         )
