@@ -46,7 +46,7 @@ class Here:
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
-        Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
+        Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
     failed : Exception
         Why the motion cannot go on here.
     watched : str
