@@ -36,6 +36,7 @@ class Start:
     coordinates: str  # which they are, and why
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
     engine: Engine | None = None  # what the motion is computed by; table-driven if none
+    before: Result | None = None  # what it goes on from
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 
@@ -103,7 +104,7 @@ def begin_at(
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
     y = _gone_on(before, a)
     _holds(before, a)
-    return Start(base, a, y, found.coordinates, _wound(base, a, y))
+    return Start(base, a, y, found.coordinates, _wound(base, a, y), before=before)
 
 
 def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None, switches: bool) -> Start:
@@ -151,13 +152,13 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
-    c = compiled(model, parameters=parameters, tree=old.tree, switches=bool(old.switches))
+    c = compiled(model, parameters=parameters, tree=old.tree, switches=before.stretches is not None)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
     refuse_jump(before, c, t, q, v)
     c.at(t, q, v)
-    if not c.structure.tree and not c.structure.switches:
+    if not c.structure.tree and before.stretches is None:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)
