@@ -14,6 +14,7 @@ from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Owed, Result
+from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
 from .events.here import Here
@@ -55,6 +56,7 @@ def outcome(
     ended = here.failed is None and not interrupted
     health.message, health.success = message, ended and status == ex.DONE
     health.watched = here.watched
+    health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
     cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
@@ -72,6 +74,7 @@ def outcome(
     result.events = here.records
     if here.seen is not None:
         here.seen.told(result)
+        result.contacts = contacts(result)
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result

@@ -182,10 +182,11 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
     bound = False  # whether a step that does not reach the event is known
     rough = stride = CLOSE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
-    status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+    status, error, done = 0, 0.0, False
     for n in range(TRIES):
+        status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
         f = W.g[END, i]
-        if status != 0 or f == 0.0:
+        if status != 0 or f == 0.0 or done:
             break
         if n > 0 and h != before and f != last:
             slope = (f - last) / (h - before)
@@ -196,19 +197,17 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
             low, bound = h, True
         else:
             high = h
-        if high - low <= 4.0 * ulp:
-            if s * f > 0.0 and high < most:
-                h = high
-                status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
-            break
         last, before = f, h
-        if abs(way) < 0.5 * gone and low < h + way and h + way < high:
+        if high - low <= 4.0 * ulp:
+            if s * f <= 0.0 or high >= most:
+                break
+            h, done = high, True
+        elif abs(way) < 0.5 * gone and low < h + way and h + way < high:
             gone = abs(way)
             h += way
         else:
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
-        status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
     return status, h, error
 
 

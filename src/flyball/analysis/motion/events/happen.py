@@ -8,14 +8,16 @@ import numpy as np
 
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
-from ....numerics.cone.dense.problem import FOUND
-from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
+from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
 from .actions import act, act_at_start
+from .branches import Corners
+from .doubtful import doubt, shock
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
-from .instant import Instant
+from .instant import DECIDED, Instant
 from .jump import Jump, jump, must_jump
-from .modes import Decided, decide
+from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
 from .sides import pressed, teeth, turned
@@ -37,10 +39,12 @@ def begin(here: Here) -> None:
     acts = act_at_start(here)
     if len(here.c.system.switch_i) or here.kick is not None:
         n = Instant(here)
+        corners = Corners(n)
+        corners.begin()
         n.look()
         n.restored()
         refuse_violated(n)
-        resolve(n, np.zeros(0, np.int64))
+        settled(n, corners, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
     _happen(here, acts.passed())
 
@@ -67,7 +71,8 @@ def _happen(here: Here, fired: np.ndarray) -> None:
     for _ in range(ROUNDS if len(fired) else 0):
         acts = act(here, fired.tolist())
         if len(here.c.system.switch_i) or here.kick is not None:
-            resolve(Instant(here), fired)
+            n = Instant(here)
+            settled(n, Corners(n), fired)
         acts.told(["start"])
         fired = acts.passed()
         here.acted.clear()  # what follows from it comes later
@@ -75,6 +80,19 @@ def _happen(here: Here, fired: np.ndarray) -> None:
             return
     if len(fired):
         raise no_end(here.t, [here.structure.events[int(g)].name for g in fired], ROUNDS)
+
+
+def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) -> None:
+    """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
+    corners.fired(fired)
+    by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
+    if not len(fired) or by_rows.any():
+        resolve(n, fired[by_rows], told)
+    for _ in range(ROUNDS):
+        if not corners.settle() or not np.isin(n.kind, DECIDED).any():
+            return
+        resolve(n, fired[:0], told)
+    raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
 def refuse_violated(n: Instant) -> None:
@@ -91,14 +109,17 @@ def refuse_violated(n: Instant) -> None:
             raise ModelError(f"{element.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
-def resolve(n: Instant, fired: np.ndarray) -> None:
-    """Jumps and modes at the instant, until nothing is against its rule."""
+def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
+    """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
     hits: dict[int, bool] = {}
+    calm: list[int] = []
+    gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
     for _ in range(ROUNDS):
         n.look()
         still = at_rest(n, fired)
+        still[calm] = True
         teeth(n, still)
         at = sides(n, fired)
         jumped = jumps(n, at, still)
@@ -110,14 +131,21 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still[list(jumped.even)] = True
         pressed(n, fired)
         found = decided(n, at, still, fired)
+        if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
+            tell_jump(n, found, before)
+            fired, calm = fired[:0], list(found.even)
+            continue
         turned(n, hits)
+        come_to_rest(n, found)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
-        fired = broken(n, found)
-        if not len(fired):
-            tell_modes(n, (modes, ways), before, hits)
+        new = np.setdiff1d(broken(n, found), gone)
+        if not len(new):
+            if told:
+                tell_modes(n, (modes, ways), before, hits)
             return
+        fired = gone = np.r_[gone, new]
     raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
 
 
@@ -140,17 +168,29 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     return jumped
 
 
-def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
-    """Modes; a series of bounces that has become shorter than rounding is over."""
+def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided | Jump:
+    """Modes; a series of bounces that has become shorter than rounding is over.
+
+    Where there are no accelerations velocities may jump without a collision.
+    """
     found = decide(n, at, still, fired)
     if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
         still |= over
         n.bared()
         found = decide(n, at, still, fired)
-    if found.ended != FOUND:
+    if found.ended == FOUND:
+        doubt(n, found)
+        return found
+    blow = (
+        shock(n, of_velocities(n, at, still), np.abs(found.reach).max(initial=0.0))
+        if found.ended == NONE_FOUND
+        else None
+    )
+    if blow is None:
         n.restored()
         raise no_forces(n, found)
-    return found
+    n.here.lost, n.here.fresh = n.here.lost + blow.lost, True
+    return blow
 
 
 def broken(n: Instant, found: Decided) -> np.ndarray:

@@ -39,6 +39,8 @@ class Here:
         Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
     blows : list
         What it is made of; see `results.struck.Struck`.
+    doubts : list of str
+        What rigid bodies left open, in words, for the health.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
     counts : dict
@@ -46,7 +48,7 @@ class Here:
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
-        Whether the next step finds its first width anew: after a jump of forces or velocities the last one says little.
+        Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
     failed : Exception
         Why the motion cannot go on here.
     watched : str
@@ -66,6 +68,7 @@ class Here:
     given: float = 0.0
     kick: np.ndarray | None = None
     blows: list[Any] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
     seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)

@@ -7,27 +7,34 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
-from ....errors import FlyballError, ModelError
+from ....errors import FlyballError, ModelError, SimulationError
 from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
+from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
+from .actions import expressions, stepped_over
 from .happen import begin, happen
 from .here import Here
-from .legs import Legs
+from .instant import Instant
+from .legs import Legs, breaks
 from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
+LATEST = 20  # events of which it is told who they were
+HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -77,6 +84,7 @@ class Run:
             if here.stopped:
                 self.stop()
         except KeyboardInterrupt:
+            here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
         except FlyballError as error:
             if isinstance(error, ModelError) and not here.t > self.first:  # the description is wrong
@@ -95,7 +103,13 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            return not self.legs.next()
+            sharp = self.legs.ends_sharply() and self.loop is not None
+            before = expressions(self.here) if sharp else {}
+            if not self.legs.next():
+                return True
+            if sharp:
+                self.jumped(before)
+            return False
         elif status != ex.RUNNING and not engine.hands_over(clock):
             return True
         self.legs.whole()
@@ -137,20 +151,47 @@ class Run:
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""
-        here, clock = self.here, self.here.clock
+        here = self.here
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise self.endless()
-        happen(here, self.loop.fired if self.loop else ())
+        self.happens(self.loop.fired if self.loop else ())
+
+    def happens(self, fired: Sequence[int]) -> None:
+        """What happens where these guards fired."""
+        here, clock = self.here, self.here.clock
+        system = here.c.system
+        happen(here, fired)
         clock.count[ex.STARTED] = 0
+        if here.c.system is not system:  # another value of a parameter: laws have other corners
+            self.legs.whole()
+            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+        self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
         if here.fresh:
-            clock.real[ex.H], here.fresh = 0.0, False
+            clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
+            here.fresh = False
 
-    def endless(self) -> FlyballError:
+    def jumped(self, before: Mapping[int, float]) -> None:
+        """Forces may have jumped: what held may not hold any more, without a guard that passed zero.
+
+        ``before``: expressions of events on the other side of that time, across which nothing is followed.
+        """
+        here = self.here
+        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
+        if fired := [*against.tolist(), *stepped_over(here, before)]:
+            self.happens(fired)
+
+    def endless(self) -> SimulationError:
         """What to say where events follow each other without end."""
-        return FlyballError(f"{ENDLESS} events between t = {self.recent[0]:.9g} and {self.recent[-1]:.9g} s")
+        names = dict.fromkeys(r.name for r in self.here.records[-LATEST:])
+        return SimulationError(
+            f"at t = {self.here.t:.9g} s events follow each other without end ({ENDLESS} within "
+            f"{self.recent[-1] - self.recent[0]:.2g} s): {listing(list(names))}",
+            t=self.here.t,
+        )
 
     def stop(self) -> None:
         """The motion ends here: the last row is written."""
