@@ -21,6 +21,17 @@ CONTACT = {  # see test_contact_examples
     "wrecking_ball.py",
 }
 FILES = [name for name in EVERY if name not in CONTACT]
+EVENTS = {  # see test_events: what holds in them changes at instants, or may
+    "bouncing_ball.toml",
+    "cam_follower.toml",
+    "clock_escapement.toml",
+    "gear_backlash.toml",
+    "geneva_drive.toml",
+    "ratchet.toml",
+    "safety_brake.toml",
+}
+EQUATIONS = [name for name in FILES if name not in EVENTS]
+"""Those with one set of equations for all times, friction by its direction."""
 PROMISED = {
     "andrews.toml",
     "bricard.toml",
@@ -124,3 +135,7 @@ def test_example_is_drawn(name):
     recording = record(r)
     assert {b.name for b in recording.bodies} == {b.name for b in (*r.model.bodies, *r.model.ground)}
     assert payload(recording)
+
+
+def test_examples_with_events_are_known():
+    assert {name for name in FILES if (m := mechanism(name)).events or m.limits} == EVENTS

@@ -14,7 +14,6 @@ SOME = {  # seconds of motion in which something happens, and not so many that d
     "heavy_top.toml": 0.5,
     "point_mass_pendulum.toml": 0.5,
     "rolling_disk.toml": 0.5,
-    "rope_pendulum.toml": 0.5,
 }
 TIGHT = {"rtol": 1e-10, "outputs": 11}
 

@@ -17,7 +17,7 @@ from flyball.tables.system import F_APPLIED, G_VALUE, GAMMA, LOAD, NU
 from flyball.tracing.trace import plain, traced
 from tests import mechanisms
 from tests.contract import zoo
-from tests.examples.test_examples import FILES
+from tests.examples.test_examples import EQUATIONS
 from tests.identities.test_complex_values import with_couplings, with_forces
 
 STATES = 100
@@ -128,6 +128,6 @@ def test_every_operation_of_a_law():
     agree(m)
 
 
-@pytest.mark.parametrize("name", [f for f in FILES if not has_contact(mechanisms.example(f))])
+@pytest.mark.parametrize("name", [f for f in EQUATIONS if not has_contact(mechanisms.example(f))])
 def test_every_example(name):
     agree(mechanisms.example(name))

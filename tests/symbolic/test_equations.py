@@ -11,7 +11,7 @@ from flyball.errors import ModelError
 from flyball.graph.values import reached
 from tests import mechanisms
 from tests.contract import zoo
-from tests.examples.test_examples import FILES
+from tests.examples.test_examples import EQUATIONS
 from tests.identities.test_complex_values import with_forces
 from tests.symbolic.states import random_state
 
@@ -41,7 +41,7 @@ def same_as_results(m, coordinates):
 
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", EQUATIONS)
 def test_quantities_of_examples(name, coordinates):
     same_as_results(mechanisms.example(name), coordinates)
 

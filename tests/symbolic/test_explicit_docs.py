@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from flyball.model.touching import has_contact
+from tests.examples.test_examples import EVENTS
 from tests.mechanisms import EXAMPLES, example
 from tests.symbolic.explicit_made import engine, whole
 
@@ -32,8 +33,8 @@ def test_page(page, least) -> None:
 def test_every_example(name):
     """At states about the start, and at other times where drivers move all; implicit coordinates included."""
     m = example(name)
-    if has_contact(m):
-        pytest.skip("contact is refused by m.symbolic")
+    if has_contact(m) or name in EVENTS:
+        pytest.skip("contact and events are refused by m.symbolic")
     s = m.symbolic().state_space()
     coordinates = s.equations.coordinates.partition(":")[0]
     rng = np.random.default_rng(0)

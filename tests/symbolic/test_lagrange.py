@@ -6,7 +6,7 @@ import pytest
 import flyball as fb
 from tests import mechanisms
 from tests.contract import zoo
-from tests.examples.test_examples import FILES
+from tests.examples.test_examples import EQUATIONS
 from tests.identities.test_complex_values import with_forces
 from tests.symbolic.states import random_state
 
@@ -20,7 +20,7 @@ def same_numbers(m, coordinates):
 
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", EQUATIONS)
 def test_numbers_of_examples(name, coordinates):
     same_numbers(mechanisms.example(name), coordinates)
 

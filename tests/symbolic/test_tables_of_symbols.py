@@ -15,7 +15,7 @@ from flyball.tracing.trace import plain, traced
 from tests import mechanisms
 from tests.complex_steps import with_parameters
 from tests.contract import zoo
-from tests.examples.test_examples import FILES
+from tests.examples.test_examples import EQUATIONS as EXAMPLES
 from tests.identities.test_complex_values import with_forces
 from tests.model.test_shapes import SAMPLES
 
@@ -63,7 +63,7 @@ def test_every_shape(shape):
     agree(m)
 
 
-@pytest.mark.parametrize("name", [f for f in FILES if f not in ("cam.py", "stewart.py")])
+@pytest.mark.parametrize("name", [f for f in EXAMPLES if f not in ("cam.py", "stewart.py")])
 def test_examples(name):
     agree(mechanisms.example(name))
 
