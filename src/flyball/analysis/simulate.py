@@ -82,6 +82,11 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     times = output_times(t_start, o.t_end, o.outputs)
     o = chosen(model, o)
     if isinstance(o.method, Stepping):
+        if model.events:
+            raise ModelError(
+                f"{model.name!r} has {model.events[0].title}, and steps by impulses know no events: give "
+                f"method='dop853'"
+            )
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     model = with_places(model, o.parameters)

@@ -35,6 +35,7 @@ class Start:
     coordinates: str  # which they are, and why
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
     engine: Engine | None = None  # what the motion is computed by; table-driven if none
+    before: Result | None = None  # what it goes on from
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 
@@ -102,7 +103,7 @@ def begin_at(
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
     y = _gone_on(before, a)
     _holds(before, a)
-    return Start(base, a, y, found.coordinates, _wound(base, a, y))
+    return Start(base, a, y, found.coordinates, _wound(base, a, y), before=before)
 
 
 def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None, switches: bool) -> Start:
