@@ -12,6 +12,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
+from ...tables.branches import bent_laws
 from ...tables.switches import declared
 from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
 from ..assemble import assemble
@@ -128,7 +129,7 @@ def _holds(before: Result, a: Assembly) -> None:
 def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
     """The same with the rows that have modes, all off, if there are any."""
     s = a.compiled.structure
-    if not declared(s.model) and not s.model.events:
+    if not declared(s.model) and not s.model.events and not bent_laws(s.model):
         return a
     c = compiled(s.model, parameters=parameters, tree=s.tree, switches=True)
     c.follow(a.compiled.hints)
@@ -151,13 +152,13 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
-    c = compiled(model, parameters=parameters, tree=old.tree, switches=bool(old.switches))
+    c = compiled(model, parameters=parameters, tree=old.tree, switches=before.stretches is not None)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
     refuse_jump(before, c, t, q, v)
     c.at(t, q, v)
-    if not c.structure.tree and not c.structure.switches:
+    if not c.structure.tree and before.stretches is None:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)

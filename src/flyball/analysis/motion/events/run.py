@@ -164,6 +164,7 @@ class Run:
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
             self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+        self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
         if here.fresh:
