@@ -332,3 +332,17 @@ def test_steps_by_impulses_know_none():
     m.add(fb.Event("e", "t - 0.5"))
     with pytest.raises(fb.ModelError, match="'slide' has Event 'e', and steps by impulses know no events"):
         m.simulate(1, method="impulse")
+
+
+def test_an_event_at_the_time_at_which_a_law_jumps(layer):
+    """Held from the instant on at which a force begins, which the lock carries; let go as it ends."""
+    m = slide()
+    m.add(
+        fb.Initial("A.displacement", rate=3.0),
+        fb.PointForce("f", "b", force=("where(t < 1, where(t > 0.5, 5, 0), 0)", 0)),
+    )
+    m.add(fb.Event("hold", "t - 0.5", do=fb.Lock("A")), fb.Event("free", "t - 1", do=fb.Release("A")))
+    r = m.simulate(2, outputs=201, coordinates=layer)
+    assert r["b.x"] == pytest.approx(np.where(r.t < 0.5, 3 * r.t, 1.5), abs=1e-9)
+    assert [h.name for h in r.events] == ["hold", "free"]
+    assert r.events.t == pytest.approx([0.5, 1.0], abs=1e-12)
