@@ -2,57 +2,17 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import pytest
 
 import flyball as fb
 from flyball.analysis.motion.events.happen import begin
-from flyball.constraints.modes import LOCK, STOP
-from flyball.model.element import Element, element
-from flyball.model.switch import Switch
+from flyball.constraints.modes import STOP
 from flyball.tables.system import HELD, MODE
+from tests.events.one_row import BOTH, Row, forgotten, rows
 from tests.events.standing import kicked, modes, moving, standing
 
-BOTH = pytest.mark.parametrize("coordinates", ["absolute", "joint"])
-
-
-@element
-class Row(Element):
-    """A row with a mode, of the test's."""
-
-    of: tuple[str, ...]
-    kind: int = LOCK
-    par: tuple[float, ...] = ()
-    weights: tuple[float, ...] = (1.0,)
-    category: ClassVar[str] = "limits"
-
-    def switches(self):
-        return (Switch(self.kind, along=self.of),)
-
-    def switched(self, n, *told):
-        return self.par
-
-    def acts(self):
-        return False
-
-    def switch_weights(self, n, *told):
-        return self.weights
-
-
-@pytest.fixture(autouse=True)
-def forgotten():
-    yield
-    Element.registry.pop("Row", None)
-
-
-def rows(m, *all_of):
-    """With rows of the test's."""
-    for r in all_of:
-        m.limits.append(r)
-        m.by_name[r.name] = r
-    return m
+__all__ = ["forgotten"]
 
 
 def rods(ground=False):
@@ -223,3 +183,46 @@ def test_start_beyond_a_limit_names_it():
     here = standing(rows(m, Row("knee", of=("B.angle",), kind=STOP, par=(0.2, 1.0))), "joint")
     with pytest.raises(fb.ModelError, match=r"'knee'.*begins beyond it.*is 0 and must be within 0.2 and 1"):
         begin(here)
+
+
+@BOTH
+def test_what_hinges_carry_in_a_sudden_stop(coordinates):
+    """Momentum of the second rod goes through its hinge, that of both through the first one's: the stop is a couple."""
+    m = rows(turning(1.5, -0.5), Row("stop", of=("A.angle",), kind=STOP, par=(-np.inf, 0.0)))
+    run = m.simulate(0.01, outputs=2, coordinates=coordinates)
+    (hit,) = run.events.of("impact")
+    second = -0.5 + 0.75 * 3.0 - 2.5
+    np.testing.assert_allclose(hit.impulses["B"], [0, second, 0, 0, 0, 0], atol=1e-12)
+    np.testing.assert_allclose(hit.impulses["A"], [0, second - 1.5, 0, 0, 0, 0], atol=1e-12)
+    assert set(hit.impulses) == {"stop", "A", "B"}
+    assert hit.as_dict()["impulses"]["B"][1] == pytest.approx(second)
+
+
+def falling_bar(tilt):
+    """A spatial bar that hangs on a ball joint, with a stop on the height of its free end, which it meets turning."""
+    m = fb.Mechanism("bar", gravity=(0, 0, 0))
+    m.add(
+        fb.Body(
+            "bar",
+            mass=2.0,
+            inertia=(0.1, 2 / 3, 2 / 3),
+            position=(1.0, 0, 0),
+            velocity=(0, 0.3, -0.7),
+            angular_velocity=(0, 0.7, 0.3),
+        )
+    )
+    m.add(fb.Spherical("S", "ground", "bar", at=(0, 0, 0)))
+    m.add(fb.Frame("tip", body="bar", position=(1.0, 0.2, 0)))
+    return rows(m, Row("stop", of=("tip.z",), kind=STOP, par=(0.0, np.inf, 0.4)))
+
+
+def test_both_layers_agree_on_impulses_in_space():
+    """The joint's impulse by its rows, and by the sweep over jumps of velocities."""
+    seen = []
+    for coordinates in ("absolute", "joint"):
+        run = falling_bar(0.0).simulate(0.01, outputs=2, coordinates=coordinates)
+        (hit,) = run.events.of("impact")
+        seen.append((hit.impulses["stop"], hit.lost, *hit.impulses["S"], *hit.after["bar.angular_velocity"]))
+    np.testing.assert_allclose(seen[0], seen[1], rtol=1e-10, atol=1e-13)
+    # e of the closing rate 1.4: the tip leaves with 0.56
+    assert seen[0][0] > 0.0 and seen[0][1] > 0.0

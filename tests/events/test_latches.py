@@ -103,6 +103,27 @@ def test_a_ratchet_lifts_step_by_step(coordinates):
 
 
 @layers
+def test_a_winch_in_space_counts_its_turns_and_goes_on(coordinates):
+    """Nine turns up and back to the last tooth; a motion that goes on from there holds it, one that goes on midway too."""
+    m = fb.Mechanism("winch")
+    m.add(
+        fb.Body("drum", mass=1, inertia=(0.4, 0.4, 0.4)),
+        fb.Revolute("A", "ground", "drum", at=(0, 0, 0), axis=(1, 2, 2)),
+    )
+    m.add(fb.Initial("A.angle", rate=30), fb.Motor("load", "A", torque=-3.0), fb.Ratchet("pawl", "A.angle", teeth=12))
+    pitch = 2 * np.pi / 12
+    top = 30**2 / (2 * 3.0 / 0.4)
+    tooth = pitch * np.floor(top / pitch)
+    back = 30 / 7.5 + 0.5 * np.sqrt(2 * (top - tooth) / 7.5)  # half the time that it takes to the tooth
+    for t in (back, 10.0):
+        r = run(m, t, coordinates)
+        for _ in range(2):
+            r = run(m, float(r.t[-1]) + 2.0, coordinates, start=r)
+        assert r["A"].angle[-1] == pytest.approx(tooth, abs=1e-9)
+        assert r["pawl"].force[-1] == pytest.approx(3.0, rel=1e-9)
+
+
+@layers
 def test_a_ratchet_bounces_on_its_tooth(coordinates):
     J, T, e = 0.4, 3.0, 0.5
     m = wheels(J, rates=(2.0,), torques=(-T,))

@@ -129,6 +129,23 @@ def test_world_coordinate_of_a_body():
     assert r.events[0].impulses["wall"] == pytest.approx(-3.0, abs=1e-8)
 
 
+def test_steps_by_impulses_know_stops_and_refuse_the_rest():
+    m = slider(fb.Limit("floor", "guide.displacement", lower=0, restitution=0.5), height=0.5)
+    r = m.simulate(1.0, method="impulse")
+    assert r["floor"].value == pytest.approx(r["guide"].displacement)
+    assert np.isnan(r["floor"].force).all(), "they do not tell it"
+    soft = slider(fb.Limit("floor", "guide.displacement", lower=0, stiffness=1e4, damping=10), height=0.5)
+    assert soft.simulate(0.4, method="impulse")["floor"].force.max() > 100.0
+    for part in (
+        fb.OneWay("part", "guide.displacement"),
+        fb.Ratchet("part", "guide.displacement", pitch=0.1),
+        fb.Backlash("part", ("guide.displacement",), gap=0.1),
+        fb.Rope("part", ("ground", "block"), at=((0, 3), (0, 0.5))),
+    ):
+        with pytest.raises(fb.ModelError, match=rf"steps by impulses do not know {type(part).__name__} 'part'"):
+            slider(part, height=0.5).simulate(1.0, method="impulse")
+
+
 def test_a_stop_that_starts_violated_is_refused():
     m = slider(fb.Limit("floor", "guide.displacement", lower=0.1), height=0.05)
     with pytest.raises(fb.FlyballError, match=r"Limit 'floor'.*0\.05.*0\.1"):

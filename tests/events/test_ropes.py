@@ -95,6 +95,19 @@ def test_a_jump_on_an_elastic_rope(coordinates):
 
 
 @layers
+def test_a_conical_pendulum_on_a_rope(coordinates):
+    """In space: the tension is m g / cos all the way, at the speed sqrt(g r tan)."""
+    m = fb.Mechanism("cone", gravity=(0, 0, -G))
+    at, v = (0.6, 0, -0.8), (0, np.sqrt(G * 0.36 / 0.8), 0)
+    m.add(fb.Body("bob", mass=2, inertia=(0.01, 0.01, 0.01), position=at, velocity=v))
+    m.add(fb.Rope("rope", ("ground", "bob"), at=((0, 0, 0), at)))
+    r = run(m, 2.0, coordinates)
+    assert r["rope"].tension == pytest.approx(2 * G / 0.8, rel=1e-9)
+    assert r["bob.z"] == pytest.approx(-0.8, abs=1e-9)
+    assert not len(times(r, "rope"))
+
+
+@layers
 def test_a_rope_with_restitution_bounces(coordinates):
     """Without gravity: it runs out at v, jerks, and comes back at e v."""
     m = fb.Mechanism("tether", planar=True)

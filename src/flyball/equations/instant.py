@@ -36,11 +36,13 @@ from .friction import reaction_loads
 from .loads import law, wide
 from .tasks import MOTION, SOLVE
 
-IMPULSES, TRIED = range(2)  # entries of Bench.asks: impulses or forces; how often it was solved
+IMPULSES, TRIED = range(2)  # entries of Bench.asks: what x is; how often it was solved
+FORCES, BLOWS, OF_A_STEP = range(3)  # what x is: forces, impulses in no time, or those of a short step of time
 TRIES = 60
 SETTLED = 1e-13  # of the largest impulse
 NUDGE = 1e-6  # part of an impulse that tells how loads follow it
 GRAIN = 1e-13  # of the terms of a quantity's acceleration: their rounding
+BEYOND = 1e30  # more than anything carries
 FAR = 1e8  # times a load, beside which what friction has besides it is nothing
 
 
@@ -59,6 +61,7 @@ class Bench(NamedTuple):
     free: np.ndarray  # (nv,): accelerations with everything off
     loaded: np.ndarray  # (nr,): multipliers with everything off, or of impulses that went before
     asks: np.ndarray  # (2,)
+    step: np.ndarray  # (1,): the step of time
     seen: np.ndarray  # (n,): impulses of the try before
     now: np.ndarray  # (n,): what friction holds at them
 
@@ -67,7 +70,7 @@ def bench(n: int, nv: int, nr: int) -> Bench:
     """Room for n rows."""
     z = np.zeros
     i = np.int64
-    return Bench(z(n, i), z(n), z(n), z(n), z((n, nv)), z((n, nr)), z((n, nv)), z(nv), z(nr), z(2, i), z(n), z(n))
+    return Bench(z(n, i), z(n), z(n), z(n), z((n, nv)), z((n, nr)), z((n, nv)), z(nv), z(nr), z(2, i), z(1), z(n), z(n))
 
 
 @formula
@@ -132,11 +135,14 @@ def held_by(S, W, t, B, i, load):
     x = W.sensed[VALUE, S.force_i[k, FORCE_F]]
     first = law(S, W, k, 0, (t, x, B.rate[i]))
     kind, par = S.force_i[k, FORCE_KIND], wide(S.force_x, k)
-    if B.asks[IMPULSES] != 0:
+    if B.asks[IMPULSES] == OF_A_STEP:
+        load = load / B.step[0]
+    elif B.asks[IMPULSES] != 0:
         most = effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), FAR * load)
         return magnitude(most - effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), 0.0)) / FAR
     most = effort(kind, par, x, B.rate[i], (first, 0.0, B.way[i]), load)
-    return magnitude(most - effort(kind, par, x, B.rate[i], (first, 0.0, 0.0), load))
+    reach = magnitude(most - effort(kind, par, x, B.rate[i], (first, 0.0, 0.0), load))
+    return reach * B.step[0] if B.asks[IMPULSES] == OF_A_STEP else reach
 
 
 @formula
@@ -203,9 +209,15 @@ def reaches(S, W, t, B, P):
 @formula
 def balanced(S, W, t, B, P):
     """The problem solved, with what friction holds by what it carries. How it ended stands in ``P.info``."""
-    n = B.which.shape[0]
+    n, loads = B.which.shape[0], False
     for i in range(n):
         P.x[i] = 0.0
+        loads = loads or (B.way[i] != 0.0 and S.force_i[S.switch_i[B.which[i], SWITCH_FORCE], FORCE_LOAD] >= 0)
+    if loads and B.asks[IMPULSES] != FORCES:  # without impulses loads have no slope: begin with what would hold
+        for i in range(n):
+            if B.way[i] != 0.0:
+                P.const[i] = BEYOND
+        settle(P)
     for _ in range(TRIES):
         B.asks[TRIED] += 1
         follows = reaches(S, W, t, B, P)

@@ -55,6 +55,7 @@ def outcome(
     ended = here.failed is None and not interrupted
     health.message, health.success = message, ended and status == ex.DONE
     health.watched = here.watched
+    health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
     cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
     t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))

@@ -80,7 +80,11 @@ class ForceView(View):
             x, rate = self._result.measured.quantity(s.switches[own[0]].measured)
             effort = 0.0 * x
         else:
-            x = rate = effort = self._result.records.zeros() + np.nan
+            e = self.element
+            m = s.measured.get(e.coordinate_text() or f"{e.name}:length")
+            nothing = self._result.records.zeros() + np.nan
+            x, rate = (nothing, nothing) if m is None else self._result.measured.quantity(m)
+            effort = nothing
         side = sign(effort) * (effort != 0.0)
         stretches = self._result.stretches
         if own and stretches is not None:

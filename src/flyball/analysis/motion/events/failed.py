@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import SimulationError
-from ....model.words import listing
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
+from ..reasons import jam
 from .instant import Instant, Part
-from .modes import Decided
+from .modes import Decided, elements
 
 ROLES = {
     STOP: "is closed",
@@ -22,7 +22,7 @@ ROLES = {
 def who(n: Instant, parts: list[Part]) -> str:
     """Elements of rows, with the part that they take."""
     seen = dict.fromkeys((n.here.structure.switches[p.switch].element.title, ROLES[n.kind[p.switch]]) for p in parts)
-    return listing([f"{title}, which {role}" for title, role in seen])
+    return " and ".join(f"{title}, which {role}" for title, role in seen)
 
 
 def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
@@ -37,12 +37,16 @@ def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
 def no_forces(n: Instant, found: Decided) -> SimulationError:
     """Accelerations cannot be as all ask."""
     sliding = [p for p in found.parts if p.rule in (DRIVEN, GRIPS)]
+    jammed = [n.here.structure.switches[p.switch].element for p in sliding]
+    if found.ended != NOT_HELD and len(jammed) == 1 and hasattr(jammed[0], "joint"):
+        return SimulationError(jam(jammed[0], n.here.t), t=n.here.t)
     if found.ended == NOT_HELD or not sliding:
         why = "what they hold cannot be held together: one of them must give way"
     else:
         why = (
             "friction grows with the load that it makes itself faster than that can hold it (a jam, or Painleve's "
-            f"paradox), at {who(n, sliding)}: a smaller coefficient, or an elastic stop or joint, has a solution"
+            f"paradox), at {' and '.join(elements(n, sliding))}: with less friction, or an elastic stop or joint, "
+            "there is a solution"
         )
     return SimulationError(
         f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "
@@ -55,6 +59,6 @@ def no_end(t: float, names: list[str], rounds: int) -> SimulationError:
     """What happens at an instant has no end."""
     return SimulationError(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
-        f"{listing(list(dict.fromkeys(names)))}; each undoes what the other did",
+        f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
         t=t,
     )

@@ -8,14 +8,15 @@ import numpy as np
 
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
-from ....numerics.cone.dense.problem import FOUND
+from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
 from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
 from .actions import act, act_at_start
+from .doubtful import doubt, shock
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant
 from .jump import Jump, jump, must_jump
-from .modes import Decided, decide
+from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
 from .sides import pressed, teeth, turned
@@ -40,7 +41,7 @@ def begin(here: Here) -> None:
         n.look()
         n.restored()
         refuse_violated(n)
-        resolve(n, np.zeros(0, np.int64))
+        resolve(n, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
     _happen(here, acts.passed())
 
@@ -91,14 +92,17 @@ def refuse_violated(n: Instant) -> None:
             raise ModelError(f"{element.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
-def resolve(n: Instant, fired: np.ndarray) -> None:
-    """Jumps and modes at the instant, until nothing is against its rule."""
+def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
+    """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
     hits: dict[int, bool] = {}
+    calm: list[int] = []
+    gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
     for _ in range(ROUNDS):
         n.look()
         still = at_rest(n, fired)
+        still[calm] = True
         teeth(n, still)
         at = sides(n, fired)
         jumped = jumps(n, at, still)
@@ -110,14 +114,21 @@ def resolve(n: Instant, fired: np.ndarray) -> None:
             still[list(jumped.even)] = True
         pressed(n, fired)
         found = decided(n, at, still, fired)
+        if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
+            tell_jump(n, found, before)
+            fired, calm = fired[:0], list(found.even)
+            continue
         turned(n, hits)
+        come_to_rest(n, found)
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
-        fired = broken(n, found)
-        if not len(fired):
-            tell_modes(n, (modes, ways), before, hits)
+        new = np.setdiff1d(broken(n, found), gone)
+        if not len(new):
+            if told:
+                tell_modes(n, (modes, ways), before, hits)
             return
+        fired = gone = np.r_[gone, new]
     raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
 
 
@@ -140,17 +151,29 @@ def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Ju
     return jumped
 
 
-def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
-    """Modes; a series of bounces that has become shorter than rounding is over."""
+def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided | Jump:
+    """Modes; a series of bounces that has become shorter than rounding is over.
+
+    Where there are no accelerations velocities may jump without a collision.
+    """
     found = decide(n, at, still, fired)
     if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
         still |= over
         n.bared()
         found = decide(n, at, still, fired)
-    if found.ended != FOUND:
+    if found.ended == FOUND:
+        doubt(n, found)
+        return found
+    blow = (
+        shock(n, of_velocities(n, at, still), np.abs(found.reach).max(initial=0.0))
+        if found.ended == NONE_FOUND
+        else None
+    )
+    if blow is None:
         n.restored()
         raise no_forces(n, found)
-    return found
+    n.here.lost, n.here.fresh = n.here.lost + blow.lost, True
+    return blow
 
 
 def broken(n: Instant, found: Decided) -> np.ndarray:

@@ -39,6 +39,8 @@ class Here:
         Generalised impulse (nv,) that is given at this instant: taken up by the next jump.
     blows : list
         What it is made of; see `results.struck.Struck`.
+    doubts : list of str
+        What rigid bodies left open, in words, for the health.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
     counts : dict
@@ -66,6 +68,7 @@ class Here:
     given: float = 0.0
     kick: np.ndarray | None = None
     blows: list[Any] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
     seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)

@@ -175,9 +175,9 @@ class Instant:
             P.A[i] = P.A[:, i] = 0.0
         return B, P, status
 
-    def balance(self, B: Bench, P: Dense, impulses: bool) -> int:
-        """Solve it. Returns how it ended."""
-        B.asks[IMPULSES] = int(impulses)
+    def balance(self, B: Bench, P: Dense, impulses: int) -> int:
+        """Solve it for forces or impulses, as `equations.instant` names them. Returns how it ended."""
+        B.asks[IMPULSES] = impulses
         balanced_kernel(self.S, self.W, self.here.t, B, P)
         return int(P.info[ENDED])
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ....equations.instant import Bench
+from ....equations.instant import BLOWS, Bench
 from ....numerics.cone.dense.problem import FOUND, HOLDS, PUSHES, Dense
 from ....tables.system import BODY_LAW, BODY_WORK, NU, ROW_WORK, SWITCH_BOUNCE, SWITCH_ROW, V0
 from .instant import STOPS, Instant, Part
@@ -34,6 +34,8 @@ class Jump:
         Switch -> rate at which it closed, and that at which it goes on.
     lost, given : float
         Energy [J] that the impacts took, and that kicks gave.
+    jammed : tuple of int
+        Switches that stopped without a collision.
     rows, along : ndarray
         Impulses of all rows, then of drivers that prescribe coordinates; and change of the velocities, (nv,).
     """
@@ -47,6 +49,7 @@ class Jump:
     blows: tuple[Any, ...] = ()
     even: frozenset[int] = frozenset()  # switches whose quantities are at rest afterwards
     ended: int = FOUND
+    jammed: tuple[int, ...] = ()
 
 
 def must_jump(n: Instant, parts: list[Part], rate: np.ndarray) -> bool:
@@ -61,7 +64,7 @@ def must_jump(n: Instant, parts: list[Part], rate: np.ndarray) -> bool:
 def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     """Change the velocities of the motion as the rules of these rows ask; see the module."""
     B, P, _ = n.problem(parts)
-    out = Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
+    out = nothing(n)
     before = B.sign * n.rate[B.which]
     drive = np.zeros_like(out.along)
     if kick is not None:
@@ -69,12 +72,26 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     P.grain[:] = n.still[B.which]
     B.loaded[:] = 0.0
     P.b[:] = before
-    out.ended = n.balance(B, P, True)
+    out.ended = n.balance(B, P, BLOWS)
     x, u = P.x.copy(), P.u.copy()
     if out.ended != FOUND:
         return out
     if len(parts):
         x, u = expanded(n, B, P, parts, before, (x, u))
+    return finish(n, (B, P), parts, (before, x, u), out, drive)
+
+
+def finish(
+    n: Instant,
+    solved: tuple[Bench, Dense],
+    parts: list[Part],
+    found: tuple[np.ndarray, np.ndarray, np.ndarray],
+    out: Jump,
+    drive: np.ndarray,
+) -> Jump:
+    """Velocities of the motion after impulses x, which take the rows' rates from ``before`` to u."""
+    B, P = solved
+    before, x, u = found
     out.lost = -float(x @ (before + u)) / 2.0
     out.rows += x @ B.L
     out.along += x @ B.Y
@@ -90,6 +107,11 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     return out
 
 
+def nothing(n: Instant) -> Jump:
+    """No jump."""
+    return Jump(rows=np.zeros(len(n.S.row_i)), along=np.zeros(n.here.structure.nv))
+
+
 def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray) -> np.ndarray:
     """Change of the rows' rates by a generalised impulse alone; what it does goes to ``out``."""
     dv, rows, effort = n.response(kick)
@@ -98,7 +120,7 @@ def kicked(n: Instant, kick: np.ndarray, out: Jump, B: Bench, drive: np.ndarray)
     out.along += dv
     out.rows += rows
     drive += effort
-    return B.sign * n.gradients(B.which) @ dv if len(B.which) else np.zeros(0)
+    return B.sign * (n.gradients(B.which) @ dv) if len(B.which) else np.zeros(0)
 
 
 def expanded(
@@ -131,7 +153,7 @@ def by_impulses(n: Instant, B: Bench, P: Dense, least: np.ndarray, u: np.ndarray
     P.const[:] = np.where(B.way == 0.0, fixed, 0.0)
     P.b[:] = u + P.A @ least
     B.loaded[:] = least @ B.L
-    n.balance(B, P, True)
+    n.balance(B, P, BLOWS)
     return P.x + least, P.u - u
 
 
@@ -141,7 +163,7 @@ def by_velocities(
     """Newton: what closes goes back with e times its speed at least."""
     back = np.where((P.rule == PUSHES) & (before < 0.0), bounce * before, 0.0)
     P.b[:] = before + back
-    n.balance(B, P, True)
+    n.balance(B, P, BLOWS)
     return P.x.copy(), P.u - back
 
 

@@ -58,6 +58,10 @@ class Legs:
         self.at = 0
         self.aim()
 
+    def ends_sharply(self) -> bool:
+        """Whether forces may jump at the end of this stretch."""
+        return bool(self.at < len(self.times) and self.sharp[self.at])
+
     def next(self) -> bool:
         """Go on with the next one, if there is one."""
         if self.at == len(self.times):

@@ -12,13 +12,14 @@ import numpy as np
 
 from ....constraints.modes import FRICTION
 from ....equations.friction import FORGOTTEN
+from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
-from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOAD, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
 from .slips import loose, slide_on, write_slips
 
-TIED = 1e-7  # of the forces that a force is the difference of: as good as none
+TIED = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
 CASCADE = 20  # times that others are asked again after some began to slide
 
 
@@ -37,39 +38,48 @@ class Decided:
     lean: np.ndarray
     reach: np.ndarray
     sizes: dict[int, float]
-    status: int = 0
+    A: np.ndarray
+    gain: np.ndarray
 
 
 def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
     """Modes by one problem of accelerations, into the motion; ``n`` has looked there.
 
-    What a guard says has just reached the end of what it holds is not held on to for the sake of rounding.
+    What a guard says has reached the end of what it holds lets go where that is against no rule: not for the sake of
+    rounding, and not where redundancy leaves open who carries what, should it be held on to.
     """
     parts = of_accelerations(n, at, still)
     found = solved(n, parts)
-    if found.ended == FOUND and (let_go := _loose(n, found, fired)):
+    let_go = _loose(n, found, fired) if found.ended == FOUND else {}
+    while let_go:
         other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
-        found = other if other.ended == FOUND else found
+        back = [i for i in let_go if other.ended != FOUND or _against(other, i)]
+        if not back:
+            found = other
+        let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
     if found.ended == FOUND:
         write(n, found, still)
     return found
 
 
 def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
-    """Rows that hold at the very end of what they can, by guards that fired, as they are when they do not."""
+    """Rows that hold and whose guards fired, as they are when they do not."""
     ends = {int(s): int(kind) for kind, s, _ in n.S.guard_i[fired] if int(kind) in (G_PULL, G_HOLDS)}
-    little = np.array([TIED * found.sizes[p.switch] for p in found.parts])
-    out = loose(n, found.parts, (found.x, found.state, found.reach, little), fired)
+    out = loose(n, found.parts, (found.x, found.state, found.reach, np.full(len(found.x), np.inf)), fired)
+    asked = {(G_PULL, PUSHES), (G_HOLDS, GRIPS)}
     for i, p in enumerate(found.parts):
-        kind = ends.get(p.switch)
-        least = little[i]
-        if kind is None or found.state[i] != EVEN:
-            continue
-        if (kind == G_PULL and p.rule == PUSHES and found.x[i] <= least) or (
-            kind == G_HOLDS and p.rule == GRIPS and abs(found.x[i]) >= found.reach[i] - least
-        ):
+        if found.state[i] == EVEN and (ends.get(p.switch, -1), p.rule) in asked:
             out[i] = _let_go(p, found.x[i])
     return out
+
+
+def _against(found: Decided, i: int) -> bool:
+    """Whether row i, which was let go, moves against its rule; of rows that slip together whether both do."""
+    p, least = found.parts[i], TIED * found.sizes[found.parts[i].switch] * found.A[i, i]
+    if p.rule != DRIVEN:
+        return bool(found.u[i] < -least)
+    own = [k for k, q in enumerate(found.parts) if k == i or (p.of >= 0 and q.of == p.of and q.rule == DRIVEN)]
+    return bool(found.u[own] @ [found.parts[k].lean for k in own] < -least)
 
 
 def _let_go(p: Part, x: float) -> Part:
@@ -82,10 +92,10 @@ def _let_go(p: Part, x: float) -> Part:
 
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
-    B, P, status = n.problem(parts)
+    B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
-        ended = n.balance(B, P, False)
+        ended = n.balance(B, P, FORCES)
         slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN))
         if ended != FOUND or not (slide_on(n, parts, P) or len(slips)):
             break
@@ -95,7 +105,24 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     x = P.x.copy()
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
-    return Decided(parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, status)
+    return Decided(
+        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, P.A.copy(), P.gain.copy()
+    )
+
+
+def elements(n: Instant, parts: list[Part]) -> list[str]:
+    """Titles of the elements that rows are of."""
+    return list(dict.fromkeys(n.here.structure.switches[p.switch].element.title for p in parts))
+
+
+def come_to_rest(n: Instant, found: Decided) -> None:
+    """Take the rounding from the rates of what holds."""
+    B, P = n.rooms[len(found.parts)]
+    held = [i for i, p in enumerate(found.parts) if found.state[i] == EVEN and n.rate[p.switch] != 0.0]
+    if held:
+        rates = B.sign[held] * n.rate[B.which[held]]
+        x = np.linalg.lstsq(P.A[np.ix_(held, held)], -rates, rcond=1e-12)[0]
+        n.here.v[:] += x @ B.Y[held]
 
 
 def write(n: Instant, found: Decided, still: np.ndarray) -> None:
@@ -118,3 +145,4 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     if len(n.S.load_i):
         W.info[LEARNT] = FORGOTTEN
+        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

@@ -73,7 +73,7 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
     out = []
     for s, kind in enumerate(n.kind.tolist()):
         if kind in STOPS and s in at and still[s]:
-            out += _stop(s, at[s])
+            out += _stop(s, at[s], EVEN if n.mode[s] != OFF else FREE)
             out += slips_at(n, s, len(out) - 1, still, led=True)
         elif kind == ONE_WAY and still[s]:
             out.append(Part(s, PUSHES, state=EVEN if n.mode[s] != OFF else FREE))
@@ -88,9 +88,9 @@ def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.nda
     return out
 
 
-def _stop(s: int, at: tuple[float, ...]) -> list[Part]:
+def _stop(s: int, at: tuple[float, ...], state: int = EVEN) -> list[Part]:
     """One that is at both sides holds."""
-    return [Part(s, HOLDS)] if len(at) > 1 else [Part(s, PUSHES, at[0], state=EVEN)]
+    return [Part(s, HOLDS)] if len(at) > 1 else [Part(s, PUSHES, at[0], state=state)]
 
 
 def _sign(x: float) -> float:

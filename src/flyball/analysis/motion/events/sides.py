@@ -37,12 +37,13 @@ BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
 def teeth(n: Instant, still: np.ndarray) -> None:
     """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
     for s in np.flatnonzero(n.kind == RATCHET).tolist():
-        n.W.switch[UPPER, s] = np.inf
+        first, n.W.switch[UPPER, s] = n.W.switch[UPPER, s] < np.inf, np.inf
         if n.mode[s] != OFF:
+            n.W.switch[LOWER, s] = n.hold[s]  # of a motion that goes on, too
             continue
         if (_acceleration(n, s) > -SLOW * n.unit[s]) if still[s] else (n.rate[s] > 0.0):
             _goes_on(n, s)
-        elif n.way[s] >= 0.0:
+        elif first or n.way[s] >= 0.0:
             tooth, pitch = n.S.switch_x[s, SWITCH_TOOTH], n.S.switch_x[s, SWITCH_PITCH]
             n.W.switch[LOWER, s] = tooth + pitch * np.floor((n.x[s] - tooth) / pitch + TOOTH)
             n.ways()[s] = n.way[s] = -1.0

@@ -44,7 +44,7 @@ def words(n: Instant, s: int, held: bool) -> tuple[str, str]:
 
 def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
     """Record a jump of velocities."""
-    if not jumped.closing and not jumped.given:
+    if not jumped.closing and not jumped.given and not jumped.jammed:
         return
     done: list[str] = []
     impulses: dict[str, float] = {}
@@ -54,8 +54,11 @@ def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
     for s, x in jumped.impulse.items():
         if x != 0.0:
             impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
-    names = ", ".join(dict.fromkeys(n.name(s) for s in jumped.closing)) or "start"
-    record(n, names, "impact" if jumped.closing else "kick", tuple(done), jumped, impulses, before)
+    if jumped.jammed:
+        done.append("stops without a collision: no accelerations go with its friction (Painleve's paradox)")
+    names = ", ".join(dict.fromkeys(n.name(s) for s in jumped.closing or jumped.jammed)) or "start"
+    kind = "jam" if jumped.jammed else "impact" if jumped.closing else "kick"
+    record(n, names, kind, tuple(done), jumped, impulses, before)
 
 
 def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarray, hits: dict[int, bool]) -> None:

@@ -75,6 +75,9 @@ def found(P):
             P.state[i] = P.at[i]
         if not solved(P):
             return NONE_FOUND
+    for i in range(n):  # what carries nothing and need not, does not hold
+        if P.rule[i] == PUSHES and P.state[i] == EVEN and abs(P.row[REST, i]) <= rounding(P, P.row[REST], i):
+            P.state[i], P.row[REST, i] = FREE, 0.0
     most = 0.0
     for i in range(n):
         most = max(most, abs(P.row[BIAS, i]))
