@@ -3,8 +3,8 @@
     python benchmarks/events.py [rounds]
 
 Ratios to the same motion without a guard, in one process, of the least time each took; and what an event takes with all
-that belongs to it: it is located, the step is taken again, Python decides, the motion goes on. Most of what a guard costs is
-the quantity that it measures, which is found in every evaluation of the equations (0.14 us for an angle).
+that belongs to it: it is located, the step is taken again, Python decides, the motion goes on. Most of what a guard
+costs is the quantity that it measures, found in every evaluation of the equations (0.14 us for an angle).
 """
 
 from __future__ import annotations

@@ -23,10 +23,12 @@ from .watching import (
     WIDTH,
 )
 
+MANY = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
 NARROWEST = 2.0**-14  # part of a step that a panel is not narrower than
 ODD = 1e-2  # part of a guard's change over a panel by which it may differ from the polynomial
 BLURRED = 1e-9  # part of its size that is nothing
 QUIET = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
+NOTHING = 1e-200  # a guard that is no larger is zero
 GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
 PARTS = 16  # of a panel, in which slopes are compared
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
@@ -43,12 +45,13 @@ def survey(look, S, W, t, h, first):
     """
     a = first
     w = 1.0 - first
+    most = W.count[LOOKS] + MANY
     while a < 1.0:
         w = min(w, 1.0 - a)
         W.real[PANEL], W.real[WIDTH] = a, w
         fill(look, S, W, t, h, a, w)
         smooth = resolved(W)
-        if not smooth and w > NARROWEST:
+        if not smooth and w > NARROWEST and W.count[LOOKS] < most:
             w *= 0.5
             continue
         best = -1
@@ -124,6 +127,8 @@ def restless(W, i):
     low, high = extent(W, i)
     if not finite(low, high):  # not watched, or not everywhere
         return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
+    if max(abs(low), abs(high)) < NOTHING:
+        return False
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:
         W.g[SIDE, i] = 1.0
