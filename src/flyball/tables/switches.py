@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ..constraints.modes import BRANCH, EDGE, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
 from . import events
 from .specs import RowSpec, Structure, frame, ints
 from .system import (
-    EITHER,
     FALLING,
     FORCE_SWITCH,
     G_ASTRAY,
@@ -43,6 +42,7 @@ GUARDS = {
     RATCHET: (G_LOWER, G_SLIDES, G_PULL),
     BRANCH: (G_CORNER,),
     SLIP: (G_CONE, G_TURNS),
+    EDGE: (G_ASTRAY,),
 }
 """What is watched of each kind of switch."""
 
@@ -91,7 +91,7 @@ def quantities(s: Structure) -> None:
 def rows(s: Structure) -> None:
     """The rows, behind all others."""
     for e, w in declared(s.model):
-        if w.kind == ELASTIC:
+        if w.kind in (ELASTIC, EDGE):
             s.switches.append(SwitchSpec(e, w, -1, s.measured[quantity(e, w)]))
             continue
         row, first = len(s.rows), len(s.rows)
@@ -108,7 +108,7 @@ def rows(s: Structure) -> None:
         if spec.switch.other:
             one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
             spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
-            like = [i for i in one if i != k and s.switches[i].switch.other == spec.switch.other]
+            like = [i for i in one if i != k and s.switches[i].switch.kind == spec.switch.kind == SLIP]
             spec.partner = like[0] if like else -1
 
     for joint in events.parting(s.model):
@@ -126,7 +126,7 @@ def table(s: Structure) -> None:
         if spec.switch.slides:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["force_i"][spec.force, FORCE_SWITCH] = k
-        s.guards += [(kind, k, EITHER if kind == G_CORNER else FALLING) for kind in _watched(k, spec)]
+        s.guards += [(kind, k, FALLING) for kind in _watched(k, spec)]
     s.tables["switch_i"] = ints(
         [(x.row, x.measured, x.switch.kind, x.force, max(x.law, x.partner), x.other) for x in s.switches], 6
     )
@@ -137,13 +137,15 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
     """What is watched of a switch: of two tangents of a place, the first is watched for both."""
     if x.switch.kind == SLIP and -1 < x.partner < k:
         return ()
-    return (*GUARDS.get(x.switch.kind, ()), *((G_ASTRAY,) if x.switch.seen else ()))
+    return GUARDS.get(x.switch.kind, ())
 
 
 def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:
     """Parameters of the switches, from the numbers of their elements; ``apart``: how far points of each are apart."""
     for k, spec in enumerate(s.switches):
-        if asks(spec.element):
+        if spec.switch.kind == BRANCH:
+            x[k], x[k, :2] = 0.0, (-np.inf, np.inf)
+        elif asks(spec.element):
             par = spec.element.switched(of[spec.element.name], spec.switch.label, apart(spec.element))
             x[k] = 0.0
             x[k, :2] = -np.inf, np.inf
