@@ -15,12 +15,12 @@ from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
-from ..numerics.integrators.watching import FRESH, STAGE, START, watching
+from ..numerics.integrators.watching import STAGE, START, watching
 from ..tables.system import BIAS, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
-from .engine import Sheet, engine, motion_kernel
+from .engine import Sheet, engine
 from .guards import watch as guards
 from .rows import measured
-from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT, WATCH
+from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
 
 ENGINE, S_, W_, R_, OWN, SHEET, EXPECTED = range(7)
 
@@ -192,14 +192,6 @@ class Watched:
         return watched_kernel(
             address, S, W, self.R, self.own, self.sheet, self.expected, self.desk, self.clock, out
         )  # fmt: skip
-
-    def jumped(self, S: System, W: Work) -> tuple[int, ...]:
-        """The guards that are on another side at the clock's time and state than at the end of the last step."""
-        out = np.zeros((1, max(len(S.guard_i), 1)))
-        motion_kernel(S, W, self.R, self.clock, out, WATCH)
-        side, way = self.desk.side, self.desk.way
-        fired = (self.desk.count[FRESH] == 0) & (side * out[0] < 0.0) & (way * side <= 0.0)
-        return tuple(np.flatnonzero(fired).tolist())
 
     @property
     def fired(self) -> tuple[int, ...]:

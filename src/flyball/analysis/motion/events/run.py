@@ -149,8 +149,8 @@ class Run:
         if self.here.seen is not None:
             self.here.seen.add(self.here, rows)
 
-    def event(self, fired: tuple[int, ...]) -> None:
-        """Have it decided what happens where guards fired, and begin anew."""
+    def event(self) -> None:
+        """Have it decided what happens, and begin anew."""
         here = self.here
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
