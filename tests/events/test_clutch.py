@@ -141,7 +141,7 @@ def test_a_lift_is_caught_by_its_safety_brake():
     falls, brakes = v / G, v / (F / mass - G)
     assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([falls, falls + brakes], abs=1e-8)
     assert r["shaft"].displacement[-1] == pytest.approx(-(v**2) / (2 * G) - v**2 / 2 / (F / mass - G), abs=1e-8)
-    assert r["shaft"].rate[-1] == 0.0
+    assert abs(r["shaft"].rate[-1]) < 1e-14
     assert r["safety"].friction[-1] == pytest.approx(mass * G, rel=1e-9)
 
 

@@ -286,9 +286,13 @@ def _jammed(a: Assembly, clock: ex.Clock) -> str:
     W = a.compiled.work
     if W.info[STATUS] != motion.JAMMED:
         return ""
-    e: Any = a.compiled.structure.forces[int(W.info[GUILTY])]
+    return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]))
+
+
+def jam(e: Any, t: float) -> str:
+    """What is said where friction in a joint has no force that goes with its own load."""
     return (
-        f"{e.title} jams joint {e.joint!r} at t = {clock.real[ex.T]:.6g} s: friction loads the joint by as much as the "
+        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
         f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
         f"over which the joint carries moments (bending_length, twist_length)"
     )

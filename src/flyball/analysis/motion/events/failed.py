@@ -5,6 +5,7 @@ from __future__ import annotations
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import SimulationError
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
+from ..reasons import jam
 from .instant import Instant, Part
 from .modes import Decided, elements
 
@@ -36,6 +37,9 @@ def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
 def no_forces(n: Instant, found: Decided) -> SimulationError:
     """Accelerations cannot be as all ask."""
     sliding = [p for p in found.parts if p.rule in (DRIVEN, GRIPS)]
+    jammed = [n.here.structure.switches[p.switch].element for p in sliding]
+    if found.ended != NOT_HELD and len(jammed) == 1 and hasattr(jammed[0], "joint"):
+        return SimulationError(jam(jammed[0], n.here.t), t=n.here.t)
     if found.ended == NOT_HELD or not sliding:
         why = "what they hold cannot be held together: one of them must give way"
     else:

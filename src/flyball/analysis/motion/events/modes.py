@@ -14,7 +14,7 @@ from ....constraints.modes import FRICTION
 from ....equations.friction import FORGOTTEN
 from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
-from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOAD, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
 from .slips import loose, slide_on, write_slips
@@ -145,3 +145,4 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
     if len(n.S.load_i):
         W.info[LEARNT] = FORGOTTEN
+        W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

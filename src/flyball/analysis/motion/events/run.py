@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -19,10 +20,12 @@ from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
 from .happen import begin, happen
 from .here import Here
+from .instant import Instant
 from .legs import Legs, breaks
 from .segments import Segments
 
@@ -30,6 +33,7 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
+HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -98,7 +102,12 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            return not self.legs.next()
+            sharp = self.legs.ends_sharply()
+            if not self.legs.next():
+                return True
+            if sharp and self.loop is not None:
+                self.jumped()
+            return False
         elif status != ex.RUNNING and not engine.hands_over(clock):
             return True
         self.legs.whole()
@@ -140,21 +149,35 @@ class Run:
 
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""
-        here, clock = self.here, self.here.clock
+        here = self.here
         self.recent.append(here.t)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise self.endless()
+        self.happens(self.loop.fired if self.loop else ())
+
+    def happens(self, fired: Sequence[int]) -> None:
+        """What happens where these guards fired."""
+        here, clock = self.here, self.here.clock
         system = here.c.system
-        happen(here, self.loop.fired if self.loop else ())
+        happen(here, fired)
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
             self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+        self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
         if here.fresh:
             clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
             here.fresh = False
+
+    def jumped(self) -> None:
+        """Forces may have jumped: what held may not hold any more, without a guard that passed zero."""
+        here = self.here
+        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
+        if len(against):
+            self.happens(against.tolist())
 
     def endless(self) -> SimulationError:
         """What to say where events follow each other without end."""
