@@ -38,6 +38,7 @@ from ..tables.system import (
     GUARD_KIND,
     GUARD_OF,
     LAM,
+    LENGTH,
     LOWER,
     MODE,
     OFF,
@@ -58,6 +59,8 @@ from .rows import way_of
 from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
+GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
+RESTING = 1e-9  # of the same a second: not coming nearer
 
 
 @formula
@@ -85,9 +88,9 @@ def watched(S, W, t, kind, s):
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:
         if kind == G_LOWER:
-            return x - W.switch[LOWER, s]
+            return distance(S, x - W.switch[LOWER, s], rate)
         if kind == G_UPPER:
-            return W.switch[UPPER, s] - x
+            return distance(S, W.switch[UPPER, s] - x, -rate)
         if kind == G_SLIDES:
             return way * rate
         if kind == G_BACK:
@@ -98,6 +101,13 @@ def watched(S, W, t, kind, s):
     if kind == G_HOLDS:
         return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
     return NOT_WATCHED
+
+
+@formula
+def distance(S, x, rate):
+    """How far something is from a stop; none where that is rounding, as where it parts with no speed."""
+    size = max(1.0, S.glob[LENGTH])
+    return 0.0 if magnitude(x) <= GRAIN * size and rate >= -RESTING * size else x
 
 
 @formula
