@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import FROZEN, STATIC
+from ..constraints.modes import FROZEN, RATCHET, STATIC, TURN
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -46,6 +46,7 @@ from ..tables.system import (
     RETURNED,
     SWITCH_DAMPING,
     SWITCH_FORCE,
+    SWITCH_KIND,
     SWITCH_LAW,
     SWITCH_MEASURED,
     SWITCH_ROW,
@@ -92,7 +93,7 @@ def watched(S, W, t, kind, s):
         if kind == G_UPPER:
             return distance(S, W.switch[UPPER, s] - x, -rate)
         if kind == G_SLIDES:
-            return way * rate
+            return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
             return rate
         return NOT_WATCHED
