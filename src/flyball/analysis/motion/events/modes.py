@@ -92,6 +92,9 @@ def _let_go(p: Part, x: float) -> Part:
 
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
+    for p in parts:  # what takes part is none of the forces that are there without it
+        if n.kind[p.switch] == FRICTION:
+            n.ways()[p.switch] = 0.0
     B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
