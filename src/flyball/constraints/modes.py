@@ -12,3 +12,6 @@ FROZEN = 4.0
 told anything less than `STATIC` and a half looks where it is by itself."""
 STATIC = 2.0
 """In place of the way of sliding: asks the effort of a force for the most that it holds at rest."""
+BY_RATE = 8.0
+"""In place of the way of sliding: that of the rate, and none at rest. Of friction on what nothing free moves, which a
+row cannot hold: a coordinate that a driver moves, or that cannot move at all."""
