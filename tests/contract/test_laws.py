@@ -9,7 +9,8 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from flyball.compiler.jit import kernel
-from flyball.laws.evaluation import entire, evaluate, evaluate_jet
+from flyball.laws.evaluation import evaluate, evaluate_jet
+from flyball.laws.manner import entire
 from flyball.laws.opcodes import BY_MOTION
 from flyball.laws.program import compile_law
 from flyball.model.expressions import FUNCTIONS, Expression

@@ -177,3 +177,13 @@ def test_a_function_may_say_when():
     m.add(fb.Event("e", lambda t, turned: turned - t))
     with pytest.raises(fb.ModelError, match="Event 'e': when is the Python function"):
         dumps(m)
+
+
+def test_check_lists_them():
+    m = fb.Mechanism("p", planar=True)
+    m.add(fb.Body("rod", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Event("hit", "A.angle > 90 deg", times=1, do=[fb.Lock("A"), fb.Stop()]))
+    m.add(fb.Event("low", "A.angle", direction="falling"))
+    lines = dict(m.check().lines())
+    assert lines["event hit"] == "A.angle > 90 deg, once: Lock A, Stop"
+    assert lines["event low"] == "A.angle (falling): noted"

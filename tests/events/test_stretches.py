@@ -29,6 +29,9 @@ class Hold(Element):
     of: str
     category: ClassVar[str] = "limits"
 
+    def acts(self):
+        return False
+
     def switches(self):
         return (Switch(LOCK, along=(self.of,)),)
 

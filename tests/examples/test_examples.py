@@ -16,6 +16,7 @@ CONTACT = {  # see test_contact_examples
     "labyrinth.py",
     "newtons_cradle.py",
     "pile_in_a_box.py",
+    "rocking_block.toml",  # and test_events
     "tippe_top.py",
     "wrecking_ball.py",
 }
@@ -23,11 +24,18 @@ FILES = [name for name in EVERY if name not in CONTACT]
 PROMISED = {
     "andrews.toml",
     "bricard.toml",
+    "bouncing_ball.toml",
     "cam.py",
+    "cam_follower.toml",
+    "capstan.toml",
     "car_axis.toml",
     "cart_pole_swing_up.py",
     "chaplygin_sleigh.toml",
+    "clock_escapement.toml",
+    "clutch_start.toml",
     "double_wishbone.toml",
+    "gear_backlash.toml",
+    "geneva_drive.toml",
     "governor.toml",
     "governor_criterion.py",
     "heavy_top.toml",
@@ -37,20 +45,24 @@ PROMISED = {
     "planetary.py",
     "point_mass_pendulum.toml",
     "quick_return.toml",
+    "ratchet.toml",
     "rattleback.toml",
     "rolling_disk.toml",
     "rolling_race.toml",
     "rope_pendulum.toml",
+    "safety_brake.toml",
     "slider_crank.toml",
     "slider_crank_singularities.py",
     "spatial_four_bar.toml",
     "spatial_slider_crank.toml",
     "stewart.py",
+    "stick_slip.toml",
     "t_handle.toml",
     "thin_rod.toml",
     "toggle_press.toml",
 }
-REDUNDANT = {"bricard.toml": 1, "planetary.py": 2}  # rows that say nothing new, on purpose
+REDUNDANT = {"bricard.toml": 1, "planetary.py": 2, "geneva_drive.toml": 1}  # rows that say nothing new, on purpose
+WAY = {"cam_follower.toml": 0.01}  # what moves least [m]
 SECONDS = {"governor.toml": 0.2, "andrews.toml": 0.05}  # to be seen of what moves fast; 1 s of the others
 
 
@@ -74,7 +86,7 @@ def test_example_is_sound(name):
     assert r.health.violation < 1e-9
     assert r.health.velocity_violation < 1e-8
     moved = max(np.ptp(r[b.name].rotation, axis=0).max() + np.ptp(r[b.name].position, axis=0).max() for b in m.bodies)
-    assert moved > 0.1
+    assert moved > WAY.get(name, 0.1)
     exchanged = np.ptp(r.energy.kinetic) + np.ptp(r.energy.potential) + 0.1 * r.energy.kinetic.max()
     assert r.energy.drift < 1e-6 * exchanged
     assert all(np.isfinite(v).all() for _, v in r.channels().values())
@@ -110,5 +122,5 @@ def test_example_is_drawn(name):
 
     r = mechanism(name).simulate(0.1, outputs=5)
     recording = record(r)
-    assert {b.name for b in recording.bodies} == {b.name for b in r.model.bodies}
+    assert {b.name for b in recording.bodies} == {b.name for b in (*r.model.bodies, *r.model.ground)}
     assert payload(recording)

@@ -11,6 +11,7 @@ import flyball as fb
 from .dice import Dice, plus
 from .forces import FORCES, driven
 from .joints import coordinates, coupling, joint
+from .switching import switched
 
 
 @dataclass
@@ -266,11 +267,46 @@ def crowds(d: Dice) -> Case:
     return case
 
 
+def _switching(d: Dice, name: str, kinds: list[str], most: int = 3) -> Case:
+    """A tree, at times with a loop, with parts that hold at times."""
+    case, m = _case(d, name, d.pick([0.5, 1.0]))
+    tree(d, m, case, d.whole(1, 4), kinds=["Revolute", "Prismatic", "Revolute"])
+    close(d, m, case, d.pick([0, 0, 0, 1]))
+    switched(d, m, case, kinds, most)
+    return case
+
+
+def stops(d: Dice) -> Case:
+    """Limits and play, rigid and elastic."""
+    return _switching(d, "stops", ["Limit", "Limit", "Backlash"])
+
+
+def sticking(d: Dice) -> Case:
+    """Friction that sticks, brakes, clutches."""
+    return _switching(d, "sticking", ["JointFriction", "JointFriction", "Brake", "Clutch"])
+
+
+def ropes(d: Dice) -> Case:
+    """Ropes that go slack and taut."""
+    return _switching(d, "ropes", ["Rope"], 2)
+
+
+def latches(d: Dice) -> Case:
+    """Freewheels and ratchets."""
+    return _switching(d, "latches", ["OneWay", "Ratchet"], 2)
+
+
+def happenings(d: Dice) -> Case:
+    """Events, and whatever else switches."""
+    kinds = ["Event", "Event", "Limit", "Brake", "JointFriction", "Rope", "OneWay"]
+    return _switching(d, "happenings", kinds, 4)
+
+
 FAMILIES = {
     f.__name__: f
     for f in (
         chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, drivers, couplings, friction,
-        crowds,
+        crowds, stops, sticking, ropes, latches, happenings,
     )
 }  # fmt: skip
 

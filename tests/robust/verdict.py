@@ -89,8 +89,14 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if not all(np.isfinite(x).all() for x in (r.q, r.v, r.vdot, r.multipliers, r.states)):
         return Verdict("broken", "the result is not finite")
     str(r.health)
+    lost = r.exchanged.get("impact_loss", np.zeros(1))
+    if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):
+        return Verdict("broken", f"an impact gives energy: {np.diff(lost, prepend=0.0).min():.3g} J")
     moved = energy_moved(r)
     energy = r.health.energy_drift / moved if moved > 0.0 else 0.0
+    for f in case.mechanism.forces:
+        if f.single == "friction" and np.diff(r[f.name].work).max(initial=0.0) > 1e-6 * (1e-6 + moved):
+            return Verdict("broken", f"{f.title} gives {np.diff(r[f.name].work).max():.3g} J")
     out = Verdict("healthy", "", r.health.violation / r.values.length, energy, r.health.acceleration_violation)
     if out.violation > VIOLATION and case.options.get("stabilization") != "baumgarte":
         return Verdict("broken", f"violation {out.violation:.2e}", out.violation, energy, out.residual)

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import ModelError, SingularityError
 from ..model.model import Model
-from ..model.touching import has_contact
+from ..model.touching import holds_at_times
 from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
 from .assembly.start import Assembly
@@ -66,7 +66,7 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin = _begun(a, o.start)
-    if has_contact(model):
+    if holds_at_times(model):
         _refuse_smooth_only(o)
         return rest(model, begin, o.parameters)
     if o.turning:

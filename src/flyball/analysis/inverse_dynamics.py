@@ -23,6 +23,7 @@ from ..results.result import Result
 from .freedom.determinacy import determinacy
 from .kinematics import KinematicsOptions, kinematics, wanted_times
 from .untouched import refuse_contact
+from .watched import KNOWN
 
 FEWEST = 4  # samples that make a curve with two continuous derivatives
 
@@ -36,7 +37,7 @@ class InverseDynamicsOptions(KinematicsOptions):
 
 def inverse_dynamics(model: Model, o: InverseDynamicsOptions) -> InverseDynamics:
     """Forces and torques of drives, and reactions, for a given motion: see `Mechanism.inverse_dynamics`."""
-    refuse_contact(model, "inverse_dynamics")
+    refuse_contact(model, "inverse_dynamics", KNOWN)
     model = model.copy() if o.motion else model.snapshot()
     labels = {d.name: d.name for d in model.drivers}
     if o.motion:

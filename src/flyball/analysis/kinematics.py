@@ -33,6 +33,7 @@ from .options import Options
 from .progress import shown
 from .simulate import moved
 from .untouched import refuse_contact
+from .watched import KNOWN, refuse_passed
 
 NARROW = 1e-3  # a smallest singular value below this part of the largest, where the motion ends, is a singular position
 PART = 1e-2  # elements with less than this part of the largest share in a dependency are not named
@@ -60,7 +61,7 @@ class KinematicsOptions(Options):
 
 def kinematics(model: Model, o: KinematicsOptions) -> Result:
     """Positions, velocities and accelerations that drivers prescribe: see `Mechanism.kinematics`."""
-    refuse_contact(model, "kinematics")
+    refuse_contact(model, "kinematics", KNOWN)
     started = time.perf_counter()
     outputs, begin = wanted_times(o.times, o.t_start, o.t_end)
     model = model.snapshot()
@@ -72,9 +73,11 @@ def kinematics(model: Model, o: KinematicsOptions) -> Result:
     with shown(o.progress, "following the drivers") as tell:
         try:
             task = FOLLOW if holonomic else INTEGRATE
-            return moved(start, float(outputs[-1]), outputs, projected(o.coordinates, 1e-10, 1e-12), task, tell)
+            result = moved(start, float(outputs[-1]), outputs, projected(o.coordinates, 1e-10, 1e-12), task, tell)
         except SimulationError as error:
             raise _locked(start, error) or error from None
+    refuse_passed(result, "kinematics")
+    return result
 
 
 def wanted_times(times: Times, first: float | None, last: float | None) -> tuple[np.ndarray, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import one
-from ..model.touching import has_contact
+from ..model.touching import holds_at_times
 from ..results.descriptor import Descriptor
 from ..results.equilibrium import Equilibrium
 from ..results.linear import LinearModel, StateSpace
@@ -79,7 +79,7 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
-    if has_contact(model):
+    if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "linearize")
         out = linearize(joined, there)
         out.notes = notes

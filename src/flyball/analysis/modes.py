@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..model.model import Model
-from ..model.touching import has_contact
+from ..model.touching import holds_at_times
 from ..numerics.rank import span
 from ..results.modes import GROWS, STILL, Modes
 from ..tables.names import velocity_names
@@ -38,7 +38,7 @@ class ModesOptions(InstantOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
-    if has_contact(model):
+    if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "modes")
         return replace(modes(joined, there), notes=notes)
     count, frozen = o.count, o.frozen

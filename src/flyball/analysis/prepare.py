@@ -9,7 +9,7 @@ from ..model.model import Model
 from .motion.start import begin
 from .options import Options
 from .prepared import Prepared
-from .untouched import refuse_contact
+from .untouched import SLIDING, refuse_contact
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -22,5 +22,5 @@ class PrepareOptions(Options):
 
 def prepare(model: Model, o: PrepareOptions) -> Prepared:
     """A mechanism made ready: see `Mechanism.prepare`."""
-    refuse_contact(model, "prepare")
+    refuse_contact(model, "prepare", SLIDING)
     return Prepared(begin(model.snapshot(), 0.0, o.parameters, None, o.coordinates))

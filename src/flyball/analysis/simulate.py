@@ -9,6 +9,7 @@ from functools import partial
 
 import numpy as np
 
+from ..constraints.modes import BRANCH
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import kept
@@ -33,6 +34,7 @@ from .motion.events.legs import breaks
 from .motion.events.run import run_events
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
+from .motion.known import sampled_laws, told_of
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
@@ -82,10 +84,17 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     times = output_times(t_start, o.t_end, o.outputs)
     o = chosen(model, o)
     if isinstance(o.method, Stepping):
+        if model.events:
+            raise ModelError(
+                f"{model.name!r} has {model.events[0].title}, and steps by impulses know no events: give "
+                f"method='dop853'"
+            )
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
+    if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
+        begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
@@ -154,21 +163,30 @@ def moved(
     o = o.sized(begun.base.compiled.values.length)
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
-    clock = clock_for(begun, begun.base.t, float(t_end), times, o)
+    c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
+    sampled = sampled_laws(c, known)
+    clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
-    known = breaks(c, here.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
     if watched(begun) or len(known.times):
         rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
     else:
         rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
+    if task == INTEGRATE:
+        here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
     if task == FOLLOW:
         owed = partial(owed_works, begun, clock, rows)
         rows = at_outputs(clock, rows)
     return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
+
+
+def _corners_only(begun: Start) -> bool:
+    """Whether nothing is watched but corners of laws."""
+    s = begun.assembly.compiled.structure
+    return bool(s.switches) and not s.model.events and all(x.switch.kind == BRANCH for x in s.switches)
 
 
 def watched(begun: Start) -> bool:
@@ -188,8 +206,18 @@ def _refuse_idle(begun: Start, stabilization: str) -> None:
         )
 
 
-def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integration) -> ex.Clock:
-    """Everything the compiled loop needs to start, and the choices of the solve."""
+def clock_for(
+    start: Start,
+    t: float,
+    t_end: float,
+    times: np.ndarray,
+    o: Integration,
+    sampled: frozenset[int] | None = None,
+) -> ex.Clock:
+    """Everything the compiled loop needs to start, and the choices of the solve.
+
+    ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
+    """
     a, y = start.assembly, start.y
     refuse_unheld(len(times), _width(a))
     s, W = a.compiled.structure, a.compiled.work
@@ -215,7 +243,7 @@ def clock_for(start: Start, t: float, t_end: float, times: np.ndarray, o: Integr
     W.option[PASS] = 1e-13
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system, sampled))
 
 
 def _energy_size(a: Assembly, span: float) -> float:

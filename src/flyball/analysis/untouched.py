@@ -13,8 +13,8 @@ from ..errors import ModelError
 from ..model.element import Element
 from ..model.model import Model
 
-SLIPPING = frozenset({FRICTION})
-"""Kinds that are plain forces while they slip, whose way an analysis of a motion knows."""
+SLIDING = frozenset({FRICTION})
+"""Kinds that are forces while they slide: what has no modes takes them for sliding, by the sign of the rate."""
 TOUCH = ("contacts", "limits", "bulk")
 INSTEAD = {"stick_speed": "regularised", "stiffness": "elastic"}
 """Numbers that make a part a plain force if they are given, and what it is then called."""
@@ -66,9 +66,8 @@ def _instead(parts: list[Element]) -> str:
     for name, becomes in INSTEAD.items():
         able = [e.title for e in parts if hasattr(e, name)]
         if able:
-            out.append(
-                f"; or give {', '.join(able)} a {name}: {'it is' if len(able) == 1 else 'they are'} {becomes} then"
-            )
+            they = "it is" if len(able) == 1 else "they are"
+            out.append(f"; or give {', '.join(able)} a {name}: {they} {becomes} then")
     return "".join(out)
 
 

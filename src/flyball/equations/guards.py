@@ -6,7 +6,7 @@
     friction that holds            most that it holds - |lam|
     friction that slides           way * rate
     a freewheel that overruns      rate
-    a corner of a law              way * u
+    a corner of a law              way * u; where the motion is held on u = 0: 1 - |way|
     an elastic stop that is open   how far it is, past it -(k d + c ddot)
     one that is pressed            what it pushes with, k d + c ddot
     a place of contact             see `sliding.watched_place`
@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import FROZEN, STATIC
+from ..constraints.modes import BY_RATE, FROZEN, STATIC
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -76,7 +76,7 @@ def watched(S, W, t, kind, s):
     """Value of a guard of switch s."""
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
-        return way * corner(S, W, t, s)
+        return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)
     if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
         return pressing(S, W, s, kind, way - FROZEN)
     if kind >= G_CONE:
@@ -89,7 +89,7 @@ def watched(S, W, t, kind, s):
         if kind == G_UPPER:
             return W.switch[UPPER, s] - x
         if kind == G_SLIDES:
-            return way * rate
+            return NOT_WATCHED if way == BY_RATE else way * rate
         if kind == G_BACK:
             return rate
         return NOT_WATCHED
@@ -125,9 +125,5 @@ def most(S, W, t, k):
 
 @formula
 def corner(S, W, t, s):
-    """The function whose sign a corner of a law is, of the inputs of the force that has the law."""
-    k = S.switch_i[s, SWITCH_FORCE]
-    x, rate = 0.0, 0.0
-    if k >= 0:
-        x, rate = W.sensed[VALUE, S.force_i[k, FORCE_F]], W.sensed[RATE, S.force_i[k, FORCE_F]]
-    return evaluate(S.code, S.const, S.switch_i[s, SWITCH_LAW], W.stack, (t, x, rate), W.sensed)
+    """The function u whose sign says on which side of its corner a law is."""
+    return evaluate(S.code, S.const, S.switch_i[s, SWITCH_LAW], W.stack, (t, 0.0 * t, 0.0 * t), W.sensed)

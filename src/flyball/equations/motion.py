@@ -74,6 +74,7 @@ from .projection import (
 )
 from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, reuse, solve
+from .surfaces import PASSES, bound, settled
 from .tree import rates
 
 NOT_FINITE, JAMMED, SINGULAR = 3, 4, 5
@@ -112,7 +113,6 @@ def accelerate(S, W, t, p, dy, factored):
         b = W.option[BETA] * W.option[BETA]
         for k in range(S.row_i.shape[0]):
             W.row[GAMMA, k] -= a * (row_times(S, W, k, v) - W.row[NU, k]) + b * W.row[G_VALUE, k]
-    x = W.vel[X_SOLVED]
     if W.option[PARTED] > 0.0:  # from here on with the masses
         W.option[PARTED] = 0.0
         factored = OLD
@@ -121,6 +121,20 @@ def accelerate(S, W, t, p, dy, factored):
             reuse(S, W)
         else:
             factored = OLD  # M is another one here
+    for n in range(PASSES):
+        status, factored = balance(S, W, t, p, work, factored)
+        if status != 0:
+            return status
+        if not bound(S, W) or settled(S, W, t, n):
+            return finish(S, W, t, p, dy)
+    W.info[STATUS] = NOT_FINITE
+    return NOT_FINITE
+
+
+@formula
+def balance(S, W, t, p, work, factored):
+    """Accelerations and multipliers into W, with the loads of joints that return themselves: (status, factored)."""
+    x = W.vel[X_SOLVED]
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
@@ -131,7 +145,7 @@ def accelerate(S, W, t, p, dy, factored):
         ):
             if factor(S, W) != 0:
                 W.info[STATUS] = SINGULAR
-                return SINGULAR
+                return SINGULAR, factored
             factored = HERE
             solve(S, W, W.vel[F_APPLIED], W.row[GAMMA], x, W.row[LAM], True, REFINEMENTS)
         if S.load_i.shape[0] == 0:
@@ -142,9 +156,9 @@ def accelerate(S, W, t, p, dy, factored):
             break
         if attempt == SUBSTITUTIONS - 1:
             W.info[STATUS] = JAMMED if finite(x) == 0 else NOT_FINITE
-            return W.info[STATUS]
+            return W.info[STATUS], factored
         improve(S, W, attempt)
-    return finish(S, W, t, p, dy)
+    return 0, factored
 
 
 @formula

@@ -11,6 +11,7 @@ from ..tables.specs import Structure
 from ..tables.system import (
     FLAT,
     INVERSE_JACOBIAN,
+    INVERSE_SLOPES,
     LOWER,
     MADE,
     SCRATCH,
@@ -35,7 +36,7 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     W = Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads else 0, 6), z(9, nr), z(8, nv),
-        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + nw), z(5, nw), z(len(system.ldl.Ai) + 1),
+        z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + nw), z(INVERSE_SLOPES + nw, nw), z(len(system.ldl.Ai) + 1),
         z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny), np.zeros(11),
         np.zeros(MADE + FLAT, np.int64), z(system.flat[SCRATCH]),
     )  # fmt: skip

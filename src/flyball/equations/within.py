@@ -8,10 +8,13 @@ matters. Samples are dense relative to the whole time span, so that their number
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 
 from ..compiler.jit import formula
-from ..laws.evaluation import brief, evaluate, evaluate_jet
+from ..laws.evaluation import evaluate, evaluate_jet
+from ..laws.manner import brief
 from ..math.scalar import cos
 from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, TO_RATE
 from ..tables.system import (
@@ -21,6 +24,7 @@ from ..tables.system import (
     FORCE_F,
     FORCE_KIND,
     FORCE_LAW,
+    FORCE_LOAD,
     FORCE_M,
     MADE,
     RATE,
@@ -42,15 +46,29 @@ LAWS = 3  # of a force
 ODD = 1e-3  # part of a law's change over the step by which it may differ from what is expected
 BLURRED = 1e-9  # part of its size that is nothing
 # rows of Clock.seen: sensors within the step; (sensors and inputs of forces, and rates, at its start and end;) nodes
-WITHIN, EXPECTED, ROWS = 0, 5, 6
+# (1 for each law that is looked at)
+WITHIN, EXPECTED, LOOK, ROWS = 0, 5, 6, 7
 
 
-def kept(S) -> np.ndarray:
-    """What `inspect` writes on: no columns, and nothing is inspected, where no law can act briefly."""
-    laws = np.r_[S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel(), S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW]]
-    if not any(brief(S.code, at) for at in laws[laws >= 0]):
+def law_starts(S) -> np.ndarray:
+    """Where each law begins in the code, by its number (see `law_at`); -1 where there is none."""
+    return np.r_[S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel(), S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW]]
+
+
+def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
+    """What `inspect` writes on: no columns, and nothing is inspected, where no law can act briefly.
+
+    ``sampled`` are the starts of the laws that are to be looked at; without it all that can act briefly are.
+    """
+    laws = law_starts(S)
+    look = [at >= 0 and brief(S.code, at) and (sampled is None or at in sampled) for at in laws]
+    if not any(look):
         return np.zeros((ROWS, 0))
-    return np.zeros((ROWS, max(2 * measured(S), measured(S) + len(S.force_i), NODES)))
+    loads = int((S.force_i[:, FORCE_LOAD] >= 0).sum())
+    sensed = 2 * measured(S) + loads + len(S.switch_i)
+    seen = np.zeros((ROWS, max(sensed, measured(S) + len(S.force_i), NODES, len(laws))))
+    seen[LOOK, : len(laws)] = look
+    return seen
 
 
 @formula
@@ -72,7 +90,7 @@ def inspect(t, h, span, first, seen, S, W):
     again = first % 2 == 1  # the law that was named last has another place to look at
     for k in range(first // 2, LAWS * S.force_i.shape[0] + S.row_i.shape[0] + S.body_i.shape[0]):
         law = law_at(S, k)
-        if law >= 0 and brief(S.code, law):
+        if seen[LOOK, k] > 0.0:
             n = max(LEAST, int(SAMPLES * min(1.0, h / span)))
             if again:
                 x, share = farthest(S, W, k, law, t, h, n, seen)
@@ -99,6 +117,8 @@ def law_at(S, k):
 def take_note(S, W, seen, row):
     """Keep what laws depend on, and its rates, at the state in W."""
     nm = measured(S)
+    for m in range(2 * nm, W.sensed.shape[1]):  # sides of corners do not change within a step
+        seen[WITHIN, m] = W.sensed[VALUE, m]
     for m in range(nm):
         seen[row, m] = W.sensed[VALUE, m]
         seen[row + 1, m] = W.sensed[RATE, m]

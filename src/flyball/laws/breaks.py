@@ -15,10 +15,10 @@ from .intervals.crossings import MOST, Spans, crossings
 from .intervals.enclose import Law
 from .intervals.resolve import grades
 from .intervals.steps import NOTHING, STATE, TIME, Corner, Step, brief, corners, needed, read
-from .opcodes import CONSTANT, INPUT
+from .opcodes import ABS, CALL, CONSTANT, INPUT
 
 NONE = np.zeros(0)
-NEAR = 64.0  # units in the last place that breaks are apart
+NEAR = 256.0  # units in the last place that breaks are apart
 
 
 class Breaks(NamedTuple):
@@ -115,9 +115,13 @@ def depends(code: Sequence[int], at: int) -> int:
 
 
 def acts_briefly(code: Sequence[int], at: int) -> bool:
-    """Whether a law can act briefly by more than time alone, so that samples have to guard it."""
+    """Whether a law can act briefly by more than time alone, so that samples have to guard it.
+
+    What is left of absolute values in a motion are squares u |u|, whose slope has no jump.
+    """
     steps = read(code, at)
-    return any(s.on == STATE and brief(s, steps) for s in steps)
+    bent = [s for s in steps if s.on == STATE and not (s.operation == CALL and s.operand == ABS)]
+    return any(brief(s, steps) for s in bent)
 
 
 def _of_law(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray, bool]:

@@ -46,6 +46,7 @@ from .opcodes import (
     ASIN,
     ATAN,
     ATAN2,
+    BLEND,
     BY_MOTION,
     CALL,
     CONSTANT,
@@ -79,8 +80,6 @@ from .opcodes import (
     WHERE,
     WHOLE_POWER,
 )
-
-LOW = 8  # powers up to this are no pulses
 
 
 @formula
@@ -120,6 +119,9 @@ def evaluate(code, const, at, stack, x, sensed):
         elif operation == WHERE:
             top -= 2
             stack[top, 0] = choose(stack[top, 0] - 0.5, stack[top + 1, 0], stack[top + 2, 0])
+        elif operation == BLEND:
+            top -= 2
+            stack[top, 0] = blend(stack[top, 0], stack[top + 1, 0], stack[top + 2, 0])
         elif operation >= ADD:
             top -= 1
             stack[top, 0] = combined(operation, stack[top, 0], stack[top + 1, 0])
@@ -172,6 +174,11 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
             yes = stack[top, 0] - 0.5
             for k in range(3):
                 stack[top, k] = choose(yes, stack[top + 1, k], stack[top + 2, k])
+        elif operation == BLEND:
+            top -= 2
+            way = stack[top, 0]
+            for k in range(3):
+                stack[top, k] = blend(way, stack[top + 1, k], stack[top + 2, k])
         elif operation == FREEZE:
             put(stack, top, stack[top, 0], 0.0, 0.0)
         elif operation == FUNCTION:  # its derivatives are not known
@@ -186,50 +193,13 @@ def evaluate_jet(code, const, at, stack, t, sensed, seed):
 
 
 @formula
-def entire(code, at):
-    """Whether a law is made of functions of time alone that have derivatives of every order everywhere.
-
-    Sums, products, quotients by constants, whole powers, sines and the like: it can neither jump nor have a kink.
-    """
-    for i in range(at + 2, at + 2 + 2 * code[at], 2):
-        operation = code[i]
-        operand = code[i + 1]
-        if operation == CALL:
-            smooth = operand == SIN or operand == COS or operand == NEGATE or operand == EXP or operand == TANH
-            if not (smooth or operand == SINH or operand == COSH or operand == ATAN):
-                return False
-        elif operation == WHOLE_POWER:
-            if operand < 0:
-                return False
-        elif operation == DIVIDE:
-            if code[i - 2] != CONSTANT:
-                return False
-        elif not (operation <= INPUT or operation == FREEZE or ADD <= operation <= MULTIPLY):
-            return False
-    return True
-
-
-@formula
-def brief(code, at):
-    """Whether a law can do much within a short time, or a short way.
-
-    Sums, products, low powers, sines and cosines cannot: a change of theirs is one that the error of a step shows.
-    """
-    for i in range(at + 2, at + 2 + 2 * code[at], 2):
-        operation = code[i]
-        operand = code[i + 1]
-        if operation == CALL:
-            if not (operand == SIN or operand == COS or operand == NEGATE):
-                return True
-        elif operation == WHOLE_POWER:
-            if not 0 <= operand <= LOW:
-                return True
-        elif operation == DIVIDE:
-            if code[i - 2] != CONSTANT:
-                return True
-        elif not (operation <= SENSOR or operation == FREEZE or ADD <= operation <= MULTIPLY):
-            return True
-    return False
+def blend(way, a, b):
+    """A on the one side of a corner (way 1), b on the other (-1); while sliding along it, what is between."""
+    if way.real >= 1.0:
+        return a
+    if way.real <= -1.0:
+        return b
+    return b + 0.5 * (1.0 + way) * (a - b)
 
 
 @formula

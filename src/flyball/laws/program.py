@@ -15,6 +15,7 @@ from .native import native
 from .opcodes import (
     ADD,
     ATAN2,
+    BLEND,
     CALL,
     CONSTANT,
     DIVIDE,
@@ -34,6 +35,7 @@ from .opcodes import (
     WHERE,
     WHOLE_POWER,
 )
+from .sides import BETWEEN_SIDES, SIDE, Corners, on_one_side
 
 _FUNCTIONS = ("neg", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "sqrt", "abs")
 _UNARY = {name: NEGATE + k for k, name in enumerate((*_FUNCTIONS, "sign", "cubic", "quintic", "not"))}
@@ -57,6 +59,7 @@ def compile_law(
     tables: Mapping[str, int] = _NONE,
     functions: list[Called] | None = None,
     derivatives: bool = False,
+    corners: Corners | None = None,
 ) -> tuple[int, int]:
     """Append the program of a law to the shared tables.
 
@@ -78,6 +81,9 @@ def compile_law(
         List that a law which is a Python function is appended to. Keep it as long as the code: addresses stand there.
     derivatives
         Whether the law is read by `evaluate_jet`.
+    corners
+        Given what decides at a corner by inputs or sensors, says where the side is found that the law is on. Without it
+        a law decides by itself.
 
     Returns
     -------
@@ -102,10 +108,40 @@ def compile_law(
         args = tuple(arguments(tree, known))
         tree = Node("function", args, _function(expression, args, code, functions))
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
-    writer.write(_folded(expression, tree, writer.varying))
-    at = len(code)
-    code += [len(writer.program) // 2, writer.deepest, *writer.program]
-    return at, writer.deepest
+    tree = _folded(expression, tree, writer.varying)
+    if corners is not None:
+        tree = on_one_side(tree, frozenset((*inputs[1:], *sensors)), corners)
+    writer.write(tree)
+    return writer.append(code)
+
+
+def compile_side(
+    law: Expression,
+    tree: Node,
+    parameters: Sequence[str],
+    code: list[int],
+    const: list[float],
+    sensors: Mapping[str, int],
+    tables: Mapping[str, int],
+) -> tuple[int, int]:
+    """Append the program of what decides at a corner of a law, of time and sensors, as `compile_law` does."""
+    writer = _Writer(law, ("t",), parameters, const, sensors, tables)
+    writer.write(tree)
+    return writer.append(code)
+
+
+def bends(law: Expression, inputs: Sequence[str], sensors: Collection[str]) -> bool:
+    """Whether a law has corners, or jumps, where inputs (time apart) or sensors decide."""
+    if law.function is not None:
+        return False
+    found: list[Node] = []
+
+    def corner(u: Node) -> tuple[int, float]:
+        found.append(u)
+        return -1, 1.0
+
+    on_one_side(_expand(law.tree, {*inputs, *sensors}), frozenset((*inputs[1:], *sensors)), corner)
+    return bool(found)
 
 
 def _folded(expression: Expression, tree: Node, varying: Collection[str]) -> Node:
@@ -165,9 +201,13 @@ class _Writer:
 
     def write(self, node: Node, frozen: bool = False) -> None:
         """Write a node after its arguments; `frozen` means that a constant part around it is already marked."""
-        constant = frozen or not any(n.kind == "name" and n.value in self.varying for n in node.walk())
+        constant = frozen or not any(
+            n.kind == SIDE or (n.kind == "name" and n.value in self.varying) for n in node.walk()
+        )
         if node.kind == "number":
             return self.emit(CONSTANT, self.slot(float(node.value)), 1)
+        if node.kind == SIDE:
+            return self.emit(SENSOR, node.value, 1)
         if node.kind == "name" and node.value in self.varying:
             return self.emit(*self.varying[node.value], 1)
         if node.kind == "name":
@@ -191,9 +231,17 @@ class _Writer:
             self.emit(FUNCTION, node.value, 1 - len(node.args))
         elif node.kind == "where":
             self.emit(WHERE, 0, -2)
+        elif node.kind == BETWEEN_SIDES:
+            self.emit(BLEND, 0, -2)
         else:
             for _ in node.args[1:]:
                 self.emit(_BINARY[node.kind], 0, -1)
+
+    def append(self, code: list[int]) -> tuple[int, int]:
+        """Append the program to the code: where it begins, and the rows of stack it needs."""
+        at = len(code)
+        code += [len(self.program) // 2, self.deepest, *self.program]
+        return at, self.deepest
 
     def slot(self, literal: float) -> int:
         """Place of a literal in the table of constants; a new one if it is not among the last ones."""

@@ -33,6 +33,11 @@ class Action:
         """What it acts on: a parameter, joint, coordinate, element or body; nothing if empty."""
         return ""
 
+    @property
+    def told(self) -> str:
+        """What it does, in words."""
+        return f"{type(self).__name__} {self.about()}".strip()
+
     def laws(self) -> tuple[tuple[str, Law], ...]:
         """Its expressions, evaluated at the instant: (field, what was written)."""
         return ()

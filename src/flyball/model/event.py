@@ -76,6 +76,13 @@ class Event(Element):
         """What its expressions may use."""
         return LawOf(None, curves=True)
 
+    @property
+    def told(self) -> str:
+        """When it is, and what it does, in words."""
+        way = "" if self.at_start or self.direction == "rising" else f" ({self.direction})"
+        often = "" if self.times is None else f", at most {self.times} times" if self.times > 1 else ", once"
+        return f"{self.when}{way}{often}: {', '.join(a.told for a in self.do) or 'noted'}"
+
     def laws(self) -> tuple[tuple[str, Law], ...]:
         """All its expressions: where each stands, and what was written."""
         own = () if self.at_start else ((f"when of {self.title}", self.law),)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from ..constraints.modes import ELASTIC
 from ..errors import ModelError
 from .body import GROUND, Body
 from .bulk import Bodies
@@ -23,6 +24,12 @@ Owner = Body | Bodies | Ground
 def has_contact(model: Model) -> bool:
     """Whether there is something that only a motion by impulses knows: contacts, rigid stops, many bodies."""
     return bool(model.contacts or model.bulk or any(not e.acts() for e in model.limits))
+
+
+def holds_at_times(model: Model) -> bool:
+    """Whether something holds at times: the same, and what sticks, locks, latches or goes taut; or events."""
+    held = any(w.kind != ELASTIC for e in model.elements() for w in e.switches())
+    return has_contact(model) or held or any(e.category == "events" for e in model.elements())
 
 
 def smooth_only(model: Model) -> list[Element]:

@@ -58,6 +58,7 @@ class Report:
     mass: float  # of all bodies together [kg]
     com: tuple[float, ...]  # their centre of mass in the world, assembled [m]
     warnings: tuple[str, ...] = field(default=())
+    events: dict[str, str] = field(default_factory=dict)  # event -> when it is, and what it does
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -85,6 +86,9 @@ class Report:
             out.append(("", f"... and {len(self.bodies) - 30} more bodies"))
         if len(self.bodies) > 1:
             out.append(("all together", f"{self.mass:.4g} kg, centre of mass at {tuple_of(self.com)} m"))
+        out += [(f"event {name}", text) for name, text in list(self.events.items())[:12]]
+        if len(self.events) > 12:
+            out.append(("", f"... and {len(self.events) - 12} more events"))
         return out + [("warning", w) for w in self.warnings]
 
     def _freedoms(self) -> str:

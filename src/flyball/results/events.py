@@ -12,7 +12,6 @@ import numpy as np
 from ..errors import ModelError
 from ..model.words import listing, shortened, suggest
 from .moment import Moment
-from .struck import Struck
 
 if TYPE_CHECKING:
     import pandas
@@ -52,6 +51,7 @@ class Happening:
     impulses: Mapping[str, Any] = field(default_factory=dict)
     before: Any = field(default=None, repr=False, compare=False)  # state vectors until a result has it
     after: Any = field(default=None, repr=False, compare=False)
+    tables: Any = field(default=None, repr=False, compare=False)  # before and after, where a parameter was set
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data, without the states."""
@@ -75,7 +75,7 @@ class Events(Sequence):
     """All that happened at instants of a motion, in the order of time; ``run.events["hit"]`` are those of a name."""
 
     def __init__(self, happened: Iterable[Happening], result: Result | None = None) -> None:
-        self._all = tuple(happened if result is None else (_bound(h, result) for h in happened))
+        self._all = tuple(happened if result is None else _bound(list(happened), result))
 
     def __len__(self) -> int:
         return len(self._all)
@@ -178,10 +178,14 @@ class Events(Sequence):
         return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _bound(h: Happening, result: Result) -> Happening:
-    """With states that can be read by name."""
-    before, after = (Moment(result, h.t, y) if isinstance(y, np.ndarray) else y for y in (h.before, h.after))
-    impulses = h.impulses
-    if isinstance(impulses, Struck) and isinstance(before, Moment) and isinstance(after, Moment):
-        impulses = impulses.bound(before, after)
-    return dataclasses.replace(h, before=before, after=after, impulses=impulses)
+def _bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
+    """With states that can be read by name, by the parameters of their time."""
+    now = next((h.tables[0] for h in happened if h.tables is not None), result.values)
+    for h in happened:
+        both = h.tables or (now, now)
+        now = both[1]
+        before, after = (
+            Moment(result, x, h.t, y) if isinstance(y, np.ndarray) else y
+            for x, y in zip(both, (h.before, h.after), strict=True)
+        )
+        yield dataclasses.replace(h, before=before, after=after)

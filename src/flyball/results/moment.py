@@ -10,6 +10,7 @@ import numpy as np
 from ..errors import ModelError
 
 if TYPE_CHECKING:
+    from ..tables.values import Values
     from .result import Result
 
 
@@ -23,19 +24,21 @@ class Moment:
     t : float [s]
     y : ndarray
         State vector: coordinates, velocities, turns and works.
+    values : Values
+        The mechanism with the parameters of that time.
     """
 
-    def __init__(self, result: Result, t: float, y: np.ndarray) -> None:
-        self._of, self.t, self.y = result, float(t), y
+    def __init__(self, result: Result, values: Values, t: float, y: np.ndarray) -> None:
+        self._of, self.values, self.t, self.y = result, values, float(t), y
 
     @cached_property
     def _result(self) -> Result:
         """A result of this one time; what nobody knows there is nan."""
         r = self._of
-        s = r.values.structure
+        s = self.values.structure
         q, v, z = (p[None, :] for p in np.split(self.y, [s.nq, s.nq + s.nv]))
         unknown = np.full((1, s.nv), np.nan), np.full((1, len(s.rows) + len(s.prescribed)), np.nan)
-        made = type(r)(r.model, r.values, np.array([self.t]), q, v, z, *unknown, r.health)
+        made = type(r)(r.model, self.values, np.array([self.t]), q, v, z, *unknown, r.health)
         made.wound = r.wound
         return made
 

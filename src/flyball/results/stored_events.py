@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..tables.values import Values, values
 from .events import Happening
 
 if TYPE_CHECKING:
@@ -18,6 +19,11 @@ def packed(result: Result) -> tuple[dict[str, str], dict[str, np.ndarray]]:
     if not len(result.events):
         return {}, {}
     states = {f"events_{k}": _rows([getattr(h, k) for h in result.events], len(result.final[1])) for k in SIDES}
+    if n := len(result.model.parameters):
+        for k in SIDES:
+            every = [getattr(h, k) for h in result.events]
+            told = [np.full(n, np.nan) if m is None else m.values.system.const[:n].real for m in every]
+            states[f"events_{k}_parameters"] = np.array(told)
     return {"events": json.dumps(result.events.as_dict())}, states
 
 
@@ -46,7 +52,21 @@ def unpack(stored: dict[str, Any], result: Result) -> None:
         raise ValueError(f"{len(told)} events, and states of {[len(x) for x in sides]}")
     if told:
         sides = [[None if np.isnan(y).any() else y for y in x] for x in sides]
+        tables = zip(*(_tables(stored, k, result) for k in SIDES), strict=True)
         result.events = [  # type: ignore[assignment]
-            Happening(**{**one, "done": tuple(one["done"]), "before": before, "after": after})
-            for one, before, after in zip(told, *sides, strict=True)
+            Happening(**{**one, "done": tuple(one["done"]), "before": before, "after": after, "tables": both})
+            for one, before, after, both in zip(told, *sides, tables, strict=True)
         ]
+
+
+def _tables(stored: dict[str, Any], side: str, result: Result) -> list[Values]:
+    """The mechanism with the parameters of each event, before or after it."""
+    names, rows = list(result.model.parameters), stored.get(f"events_{side}_parameters")
+    if rows is None:
+        return [result.values] * len(stored[f"events_{side}"])
+    made: dict[tuple[float, ...], Values] = {}
+    for told in {tuple(row) for row in rows.tolist()}:
+        known = not np.isnan(told).any()
+        own = dict(zip(names, told, strict=True))
+        made[told] = values(result.values.structure, own) if known else result.values
+    return [made[tuple(row)] for row in rows.tolist()]

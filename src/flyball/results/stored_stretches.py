@@ -23,7 +23,7 @@ def packed(result: Result) -> dict[str, np.ndarray]:
     every = result.stretches.all
     out = {FIRST + name: np.array([getattr(x, name) for x in every], float) for name in ARRAYS}
     out[FIRST + "sigma"] = result.stretches.sigma
-    out[FIRST + "last_sigma"] = every[-1].sigma.reshape(len(every[-1].sigma), -1)[:, -1:]
+    out[FIRST + "last_sigma"] = every[-1].ways[:, -1:]
     n = len(result.model.parameters)
     out[FIRST + "parameters"] = np.array([x.values.system.const[:n].real for x in every], float).reshape(-1, n)
     return {name: x for name, x in out.items() if x.size}
@@ -31,7 +31,7 @@ def packed(result: Result) -> dict[str, np.ndarray]:
 
 def switched(stored: dict[str, Any]) -> bool:
     """Whether the result of a file was computed with rows that have modes."""
-    return FIRST + "switch" in stored
+    return FIRST + "rows" in stored
 
 
 def unpack(stored: dict[str, Any], result: Result) -> None:

@@ -47,6 +47,11 @@ class Stretch:
     given: float
     end: np.ndarray
 
+    @property
+    def ways(self) -> np.ndarray:
+        """The directions as columns, (ns, 1) or (ns, rows)."""
+        return self.sigma if self.sigma.ndim == 2 else self.sigma[:, None]
+
 
 @dataclass(frozen=True)
 class Stretches:
@@ -67,7 +72,7 @@ class Stretches:
     @cached_property
     def sigma(self) -> np.ndarray:
         """Direction of every switch, (ns, n)."""
-        every = [(x.sigma if x.sigma.ndim == 2 else x.sigma[:, None], x.rows) for x in self.all]
+        every = [(x.ways, x.rows) for x in self.all]
         return np.concatenate([np.broadcast_to(x, (len(x), rows)) for x, rows in every], axis=1)
 
     def pieces(self) -> list[tuple[slice, Stretches]]:

@@ -19,7 +19,8 @@ class Touch:
         ``"sticks"``; ``"smooth"`` without friction; ``"at its friction limit"``, where any more would make it slide; or
         ``"about to part"``, which carries nothing.
     normal : float
-        Force that presses [N]; of a stop its effort [N or N m].
+        Force that presses [N]; of a stop its effort [N or N m]; of friction in a joint, a brake or clutch the most that
+        it bears.
     tangential : float [N]
         Friction force.
     used : float

@@ -20,7 +20,8 @@ from ..equations.rows import BY_TIME
 from ..equations.within import LAWS, kept, law_at, take_note
 from ..graph.node import Node, Undecided
 from ..graph.printers.llvm_order import operations
-from ..laws.evaluation import brief, evaluate, evaluate_jet
+from ..laws.evaluation import evaluate, evaluate_jet
+from ..laws.manner import brief
 from ..tables.specs import Structure
 from ..tables.system import (
     BIAS,

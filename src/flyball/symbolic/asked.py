@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..analysis.linear.inputs import with_inputs
-from ..analysis.untouched import refuse_contact
+from ..analysis.untouched import SLIDING, refuse_contact
 from ..errors import ModelError
 from ..graph.node import Symbol
 from ..model.model import Model, suggest
@@ -17,7 +17,7 @@ NAMES = ("parameters", "all", "none")
 
 def symbolic(model: Model, o: SymbolicOptions) -> Equations:
     """Equations of motion as expressions: see `Mechanism.symbolic`."""
-    refuse_contact(model, "symbolic")
+    refuse_contact(model, "symbolic", SLIDING)
     if o.names not in NAMES:
         raise ModelError(f"names is {o.names!r}{suggest(o.names, NAMES)}; must be one of {', '.join(NAMES)}")
     plain: Model = model.snapshot()

@@ -132,4 +132,4 @@ def _compile_laws(s: Structure, e: Force, row: np.ndarray) -> None:
     for name, of in fields_with(e.__class__, LawOf).items():
         for slot, law in enumerate(e.laws()):
             if law is not None:
-                row[2 + slot] = s.law(s.model.law(law, of, f"{name} of {e.title}"), of.inputs)
+                row[2 + slot] = s.law(s.model.law(law, of, f"{name} of {e.title}"), of.inputs, e)

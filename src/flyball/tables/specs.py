@@ -84,6 +84,7 @@ class Structure:
     angles: list[tuple[int, int, int]] = field(default_factory=list)  # frame F, frame M, state
     forces: list[Force] = field(default_factory=list)
     switches: list[Any] = field(default_factory=list)  # rows with modes (`switches.SwitchSpec`)
+    branches: Any = None  # what finds the sides of laws' corners (`branches.Branches`); None: laws decide themselves
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
     events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
@@ -117,8 +118,8 @@ class Structure:
         """Index of a state of that name, made when first asked for."""
         return self.state_at.setdefault(name, len(self.state_at))
 
-    def law(self, law: Expression, inputs: tuple[str, ...], derivatives: bool = False) -> int:
-        """Compile a law into the code; returns where it begins."""
+    def law(self, law: Expression, inputs: tuple[str, ...], owner: Any = None, derivatives: bool = False) -> int:
+        """Compile a law of an element into the code; returns where it begins."""
         at, depth = compile_law(
             law,
             ("t", *inputs),
@@ -129,6 +130,7 @@ class Structure:
             tables=self.table_at,
             functions=self.functions,
             derivatives=derivatives,
+            corners=self.branches.of(owner, law, inputs) if self.branches is not None and owner is not None else None,
         )
         self.depth = max(self.depth, depth)
         self.laws[at] = law.where

@@ -14,6 +14,7 @@ from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
 from . import events, forces, patterns, switches, terms
+from .branches import Branches, settle
 from .forest import body_table
 from .points import single
 from .specs import FrameSpec, Structure
@@ -84,6 +85,8 @@ def _decided(model: Model, choices: Choices) -> Structure:
     body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
     if c.switches:
+        s.branches = Branches(s)
+        s.branches.quantities()
         switches.quantities(s)
         events.quantities(s)
     forces.measured_quantities(s, events.names(model) if c.switches else {})
@@ -99,5 +102,6 @@ def _decided(model: Model, choices: Choices) -> Structure:
             raise ModelError(f"{e.title} needs the reaction of {joint!r}, which must then be rows, not a tree joint")
     terms.sort(s)
     patterns.patterns(s, c.solved)
+    settle(s)
     s.tables["code"] = np.array(s.code or [0], np.int64)
     return s

@@ -17,7 +17,6 @@ from ..model.switch import Switch
 from . import events
 from .specs import RowSpec, Structure, frame, ints
 from .system import (
-    EITHER,
     FALLING,
     FORCE_SWITCH,
     G_ASTRAY,
@@ -126,7 +125,7 @@ def table(s: Structure) -> None:
         if spec.switch.slides:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["force_i"][spec.force, FORCE_SWITCH] = k
-        s.guards += [(kind, k, EITHER if kind == G_CORNER else FALLING) for kind in _watched(k, spec)]
+        s.guards += [(kind, k, FALLING) for kind in _watched(k, spec)]
     s.tables["switch_i"] = ints(
         [(x.row, x.measured, x.switch.kind, x.force, max(x.law, x.partner), x.other) for x in s.switches], 6
     )
@@ -143,7 +142,9 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
 def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:
     """Parameters of the switches, from the numbers of their elements; ``apart``: how far points of each are apart."""
     for k, spec in enumerate(s.switches):
-        if asks(spec.element):
+        if spec.switch.kind == BRANCH:
+            x[k], x[k, :2] = 0.0, (-np.inf, np.inf)
+        elif asks(spec.element):
             par = spec.element.switched(of[spec.element.name], spec.switch.label, apart(spec.element))
             x[k] = 0.0
             x[k, :2] = -np.inf, np.inf

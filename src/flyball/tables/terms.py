@@ -58,7 +58,7 @@ def _joint_rows(s: Structure, joint: Joint) -> None:
 
 def _driver_row(s: Structure, driver: Driver) -> None:
     law = s.model.law(driver.law, LawOf(s.model.unit(driver.coordinate, driver)), f"law of {driver.title}", driver=True)
-    at = s.law(law, (), derivatives=True)
+    at = s.law(law, (), driver, derivatives=True)
     sensors = tuple(sorted({s.slots[name] for name in law.names & set(s.slots)}))
     link = _prescribes(s, driver)
     if link is not None and not sensors:

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ... import special
+from ...equations.within import LOOK
 from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
@@ -111,7 +112,7 @@ class Engine:
         t, end, first = clock.real[ex.T], clock.real[ex.T_END], self._first[0][ex.T]
         if not t > first or not self._choose(self._spent() * float((end - t) / (t - first))):
             return False
-        clock.K[:] = clock.y[:] = clock.seen[:] = 0.0
+        clock.K[:] = clock.y[:] = clock.seen[:LOOK] = 0.0
         clock.real[:], clock.count[:], clock.y[ex.NOW] = self._first
         return True
 

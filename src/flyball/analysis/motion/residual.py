@@ -32,10 +32,10 @@ def acceleration_violation(result: Result) -> float:
     if result.pieces:
         return max(map(acceleration_violation, result.pieces))
     told = result.values.told
-    own = compiled(result.model, parameters=told, tree=old.tree, switches=bool(old.switches))
+    own = compiled(result.model, parameters=told, tree=old.tree, switches=result.stretches is not None)
     c = own
     if old.tree:
-        c = compiled(result.model, parameters=told, switches=bool(old.switches))
+        c = compiled(result.model, parameters=told, switches=result.stretches is not None)
     if not len(c.structure.rows):
         return 0.0
     picked = np.unique(np.linspace(0, n - 1, min(n, MOST)).astype(int)).tolist()

@@ -12,6 +12,7 @@ from ...errors import ModelError
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
+from ...tables.branches import bent_laws
 from ...tables.switches import declared
 from ...tables.system import HOLD, MODE, Q0, SEMIDEFINITE, VALUE
 from ..assemble import assemble
@@ -35,6 +36,7 @@ class Start:
     coordinates: str  # which they are, and why
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
     engine: Engine | None = None  # what the motion is computed by; table-driven if none
+    before: Result | None = None  # what it goes on from
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 
@@ -102,7 +104,7 @@ def begin_at(
         return Start(base, a, a.y, found.coordinates, dict(found.wound))
     y = _gone_on(before, a)
     _holds(before, a)
-    return Start(base, a, y, found.coordinates, _wound(base, a, y))
+    return Start(base, a, y, found.coordinates, _wound(base, a, y), before=before)
 
 
 def _begun(base: Assembly, wish: str, parameters: Mapping[str, float] | None, switches: bool) -> Start:
@@ -127,7 +129,7 @@ def _holds(before: Result, a: Assembly) -> None:
 def with_switches(a: Assembly, parameters: Mapping[str, float] | None) -> Assembly:
     """The same with the rows that have modes, all off, if there are any."""
     s = a.compiled.structure
-    if not declared(s.model) and not s.model.events:
+    if not declared(s.model) and not s.model.events and not bent_laws(s.model):
         return a
     c = compiled(s.model, parameters=parameters, tree=s.tree, switches=True)
     c.follow(a.compiled.hints)
@@ -150,13 +152,13 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     old = before.values.structure
-    c = compiled(model, parameters=parameters, tree=old.tree, switches=bool(old.switches))
+    c = compiled(model, parameters=parameters, tree=old.tree, switches=before.stretches is not None)
     y = before.state_at_end(c)
     nq, nv = c.structure.nq, c.structure.nv
     q, v, c.z = y[:nq], y[nq : nq + nv], y[nq + nv :].copy()
     refuse_jump(before, c, t, q, v)
     c.at(t, q, v)
-    if not c.structure.tree and not c.structure.switches:
+    if not c.structure.tree and before.stretches is None:
         return Assembly(c, t, q.copy(), v.copy())
     plain = compiled(model, parameters=parameters)
     q, v = plain.take(c, t, q, v)

@@ -1,4 +1,4 @@
-"""A mechanism with its closed contacts as joints, and its closed stops as drivers."""
+"""A mechanism with its closed contacts as joints, and what holds it as constraints."""
 
 from __future__ import annotations
 
@@ -6,39 +6,23 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from ...model.body import GROUND, Driver
+from ...model.body import GROUND
 from ...model.model import Model
-from ...tables.contact.stops import stops
 from ..assembly.start import Assembly
-from ..linear.curves import snapshot
-from ..linear.derivatives import State
 from ..motion.impulse.scene import placed
-from .closed import CLOSED, Closed, Place
+from ..untouched import holding_parts
+from .closed import Closed, Place
+from .holds import Holds, holds
 from .joints import Centres, ClosedContact, CommonPoint, PointOnFlat, Rolling, SlidingDisk
 from .sides import BALL, CORNER, DISK, FLAT, SHARP, Side, side
 
 
-def open_copy(model: Model, at: Assembly) -> tuple[Model, dict[str, float]]:
-    """The model without contacts; stops that are reached hold their coordinates.
-
-    Returns
-    -------
-    model : Model
-    signs : dict
-        Name of a closed stop -> +1 if it pushes upwards, -1 downwards.
-    """
-    gone = {e.name: None for e in (*model.contacts, *(e for e in model.limits if not e.acts()))}
-    out, signs = model.changed(gone), dict[str, float]()
-    here = snapshot(State.resting(at.compiled, at.t, at.q)) if model.limits else None
-    for stop in stops(model, at.compiled.values.given):
-        name = stop.element.coordinate
-        x = float(here[name][0])  # type: ignore[index]
-        size = at.compiled.values.length if model.unit(name, stop.element) == "m" else 1.0
-        for end, sign in ((stop.lower, 1.0), (stop.upper, -1.0)):
-            if abs(x - end) <= CLOSED * size:
-                out.add(Driver(stop.element.name, name, end))
-                signs[stop.element.name] = sign
-    return out.snapshot(), signs
+def open_copy(model: Model, at: Assembly) -> tuple[Model, Holds]:
+    """The model without contacts; what may hold at rest is a constraint there (`holds.holds`)."""
+    gone = {e.name: None for e in (*model.contacts, *holding_parts(model))}
+    out, held = model.changed(gone), holds(model, at)
+    out.add(*held.parts)
+    return out.snapshot(), held
 
 
 def joined_copy(bare: Model, place: Place) -> tuple[Model, dict[str, str]]:

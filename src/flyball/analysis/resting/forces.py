@@ -41,7 +41,7 @@ class Carried:
     unique: bool
 
 
-def carried(place: Place, x: Rest, signs: Mapping[str, float]) -> Carried:
+def carried(place: Place, x: Rest, signs: Mapping[str, float], bears: Mapping[str, float] | None = None) -> Carried:
     """Forces that balance what acts, of those that contacts can bear.
 
     Parameters
@@ -50,7 +50,9 @@ def carried(place: Place, x: Rest, signs: Mapping[str, float]) -> Carried:
     x : Rest
         There, of the model with stops that touch as drivers.
     signs : mapping
-        Name of a stop -> +1 if its effort may push upwards only, -1 downwards.
+        Name of a stop -> +1 if its effort may push upwards only, -1 downwards, 0 either way.
+    bears : mapping, optional
+        Name of what sticks -> the most that it bears [N] or [N m].
     """
     c = x.c
     r = Equations(State.resting(c, x.t, x.q)).block("r")
@@ -60,18 +62,22 @@ def carried(place: Place, x: Rest, signs: Mapping[str, float]) -> Carried:
     stop = np.zeros(G.shape[1])
     for name, sign in signs.items():
         stop[c.structure.slices[name]] = sign
-    order = np.r_[np.flatnonzero(stop == 0.0), np.flatnonzero(stop)]
+    most = np.full(G.shape[1], np.inf)
+    for name, bound in (bears or {}).items():
+        most[c.structure.slices[name]] = bound / x.per_row[c.structure.slices[name]]
+    free, signed, sticks = (np.flatnonzero(k) for k in ((stop == 0.0) & (most == np.inf), stop, most < np.inf))
+    order = np.r_[free, signed]
     used = J.reshape(len(r), n, 3).copy()
     mu = np.array([k.friction for k in place.contacts])
     used[:, mu == 0.0, 1:] = 0.0
     if c.structure.model.planar:
         used[:, :, 2] = 0.0
     b = c.sizes * r
-    found = balance(np.hstack([G[:, order], used.reshape(len(r), -1)]), b, Cones(int((stop == 0.0).sum()),
-                    stop[stop != 0.0], mu))  # fmt: skip
-    lam = np.zeros(G.shape[1])
-    lam[order] = found.x[: len(order)]
-    force = found.x[len(order) :].reshape(n, 3) / c.values.length
+    columns = np.hstack([G[:, order], used.reshape(len(r), -1), G[:, sticks]])
+    found = balance(columns, b, Cones(len(free), stop[signed], mu, most[sticks]))
+    lam, last = np.zeros(G.shape[1]), len(found.x) - len(sticks)
+    lam[order], lam[sticks] = found.x[: len(order)], found.x[last:]
+    force = found.x[len(order) : last].reshape(n, 3) / c.values.length
     return Carried(x.per_row * lam, force, _left(x, r, found), _unique(used, G, found))
 
 

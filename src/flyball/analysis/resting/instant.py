@@ -10,6 +10,7 @@ import numpy as np
 from ...errors import AnalysisError, ModelError, SingularityError
 from ...model.model import Model
 from ...results.equilibrium import UNJUDGED, Equilibrium
+from ...results.result import Result
 from ...results.touch import LIMIT, PARTING, Touch
 from ..assemble import assemble
 from ..assembly.start import Assembly
@@ -17,7 +18,8 @@ from ..compiled import compiled
 from ..linear.rest import Rest
 from .closed import closed
 from .copy import joined_copy, open_copy
-from .forces import carried
+from .holds import supported
+from .motion import frozen_modes, speed
 from .rest import BALANCED, refuse_bulk, touching
 
 if TYPE_CHECKING:
@@ -41,22 +43,26 @@ def closed_instant(model: Model, o: O, analysis: str) -> tuple[Model, O, tuple[s
     refuse_bulk(model, analysis)
     model = model.snapshot()
     _refuse_parameters(model, getattr(o, "inputs", ()), analysis)
+    if isinstance(o.about, Result):
+        joined, at, notes = frozen_modes(model, o.about, o.parameters or {}, analysis)
+        return joined, dataclasses.replace(o, about=_about(at), t=None), notes
     base = _base(model, o, analysis)
     own = base.compiled.parameters
     place = closed(model, base)
-    bare, signs = open_copy(model, base)
+    bare, held = open_copy(model, base)
     joined, missing = joined_copy(bare, place)
     if missing:
         raise ModelError(f"{analysis} does not know how contacts move: {'; '.join(missing.values())}")
     c = compiled(bare, parameters=own)
     x = Rest(c, base.t, c.take(base.compiled, base.t, base.q, base.v)[0], np.zeros(len(c.structure.rows)))
-    found = carried(place, x, signs)
+    found, bears = supported(model, place, x, held)
     if found.unbalanced > BALANCED:
         raise AnalysisError(
-            f"{model.name!r} does not rest there: contacts and joints leave {found.unbalanced:.2g} of what acts "
-            f"unbalanced. Ask about=m.equilibrium()"
+            f"{model.name!r} does not rest there: contacts, joints and what holds leave {found.unbalanced:.2g} of what "
+            f"acts unbalanced. Ask about=m.equilibrium()"
         )
-    notes = _notes(touching(place, found, x, signs), base.t)
+    notes = _notes(touching(place, found, x, held, bears), base.t)
+    joined = joined.changed({name: None for name, most in bears.items() if most == 0.0}).snapshot()
     c = compiled(joined, parameters=own)
     q, v = c.take(base.compiled, base.t, base.q, base.v)
     return joined, dataclasses.replace(o, about=_about(Assembly(c, base.t, q, v)), t=None), notes
@@ -111,5 +117,5 @@ def _about(at: Assembly) -> Equilibrium:
     none: Any = None
     return Equilibrium(
         t=at.t, stability=UNJUDGED, freedoms=(), stiffness=np.zeros((0, 0)), weakest={}, least=float("nan"),
-        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at,
+        unbalanced=0.0, method="", parameters=dict(at.compiled.parameters), result=none, assembly=at, speeds=speed(at),
     )  # fmt: skip

@@ -18,6 +18,7 @@ THIN = 1e-12  # part of the span: an interval that is not cut
 THIN_TOUCH = 1e-9  # of one in which a level may be touched
 BLURRED = 8.0 * WIDER  # part of what is subtracted that a difference may be wrong by
 VAGUE = 100.0  # a range as many times its rounding says more than rounding
+BESIDE = 1024.0  # units in the last place from an end of the span at which what is at the end is told
 NEAREST = 200  # steps towards a zero: bisection alone takes sixty
 
 
@@ -72,8 +73,19 @@ def crossings(law: Law, c: Corner, spans: Spans) -> tuple[np.ndarray, bool]:
         a, b, part = _cut(a[cut], b[cut], part[cut])
     a, b, part = (np.concatenate(x) for x in zip(*passed, strict=True))
     zeros, all_of_them = _zeros(law, wanted, c, (a, b), spans.at(part))
-    times = np.sort(np.concatenate([zeros, *touched]))
+    times = np.sort(np.concatenate([zeros, *touched, _at_ends(law, wanted, c, spans)]))
     return _apart(times, thin if c.touched else 0.0, spans.edges), complete and all_of_them
+
+
+def _at_ends(law: Law, wanted: list[int], c: Corner, spans: Spans) -> np.ndarray:
+    """A time beside an end of the span where a level is reached at the end itself, as far as rounding tells."""
+    ends = spans.edges[[0, -1]]
+    near = BESIDE * np.spacing(np.abs(ends).max())
+    v, d = law.points(wanted, ends, spans.at(np.array([0, len(spans.edges) - 2])))
+    f, slope = (np.broadcast_to(x[c.of], ends.shape) for x in (v, d))
+    reach = np.where(np.isfinite(slope), np.abs(slope), 0.0) * near
+    reached = _levels(c, f + reach) > _levels(c, f - reach, before=True)
+    return (ends + near * np.array([1.0, -1.0]))[reached & (reach > 0.0)]
 
 
 def _nearer(middle: Any, width: np.ndarray, f: Range, slope: Range) -> Range:

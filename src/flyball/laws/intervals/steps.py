@@ -8,12 +8,14 @@ from typing import NamedTuple
 import numpy as np
 
 from ...math.spline import BREAKS, PIECE
+from ..manner import LOW
 from ..opcodes import (
     ABS,
     ACOS,
     ADD,
     ASIN,
     ATAN2,
+    BLEND,
     CALL,
     CONSTANT,
     COS,
@@ -43,7 +45,6 @@ from ..opcodes import (
 )
 
 NOTHING, TIME, STATE = range(3)  # what a step depends on
-LOW = 8  # powers up to this are no pulses
 SEAM = 1e-9  # part of their size by which pieces of a table may differ where they meet
 
 
@@ -89,7 +90,7 @@ def read(code: Sequence[int], at: int) -> list[Step]:
 
 
 def _taken(operation: int) -> int:
-    return 3 if operation == WHERE else 2 if operation >= ADD else 1
+    return 3 if operation in (WHERE, BLEND) else 2 if operation >= ADD else 1
 
 
 def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...]) -> list[Step]:
@@ -106,14 +107,14 @@ def _on(before: list[Step], operation: int, operand: int, args: tuple[int, ...])
 
 
 def brief(step: Step, steps: Sequence[Step]) -> bool:
-    """Whether a step can do much within a short time, or a short way: see ``evaluation.brief``."""
+    """Whether a step can do much within a short time, or a short way: see ``manner.brief``."""
     if step.operation == CALL:
         return step.operand not in (SIN, COS, NEGATE)
     if step.operation == WHOLE_POWER:
         return not 0 <= step.operand <= LOW
     if step.operation == DIVIDE:
         return steps[step.args[1]].on != NOTHING
-    return not (step.operation <= SENSOR or step.operation == FREEZE or ADD <= step.operation <= MULTIPLY)
+    return not (step.operation <= SENSOR or step.operation in (FREEZE, BLEND) or ADD <= step.operation <= MULTIPLY)
 
 
 def needed(steps: Sequence[Step], targets: Sequence[int]) -> list[int]:
@@ -146,7 +147,7 @@ def corners(steps: Sequence[Step], const: np.ndarray) -> list[Corner]:
             out.append(Corner(k, s.args[0], zero))
         elif s.operation == TABLE and len(levels := bent(const, s.operand)):
             out.append(Corner(k, s.args[0], levels, float(const[s.operand])))
-        elif len(s.args) == 3 and s.operation != WHERE:
+        elif len(s.args) == 3 and s.operation not in (WHERE, BLEND):
             out.append(Corner(k, s.args[2], zero))
     return out
 

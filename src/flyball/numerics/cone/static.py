@@ -7,7 +7,7 @@ lies in the cones.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -29,24 +29,29 @@ class Cones:
         Of the next unknowns: +1 not negative, -1 not positive.
     friction : ndarray (n,)
         The others are triples (normal, two tangential): normal >= 0, tangential <= friction * normal.
+    most : ndarray (l,)
+        Behind those: unknowns that are at most so large, either way.
     """
 
     free: int
     sign: np.ndarray
     friction: np.ndarray
+    most: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     def projected(self, x: np.ndarray) -> np.ndarray:
         """The nearest point within the cones."""
         out = x.copy()
         a, b = self.free, self.free + len(self.sign)
         out[a:b] = self.sign * np.maximum(self.sign * x[a:b], 0.0)
-        p = x[b:].reshape(-1, 3)
+        c = len(x) - len(self.most)
+        out[c:] = np.clip(x[c:], -self.most, self.most)
+        p = x[b:c].reshape(-1, 3)
         n, t, mu = p[:, 0], np.hypot(p[:, 1], p[:, 2]), self.friction
         inside, polar = t <= mu * n, mu * t <= -n
         height = np.where(inside, n, np.where(polar, 0.0, (n + mu * t) / (1.0 + mu * mu)))
         wide = np.where(inside, t, mu * height)
         shrink = np.where(t > 0.0, wide / np.where(t > 0.0, t, 1.0), 0.0)
-        out[b:] = np.column_stack([height, shrink * p[:, 1], shrink * p[:, 2]]).ravel()
+        out[b:c] = np.column_stack([height, shrink * p[:, 1], shrink * p[:, 2]]).ravel()
         return out
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...constraints.modes import BY_RATE
@@ -12,7 +14,7 @@ from ...laws.evaluation import evaluate
 from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE
 from ..records import coordinate_frames, turned
 from .base import Curves, View
 
@@ -162,10 +164,16 @@ class ForceView(View):
         if isinstance(e, CoordinateForce):
             if not any(f is e for f in self._x.structure.forces):
                 return self._result.records.zeros()
-            return e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
+            return self._in_force() * e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
         self._between()
         F, M, par = self._frames
         return e.energy(par, F, M)
+
+    def _in_force(self) -> Any:
+        """Whether it is there: 0 from where an event has released it."""
+        stretches = self._result.stretches
+        own = [k for k, x in enumerate(self._x.structure.switches) if x.element is self.element]
+        return 1.0 if stretches is None or not own else stretches.over("switch")[SPARE, own[0]] == 0.0
 
     @property
     def power(self) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -17,11 +18,13 @@ from ....model.event_check import coordinate_of
 from ....model.held import held_by
 from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
+from ....tables.values import Values
 from .blows import generalised
 from .here import Here
-from .holding import hold, let_go
+from .holding import gone_on, hold, let_go
 from .setting import set_parameters
 
+AT_ONCE = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
 CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
 
 
@@ -46,6 +49,7 @@ class Acts:
     values: dict[int, float] = field(default_factory=dict)
     before: np.ndarray = field(default_factory=lambda: np.zeros(0))
     first: int = 0
+    tables: Values | None = None  # before
 
     def told(self, own: Sequence[str] = ()) -> None:
         """Record the events, each with what was done; what only it did (locking, a blow) is told with it.
@@ -64,22 +68,15 @@ class Acts:
             if e is cause and len(mine) > 1:
                 impulses = {k: x for h in mine for k, x in h.impulses.items()}
             done = tuple(self.words.get(e.name, ()))
-            here.records.append(Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy()))
+            both = None if self.tables is here.c.values else (self.tables, here.c.values)
+            here.records.append(
+                Happening(here.t, e.name, "event", done, lost, impulses, self.before, here.y.copy(), both)
+            )
         here.records += [h for h in since if not any(h is x for x in mine)]
 
     def passed(self) -> np.ndarray:
         """Guards of events whose expressions went through zero by the jump itself, (n,)."""
-        here, out = self.here, []
-        if not self.events or not self.values:
-            return np.zeros(0, np.int64)
-        here.evaluate()
-        for g, before in self.values.items():
-            after, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
-            most = CLEAR * max(abs(before), abs(after))
-            rises, falls = before <= -most and after > most, before >= most and after < -most
-            if (rises and way >= 0) or (falls and way <= 0):
-                out.append(g)
-        return np.array(out, np.int64)
+        return crossed(self.here, self.values if self.events else {})
 
 
 def _own(here: Here) -> set[str]:
@@ -110,15 +107,21 @@ def act(here: Here, fired: Sequence[int]) -> Acts:
 
 
 def act_at_start(here: Here) -> Acts:
-    """Do what events say at the start; joints that may let go hold."""
+    """Do what events say at the start; joints that may let go hold.
+
+    Where a motion goes on nothing starts: what was locked or released stays so.
+    """
     for k, spec in enumerate(here.structure.switches):
         if spec.held:
             here.c.work.switch[MODE, k] = HELD
+    if here.start.before is not None:
+        gone_on(here, here.start.before)
+        return Acts(here, (), before=here.y.copy(), tables=here.c.values)
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
 
 def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
-    acts = Acts(here, events, before=here.y.copy(), first=len(here.records))
+    acts = Acts(here, events, before=here.y.copy(), first=len(here.records), tables=here.c.values)
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
     every = [(e, a) for e in events for a in e.do]
@@ -141,6 +144,34 @@ def expression(here: Here, g: int) -> float:
     model, e = here.structure.model, here.structure.events[g]
     law = model.law(e.law, e.of, f"when of {e.title}")
     return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
+
+
+def expressions(here: Here) -> dict[int, float]:
+    """Values of the expressions of all events, by their guards, at the state of the instant."""
+    if here.structure.events:
+        here.evaluate()
+    return {g: expression(here, g) for g in here.structure.events}
+
+
+def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:
+    """Guards of events whose expressions went through zero without being followed there, (n,)."""
+    out = []
+    if before:
+        here.evaluate()
+    for g, was in before.items():
+        now, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
+        most = CLEAR * max(abs(was), abs(now))
+        rises, falls = was <= -most and now > most, was >= most and now < -most
+        if (rises and way >= 0) or (falls and way <= 0):
+            out.append(g)
+    return np.array(out, np.int64)
+
+
+def stepped_over(here: Here, before: Mapping[int, float]) -> list[int]:
+    """Guards of events whose expressions passed zero at a time at which laws jump; not of what has just happened."""
+    since = here.t - AT_ONCE * float(np.spacing(abs(here.t)))
+    told = {h.name for h in takewhile(lambda h: h.t >= since, reversed(here.records))}
+    return [int(g) for g in crossed(here, before) if here.structure.events[int(g)].name not in told]
 
 
 def _reckoned(here: Here, e: Event, a: Action, what: str, law: Any) -> float:

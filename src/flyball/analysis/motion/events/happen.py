@@ -9,12 +9,13 @@ import numpy as np
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
-from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
 from .actions import act, act_at_start
+from .branches import Corners
 from .doubtful import doubt, shock
 from .failed import no_end, no_forces, no_impulses
 from .here import Here
-from .instant import Instant
+from .instant import DECIDED, Instant
 from .jump import Jump, jump, must_jump
 from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
@@ -38,10 +39,12 @@ def begin(here: Here) -> None:
     acts = act_at_start(here)
     if len(here.c.system.switch_i) or here.kick is not None:
         n = Instant(here)
+        corners = Corners(n)
+        corners.begin()
         n.look()
         n.restored()
         refuse_violated(n)
-        resolve(n, np.zeros(0, np.int64), told=False)
+        settled(n, corners, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
     _happen(here, acts.passed())
 
@@ -68,7 +71,8 @@ def _happen(here: Here, fired: np.ndarray) -> None:
     for _ in range(ROUNDS if len(fired) else 0):
         acts = act(here, fired.tolist())
         if len(here.c.system.switch_i) or here.kick is not None:
-            resolve(Instant(here), fired)
+            n = Instant(here)
+            settled(n, Corners(n), fired)
         acts.told(["start"])
         fired = acts.passed()
         here.acted.clear()  # what follows from it comes later
@@ -76,6 +80,19 @@ def _happen(here: Here, fired: np.ndarray) -> None:
             return
     if len(fired):
         raise no_end(here.t, [here.structure.events[int(g)].name for g in fired], ROUNDS)
+
+
+def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) -> None:
+    """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
+    corners.fired(fired)
+    by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
+    if not len(fired) or by_rows.any():
+        resolve(n, fired[by_rows], told)
+    for _ in range(ROUNDS):
+        if not corners.settle() or not np.isin(n.kind, DECIDED).any():
+            return
+        resolve(n, fired[:0], told)
+    raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
 def refuse_violated(n: Instant) -> None:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import LOCK
+from ....constraints.modes import ELASTIC, FROZEN, LOCK
 from ....errors import SimulationError
 from ....model.actions import Lock, Release
 from ....model.event import Event
 from ....model.held import held_by
+from ....results.result import Result
 from ....tables.system import (
     HELD,
     HOLD,
@@ -19,6 +20,7 @@ from ....tables.system import (
     SWITCH_KIND,
     SWITCH_LOWER,
     SWITCH_MEASURED,
+    SWITCH_STIFFNESS,
     SWITCH_UPPER,
     UPPER,
     VALUE,
@@ -43,6 +45,7 @@ def hold(here: Here, e: Event, a: Lock) -> str:
         if held.element:
             W.switch[SPARE, k] = 0.0
             W.switch[LOWER, k], W.switch[UPPER, k] = S.switch_x[k, SWITCH_LOWER], S.switch_x[k, SWITCH_UPPER]
+            here.given += stored(here, k)
             continue
         x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
         if held.joint and abs(x) > CLOSED * here.c.values.length:
@@ -61,12 +64,24 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     """Let coordinates, a joint, a limit or a rope go."""
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
-    held = held_by(here.structure.model, e, a)
+    held, kinds = held_by(here.structure.model, e, a), here.c.system.switch_i[:, SWITCH_KIND]
     for k in switches(here, held.coordinates, held.joint, held.element):
-        W.switch[MODE, k], ways[k] = OFF, 0.0
+        if held.element:
+            here.given -= stored(here, k)
+        W.switch[MODE, k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0
         if held.element:
             W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
     return f"released {a.what}"
+
+
+def stored(here: Here, k: int) -> float:
+    """Energy [J] in an elastic switch at the state last evaluated; it goes when that is released."""
+    S, W = here.c.system, here.c.work
+    if S.switch_i[k, SWITCH_KIND] != ELASTIC:
+        return 0.0
+    x = W.sensed[VALUE, S.switch_i[k, SWITCH_MEASURED]]
+    depth = max(W.switch[LOWER, k] - x, x - W.switch[UPPER, k], 0.0)
+    return float(0.5 * S.switch_x[k, SWITCH_STIFFNESS] * depth**2)
 
 
 def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str) -> list[int]:
@@ -80,3 +95,21 @@ def switches(here: Here, coordinates: tuple[str, ...], joint: str, element: str)
         ):
             out.append(k)
     return out
+
+
+def gone_on(here: Here, before: Result) -> None:
+    """Lock and release as an earlier motion ended."""
+    stretches = getattr(before, "stretches", None)
+    if stretches is None or not stretches.all:
+        return
+    last, W = stretches.all[-1], here.c.work
+    old = {(x.element.name, x.switch.label): k for k, x in enumerate(last.values.structure.switches)}
+    for k, spec in enumerate(here.structure.switches):
+        j = old.get((spec.element.name, spec.switch.label))
+        if j is None:
+            continue
+        if spec.switch.kind == LOCK:
+            W.switch[[MODE, HOLD], k] = last.switch[[MODE, HOLD], j]
+        elif last.switch[SPARE, j] == GONE:
+            W.switch[SPARE, k], W.switch[LOWER, k], W.switch[UPPER, k] = GONE, -np.inf, np.inf
+            W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] + k] = FROZEN if spec.switch.kind == ELASTIC else 0.0

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from ....constraints.modes import BRANCH
 from ....laws.breaks import Breaks, found_beforehand, margin
 from ....numerics.integrators import clock as ex
-from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW
+from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
 from ...compiled import Compiled
 
 LAWS = 3  # of a force
+SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
 
 
 def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
@@ -17,7 +19,8 @@ def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
     S = c.system
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
-    starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards])
+    corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
+    starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
     return found_beforehand(S.code.tolist(), S.const, starts.tolist(), t0, t1)
 
 
@@ -39,6 +42,12 @@ class Legs:
         self.times, self.sharp = found.times, found.sharp
         self.at = 0
         self.aim()
+
+    def passed(self) -> None:
+        """Go on with the next one where nothing is left of this one."""
+        real = self.clock.real
+        while self.at < len(self.times) and real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+            self.next()
 
     def aim(self) -> None:
         """Have the clock run to the end of the stretch."""
@@ -72,7 +81,7 @@ class Legs:
             self.clock.y[ex.NOW] += (behind - real[ex.T]) * self.clock.K[0]
             real[ex.T] = behind
             self.clock.count[ex.STARTED] = 0
-        real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
+            real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
         self.at += 1
         self.aim()
         return True

@@ -33,7 +33,10 @@ class Segments:
         )
 
     def told(self, result: Result) -> None:
-        """Give a result what held, and what events did to its energy."""
+        """Give a result what held, and what events did to its energy, if anything can switch."""
+        s = result.values.structure
+        if not s.switches and not s.guards:
+            return
         result.stretches = stretched(self.all)
         result.exchanged |= booked(result)
 

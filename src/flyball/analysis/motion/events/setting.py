@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
@@ -57,28 +58,48 @@ def _changed(old: Mapping[str, float], new: Mapping[str, float]) -> set[str]:
     return {k for k, x in new.items() if old[k] != x}
 
 
-def _places(here: Here, x: Values) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
-    """Where every body's reference frame is at the state of the motion, by these numbers; what its rows say."""
+class Places(NamedTuple):
+    """Where every body's reference frame is at the state of the motion and how it moves; what rows and drivers say."""
+
+    at: dict[str, np.ndarray]
+    moving: dict[str, np.ndarray]
+    value: np.ndarray
+    rate: np.ndarray
+
+
+def _places(here: Here, x: Values) -> Places:
+    """At the state of the motion, by these numbers."""
     c, s = here.c, here.structure
     here.evaluate()
-    K, out = c.work.BK, {}
+    K, out, moving = c.work.BK, {}, {}
     for name, b in s.place.items():
         if b >= 0:
             R = K[b, 3:12].reshape(3, 3)
             out[name] = np.r_[K[b, :3] - R @ x.bodies[name].com, R.ravel(), K[b, :3]]
-    return out, c.work.row[G_VALUE].copy(), c.work.row[NU].copy()
+            moving[name] = K[b, 12:18].copy()
+    return Places(out, moving, c.work.row[G_VALUE].copy(), c.work.row[NU].copy())
 
 
-def _refuse_moved(here: Here, who: str, before: tuple, after: tuple) -> None:
-    """Refuse that a body, or what a row holds, is elsewhere all at once."""
+def _refuse_moved(here: Here, who: str, before: Places, after: Places) -> None:
+    """Refuse that a body, or what a row holds, is elsewhere all at once, or that drivers ask for other speeds."""
     size = here.c.values.length
-    off = {f"body {k!r}": np.abs(p - before[0][k]).max() / size for k, p in after[0].items()}
     titles = [f"{r.element.title} ({r.label})" for r in here.structure.rows]
-    off |= {title: abs(a - b) / size for title, a, b in zip(titles, after[1], before[1], strict=True) if not a == b}
+    fast = {f"body {k!r}": np.abs(p - before.moving[k]).max() for k, p in after.moving.items()}
+    fast |= {title: abs(a - b) for title, a, b in zip(titles, after.rate, before.rate, strict=True)}
+    quick = max([1e-3 * size, *(np.abs(x).max() for x in before.moving.values())])
+    off = {f"body {k!r}": np.abs(p - before.at[k]).max() / size for k, p in after.at.items()}
+    off |= {title: abs(a - b) / size for title, a, b in zip(titles, after.value, before.value, strict=True)}
     worst = max(off, key=lambda name: off[name] if np.isfinite(off[name]) else np.inf)
     if not off[worst] <= NEAR:
         raise SimulationError(
             f"at t = {here.t:.9g} s {who} would put {worst} elsewhere in no time, by {off[worst] * size:.3g}: a "
             f"parameter that is set may change forces, laws and masses, not where things are. Let a Driver move it",
+            t=here.t,
+        )
+    worst = max(fast, key=lambda name: fast[name] if np.isfinite(fast[name]) else np.inf)
+    if not fast[worst] <= NEAR * quick:
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would change the velocity of {worst} by {fast[worst]:.3g} in no time, since "
+            f"a driver's law jumps: let the law rise smoothly, as by step(t, ...)",
             t=here.t,
         )

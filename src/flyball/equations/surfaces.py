@@ -1,0 +1,124 @@
+"""Motion along the surface on which a law's corner lies: both sides push towards it, what is between holds it there.
+
+The side of the corner, a number between -1 and 1, is such that du/dt = 0 (Filippov, *Differential Equations with
+Discontinuous Righthand Sides*, 1988, section 4). Accelerations depend on it by one more solve; it is found by Newton's
+method with Broyden's slopes, which are kept from one evaluation to the next.
+"""
+
+from __future__ import annotations
+
+from ..compiler.jit import formula
+from ..constraints.modes import BRANCH
+from ..laws.evaluation import evaluate_jet
+from ..tables.system import (
+    BIAS,
+    DRIFT_BEFORE,
+    DRIFT_OFF,
+    HELD,
+    INVERSE_SLOPES,
+    MODE,
+    RATE,
+    SIDE_BEFORE,
+    SIDE_MOVED,
+    SIDE_TOLD,
+    SWITCH_KIND,
+    SWITCH_LAW,
+    VALUE,
+    X_SOLVED,
+)
+from .rows import measured, way_of
+
+WHOLE = -1  # derivative along the motion
+PASSES = 40
+SETTLED = 1e-13  # change of a side that is none
+FLAT = 1e-9
+
+
+@formula
+def along(S, W, s):
+    """Whether the motion is held on the corner of switch s."""
+    return S.switch_i[s, SWITCH_KIND] == BRANCH and W.switch[MODE, s] == HELD
+
+
+@formula
+def bound(S, W):
+    """Whether the motion is held on some corner."""
+    count = 0
+    for s in range(S.switch_i.shape[0]):
+        count += 1 if along(S, W, s) else 0
+    return count > 0
+
+
+@formula
+def drifts(S, W, t):
+    """How fast u of each corner changes with the accelerations at hand, into row DRIFT_OFF."""
+    nr = S.row_i.shape[0]
+    nm = measured(S)
+    for m in range(nm):
+        a = W.sensed[BIAS, m]
+        for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
+            a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
+        W.sensed[RATE, nm + m] = a
+    for s in range(S.switch_i.shape[0]):
+        if S.switch_i[s, SWITCH_KIND] == BRANCH:
+            law = S.switch_i[s, SWITCH_LAW]
+            W.switch[DRIFT_OFF, s] = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)[1]
+    for m in range(nm):
+        W.sensed[RATE, nm + m] = 0.0 * W.sensed[VALUE, m]
+
+
+@formula
+def settled(S, W, t, n):
+    """Whether u stays zero on all corners that hold the motion; if not, their sides are moved. n counts the passes."""
+    drifts(S, W, t)
+    ns = S.switch_i.shape[0]
+    if n > 0:
+        learn(S, W)
+    worst = 0.0
+    for s in range(ns):
+        if along(S, W, s):
+            change = 0.0
+            for k in range(ns):
+                if along(S, W, k):
+                    change += W.switch[INVERSE_SLOPES + s, k] * W.switch[DRIFT_OFF, k]
+            W.switch[SIDE_MOVED, s] = change
+            if not abs(change) <= worst:
+                worst = abs(change)
+    if worst <= SETTLED:
+        return True
+    for s in range(ns):
+        if along(S, W, s):
+            at = way_of(S, W, s)
+            W.switch[SIDE_BEFORE, s] = W.sensed[VALUE, at]
+            W.switch[DRIFT_BEFORE, s] = W.switch[DRIFT_OFF, s]
+            W.sensed[VALUE, at] -= W.switch[SIDE_MOVED, s]
+    return False
+
+
+@formula
+def learn(S, W):
+    """Broyden's update of the inverse slopes, B += (dx - B dr) (dx^T B) / (dx^T B dr) (Broyden, 1965)."""
+    ns = S.switch_i.shape[0]
+    moved = 0.0
+    share = 0.0
+    for s in range(ns):
+        W.switch[SIDE_MOVED, s] = 0.0
+        W.switch[SIDE_TOLD, s] = 0.0
+    for s in range(ns):
+        if along(S, W, s):
+            dx = W.sensed[VALUE, way_of(S, W, s)] - W.switch[SIDE_BEFORE, s]
+            for k in range(ns):
+                if along(S, W, k):
+                    b = W.switch[INVERSE_SLOPES + s, k]
+                    W.switch[SIDE_MOVED, s] += b * (W.switch[DRIFT_OFF, k] - W.switch[DRIFT_BEFORE, k])
+                    W.switch[SIDE_TOLD, k] += dx * b
+            moved += dx * dx
+            share += dx * W.switch[SIDE_MOVED, s]
+    if not share > FLAT * moved or moved < SETTLED * SETTLED:
+        return
+    for s in range(ns):
+        if along(S, W, s):
+            dx = W.sensed[VALUE, way_of(S, W, s)] - W.switch[SIDE_BEFORE, s]
+            for k in range(ns):
+                if along(S, W, k):
+                    W.switch[INVERSE_SLOPES + s, k] += (dx - W.switch[SIDE_MOVED, s]) * W.switch[SIDE_TOLD, k] / share

@@ -1,0 +1,162 @@
+"""Laws with corners where the state decides: integrated from corner to corner, and held on them (Filippov)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.layers import both_layers
+
+pytestmark = both_layers
+FINE = {"rtol": 1e-11}
+
+
+def cart(force, mass=1.0, tables=(), **start) -> fb.Mechanism:
+    m = fb.Mechanism("cart", planar=True)
+    m.gravity = (0, 0)
+    m.add(*tables, fb.Body("cart", mass=mass, inertia=1, position=(0, 0), **start))
+    m.add(fb.Prismatic("track", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("drive", "track.displacement", force=force))
+    return m
+
+
+def moved(m, t_end, **more):
+    r = m.simulate(t_end, **{**FINE, "outputs": 11, **more})
+    return r, r["cart"].position[:, 0], r["cart"].velocity[:, 0]
+
+
+def test_friction_that_a_user_writes_comes_to_true_rest():
+    """-mu m g sign(v): v^2 / (2 mu g), and then exactly nothing."""
+    r, x, v = moved(cart("-0.3*2*9.81*sign(rate)", mass=2.0, velocity=(3, 0)), 4.0)
+    at = r.events[0].t
+    assert at == pytest.approx(3 / (0.3 * 9.81), rel=1e-12)
+    assert x[-1] == pytest.approx(9 / (2 * 0.3 * 9.81), rel=1e-12)
+    assert (v[r.t > at] == 0.0).all() and np.ptp(x[r.t > at]) < 1e-14
+
+
+def test_the_mass_on_a_spring_stops_where_friction_holds_it():
+    """Half swings about +-F/k: amplitudes fall by 2 F/k each until |x| <= F/k."""
+    m, k, F, start = 2.0, 100.0, 7.0, 1.0
+    r, x, v = moved(cart(f"-{k}*(value + {start}) - {F}*sign(rate)", mass=m), 10.0)
+    n, amplitude = 0, start
+    while amplitude > F / k:
+        amplitude, n = amplitude - 2 * F / k, n + 1
+    stop = (-1.0) ** n * amplitude - start
+    assert r.events[0].t == pytest.approx(n * np.pi / np.sqrt(k / m), rel=1e-9)
+    assert x[-1] == pytest.approx(stop, abs=1e-9) and abs(v[-1]) < 1e-12
+
+
+def test_it_breaks_away_when_the_force_grows():
+    r, x, v = moved(cart("2*t - 3*sign(rate)"), 3.0)
+    assert [e.kind for e in r.events] == ["hold", "leave"]
+    assert r.events[1].t == pytest.approx(1.5, rel=1e-9)
+    assert v[-1] == pytest.approx(1.5**2, rel=1e-9) and x[-1] == pytest.approx(1.5**3 / 3, rel=1e-9)
+
+
+def test_sliding_along_a_switching_line():
+    """x'' = -U sign(v + c x): onto the line in finite time, and along it as exp(-c t), to the digits."""
+    U, c, x0 = 2.0, 1.0, 1.0
+    r, x, v = moved(cart(f"-{U}*sign(rate + {c}*(value + {x0}))"), 6.0, outputs=61)
+    reached = r.events[0].t
+    # a parabola x0 - U t^2 / 2 up to the line -U t + c (x0 - U t^2 / 2) = 0
+    expected = (-U + np.sqrt(U * U + 2 * c * c * U * x0)) / (c * U)
+    assert reached == pytest.approx(expected, rel=1e-9)
+    on = r.t > reached
+    there = (x0 - U * expected**2 / 2) * np.exp(-c * (r.t[on] - expected))
+    assert x[on] + x0 == pytest.approx(there, abs=1e-9) and v[on] == pytest.approx(-c * there, abs=1e-9)
+    assert len(r.events) == 1 and r.health.steps < 300
+
+
+def test_the_limit_cycle_of_a_relay():
+    """x'' = -sign(x): parabolas, period 4 v0, amplitude v0^2 / 2; a hundred cycles."""
+    r, x, v = moved(cart("-sign(value)", velocity=(1, 0)), 400.0, outputs=401)
+    s = r.t % 4.0
+    exact = np.where(s < 2.0, s - s**2 / 2, -(s - 2.0) + (s - 2.0) ** 2 / 2)
+    assert x == pytest.approx(exact, abs=1e-8)
+    assert r.health.steps < 2000
+
+
+def test_the_limit_cycle_of_a_relay_with_damping():
+    """x'' + x' = -sign(x + T x') with T < 0 keeps on swinging: period and amplitude by the half cycle's equations."""
+    T = -0.5
+    from scipy.optimize import brentq
+
+    # from the switching line (a, -a/T) under x'' + x' = -1 to the opposite point after half a period h
+    def there(h, a):
+        w = -a / T  # velocity on the line
+        e = np.exp(-h)
+        return a + (w + 1.0) * (1.0 - e) - h, (w + 1.0) * e - 1.0
+
+    def miss(h):
+        # v(h) = -w gives w, then x(h) = -a
+        e = np.exp(-h)
+        w = (1.0 - e) / (1.0 + e)
+        return there(h, -T * w)[0] + (-T * w)
+
+    h = brentq(miss, 0.5, 20.0, xtol=1e-15)
+    e = np.exp(-h)
+    w = (1.0 - e) / (1.0 + e)
+    m = cart(f"-rate - sign(value + {-T * w} + {T}*rate)", velocity=(w, 0))
+    r, x, v = moved(m, 20 * h, outputs=np.linspace(0, 20 * h, 21))
+    assert np.abs(x[::2]).max() < 1e-8 and v[::2] == pytest.approx(w, abs=1e-8)
+    assert v[1::2] == pytest.approx(-w, abs=1e-8)
+
+
+def test_springs_with_a_corner():
+    """Another stiffness on either side: half periods add up; by where, max and min, abs."""
+    a, b = 10.0, 20.0
+    for law in [
+        "-where(value < 0, 400*value, 100*value)",
+        "-100*max(value, 0) - 400*min(value, 0)",
+        "-250*value + 150*abs(value)",
+        "-100*value - where(not value >= 0, 300, 0)*value",
+    ]:
+        r, x, v = moved(cart(law, velocity=(1, 0)), 10 * (np.pi / a + np.pi / b))
+        assert x[-1] == pytest.approx(0.0, abs=1e-9) and v[-1] == pytest.approx(1.0, rel=1e-9)
+        assert r.health.rejected < 10 * 20
+
+
+def test_a_table_with_corners_holds_its_energy():
+    """A spring of straight pieces: a quarter of its period is the sum of closed forms."""
+    table = fb.Table("pull", x=[-3, -1, 1, 3], y=[7, 1, -1, -7], interpolation="linear", beyond="line")
+    r, x, v = moved(cart("pull(value)", velocity=(2, 0), tables=(table,)), 1.0, outputs=2)
+    # inside: x = 2 sin t up to x = 1; outside x'' = -1 - 3 (x - 1)
+    t1 = np.pi / 6
+    v1, w, s = 2 * np.cos(t1), np.sqrt(3.0), 1.0 - np.pi / 6
+    assert x[-1] == pytest.approx(1 - 1 / 3 + np.cos(w * s) / 3 + v1 / w * np.sin(w * s), abs=1e-9)
+    assert v[-1] == pytest.approx(-w / 3 * np.sin(w * s) + v1 * np.cos(w * s), abs=1e-9)
+
+
+def test_a_force_between_bodies_by_its_length():
+    """A spring that only pulls: its own length decides, which nothing else measures."""
+    m = fb.Mechanism("pair", planar=True)
+    m.gravity = (0, 0)
+    m.add(fb.Body("cart", mass=1, inertia=1, position=(2, 0), velocity=(1, 0)))
+    m.add(fb.Prismatic("track", "ground", "cart", at=(2, 0), axis=(1, 0)))
+    m.add(fb.SpringDamper("cord", "ground", "cart", at=((0, 0), (2, 0)), force="100*max(0, length - 2)"))
+    r = m.simulate(np.pi / 10 + 0.5, outputs=2, **FINE)
+    assert r["cart"].velocity[-1, 0] == pytest.approx(-1.0, rel=1e-9)
+    assert r["cart"].position[-1, 0] == pytest.approx(1.5, abs=1e-9)
+
+
+def test_two_corners_at_once():
+    """Two blocks pulled over a table by one law each: both come to rest, at their own times."""
+    m = fb.Mechanism("two", planar=True)
+    m.gravity = (0, 0)
+    for name, v in (("a", 1.0), ("b", 2.0)):
+        m.add(fb.Body(name, mass=1, inertia=1, position=(0, 0), velocity=(v, 0)))
+        m.add(fb.Prismatic(f"{name} track", "ground", name, at=(0, 0), axis=(1, 0)))
+        m.add(fb.Actuator(f"{name} friction", f"{name} track.displacement", force="-2*sign(rate)"))
+    r = m.simulate(3.0, outputs=2, **FINE)
+    assert [e.t for e in r.events] == pytest.approx([0.5, 1.0], rel=1e-10)
+    assert r["a"].position[-1, 0] == pytest.approx(0.25, rel=1e-10)
+    assert r["b"].position[-1, 0] == pytest.approx(1.0, rel=1e-10)
+    assert r["a"].velocity[-1, 0] == r["b"].velocity[-1, 0] == 0.0
+
+
+def test_drag_by_the_square_is_no_corner():
+    """-c v |v| has no jump in its slope: nothing is watched."""
+    r, x, v = moved(cart("-0.5*rate*abs(rate)", velocity=(4, 0)), 3.0)
+    assert v[-1] == pytest.approx(4 / (1 + 0.5 * 4 * 3), rel=1e-9)
+    assert not r.health.events
