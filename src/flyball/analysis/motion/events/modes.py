@@ -53,7 +53,7 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     let_go = _loose(n, found, fired) if found.ended == FOUND else {}
     while let_go:
         other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
-        back = [i for i in let_go if other.ended != FOUND or _against(other, i)]
+        back = [i for i in let_go if other.ended != FOUND or _against(n, other, i)]
         if not back:
             found = other
         let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
@@ -73,9 +73,10 @@ def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
     return out
 
 
-def _against(found: Decided, i: int) -> bool:
+def _against(n: Instant, found: Decided, i: int) -> bool:
     """Whether row i, which was let go, moves against its rule; of rows that slip together whether both do."""
-    p, least = found.parts[i], TIED * found.sizes[found.parts[i].switch] * found.A[i, i]
+    p = found.parts[i]
+    least = TIED * found.sizes[p.switch] * found.A[i, i] + n.tiny[p.switch]
     if p.rule != DRIVEN:
         return bool(found.u[i] < -least)
     own = [k for k, q in enumerate(found.parts) if k == i or (p.of >= 0 and q.of == p.of and q.rule == DRIVEN)]
