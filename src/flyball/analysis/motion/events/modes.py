@@ -93,9 +93,6 @@ def _let_go(p: Part, x: float) -> Part:
 
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
-    for p in parts:  # what takes part is none of the forces that are there without it
-        if n.kind[p.switch] == FRICTION:
-            n.ways()[p.switch] = 0.0
     B, P, _ = n.problem(parts)
     free = [p for i, p in enumerate(parts) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
     if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
