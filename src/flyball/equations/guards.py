@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import BY_RATE, FROZEN, STATIC
+from ..constraints.modes import BY_RATE, FROZEN, RATCHET, STATIC, TURN
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -45,6 +45,7 @@ from ..tables.system import (
     RETURNED,
     SWITCH_DAMPING,
     SWITCH_FORCE,
+    SWITCH_KIND,
     SWITCH_LAW,
     SWITCH_MEASURED,
     SWITCH_ROW,
@@ -89,7 +90,9 @@ def watched(S, W, t, kind, s):
         if kind == G_UPPER:
             return W.switch[UPPER, s] - x
         if kind == G_SLIDES:
-            return NOT_WATCHED if way == BY_RATE else way * rate
+            if way == BY_RATE:
+                return NOT_WATCHED
+            return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
             return rate
         return NOT_WATCHED
