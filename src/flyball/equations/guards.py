@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import FROZEN, RATCHET, STATIC, TURN
+from ..constraints.modes import BY_RATE, FROZEN, RATCHET, STATIC, TURN
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -93,6 +93,8 @@ def watched(S, W, t, kind, s):
         if kind == G_UPPER:
             return distance(S, W.switch[UPPER, s] - x, -rate)
         if kind == G_SLIDES:
+            if way == BY_RATE:
+                return NOT_WATCHED
             return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
             return rate
