@@ -15,3 +15,6 @@ TURN = 1e-9
 """Rate [m/s or rad/s] at which a ratchet has turned round: so one at rest is watched whichever way it begins to go."""
 STATIC = 2.0
 """In place of the way of sliding: asks the effort of a force for the most that it holds at rest."""
+BY_RATE = 8.0
+"""In place of the way of sliding: that of the rate, and none at rest. Of friction on what nothing free moves, which a
+row cannot hold: a coordinate that a driver moves, or that cannot move at all."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....constraints.modes import FRICTION
+from ....constraints.modes import BY_RATE, FRICTION
 from ....equations.friction import FORGOTTEN
 from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
@@ -94,6 +94,10 @@ def _let_go(p: Part, x: float) -> Part:
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
     B, P, _ = n.problem(parts)
+    free = [p for i, p in enumerate(parts) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
+    if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
+        parts = free
+        B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
         ended = n.balance(B, P, FORCES)
@@ -128,11 +132,13 @@ def come_to_rest(n: Instant, found: Decided) -> None:
 
 def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     """Modes, ways and places to hold into the motion."""
-    W, ways = n.W, n.ways()
+    W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kind.tolist()):
         if kind in DECIDED and n.m[s] >= 0:
             W.switch[MODE, s] = OFF
             ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0
+            if kind == FRICTION and still[s] and s not in taking:
+                ways[s] = BY_RATE
     for i, p in enumerate(found.parts):
         s, kind = p.switch, n.kind[p.switch]
         if found.state[i] == EVEN:
