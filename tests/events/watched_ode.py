@@ -11,7 +11,7 @@ from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.expected import expect
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.numerics.integrators.watched import advance_watched
-from flyball.numerics.integrators.watching import EVENT, STAGE, START, Watch, watching
+from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
 
 
 class Equations(NamedTuple):
@@ -26,9 +26,6 @@ def derivative(t, y, dy, S, W):
     n = len(y) // 2
     dy[:n], dy[n:] = y[n:], S.f(t, y[:n], y[n:])
     S.latest[:] = [t, y.copy()]
-    W.count[STAGE] += 1
-    for j in np.flatnonzero(W.stages == W.count[STAGE]):
-        W.seen[j] = y[:n]
     return 0
 
 

@@ -52,8 +52,6 @@ def derivative(t, y, dy, A, K):
     for j in range(K.stages.shape[0]):
         if K.stages[j] == K.count[STAGE]:
             levels(A, K, 1 + j)
-            for m in range(K.seen.shape[1]):
-                K.seen[j, m] = A[W_].sensed[VALUE, m]
     return status
 
 

@@ -8,32 +8,6 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 
-ODD = 1e-2  # part of its change over a step by which what is measured may differ from what is expected
-BLURRED, NOTHING = 1e-9, 1e-12  # part of its size, and of the mechanism's, that is nothing
-
-
-@formula
-def foreseen(W, h, length):
-    """Whether what is measured goes as expected within a step of width h: as late stages of it have seen.
-
-    A step in which nothing bends by much is wide, and polynomials through its ends may say nothing of what lies
-    between: of a distance that goes through its least value and back, for instance.
-    """
-    for m in range(W.seen.shape[1]):
-        low = min(W.moving[0, 0, m], W.moving[1, 0, m])
-        high = max(W.moving[0, 0, m], W.moving[1, 0, m])
-        if low == 0.0 and high == 0.0:  # it has no value
-            continue
-        for j in range(W.seen.shape[0]):
-            low = min(low, W.seen[j, m])
-            high = max(high, W.seen[j, m])
-        allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + NOTHING * length
-        for j in range(W.seen.shape[0]):
-            value, _ = quintic(W.moving, m, W.places[1 + j], h)
-            if abs(value - W.seen[j, m]) > allowed:
-                return False
-    return True
-
 
 @formula
 def expect(W, x, h):

@@ -21,7 +21,6 @@ from .clock import (
     QUOTA,
     REJECTED,
     RUNNING,
-    SCALE,
     SPAN,
     STARTED,
     STATUS,
@@ -31,14 +30,11 @@ from .clock import (
     H,
     T,
 )
-from .expected import foreseen
 from .explicit import overlooked, start, width, write
 from .pinned import first_event
 from .refusal import enter, refuse, shorten
 from .step import attempt
-from .watching import END, EVENT, EVENTS, EXTENDED, FRESH, HALVED, SIDE, STAGE, START, STEPS
-
-OFTEN = 12  # halves of a step in a row, after which what is expected is taken as it is
+from .watching import END, EVENT, EVENTS, EXTENDED, FRESH, SIDE, STAGE, START, STEPS
 
 
 @formula
@@ -97,10 +93,6 @@ def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
     derivative, _, _, _, note, _ = callbacks
     whole, error = step
     note(S, W, END)
-    if W.count[HALVED] < OFTEN and not foreseen(W, whole, c.real[SCALE]):
-        W.count[HALVED] += 1
-        shorten(c, 0.5 * whole)
-        return used, False
     inspect(c.real[T], whole, c.real[SPAN], AT_END, c.seen, S, W)
     if overlooked(derivative, inspect, S, W, R, c, whole):
         shorten(c, 0.5 * whole)
@@ -121,7 +113,6 @@ def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
         return used, True  # the buffer is full inside this step: it is taken again by the next call
     enter(R, c, t, h, error)
     W.count[STEPS] += 1
-    W.count[HALVED] = 0
     if hit:
         c.real[H] = max(c.real[H], whole)
         c.count[STATUS] = EVENT

@@ -17,9 +17,8 @@ CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same 
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant
 PANEL, WIDTH, SAME, REAL = range(4)
 # entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
-# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events;
-# how often the step was halved since what is measured is not as expected
-STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, HALVED, COUNT = range(9)
+# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events
+STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, COUNT = range(8)
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
 
@@ -40,7 +39,6 @@ class Watch(NamedTuple):
     count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
     stages: np.ndarray  # of a step, where levels are kept
     moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
-    seen: np.ndarray  # (stages, nm): measured quantities there
     levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
     places: np.ndarray  # (2 + stages,): where in the step these were seen
     rows: np.ndarray  # multipliers that guards depend on
@@ -119,7 +117,6 @@ def watching(
         count=np.zeros(COUNT, np.int64),
         stages=kept,
         moving=np.zeros((2, 3, measured)),
-        seen=np.zeros((len(kept), measured)),
         levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
         places=np.r_[0.0, c[kept], 1.0],
         rows=np.array(rows, np.int64),
