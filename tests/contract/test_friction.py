@@ -149,12 +149,12 @@ def test_a_joint_without_load_has_no_friction():
     assert r["slide"].acceleration == pytest.approx(np.full(5, 3.0), rel=1e-9)
 
 
-def drawer(ahead, arm, mu=0.3, length=0.1):
+def drawer(ahead, arm, mu=0.3, length=0.1, **law):
     """A drawer on a rail with its centre of mass ahead of and under the point that rubs."""
     m = fb.Mechanism("drawer", planar=True, gravity=(0, -G))
     m.add(fb.Body("drawer", mass=1.0, inertia=0.1, velocity=(1, 0), com=(ahead, -arm)))
     m.add(fb.Translational("rail", "ground", "drawer", at=(0, 0), axis=(1, 0)))
-    m.add(fb.JointFriction("rub", joint="rail", static=mu, bending_length=length))
+    m.add(fb.JointFriction("rub", joint="rail", static=mu, bending_length=length, **law))
     return m
 
 
@@ -162,9 +162,19 @@ def drawer(ahead, arm, mu=0.3, length=0.1):
 def test_friction_that_outweighs_its_cause_jams(ahead, arm):
     """F = mu (m g + |m g x - F h| / L) has no solution where mu h / L > 1, unless the weight tilts it back enough."""
     with pytest.raises(SimulationError, match="JointFriction 'rub' jams joint 'rail'") as caught:
-        drawer(ahead, arm).simulate(1.0)
+        drawer(ahead, arm, stick_speed=1e-3).simulate(1.0)
     assert "bending_length" in str(caught.value)
     assert caught.value.t == 0.0
+
+
+@pytest.mark.parametrize(("ahead", "arm"), [(-1.0, 1.0), (0.2, 1.0)])
+def test_what_jams_and_can_stick_stops(ahead, arm):
+    """The same with friction that sticks: it stops at once, which takes all its energy, and the event says why."""
+    r = drawer(ahead, arm).simulate(0.1, outputs=3)
+    (jam,) = r.events
+    assert jam.t == 0.0 and "Painleve" in jam.done[0]
+    assert jam.lost == pytest.approx(0.5, rel=1e-9)
+    assert np.abs(r["rail"].displacement).max() < 1e-14
 
 
 @pytest.mark.parametrize(("ahead", "arm"), [(0.5, 0.1), (-0.5, 0.1), (1.0, 0.32), (-1.0, 0.32), (1.0, 0.5), (1.0, 1.0)])

@@ -30,6 +30,8 @@ def test_stop_ends_the_motion_with_success(layer):
     r = m.simulate(2, outputs=21, coordinates=layer)
     assert r.health.success
     assert r.health.message == "event 'there' ended the motion at t = 0.5 s"
+    assert r.health.status == "done"
+    assert dict(r.health.lines())["status"] == f"done: {r.health.message}"
     assert r.t[-1] == pytest.approx(0.5, abs=1e-12)
     assert r["A.displacement"][-1] == pytest.approx(1.5, abs=1e-12)
     assert [(h.name, h.kind, h.done) for h in r.events] == [("there", "event", ("ended the motion",))]
@@ -332,3 +334,29 @@ def test_steps_by_impulses_know_none():
     m.add(fb.Event("e", "t - 0.5"))
     with pytest.raises(fb.ModelError, match="'slide' has Event 'e', and steps by impulses know no events"):
         m.simulate(1, method="impulse")
+
+
+def test_an_event_at_the_time_at_which_a_law_jumps(layer):
+    """Held from the instant on at which a force begins, which the lock carries; let go as it ends."""
+    m = slide()
+    m.add(
+        fb.Initial("A.displacement", rate=3.0),
+        fb.PointForce("f", "b", force=("where(t < 1, where(t > 0.5, 5, 0), 0)", 0)),
+    )
+    m.add(fb.Event("hold", "t - 0.5", do=fb.Lock("A")), fb.Event("free", "t - 1", do=fb.Release("A")))
+    r = m.simulate(2, outputs=201, coordinates=layer)
+    assert r["b.x"] == pytest.approx(np.where(r.t < 0.5, 3 * r.t, 1.5), abs=1e-9)
+    assert [h.name for h in r.events] == ["hold", "free"]
+    assert r.events.t == pytest.approx([0.5, 1.0], abs=1e-12)
+
+
+def test_without_parameters_results_are_saved_too(layer, tmp_path):
+    m = fb.Mechanism("swing", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("rod", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Event("hold", "A.angle < -90 deg", do=fb.Lock("A")), fb.Event("end", "t - 1", do=fb.Stop()))
+    r = m.simulate(3, outputs=31, coordinates=layer)
+    r.save(tmp_path / "r.nc")
+    again = fb.load_result(tmp_path / "r.nc")
+    assert list(again.events) == list(r.events)
+    assert again.events["hold"][0].lost == pytest.approx(9.81 * 0.5, abs=1e-6)
+    assert again["A.torque"] == pytest.approx(r["A.torque"], abs=1e-9)

@@ -157,3 +157,18 @@ def test_a_negative_capacity_is_refused_at_once():
         shafts(capacity=-2)
     with pytest.raises(fb.ModelError, match=r"capacity of Clutch 'clutch' is -3 N\*m; it must be zero or greater"):
         shafts(capacity="1 - 4")
+
+
+@pytest.mark.parametrize("pull", [-0.9, -0.3, 0.5])
+def test_a_brake_holds_whichever_way_the_load_pulls(pull):
+    """Braked to rest, by its capacity and what pulls; then it holds what pulls, though it came from the other side."""
+    J, M, w = 0.5, 2.0, 12.0
+    m = fb.Mechanism("held", planar=True)
+    m.add(fb.Body("wheel", mass=1.0, inertia=J), fb.Revolute("axle", "ground", "wheel", at=(0, 0)))
+    m.add(fb.Initial("axle.angle", rate=w))
+    m.add(fb.Brake("brake", "axle.angle", capacity=M), fb.Motor("motor", "axle", torque=pull * M))
+    r = m.simulate(8.0, outputs=9, **TIGHT)
+    stops = w * J / (M * (1.0 - pull))
+    assert [e.t for e in r.events if e.t > 0.0] == pytest.approx([stops], abs=1e-9)
+    assert np.abs(r["axle"].rate[r.t > stops]).max() < 1e-14
+    assert r["brake"].friction[-1] == pytest.approx(-pull * M, rel=1e-12)

@@ -163,3 +163,9 @@ def test_motions_without_events_take_the_way_they_always_took(monkeypatch):
 
     monkeypatch.setattr(simulating, "run_events", never)
     assert ball().simulate(0.1).health.success
+
+
+def test_a_guard_that_jumps_with_a_law_of_time_is_seen_behind_the_jump():
+    """At 1.25 s, where it jumps over zero: no step has a zero in it."""
+    m = ball(note("where(t < 1.25, 1, -1)*(3 + sin(S.rate))", "falling"))
+    assert times(m.simulate(2.0, outputs=2)) == pytest.approx([1.25], abs=1e-12)

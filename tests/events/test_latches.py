@@ -124,6 +124,33 @@ def test_a_winch_in_space_counts_its_turns_and_goes_on(coordinates):
 
 
 @layers
+def test_a_hoist_keeps_what_its_lever_lifts(coordinates):
+    """A lever's feed pawl takes the wheel along from rest on a tooth; where the lever goes back the wheel stays."""
+    swing, load, J = np.radians(26), 4.0, 0.2
+    m = wheels(0.1, J, torques=(None, -load))
+    m.add(fb.Driver("hand", "A.angle", f"{swing}*(1 - cos(pi*t))"))
+    m.add(fb.OneWay("feed", "B.angle", relative_to="A.angle"), fb.Ratchet("pawl", "B.angle", teeth=24))
+    r = run(m, 4.0, coordinates, outputs=401)
+    pitch = 2 * np.pi / 24
+    first = pitch * np.floor(2 * swing / pitch)
+    assert r["B"].angle[200] == pytest.approx(first, abs=1e-9)
+    second = pitch * np.floor((first + 2 * swing) / pitch)
+    assert r["B"].angle.max() == pytest.approx(first + 2 * swing, abs=1e-8)
+    assert r["B"].angle[-1] == pytest.approx(second, abs=1e-9)
+    assert r["pawl"].force[-1] == pytest.approx(load, rel=1e-9)
+    assert np.abs(r.energy.balance).max() < 1e-8
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_a_ratchet_at_rest_between_teeth_sees_which_way_it_goes(way):
+    m = wheels(0.4, torques=(f"{way}*t",))
+    m.add(fb.Ratchet("pawl", "A.angle", pitch=0.3, tooth=0.1))
+    r = run(m, 2.0, "joint")
+    free = way * r.t**3 / 6 / 0.4
+    assert r["A"].angle == pytest.approx(np.maximum(free, -0.2) if way < 0 else free, abs=1e-8)
+
+
+@layers
 def test_a_ratchet_bounces_on_its_tooth(coordinates):
     J, T, e = 0.4, 3.0, 0.5
     m = wheels(J, rates=(2.0,), torques=(-T,))

@@ -188,3 +188,13 @@ def test_places_looked_at_without_the_equations():
     evaluations[0] = 0
     run(counted, lambda t, q, v: [], [1.0, 0.0], 20.0, [])
     assert far < 1.15 * evaluations[0] + 20
+
+
+def test_what_is_rounding_has_an_end():
+    """A guard of denormal numbers, which are zero between the ends of a step, does not keep the loop from going on."""
+
+    def tiny(t, q, v):
+        return (1.5e-323 * (t in (0.0, 1.0, 2.0)),)
+
+    _, rows, _, _ = run(resting, tiny, [1.0, 0.0], 2.0, [FALLING], times=[2.0], most=200)
+    assert rows[:, 0].tolist() == [2.0]

@@ -77,3 +77,43 @@ def test_drawer_jams(coordinates):
     (jam,) = run.events.of("jam")
     assert jam.lost == pytest.approx(0.5, rel=1e-9)
     np.testing.assert_allclose(run["drawer.vx"], 0.0, atol=1e-12)
+
+
+@BOTH
+@pytest.mark.parametrize("along", [1.0, -1.0])
+def test_brake_that_stops_what_a_force_within_its_capacity_pulls(coordinates, along):
+    """m a = -(c - F) to rest, and there it holds: c > F. Its own force counts once."""
+    m = fb.Mechanism("braked", planar=True)
+    m.add(fb.Body("block", mass=1.0, inertia=1.0, velocity=(2.0 * along, 0)))
+    m.add(fb.Prismatic("P", "ground", "block", at=(0, 0), axis=(1, 0)))
+    m.add(
+        fb.Brake("brake", "P.displacement", capacity=4.0), fb.PointForce("pull", body="block", force=(-2.0 * along, 0))
+    )
+    run = m.simulate(1.0, outputs=21, coordinates=coordinates)
+    (stick,) = run.events
+    assert (stick.kind, stick.t) == ("stick", pytest.approx(2.0 / 6.0, rel=1e-10))
+    np.testing.assert_allclose(run["P.displacement"][run.t > 0.34], along * 2.0 / 6.0, rtol=1e-9)
+
+
+def test_brake_whose_capacity_comes_and_goes_never_gives_energy():
+    """Its power is never positive, though it sticks, slips and turns again and again."""
+    m = fb.Mechanism("braked", planar=True)
+    m.add(fb.Body("block", mass=1.0, inertia=1.0, velocity=(1.0, 0)))
+    m.add(fb.Prismatic("P", "ground", "block", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Brake("brake", "P.displacement", capacity="3 * sin(7*t)**2"))
+    m.add(fb.PointForce("pull", body="block", force=("2 * sin(5*t + 1)", 0)))
+    run = m.simulate(4.0, outputs=401)
+    power = run["brake"].friction * run["brake"].rate
+    assert power.max() < 1e-9
+    assert len(run.events) > 5
+
+
+@BOTH
+def test_friction_where_nothing_can_move(coordinates):
+    """A bar between two fixed hinges: its friction has nothing to hold, and that is no contradiction."""
+    m = fb.Mechanism("fixed", planar=True, gravity=(0, -G))
+    m.add(fb.Body("bar", mass=1.0, inertia=1.0), fb.Revolute("A", "ground", "bar", at=(0, 0)))
+    m.add(fb.Revolute("B", "ground", "bar", at=(1, 0)))
+    m.add(fb.Brake("rub", "A.angle", capacity=0.3))
+    run = m.simulate(0.1, outputs=2, coordinates=coordinates)
+    np.testing.assert_allclose(run["bar.angle"], 0.0, atol=1e-14)

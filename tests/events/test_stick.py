@@ -269,3 +269,20 @@ def test_the_regularised_law_tends_to_it(seed):
         assert r["turns"].work[-1] == pytest.approx(true["turns"].work[-1], rel=300 * v + 1e-5)
     assert gaps[1] < 1e-4
     assert gaps[1] < 0.1 * gaps[0]
+
+
+@pytest.mark.parametrize(
+    ("law", "way"), [("step5(t, 0, 0, 1, 0.5)", 0.5), ("0.3*sin(4*t)", 0.6 - 0.3 * math.sin(4.0)), ("0", 0.0)]
+)
+def test_friction_on_a_coordinate_that_a_driver_moves(law, way):
+    """The driver carries it, against the rate, and nothing where it rests; there is nothing to hold."""
+    m = sled(static=0.3)
+    m.add(fb.Driver("drive", "rail.displacement", law=law))
+    m.initial = []
+    m.add(fb.Body("bob", mass=1.0, inertia=0.1, position=(0, -0.5)), fb.Sensor("pace", "rail.rate"))
+    m.add(fb.Fixed("held", "ground", "bob", at=(0, -0.5)))
+    r = m.simulate(1.5 if "step5" in law else 1.0, outputs=31, **TIGHT)
+    moves = np.abs(r["rail"].rate) > 1e-6
+    assert r["rub"].friction[moves] == pytest.approx(-0.3 * 2.0 * G * np.sign(r["rail"].rate[moves]), rel=1e-9)
+    assert (r["rub"].friction[r["rail"].rate == 0.0] == 0.0).all()
+    assert r["rub"].work[-1] == pytest.approx(-0.3 * 2.0 * G * way, rel=1e-8)

@@ -42,6 +42,10 @@ def test_a_ball_bounces_to_rest(planar):
     hits = np.array([x.t for x in run.events])
     assert np.allclose(hits[:8], first * (1 + 2 * np.r_[0.0, np.cumsum(e ** np.arange(1, 8))]), rtol=0, atol=1e-8)
     assert abs(next(x.t for x in run.events if x.kind == "rest") - whole) < 1e-9
+    weight = G * run.values.bodies["ball"].mass
+    assert np.isclose(run["floor-ball"].normal[-1], weight, rtol=1e-9)
+    assert np.allclose(run["ball"].contact_force[-1], weight * np.eye(len(at))[-1], atol=1e-9 * weight)
+    assert np.abs(run.energy.balance).max() < 1e-9 * weight * h
 
 
 def test_a_ball_with_backspin_slides_then_rolls():
@@ -51,12 +55,20 @@ def test_a_ball_with_backspin_slides_then_rolls():
     slip = v + np.cross(w, (0, 0, -r))
     speed = np.linalg.norm(slip)
     rolls = speed / (3.5 * mu * G)
-    run = scene(floor(), ball, friction=mu).simulate(2 * rolls, outputs=[0.0, 0.5 * rolls, rolls, 2 * rolls], **TIGHT)
+    run = scene(floor(), ball, friction=mu).simulate(
+        2 * rolls, outputs=[0.0, 0.5 * rolls, 1.5 * rolls, 2 * rolls], **TIGHT
+    )
     d = slip / speed
     path = v * 0.5 * rolls - 0.5 * mu * G * (0.5 * rolls) ** 2 * d
     assert np.allclose(run["ball"].position[1, :2], path[:2], rtol=0, atol=1e-9)
     assert np.allclose(run["ball"].velocity[-1], v - 2 / 7 * slip, rtol=0, atol=1e-9)
     assert any(abs(x.t - rolls) < 1e-8 for x in run.events)
+    touch, weight = run["floor-ball"], G * run.values.bodies["ball"].mass
+    assert np.allclose(touch.friction, (mu * weight, mu * weight, 0.0, 0.0), rtol=0, atol=1e-8 * weight)
+    assert np.allclose(touch.slip, (speed, 0.5 * speed, 0.0, 0.0), rtol=0, atol=1e-9)
+    assert np.allclose(run.contacts.at(0.5 * rolls).force[0], (*-mu * weight * d[:2], weight), rtol=1e-9)
+    assert np.isclose(touch.work[-1], -0.5 * weight / G * 2 / 7 * speed**2, rtol=1e-9)
+    assert np.abs(run.energy.balance).max() < 1e-9 * run.energy.kinetic[0]
 
 
 @pytest.mark.parametrize("steep", [0.4, 0.8])
@@ -167,6 +179,18 @@ def test_a_ball_rolls_slips_and_leaves_a_hill():
         (0, 2), rolls.y[:, -1], events=pull, **usual,
     )  # fmt: skip
     assert np.isclose(on_a_hill(mu), np.cos(slides.y[0, -1]), rtol=0, atol=1e-8)
+
+
+def test_a_block_slides_off_a_table():
+    """Its corner passes the edge, then the table's corner carries it; it tips when its middle passes the edge."""
+    table = fb.Ground("table", shape=fb.Box(edges=(2.0, 1.0, 0.1)), position=(0, -0.5))
+    box = fb.Body("b", shape=fb.Box(edges=(0.4, 0.2, 0.1)), density=500, position=(0.5, 0.1), velocity=(2.0, 0))
+    run = scene(table, box, planar=True, friction=0.0).simulate(1.0, outputs=[0.0, 0.2, 0.25, 1.0], **TIGHT)
+    t = [x.t for x in run.events if x.kind == "part"]
+    assert np.allclose(t[:2], (0.15, 0.25), rtol=0, atol=1e-9)
+    assert np.allclose(run["b"].position[:3], [(0.5, 0.1), (0.9, 0.1), (1.0, 0.1)], rtol=0, atol=1e-10)
+    assert run["b"].angle[-1] < -0.5
+    assert np.isclose(run.energy.total[-1], run.energy.total[0], rtol=1e-10)
 
 
 def test_the_same_by_short_impulses():

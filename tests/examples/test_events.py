@@ -48,7 +48,6 @@ def test_ratchet_hoist():
     assert (np.diff(wheel - lever) > -1e-6).all()
 
 
-@pytest.mark.xfail(reason="friction slides on where a stop opens at rest", strict=False)
 def test_gears_with_backlash():
     """The table stands where the motor turns, until the other flank touches: it turns by 2 (60 - 2) / 3 degrees in all."""
     r = example("gear_backlash.toml").simulate(8.0, outputs=801, **TIGHT)

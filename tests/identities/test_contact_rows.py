@@ -85,10 +85,15 @@ def test_tangents_are_axes_across_the_normal():
         assert which in (1, 2)
 
 
-def test_a_corner_stays_on_its_face_where_another_is_as_near():
-    rest = (((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)),) + ((0.0,) * 3,) * 4
-    F = ((0.0,) * 3, *rest)
-    par = (0.3, 0.2, 0.1, 0.0, 1.0, 3.0, 0.0, 1.0)
-    at_edge = ((0.3, 0.2, 0.0), *rest)
-    assert [corner.foot(par, F, at_edge, float(k), None) for k in (0, 2)] == [0.0, 2.0]
-    assert corner.foot(par, F, ((0.31, 0.2, 0.0), *rest), 2.0, None) == 0.0
+@pytest.mark.parametrize("face", range(6))
+def test_margin_of_a_corner_on_a_face(face):
+    assert max(errors(corner.margin_row, (30.0, 20.0, 10.0, 0.0, 1.0, 0.5, 0.0, 1.0), float(face))) < 1e-5
+
+
+def test_a_corner_over_an_edge_is_on_the_face_in_front_of_which_its_body_lies():
+    axes = ((1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), *((0.0,) * 3,) * 4)
+    at_edge = ((0.3, 0.2, 0.0), *axes)
+    for degrees, face in ((100.0, 2.0), (170.0, 2.0), (-60.0, 0.0), (-80.0, 0.0)):
+        par = (0.3, 0.2, 1e30, 0.0, 0.0, np.deg2rad(degrees), 0.0, 1.0)
+        assert corner.foot(par, ((0.0,) * 3, *axes), at_edge, 1.0, None) == face
+        assert corner.foot(par, ((0.0,) * 3, *axes), ((0.31, 0.2, 0.0), *axes), 2.0, None) == 0.0

@@ -17,7 +17,7 @@ A guard that means nothing in the present mode is nan. Modes and ways stand in `
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..constraints.modes import FROZEN, STATIC
+from ..constraints.modes import BY_RATE, FROZEN, RATCHET, STATIC, TURN
 from ..laws.evaluation import evaluate
 from ..math.scalar import magnitude
 from ..tables.system import (
@@ -38,6 +38,7 @@ from ..tables.system import (
     GUARD_KIND,
     GUARD_OF,
     LAM,
+    LENGTH,
     LOWER,
     MODE,
     OFF,
@@ -45,6 +46,7 @@ from ..tables.system import (
     RETURNED,
     SWITCH_DAMPING,
     SWITCH_FORCE,
+    SWITCH_KIND,
     SWITCH_LAW,
     SWITCH_MEASURED,
     SWITCH_ROW,
@@ -58,6 +60,8 @@ from .rows import way_of
 from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
+GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
+RESTING = 1e-9  # of the same a second: not coming nearer
 
 
 @formula
@@ -85,11 +89,13 @@ def watched(S, W, t, kind, s):
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:
         if kind == G_LOWER:
-            return x - W.switch[LOWER, s]
+            return distance(S, x - W.switch[LOWER, s], rate)
         if kind == G_UPPER:
-            return W.switch[UPPER, s] - x
+            return distance(S, W.switch[UPPER, s] - x, -rate)
         if kind == G_SLIDES:
-            return way * rate
+            if way == BY_RATE:
+                return NOT_WATCHED
+            return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
             return rate
         return NOT_WATCHED
@@ -98,6 +104,13 @@ def watched(S, W, t, kind, s):
     if kind == G_HOLDS:
         return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
     return NOT_WATCHED
+
+
+@formula
+def distance(S, x, rate):
+    """How far something is from a stop; none where that is rounding, as where it parts with no speed."""
+    size = max(1.0, S.glob[LENGTH])
+    return 0.0 if magnitude(x) <= GRAIN * size and rate >= -RESTING * size else x
 
 
 @formula

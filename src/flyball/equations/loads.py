@@ -7,8 +7,9 @@ Gravity and gyroscopic terms are the inertial wrench of the bias accelerations.
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..constraints.modes import BY_RATE
 from ..laws.evaluation import evaluate
-from ..math.scalar import sign
+from ..math.scalar import magnitude, sign
 from ..math.vec import add, cross, dot, load3, load9, mtv, mv, neg, put3, scale, sub
 from ..tables.system import (
     ALONG,
@@ -22,6 +23,7 @@ from ..tables.system import (
     FORCE_SWITCH,
     FORCE_WORK,
     INERTIA,
+    LENGTH,
     LOAD,
     MASS,
     NV,
@@ -36,6 +38,8 @@ from .records import load
 from .rows import way_of
 from .sliding import slide
 from .tree import project
+
+SLOW = 1e-9  # lengths of the mechanism a second: slower is at rest
 
 
 @formula
@@ -136,7 +140,12 @@ def power(F, M, force, torque):
 def way(S, W, k, rate):
     """Which way what force k acts along slides: as its switch says, where there is none by the sign of the rate."""
     s = S.force_i[k, FORCE_SWITCH]
-    return W.sensed[VALUE, way_of(S, W, s)] if s >= 0 else sign(rate)
+    if s < 0:
+        return sign(rate)
+    told = W.sensed[VALUE, way_of(S, W, s)]
+    if told.real == BY_RATE:
+        return sign(rate) if magnitude(rate) > SLOW * S.glob[LENGTH].real else 0.0 * told
+    return told
 
 
 @formula

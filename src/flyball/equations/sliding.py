@@ -33,7 +33,6 @@ from .rows import way_of
 
 SLOW = 1e-10  # lengths of the mechanism a second: slower sliding in space goes the way of its switch
 TURNED = 0.5  # cosine of the angle by which a direction of sliding turns before its way is told anew
-LOST = 1e-9  # lengths of the mechanism: a corner that far beyond the end of its face has left it
 NOT_WATCHED = float("nan")
 
 
@@ -91,8 +90,8 @@ def slide(S, W, k, work, f):
 def watched_place(S, W, sensed, lam, kind, s):
     """Value of a guard of a place: friction that its stick has left; whether it slides its way; whether it is there."""
     if kind == G_ASTRAY:
-        held = W.switch[MODE, s] != OFF
-        return LOST * S.glob[LENGTH] - sensed[VALUE, S.switch_i[s, SWITCH_MEASURED]] if held else NOT_WATCHED
+        held = W.switch[MODE, S.switch_i[s, SWITCH_OTHER]] != OFF
+        return sensed[VALUE, S.switch_i[s, SWITCH_MEASURED]] if held else NOT_WATCHED
     other = S.switch_i[s, SWITCH_PARTNER]
     if kind == G_CONE:
         if W.switch[MODE, s] == OFF:

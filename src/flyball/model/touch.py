@@ -7,10 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from ..constraints import along
+from ..constraints import along, corner
 from ..constraints.blocks import Row
-from ..constraints.corner import foot
-from ..constraints.modes import SLIP, STOP
+from ..constraints.modes import EDGE, SLIP, STOP
 from .element import element
 from .force import TwoFrameForce
 from .joint import WorldFrame
@@ -39,8 +38,6 @@ class Touch(TwoFrameForce):
         The same as it is watched while they are apart, where that is another.
     slips : tuples of 9 numbers
         The rows that say how fast the sides slide, one in the plane and two in space; none without friction.
-    face : int
-        Of a sharp corner on a sharp box: the face that it is on where two are as near.
     friction : two numbers
         Coefficients of rest and of sliding.
     restitution : number
@@ -50,7 +47,6 @@ class Touch(TwoFrameForce):
     gap: Term
     seen: Term | None = None
     slips: tuple[Term, ...] = ()
-    face: int = 0
     friction: tuple[float, float] = (0.0, 0.0)
     restitution: float = 0.0
 
@@ -79,7 +75,7 @@ class Touch(TwoFrameForce):
     def nearest(self, n: SimpleNamespace, F: WorldFrame, M: WorldFrame) -> tuple[float, float]:
         """The face that its corner is on, and 0."""
         f, m = ((tuple(p), tuple(R.ravel())) for p, R in (F, M))
-        return foot(self.gap[1:], f, m, float(self.face), None), 0.0
+        return corner.foot(self.gap[1:], f, m, 0.0, None), 0.0
 
     def switches(self) -> tuple[Switch, ...]:
         """The gap, and the slip along each tangent."""
@@ -88,11 +84,14 @@ class Touch(TwoFrameForce):
         for k, slip in enumerate(self.slips):
             path = (("F", "M", _row(slip, holonomic=False)),)
             out.append(Switch(SLIP, f"slip_{k + 1}", path=path, slides=k == 0, other="gap"))
+        if self.seen is not None:
+            margin = (corner.KIND_MARGIN, *self.gap[1:])
+            out.append(Switch(EDGE, "edge", path=(("F", "M", _row(margin)),), other="gap"))
         return tuple(out)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Of the gap its least value and the restitution, of a slip both coefficients."""
-        return (0.0, np.inf, self.restitution) if label == "gap" else self.friction
+        return (0.0, np.inf, self.restitution) if label == "gap" else () if label == "edge" else self.friction
 
 
 def _row(term: Term, holonomic: bool = True) -> Row:

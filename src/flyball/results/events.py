@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.words import listing, shortened, suggest
 from .moment import Moment
+from .struck import Struck
 
 if TYPE_CHECKING:
     import pandas
@@ -188,4 +189,7 @@ def _bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
             Moment(result, x, h.t, y) if isinstance(y, np.ndarray) else y
             for x, y in zip(both, (h.before, h.after), strict=True)
         )
-        yield dataclasses.replace(h, before=before, after=after)
+        impulses = h.impulses
+        if isinstance(impulses, Struck) and isinstance(before, Moment) and isinstance(after, Moment):
+            impulses = impulses.bound(before, after)
+        yield dataclasses.replace(h, before=before, after=after, impulses=impulses)

@@ -58,6 +58,11 @@ class Health:
         return "done" if self.success and self._simulated else self.message
 
     @property
+    def ended_early(self) -> bool:
+        """Whether an event of the model ended the motion, as asked for."""
+        return self.success and self.message.startswith("event ")
+
+    @property
     def freedoms(self) -> int:
         """Freedoms by rank, at the start."""
         return self._found("mobility").freedoms
@@ -104,7 +109,7 @@ class Health:
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
-            ("status", self.status),
+            ("status", f"done: {self.message}" if self.ended_early else self.status),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             *([("engine", self.engine)] if self.engine else []),
             *([("assembly", summary(self.departures))] if self.departures else []),

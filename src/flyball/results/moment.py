@@ -32,7 +32,7 @@ class Moment:
         self._of, self.values, self.t, self.y = result, values, float(t), y
 
     @cached_property
-    def _result(self) -> Result:
+    def alone(self) -> Result:
         """A result of this one time; what nobody knows there is nan."""
         r = self._of
         s = self.values.structure
@@ -50,7 +50,7 @@ class Moment:
         ModelError
             If there is no such curve, or it jumps there.
         """
-        value = np.asarray(self._result.channel(name if "." in name else f"{name}.value")[1])[0]
+        value = np.asarray(self.alone.channel(name if "." in name else f"{name}.value")[1])[0]
         if not np.isfinite(value).all():
             raise ModelError(
                 f"{name!r} has no value at the instant t = {self.t:.6g} s of an event: accelerations and forces of "

@@ -25,7 +25,7 @@ def packed(result: Result) -> dict[str, np.ndarray]:
     out[FIRST + "sigma"] = result.stretches.sigma
     out[FIRST + "last_sigma"] = every[-1].ways[:, -1:]
     n = len(result.model.parameters)
-    out[FIRST + "parameters"] = np.array([x.values.system.const[:n].real for x in every], float).reshape(-1, n)
+    out[FIRST + "parameters"] = np.array([x.values.system.const[:n].real for x in every], float).reshape(len(every), n)
     return {name: x for name, x in out.items() if x.size}
 
 

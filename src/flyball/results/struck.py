@@ -7,6 +7,7 @@ less what rows and given impulses do to it, its tree joint must have done. Gravi
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
@@ -44,21 +45,28 @@ class Struck(Mapping):
 
     def __init__(self, own: Mapping[str, float], rows: np.ndarray, blows: tuple[Blow, ...] = ()) -> None:
         self._own, self._rows, self._blows = dict(own), rows, blows
-        self._reactions: Reactions | None = None
+        self._moments: tuple[Moment, Moment] | None = None
         self._joints: tuple[str, ...] = ()
 
     def bound(self, before: Moment, after: Moment) -> Struck:
         """With what joints carried, for which the states before and after are needed."""
         made = Struck(self._own, self._rows, self._blows)
-        made._reactions = ImpulseReactions(before._result, after._result, self._rows, self._blows)
-        s = before._result.values.structure
+        made._moments = before, after
+        s = before.values.structure
         made._joints = tuple(j.name for j in s.model.joints if j.name in s.terms_of or j.name in s.tree_joints)
         return made
+
+    @cached_property
+    def _reactions(self) -> Reactions:
+        """What joints carried, found when first asked for."""
+        assert self._moments is not None
+        before, after = (m.alone for m in self._moments)
+        return ImpulseReactions(before, after, self._rows, self._blows)
 
     def __getitem__(self, name: str) -> Any:
         if name in self._own:
             return self._own[name]
-        if name not in self._joints or self._reactions is None:
+        if name not in self._joints:
             raise KeyError(name)
         force, torque = self._reactions.of(name)
         return np.array([np.asarray(x, float).ravel()[0] for x in (*force, *torque)])

@@ -24,7 +24,7 @@ class Touched:
 
     def __init__(self, result: Result, element: Touch) -> None:
         self._result, self._s, self.element = result, result.values.structure, element
-        self._switches = [k for k, x in enumerate(self._s.switches) if x.element is element]
+        self._switches = [k for k, x in enumerate(self._s.switches) if x.element is element and x.row >= 0]
 
     @property
     def known(self) -> bool:

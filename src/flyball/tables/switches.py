@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.modes import BRANCH, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ..constraints.modes import BRANCH, EDGE, ELASTIC, FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ..model.element import Element
 from ..model.model import Model
 from ..model.switch import Switch
@@ -42,6 +42,7 @@ GUARDS = {
     RATCHET: (G_LOWER, G_SLIDES, G_PULL),
     BRANCH: (G_CORNER,),
     SLIP: (G_CONE, G_TURNS),
+    EDGE: (G_ASTRAY,),
 }
 """What is watched of each kind of switch."""
 
@@ -90,7 +91,7 @@ def quantities(s: Structure) -> None:
 def rows(s: Structure) -> None:
     """The rows, behind all others."""
     for e, w in declared(s.model):
-        if w.kind == ELASTIC:
+        if w.kind in (ELASTIC, EDGE):
             s.switches.append(SwitchSpec(e, w, -1, s.measured[quantity(e, w)]))
             continue
         row, first = len(s.rows), len(s.rows)
@@ -107,7 +108,7 @@ def rows(s: Structure) -> None:
         if spec.switch.other:
             one = [i for i, x in enumerate(s.switches) if x.element is spec.element]
             spec.other = next(i for i in one if s.switches[i].switch.label == spec.switch.other)
-            like = [i for i in one if i != k and s.switches[i].switch.other == spec.switch.other]
+            like = [i for i in one if i != k and s.switches[i].switch.kind == spec.switch.kind == SLIP]
             spec.partner = like[0] if like else -1
 
     for joint in events.parting(s.model):
@@ -136,7 +137,7 @@ def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:
     """What is watched of a switch: of two tangents of a place, the first is watched for both."""
     if x.switch.kind == SLIP and -1 < x.partner < k:
         return ()
-    return (*GUARDS.get(x.switch.kind, ()), *((G_ASTRAY,) if x.switch.seen else ()))
+    return GUARDS.get(x.switch.kind, ())
 
 
 def numbers(s: Structure, of: Any, x: np.ndarray, asks: Any, apart: Any) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...equations.engine import COMPLETE, INTEGRATE, motion_kernel
 from ...equations.within import ROWS
+from ...model.actions import Set
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import tableau
 from ...tables.system import LATER
@@ -20,11 +21,13 @@ from .start import Start
 def open_until_asked(start: Start, o: Integration, task: int) -> bool:
     """Whether accelerations can be left for later: they would be the same then.
 
-    Friction starts from the loads found last, a Python function may have a memory, and events change modes and numbers.
+    Friction starts from the loads found last, a Python function may have a memory, and events may change modes and
+    numbers.
     """
     s = start.assembly.compiled.structure
     usual = task == INTEGRATE and o.stabilization == "projection"
-    return usual and not (s.loads or s.functions or s.guards or s.switches)
+    changes = any(isinstance(a, Set) for e in s.model.events for a in e.do)
+    return usual and not (s.loads or s.functions or s.switches or changes)
 
 
 def solved(start: Start, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from ...results import doubts
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Owed, Result
+from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
 from .events.here import Here
@@ -73,6 +74,7 @@ def outcome(
     result.events = here.records
     if here.seen is not None:
         here.seen.told(result)
+        result.contacts = contacts(result)
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result

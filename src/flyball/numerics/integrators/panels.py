@@ -8,7 +8,6 @@ row of ``W.g``; W is a `Watch`.
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from ...math.scalar import cos
 from .watching import (
     CHECKS,
     END,
@@ -24,24 +23,18 @@ from .watching import (
     WIDTH,
 )
 
+MANY = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
 NARROWEST = 2.0**-14  # part of a step that a panel is not narrower than
 ODD = 1e-2  # part of a guard's change over a panel by which it may differ from the polynomial
 BLURRED = 1e-9  # part of its size that is nothing
 QUIET = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
+NOTHING = 1e-200  # a guard that is no larger is zero
 GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
 PARTS = 16  # of a panel, in which slopes are compared
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
 NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
 NOISE = 4.0  # times its value at the start that is about zero as well
 ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
-
-
-@formula
-def node(j):
-    """Place of node j in a panel; the checks come after the nodes."""
-    if j >= NODES:
-        return 0.131 if j == NODES else 0.567
-    return 0.5 - 0.5 * cos(3.141592653589793 * j / (NODES - 1))
 
 
 @formula
@@ -52,12 +45,13 @@ def survey(look, S, W, t, h, first):
     """
     a = first
     w = 1.0 - first
+    most = W.count[LOOKS] + MANY
     while a < 1.0:
         w = min(w, 1.0 - a)
         W.real[PANEL], W.real[WIDTH] = a, w
         fill(look, S, W, t, h, a, w)
         smooth = resolved(W)
-        if not smooth and w > NARROWEST:
+        if not smooth and w > NARROWEST and W.count[LOOKS] < most:
             w *= 0.5
             continue
         best = -1
@@ -80,7 +74,7 @@ def survey(look, S, W, t, h, first):
 def fill(look, S, W, t, h, a, w):
     """Guards at the nodes of a panel and where it is checked; at the ends of the step they are known."""
     for j in range(NODES + CHECKS):
-        x = a + w * node(j)
+        x = a + w * W.nodes[j]
         row = NODE + j
         if x <= 0.0 or x >= 1.0:
             for i in range(W.way.shape[0]):
@@ -98,27 +92,13 @@ def resolved(W):
         if not finite(low, high):
             continue
         allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high))
-        for j in range(NODES, NODES + CHECKS):
-            if not abs(W.g[NODE + j, i] - through(W, i, node(j))) <= allowed:
+        for j in range(CHECKS):
+            f = W.g[NODE + NODES + j, i]
+            for k in range(NODES):
+                f -= W.checks[j, k] * W.g[NODE + k, i]
+            if not abs(f) <= allowed:
                 return False
     return True
-
-
-@formula
-def through(W, i, x):
-    """The polynomial through the values at the nodes (barycentric form)."""
-    above = 0.0
-    below = 0.0
-    for j in range(NODES):
-        d = x - node(j)
-        if d == 0.0:
-            return W.g[NODE + j, i]
-        c = (0.5 if j == 0 or j == NODES - 1 else 1.0) / d
-        if j % 2 == 1:
-            c = -c
-        above += c * W.g[NODE + j, i]
-        below += c
-    return above / below
 
 
 @formula
@@ -147,6 +127,8 @@ def restless(W, i):
     low, high = extent(W, i)
     if not finite(low, high):  # not watched, or not everywhere
         return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
+    if max(abs(low), abs(high)) < NOTHING:
+        return False
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:
         W.g[SIDE, i] = 1.0
@@ -214,7 +196,7 @@ def jumping(W, i):
         elif s * f <= 0.0 and s != 0.0 and (f != 0.0 or fires(W.way[i], s)):
             if fires(W.way[i], s):
                 W.g[SIDE, i] = s
-                return node(j - 1), node(j)
+                return W.nodes[j - 1], W.nodes[j]
             s = side_of(f)
         elif s == 0.0:
             s = side_of(f)

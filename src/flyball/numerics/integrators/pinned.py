@@ -23,6 +23,7 @@ TRIES = 80  # times that a step is taken again
 ULP = 2.3e-16
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 AT_ONCE = 1e-11  # part of the step within which events are at the same instant
+SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
 OTHERS = 20  # guards that may turn out to be earlier
 
 
@@ -259,13 +260,17 @@ def next_event(callbacks, S, W, R, c, h):
     i, a, b, at = begin_sides(look, S, W, c.real[T], h)
     if i < 0:
         i, a, b = survey(look, S, W, c.real[T], h, at)
+    skip = SKIPPED
     while i >= 0:
         s = W.g[SIDE, i]
         status, x = crossing(derivative, watch, S, W, R, c, h, i, a, b, s)
         if status != 0 or x > 0.0:
             return status, i, x, (s if fires(W.way[i], s) else -s)
-        if b >= 1.0:
+        at = max(at + skip, b)
+        skip *= 2.0  # of what is rounding there is no end
+        if at >= 1.0:
             break
+        b = at
         resume(look, S, W, c.real[T], h, b)
         i, a, b = survey(look, S, W, c.real[T], h, b)
     return 0, -1, 0.0, 0.0

@@ -13,6 +13,7 @@ FALLING, EITHER, RISING = -1, 0, 1
 START, END, TRUE, THERE, SIDE, MARK, NODE = range(7)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
+CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant
 PANEL, WIDTH, SAME, REAL = range(4)
 # entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
@@ -32,6 +33,8 @@ class Watch(NamedTuple):
     g: np.ndarray  # (GUARDS, ng)
     poly: np.ndarray  # (NODES,): a guard over a panel, in powers
     basis: np.ndarray  # (NODES, NODES): powers from values at the nodes
+    nodes: np.ndarray  # (NODES + CHECKS,): places in a panel
+    checks: np.ndarray  # (CHECKS, NODES): the polynomial through the nodes where it is checked
     real: np.ndarray  # (REAL,)
     count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
     stages: np.ndarray  # of a step, where levels are kept
@@ -51,7 +54,12 @@ def nodes() -> np.ndarray:
 
 def basis() -> np.ndarray:
     """What takes values at the nodes to powers of the place in the panel."""
-    return np.linalg.inv(np.vander(nodes(), increasing=True))
+    return np.ascontiguousarray(np.linalg.inv(np.vander(nodes(), increasing=True)))
+
+
+def checks() -> np.ndarray:
+    """What takes values at the nodes to those of the polynomial where it is checked."""
+    return np.ascontiguousarray(np.vander(CHECKED, NODES, increasing=True) @ basis())
 
 
 def kept_stages(c: np.ndarray, stages: int) -> list[int]:
@@ -102,7 +110,9 @@ def watching(
         fired=np.zeros(ng, np.int64),
         g=np.full((GUARDS, ng), np.nan),
         poly=np.zeros(NODES),
-        basis=np.ascontiguousarray(basis()),
+        basis=basis(),
+        nodes=np.r_[nodes(), CHECKED],
+        checks=checks(),
         real=np.zeros(REAL),
         count=np.zeros(COUNT, np.int64),
         stages=kept,

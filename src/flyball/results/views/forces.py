@@ -6,14 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from ...equations.loads import power, wide
+from ...constraints.modes import BY_RATE
+from ...equations.loads import SLOW, power, wide
 from ...errors import AnalysisError
 from ...laws.call import STACK_RESERVE
 from ...laws.evaluation import evaluate
 from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, SPARE
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE
 from ..records import coordinate_frames, turned
 from .base import Curves, View
 
@@ -64,7 +65,11 @@ class ForceView(View):
         """Which way it slides: as its switch said then; where there is none by the sign of the rate."""
         s = int(self._x.system.force_i[k, FORCE_SWITCH])
         stretches = self._result.stretches
-        return sign(rate) if s < 0 or stretches is None else stretches.sigma[s] + 0.0 * rate
+        if s < 0 or stretches is None:
+            return sign(rate)
+        slow = SLOW * self._x.system.glob[LENGTH].real
+        by_rate = np.where(np.abs(rate) > slow, sign(rate), 0.0)
+        return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
 
     def _rows(self) -> list[int]:
         """Its switches, by number."""

@@ -207,8 +207,10 @@ def _core(s: _Side) -> _Core | None:
 
 
 def _rectangle(s: _Side) -> _Core | None:
-    """A polygon that is a rectangle or a segment; none for others."""
+    """A polygon that is a rectangle, a segment or a point; none for others."""
     x = s.corners
+    if len(x) == 1:
+        return _Core(s.p + s.R @ x[0], s.R, np.zeros(3), float(s.par[0]))
     if len(x) not in (2, 4):
         return None
     middle, along, other = x.mean(axis=0), x[1] - x[0], x[2] - x[1] if len(x) == 4 else np.zeros(3)
@@ -252,16 +254,13 @@ def _on_core(F: _Side, M: _Side, core: _Core, ball: tuple[np.ndarray, float], ta
     up = int(np.argmax(np.abs(d)))
     way = float(up + 1) * (1.0 if d[up] >= 0.0 else -1.0)
     sharp = r + core.radius == 0.0
+    if sharp:
+        inward = M.corners.mean(axis=0) - x
+        way = float(np.arctan2(inward[1], inward[0]))
     gap, slip = (corner.KIND_HEIGHT, corner.KIND_SLIDE) if sharp else (touch.KIND_GAP, touch.KIND_SLIP)
     which = range(1, tangents + 1) if tangents else (0,)
     slips = tuple((slip, *half, r, float(k), way, 0.0, 1.0) for k in which)
-    par = (*half, r, 0.0, way, r + core.radius, 1.0)
-    fields = _place(F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *par), slips)
-    return fields | ({"seen": (touch.KIND_GAP, *par), "face": _face(core, M)} if sharp else {})
-
-
-def _face(core: _Core, M: _Side) -> int:
-    """The face of a core beyond which the other shape lies as a whole, or nearly."""
-    x = (M.p + M.corners @ M.R.T - core.p) @ core.R
-    beyond = np.concatenate([(x[:, i].min() - core.half[i], -x[:, i].max() - core.half[i]) for i in range(3)])
-    return int(np.argmax(beyond))
+    fields = _place(
+        F, M, (_frame(core.p, core.R), _frame(p, M.R)), (gap, *half, r, 0.0, way, r + core.radius, 1.0), slips
+    )
+    return fields | ({"seen": (corner.KIND_APART, *fields["gap"][1:])} if sharp else {})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from .here import Here
 from .holding import gone_on, hold, let_go
 from .setting import set_parameters
 
+AT_ONCE = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
 CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
 
 
@@ -163,6 +165,13 @@ def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:
         if (rises and way >= 0) or (falls and way <= 0):
             out.append(g)
     return np.array(out, np.int64)
+
+
+def stepped_over(here: Here, before: Mapping[int, float]) -> list[int]:
+    """Guards of events whose expressions passed zero at a time at which laws jump; not of what has just happened."""
+    since = here.t - AT_ONCE * float(np.spacing(abs(here.t)))
+    told = {h.name for h in takewhile(lambda h: h.t >= since, reversed(here.records))}
+    return [int(g) for g in crossed(here, before) if here.structure.events[int(g)].name not in told]
 
 
 def _reckoned(here: Here, e: Event, a: Action, what: str, law: Any) -> float:

@@ -9,7 +9,21 @@ import numpy as np
 from ....constraints.modes import ONE_WAY, STOP
 from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
-from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND, GUARD_OF, LOWER, MODE, OFF, UPPER
+from ....tables.system import (
+    G_BACK,
+    G_CONE,
+    G_CORNER,
+    G_HOLDS,
+    G_PULL,
+    G_SLIDES,
+    G_TURNS,
+    GUARD_KIND,
+    GUARD_OF,
+    LOWER,
+    MODE,
+    OFF,
+    UPPER,
+)
 from .actions import act, act_at_start
 from .branches import Corners
 from .doubtful import doubt, shock
@@ -24,6 +38,7 @@ from .sides import pressed, teeth, turned
 from .told import tell_jump, tell_modes
 
 ROUNDS = 100
+RATES = (G_SLIDES, G_BACK, G_TURNS)  # guards of rates
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
 
@@ -122,18 +137,21 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         still[calm] = True
         teeth(n, still)
         at = sides(n, fired)
+        rate = n.rate.copy()
         jumped = jumps(n, at, still)
         if jumped is None:
             still |= n.mode != OFF
         else:
             hits |= {s: s in jumped.even for s in jumped.closing}
-            still = at_rest(n, fired[:0])
+            fired = unmoved(n, fired, rate)
+            still = at_rest(n, fired)
             still[list(jumped.even)] = True
         pressed(n, fired)
         found = decided(n, at, still, fired)
         if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
             tell_jump(n, found, before)
-            fired, calm = fired[:0], list(found.even)
+            n.look_again()
+            fired, calm = unmoved(n, fired, rate), list(found.even)
             continue
         turned(n, hits)
         come_to_rest(n, found)
@@ -145,8 +163,16 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return
-        fired = gone = np.r_[gone, new]
+        fired, gone = np.r_[fired, new], np.r_[gone, new]
     raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
+
+
+def unmoved(n: Instant, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:
+    """Guards that fired, without those of rates that were something else before a jump."""
+    other = np.abs(n.rate - rate) > n.still
+    return np.array(
+        [g for g in fired if n.S.guard_i[g, GUARD_KIND] not in RATES or not other[n.S.guard_i[g, GUARD_OF]]], int
+    )
 
 
 def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:

@@ -39,6 +39,7 @@ REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the 
 NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
+MOTIONLESS = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
@@ -89,6 +90,8 @@ class Instant:
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
         self.inertia = np.array([mass if metric else turning for metric in _metric(here)])
+        fall = np.linalg.norm(S.glob[:3]) / c.values.length + 1.0 / here.clock.real[SPAN] ** 2
+        self.tiny = MOTIONLESS * self.unit * fall
         self.over = np.nan
         self.rooms: dict[int, tuple[Bench, Dense]] = {}
 
@@ -124,13 +127,17 @@ class Instant:
                 self.still[s] += STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
 
     def bared(self) -> None:
-        """Switch off what is decided; friction without a load that slides goes on doing so."""
-        ways, rows = self.ways(), self.S.force_i
+        """Switch off what is decided."""
         for s, kind in enumerate(self.kind.tolist()):
             if kind in DECIDED and self.m[s] >= 0:
                 self.W.switch[MODE, s] = OFF
-                if kind == FRICTION and rows[self.force[s], FORCE_LOAD] >= 0:
-                    ways[s] = 0.0
+
+    def slide(self, parts: list[Part]) -> None:
+        """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
+        ways, own = self.ways(), {p.switch for p in parts}
+        for s in np.flatnonzero(self.kind == FRICTION).tolist():
+            loaded = self.S.force_i[self.force[s], FORCE_LOAD] >= 0
+            ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
 
     def response(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """What a generalised force does at the state last looked at: accelerations, multipliers, efforts of drivers."""
@@ -167,12 +174,15 @@ class Instant:
             P.rule[i], P.lean[i], P.const[i], P.state[i] = part.rule, part.lean, part.const, part.state
             if part.of >= 0:
                 P.gain[i, part.of] = part.gain
+        self.slide(parts)
         self.desk.real[T] = self.here.t
         self.desk.y[0] = self.here.y
         given = self.S, self.W, self.R, self.desk, self.sheet
         status = int(bare_kernel(engine.address(*given), *given, B, P))
         for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
             P.A[i] = P.A[:, i] = 0.0
+            if abs(P.b[i]) <= self.tiny[B.which[i]]:
+                P.b[i] = 0.0
         return B, P, status
 
     def balance(self, B: Bench, P: Dense, impulses: int) -> int:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ....constraints.modes import FRICTION
+from ....constraints.modes import BY_RATE, FRICTION
 from ....equations.friction import FORGOTTEN
 from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
@@ -53,7 +53,7 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     let_go = _loose(n, found, fired) if found.ended == FOUND else {}
     while let_go:
         other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
-        back = [i for i in let_go if other.ended != FOUND or _against(other, i)]
+        back = [i for i in let_go if other.ended != FOUND or _against(n, other, i)]
         if not back:
             found = other
         let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
@@ -73,9 +73,10 @@ def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
     return out
 
 
-def _against(found: Decided, i: int) -> bool:
+def _against(n: Instant, found: Decided, i: int) -> bool:
     """Whether row i, which was let go, moves against its rule; of rows that slip together whether both do."""
-    p, least = found.parts[i], TIED * found.sizes[found.parts[i].switch] * found.A[i, i]
+    p = found.parts[i]
+    least = TIED * found.sizes[p.switch] * found.A[i, i] + n.tiny[p.switch]
     if p.rule != DRIVEN:
         return bool(found.u[i] < -least)
     own = [k for k, q in enumerate(found.parts) if k == i or (p.of >= 0 and q.of == p.of and q.rule == DRIVEN)]
@@ -93,6 +94,10 @@ def _let_go(p: Part, x: float) -> Part:
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
     B, P, _ = n.problem(parts)
+    free = [p for i, p in enumerate(parts) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
+    if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
+        parts = free
+        B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):
         ended = n.balance(B, P, FORCES)
@@ -127,11 +132,13 @@ def come_to_rest(n: Instant, found: Decided) -> None:
 
 def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     """Modes, ways and places to hold into the motion."""
-    W, ways = n.W, n.ways()
+    W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
     for s, kind in enumerate(n.kind.tolist()):
         if kind in DECIDED and n.m[s] >= 0:
             W.switch[MODE, s] = OFF
             ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0
+            if kind == FRICTION and still[s] and s not in taking:
+                ways[s] = BY_RATE
     for i, p in enumerate(found.parts):
         s, kind = p.switch, n.kind[p.switch]
         if found.state[i] == EVEN:

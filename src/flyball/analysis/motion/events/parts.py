@@ -27,7 +27,7 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
     hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
     out = {}
-    gone = astray(n, fired)
+    gone = astray(n)
     for s in np.flatnonzero(np.isin(n.kind, STOPS)).tolist():
         if s in gone:
             continue

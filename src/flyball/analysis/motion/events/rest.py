@@ -41,7 +41,7 @@ def note_bounces(n: Instant, jumped: Jump) -> None:
 def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> np.ndarray:
     """Switches whose flights are none, (ns,); the modes are written, and their rates are those that they start with."""
     over = np.zeros(len(n.kind), bool)
-    leaving = [s for s, side in at.items() if not still[s] and len(side) == 1 and s in n.here.bounces]
+    leaving = [s for s, side in at.items() if not still[s] and len(side) == 1]
     if not leaving:
         return over
     n.ask(MOTION)
@@ -51,6 +51,8 @@ def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarr
         u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
         if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * LOW * n.unit[s]:
             over[s] = True
+            if s not in n.here.bounces:  # it did not close before: let go by rounding only
+                continue
             b, flight = n.here.bounces[s], 2.0 * u / back
             past = n.here.t - (b.before if b.last == n.here.t else b.last)
             b.over = n.here.t + (flight / (1.0 - flight / past) if flight < past < np.inf else flight)

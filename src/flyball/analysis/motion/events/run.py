@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
+from .actions import expressions, stepped_over
 from .happen import begin, happen
 from .here import Here
 from .instant import Instant
@@ -102,11 +103,12 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            sharp = self.legs.ends_sharply()
+            sharp = self.legs.ends_sharply() and self.loop is not None
+            before = expressions(self.here) if sharp else {}
             if not self.legs.next():
                 return True
-            if sharp and self.loop is not None:
-                self.jumped()
+            if sharp:
+                self.jumped(before)
             return False
         elif status != ex.RUNNING and not engine.hands_over(clock):
             return True
@@ -171,13 +173,16 @@ class Run:
             clock.real[ex.H] = min(clock.real[ex.H], clock.real[ex.WIDE] or clock.real[ex.H])
             here.fresh = False
 
-    def jumped(self) -> None:
-        """Forces may have jumped: what held may not hold any more, without a guard that passed zero."""
+    def jumped(self, before: Mapping[int, float]) -> None:
+        """Forces may have jumped: what held may not hold any more, without a guard that passed zero.
+
+        ``before``: expressions of events on the other side of that time, across which nothing is followed.
+        """
         here = self.here
         values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
-        if len(against):
-            self.happens(against.tolist())
+        if fired := [*against.tolist(), *stepped_over(here, before)]:
+            self.happens(fired)
 
     def endless(self) -> SimulationError:
         """What to say where events follow each other without end."""

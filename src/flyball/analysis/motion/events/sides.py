@@ -11,7 +11,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from ....constraints.modes import ELASTIC, FROZEN, RATCHET
+from ....constraints.modes import ELASTIC, FROZEN, RATCHET, TURN
 from ....equations.tasks import MOTION
 from ....tables.system import (
     BIAS,
@@ -40,8 +40,7 @@ def teeth(n: Instant, still: np.ndarray) -> None:
         first, n.W.switch[UPPER, s] = n.W.switch[UPPER, s] < np.inf, np.inf
         if n.mode[s] != OFF:
             n.W.switch[LOWER, s] = n.hold[s]  # of a motion that goes on, too
-            continue
-        if (_acceleration(n, s) > -SLOW * n.unit[s]) if still[s] else (n.rate[s] > 0.0):
+        elif n.rate[s] > 0.0 and not still[s]:
             _goes_on(n, s)
         elif first or n.way[s] >= 0.0:
             tooth, pitch = n.S.switch_x[s, SWITCH_TOOTH], n.S.switch_x[s, SWITCH_PITCH]
@@ -50,11 +49,13 @@ def teeth(n: Instant, still: np.ndarray) -> None:
 
 
 def turned(n: Instant, hit: Collection[int]) -> None:
-    """Ratchets whose tooth let go, or that it was ``hit`` and threw back, go on; of others the way is as it was."""
+    """Ratchets whose tooth let go, or threw back what it was ``hit`` by, go on, and those that begin to; modes are
+    decided.
+    """
     for s in np.flatnonzero(n.kind == RATCHET).tolist():
         if n.W.switch[MODE, s] != OFF:
             continue
-        if n.mode[s] != OFF or s in hit:
+        if n.mode[s] != OFF or s in hit or (abs(n.rate[s]) <= 2.0 * TURN and _acceleration(n, s) > SLOW * n.unit[s]):
             _goes_on(n, s)
         else:
             n.ways()[s] = n.way[s]

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....constraints.modes import SLIP
+from ....constraints.modes import EDGE, SLIP
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, GRIPS, SLIPS, TURNS, WITH, Dense
 from ....tables.system import (
-    G_ASTRAY,
     G_CONE,
     G_TURNS,
     HELD,
@@ -35,9 +34,10 @@ def slips_of(n: Instant, gap: int) -> list[int]:
     return np.flatnonzero((n.kind == SLIP) & (n.S.switch_i[:, SWITCH_OTHER] == gap)).tolist()
 
 
-def astray(n: Instant, fired: np.ndarray) -> set[int]:
-    """Gaps of corners that have left their face."""
-    return {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_ASTRAY}
+def astray(n: Instant) -> set[int]:
+    """Gaps of corners that leave their face: at its end, and going on."""
+    leaving = (n.kind == EDGE) & (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
+    return {int(n.S.switch_i[s, SWITCH_OTHER]) for s in np.flatnonzero(leaving)}
 
 
 def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:

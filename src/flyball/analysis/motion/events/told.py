@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....constraints.modes import ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
+from ....constraints.modes import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....model.touch import Touch
 from ....results.events import Happening
 from ....results.struck import Struck
@@ -90,7 +90,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
             kind, said = words(n, s, now)
             if kind:
                 told.setdefault(kind, []).append((s, said))
-        elif not was and not now and _goes_both_ways(n, s) and ways[s] * n.ways()[s] < 0.0:
+        elif not was and not now and _goes_both_ways(n, s) and ways[s] * n.ways()[s] < 0.0 and n.ways()[s] != BY_RATE:
             told.setdefault("turn", []).append((s, "slides the other way"))
     for kind, all_of in told.items():
         names = ", ".join(dict.fromkeys(n.name(s) for s, _ in all_of))
