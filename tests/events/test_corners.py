@@ -160,3 +160,15 @@ def test_drag_by_the_square_is_no_corner():
     r, x, v = moved(cart("-0.5*rate*abs(rate)", velocity=(4, 0)), 3.0)
     assert v[-1] == pytest.approx(4 / (1 + 0.5 * 4 * 3), rel=1e-9)
     assert not r.health.events
+
+
+@pytest.mark.parametrize("start", [1.0, 0.0])
+def test_corners_of_which_one_is_the_rate_of_another_are_refused_where_they_meet(start):
+    """From x = 1 each swing is half as long as the last, until t = 3 / (1 - sqrt(1/2)) / 2, where all should rest."""
+    m = fb.Mechanism("twisting", planar=True)
+    m.add(fb.Body("block", mass=1.0, inertia=0.1, position=(start, 0)))
+    m.add(fb.Translational("rail", "ground", "block", at=(0, 0), axis=(1, 0), displacement=start))
+    m.add(fb.Actuator("pull", "rail.displacement", force="-3*sign(value) - sign(rate)"))
+    with pytest.raises(fb.SimulationError, match="meet where their laws push back from every side") as error:
+        m.simulate(6.0, rtol=1e-10, atol=1e-12)
+    assert error.value.t == pytest.approx(1.5 * start / (1 - np.sqrt(0.5)), abs=1e-6)

@@ -14,7 +14,9 @@ from ....equations.guards import corner
 from ....equations.rows import measured
 from ....equations.surfaces import drifts
 from ....equations.tasks import MOTION
+from ....errors import SimulationError
 from ....laws.evaluation import evaluate_jet
+from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
@@ -138,6 +140,8 @@ class Corners:
             self._hold([s for s, h in zip(which, held, strict=True) if h], B[np.ix_(held, held)])
         for k in np.flatnonzero(flat & ~left):
             self._tried(which, int(k), sides, old)
+        if len(which) > 1:
+            self._goes_on([s for s, h in zip(which, held, strict=True) if not h])
         n.ask(MOTION)
         self._tell(which)
         return bool(B.any())
@@ -179,6 +183,25 @@ class Corners:
                 fits.append(side)
             n.here.y[:] = y
         n.ways()[s] = fits[0] if len(fits) == 1 else (np.sign(old[k]) or 1.0)
+
+    def _goes_on(self, which: list[int]) -> None:
+        """Refuse a point where several corners meet and sides lead back at once: none of them is one to go on."""
+        n = self.n
+        y, h = n.here.y.copy(), AHEAD * float(n.here.clock.real[ex.SPAN])
+        for part in (0.5, 1.0):
+            n.ask(MOTION)
+            n.here.y[:] = y + part * h * n.desk.K[0]
+        n.ask(MOTION)
+        back = [s for s in which if n.ways()[s] * self.value(s)[0] < -self.value(s)[1]]
+        n.here.y[:] = y
+        if back:
+            t = n.here.t
+            raise SimulationError(
+                f"at t = {t:.9g} s corners of {listing(list(dict.fromkeys(n.name(s) for s in back)))} meet where their "
+                f"laws push back from every side: how the motion goes on along several such corners, of which one is a "
+                f"rate of another, is not known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x)",
+                t=t,
+            )
 
     def _tell(self, which: list[int]) -> None:
         n = self.n
