@@ -15,7 +15,7 @@ from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
 from flyball.tables.system import FRAMES, GROUND_FRAMES, NV
 from tests.contract.zoo import CASES
-from tests.examples.test_examples import FILES, mechanism
+from tests.examples.test_examples import EQUATIONS, FILES, mechanism
 from tests.identities.test_joint_layer import PARTS, coupled, with_joint
 from tests.layers import both_layers, started
 from tests.mechanisms import G, bricard, four_bar
@@ -50,7 +50,7 @@ def residual(r):
     return largest / max(*needs, *carried, 1e-3)
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", EQUATIONS)
 def test_examples(name):
     r = mechanism(name).simulate(0.05, outputs=5, coordinates="absolute")
     assert residual(r) < 1e-12

@@ -73,10 +73,13 @@ def absolute(r, structure):
     return x
 
 
-@pytest.mark.parametrize("family", [f for f in FAMILIES if f != "extremes"])  # those have digits of their own
+# those have digits of their own; an ideal rope has no tension without a motion
+@pytest.mark.parametrize("family", [f for f in FAMILIES if f not in ("extremes", "ropes", "happenings")])
 def test_the_same_at_the_same_state(family):
     compared = 0
     for seed, m, a, tree in cases(family, FEW if family == "crowds" else EACH):
+        if any(isinstance(f, fb.Brake | fb.Clutch) for f in m.forces):  # at rest which way it slides is rounding
+            continue
         x = exact(a)
         r = assembled(a) if x is not None else None
         if r is None or (rubbed(m) and r.health.redundant):  # loads that are open leave friction open
