@@ -124,6 +124,12 @@ def acts_briefly(code: Sequence[int], at: int) -> bool:
     return any(brief(s, steps) for s in bent)
 
 
+def may_be_sharp(code: Sequence[int], at: int) -> bool:
+    """Whether a law may have corners or act briefly by time alone, whatever its constants are."""
+    steps = read(code, at)
+    return any(s.on == TIME and brief(s, steps) for s in steps)
+
+
 def _of_law(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray, bool]:
     """Its corners, where brief actions of it begin and end, and whether these are all."""
     if not t1 > t0 or not any(s.on == TIME and brief(s, steps) for s in steps):

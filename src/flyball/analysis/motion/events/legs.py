@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import BRANCH
-from ....laws.breaks import Breaks, found_beforehand, margin
+from ....laws.breaks import Breaks, found_beforehand, margin, may_be_sharp
 from ....numerics.integrators import clock as ex
-from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
+from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW, System
 from ...compiled import Compiled
 
 LAWS = 3  # of a force
@@ -17,11 +17,22 @@ SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
 def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
     """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
     S = c.system
+    return found_beforehand(S.code.tolist(), S.const, _begins(S), t0, t1)
+
+
+def sharp_by_time(S: System) -> bool:
+    """Whether a law may have a corner or act briefly by time alone, whatever the constants are."""
+    code = S.code.tolist()
+    return any(may_be_sharp(code, at) for at in _begins(S))
+
+
+def _begins(S: System) -> list[int]:
+    """Where in the code the laws of a mechanism begin, those of guards too."""
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
     corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
     starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
-    return found_beforehand(S.code.tolist(), S.const, starts.tolist(), t0, t1)
+    return [int(at) for at in starts.tolist() if at >= 0]
 
 
 class Legs:
