@@ -93,10 +93,9 @@ def study(model: Model, o: StudyOptions) -> Study:
     there = o.file is not None and Path(o.file).exists()
     found = stored(Path(o.file), mark) if o.file is not None and there else _begun(question, o, x, axes, mark)
     found.start, found.options["method"] = o.start, o.method
-    question = _decided(question, found)
     with shown(o.progress, "studying") as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks of the runs say it
-        _run(question, found, o, tell)
+        _run(_decided(question, found), found, o, tell)
     found.seconds += time.perf_counter() - started
     if o.file is not None:
         save_study(found, o.file)
