@@ -1,7 +1,7 @@
 """A load is put on a spring scale: how far does it dip, if springs, dampers and loads have tolerances?
 
-It comes to rest at m g / k and dips below that by the part exp(-pi z / sqrt(1 - z^2)) of it, z = c / (2 sqrt(k m)). Run it
-to have 5120 scales weigh, and to see which tolerance matters.
+It comes to rest at m g / k and dips below that by the part exp(-pi z / sqrt(1 - z^2)) of it, z = c / (2 sqrt(k m)).
+Run it to have 5120 scales weigh, and to see which tolerance matters.
 """
 
 import flyball as fb
