@@ -1,10 +1,11 @@
 """Studies of Andrews' mechanism, 0.03 s a run: whole time against that of the compiled kernels alone.
 
-``kernel``: the compiled loop of a run by itself, mean of a thousand runs, the least of three readings. ``CPU`` is that of
-the process and ``ratio`` what it is of the kernels'; ``wall`` is a clock's, which on a shared machine measures the
-neighbours too, and its ratio is to the kernels' time divided by the threads. Of three studies the quickest. ``simulate``:
-CPU of `m.simulate` with a curve read, in a loop over some of the points. Stiffnesses and torques only forces see; with
-another length each run is assembled by itself. Usage: ``python study.py [--runs 10000] [--threads 1 2]``.
+``kernel``: the compiled loop of a run by itself, mean of a thousand runs, the least of three readings. ``CPU`` is
+that of the process and ``ratio`` what it is of the kernels'; ``wall`` is a clock's, which on a shared machine
+measures the neighbours too, and its ratio is to the kernels' time divided by the threads. Of three studies the
+quickest. ``simulate``: CPU of `m.simulate` with a curve read, in a loop over some of the points. Stiffnesses and
+torques only forces see; with another length each run is assembled by itself. Usage: ``python study.py [--runs 10000]
+[--threads 1 2]``.
 """
 
 from __future__ import annotations
