@@ -196,7 +196,7 @@ def test_a_relay_holds_what_begins_at_rest_until_it_is_pulled_away():
     assert x[-1] == pytest.approx(2**3 / 6, abs=1e-9)
 
 
-@pytest.mark.parametrize("pull, moves", [(2, 0.0), (10, 7.0), (-10, -7.0)])
+@pytest.mark.parametrize(("pull", "moves"), [(2, 0.0), (10, 7.0), (-10, -7.0)])
 @pytest.mark.parametrize("law", ["-3*sign(rate)", "-2*sign(value) - sign(rate)"])
 def test_a_force_that_jumps_pulls_what_is_held_away(law, pull, moves):
     """A law of time has no zero to be found where it jumps."""
