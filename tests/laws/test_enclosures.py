@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flyball.laws.breaks import found_beforehand, reached
+from flyball.laws.breaks import found_beforehand, reached, timed
 from flyball.laws.intervals.enclose import Law
 from flyball.laws.intervals.steps import read
 from tests.laws.written import program, values
@@ -96,7 +96,7 @@ def test_between_breaks_laws_are_smooth(text):
     if made is None:
         return
     code, const, at = made
-    b = found_beforehand(code, const, [at], 0.0, 3.0)
+    b = found_beforehand(timed(code, [at]), const, 0.0, 3.0)
     if b.given_up:
         return
     h = 1e-5
