@@ -99,3 +99,10 @@ def test_signs_of_a_law_of_time():
     assert (up == (np.arange(400) % 2 == 0)).all()
     with pytest.raises(ValueError, match="more than time"):
         reached(*program("value - t"), 0.0, 1.0)
+
+
+def test_zero_at_a_place_where_an_interval_is_cut():
+    """A table passes zero at its break 0.5; t^3 is 0.5 at the middle of the time up to where the table ends."""
+    code, const, at = program("bow(t**3)")
+    times, up, complete = reached(code, const, at, 0.0, 3.0)
+    assert complete and times[0] == pytest.approx(0.5 ** (1 / 3), abs=1e-14) and up[0]
