@@ -271,10 +271,11 @@ def begin_sides(callbacks, S, W, R, c, h):
 @formula
 def doubtful(W):
     """Whether a guard that has to stay above zero is about zero since the motion's segment began."""
+    n = 0
     for i in range(W.way.shape[0]):
         if W.kept[i] == 1 and W.side[i] <= 0.0 and W.g[START, i] == W.g[START, i]:
-            return True
-    return False
+            n += 1
+    return n > 0
 
 
 @formula

@@ -87,10 +87,11 @@ def first_event(callbacks, S, W, R, c, h, error):
 @formula
 def begins_at_zero(W):
     """Whether a guard is zero as the step begins."""
+    n = 0
     for i in range(W.way.shape[0]):
         if W.g[START, i] == 0.0 or W.side[i] == 0.0:
-            return True
-    return False
+            n += 1
+    return n > 0
 
 
 @formula
