@@ -14,7 +14,7 @@ from tests.robust.verdict import judge
 
 ONCE = [
     *(("sticking", seed) for seed in (14, 103, 198, 451, 532)),
-    *(("happenings", seed) for seed in (62, 183, 230, 236, 259, 296, 412, 549, 607, 618, 712)),
+    *(("happenings", seed) for seed in (62, 183, 230, 236, 259, 296, 412, 549, 607, 712)),
 ]
 EACH = 17  # mechanisms of each family: two hundred in all
 

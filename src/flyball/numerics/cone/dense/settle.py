@@ -90,7 +90,7 @@ def found(P):
 
 @formula
 def driving(P, x, i):
-    """How large the terms of row i are together, of all that does not hold: impulses of what cannot hold are no size."""
+    """How large the terms of row i are together, without impulses of what holds: where it cannot these say nothing."""
     size = abs(P.row[BIAS, i])
     for j in range(x.shape[0]):
         if P.state[j] != EVEN:
