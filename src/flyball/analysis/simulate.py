@@ -26,6 +26,7 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
@@ -83,6 +84,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     o = chosen(model, o)
+    announce_motion(model, not isinstance(o.method, Stepping))
     if isinstance(o.method, Stepping):
         if model.events:
             raise ModelError(
