@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,7 @@ import numpy as np
 from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
-from ..equations.within import kept
+from ..equations.within import ROWS, kept
 from ..errors import ModelError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
@@ -26,6 +26,7 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
 from .motion.engines import Engine, check_specialize
@@ -84,6 +85,7 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     t_start = start_time(o.t_start, o.start)
     times = output_times(t_start, o.t_end, o.outputs)
     o = chosen(model, o)
+    announce_motion(model, not isinstance(o.method, Stepping))
     if isinstance(o.method, Stepping):
         if model.events:
             raise ModelError(
@@ -121,9 +123,9 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
     """
     if o.method == AUTO:
         stepped = (model.contacts or model.bulk) and not smooth_only(model)
-        o = replace(o, method=Stepping() if stepped else USUAL)
+        o = o.known(method=Stepping() if stepped else USUAL)
     elif o.method == IMPULSE:
-        o = replace(o, method=Stepping())
+        o = o.known(method=Stepping())
     if not isinstance(o.method, Stepping):
         if model.bulk:
             part = model.bulk[0]
@@ -144,7 +146,7 @@ def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
         raise ModelError(
             "steps by impulses are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
         )
-    return replace(o, method=o.method.bounded(o.max_step))
+    return o.known(method=o.method.bounded(o.max_step))
 
 
 def moved(
@@ -246,9 +248,11 @@ def clock_for(
     W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
+    nothing = sampled is not None and not sampled
+    seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system, sampled))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
 
 
 def _energy_size(a: Assembly, span: float) -> float:
@@ -266,7 +270,7 @@ def _energy_size(a: Assembly, span: float) -> float:
 def _width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
-    return 1 + len(a.y) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
+    return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
 
 
 def run_clock(
