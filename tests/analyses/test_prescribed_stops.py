@@ -46,7 +46,7 @@ def test_what_is_only_just_not_passed():
 
 def test_a_freewheel_that_turns_back_between_output_times():
     m = slider_crank(fb.OneWay("W", "D.displacement", direction=-1))
-    with pytest.raises(fb.ModelError, match="OneWay 'W': the drivers take D.displacement past it"):
+    with pytest.raises(fb.ModelError, match=r"OneWay 'W': the drivers take D.displacement past it"):
         m.kinematics([0.0, 0.45, 1.45], t_start=0.0)
 
 
