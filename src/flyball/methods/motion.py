@@ -106,7 +106,8 @@ class Motions(Model):
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
         """
-        from ..analysis.simulate import SimulateOptions, simulate
+        from ..analysis.motion.choice import SimulateOptions
+        from ..analysis.simulate import simulate
 
         return simulate(self, SimulateOptions.asked(locals()))
 

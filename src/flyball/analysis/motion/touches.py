@@ -21,15 +21,18 @@ def found(model: Model, parameters: Mapping[str, float] | None) -> Places:
     return model.kept.get("places", given.key, KEPT, lambda: places(model, given))
 
 
-def stepped(model: Model, parameters: Mapping[str, float] | None) -> str:
-    """Why a motion of a model with contact is better computed by steps by impulses; empty if it is not."""
+def impossible(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """What of its contacts rows of constraint do not know; empty if they know all."""
     if not (model.contacts or model.bulk):
         return ""
     p = found(model, parameters)
-    if p.why_not:
-        return f"{_several(p.why_not)}, which rows of constraint do not know"
-    n = len(p.touches)
-    return f"bodies may touch at {n} places, too many to integrate from touch to touch (most {FEW})" if n > FEW else ""
+    return f"{_several(p.why_not)}, which rows of constraint do not know" if p.why_not else ""
+
+
+def many(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """Whether there are so many places that steps by impulses cost less; empty if not."""
+    n = len(found(model, parameters).touches)
+    return f"bodies may touch at {n} places, too many to go from touch to touch (most {FEW})" if n > FEW else ""
 
 
 def with_places(model: Model, parameters: Mapping[str, float] | None) -> Model:

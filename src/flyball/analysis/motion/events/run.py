@@ -13,7 +13,7 @@ import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
-from ....errors import FlyballError, ModelError, SimulationError
+from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....model.words import listing
@@ -23,6 +23,7 @@ from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
+from ..jams import Unresolved
 from .actions import expressions, stepped_over
 from .happen import begin, happen
 from .here import Here
@@ -187,10 +188,10 @@ class Run:
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
 
-    def endless(self) -> SimulationError:
+    def endless(self) -> Unresolved:
         """What to say where events follow each other without end."""
         names = dict.fromkeys(r.name for r in self.here.records[-LATEST:])
-        return SimulationError(
+        return Unresolved(
             f"at t = {self.here.t:.9g} s events follow each other without end ({ENDLESS} within "
             f"{self.recent[-1] - self.recent[0]:.2g} s): {listing(list(names))}",
             t=self.here.t,
