@@ -361,3 +361,14 @@ def test_without_parameters_results_are_saved_too(layer, tmp_path):
         assert (a.t, a.name, a.kind, a.done, a.lost) == (b.t, b.name, b.kind, b.done, b.lost)
     assert again.events["hold"][0].lost == pytest.approx(9.81 * 0.5, abs=1e-6)
     assert again["A.torque"] == pytest.approx(r["A.torque"], abs=1e-9)
+
+
+def test_events_that_come_ever_closer_are_named(monkeypatch):
+    from flyball.analysis.motion.events import run
+
+    monkeypatch.setattr(run, "ENDLESS", 30)
+    monkeypatch.setattr(run, "AT_ONCE", 1e-3)
+    m = slide()
+    m.add(fb.Event("ever faster", "sin(1/(0.3 - t))"))
+    with pytest.raises(fb.SimulationError, match=r"without end \(30 within .* s\): Event 'ever faster'"):
+        m.simulate(0.3)

@@ -62,6 +62,7 @@ from .sliding import watched_place
 NOT_WATCHED = float("nan")
 GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
 RESTING = 1e-9  # of the same a second: not coming nearer
+CREEP = 1e-13  # of the same a second: a rate that is none, as of what nothing moves
 
 
 @formula
@@ -97,7 +98,7 @@ def watched(S, W, t, kind, s):
                 return NOT_WATCHED
             return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
-            return rate
+            return 0.0 if magnitude(rate) <= CREEP * max(1.0, S.glob[LENGTH]) else rate
         return NOT_WATCHED
     if kind == G_PULL:
         return way * W.row[LAM, k]

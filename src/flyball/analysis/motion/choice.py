@@ -15,7 +15,7 @@ from ...results.result import Result
 from .engines import AUTO as EITHER
 from .engines import check_specialize
 from .impulse.settings import Stepping
-from .jams import Unresolved
+from .jams import Overlap, Unresolved
 from .options import MOST, Integration
 from .touches import impossible, many
 
@@ -106,7 +106,9 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
     if given:
         raise ModelError(f"{given[0]} does nothing with {STEPS}; leave it out")
     if o.coordinates == "joint":
-        raise ModelError(f"{STEPS} are taken in absolute coordinates, where joints close to rounding; leave coordinates out")
+        raise ModelError(
+            f"{STEPS} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
+        )
     return Way(_by_steps(o), f"{STEPS}, as asked")
 
 
@@ -157,11 +159,11 @@ def _went_by_steps(start: Result | None) -> str:
 
 
 def unresolved(error: BaseException) -> bool:
-    """Whether a motion failed by what rigid bodies that touch leave without an answer, or without an end."""
-    return isinstance(error, Unresolved) or isinstance(error.__cause__, Unresolved)
+    """Whether a motion failed by what rigid bodies that touch leave without an answer, or an end; or by an overlap."""
+    return isinstance(error, Overlap | Unresolved) or isinstance(error.__cause__, Unresolved)
 
 
 def instead_of(error: BaseException) -> str:
     """Why steps by impulses were taken after all, for the health."""
-    found = error if isinstance(error, Unresolved) else error.__cause__
+    found = error.__cause__ if isinstance(error.__cause__, Unresolved) else error
     return f"{STEPS}, since from touch to touch it does not go: {found}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...errors import SimulationError
+from ...errors import ModelError, SimulationError
 from ...model.body import GROUND
 from ...model.touch import Touch
 
@@ -13,11 +13,15 @@ class Unresolved(SimulationError):
     """An instant at which rigid bodies have no answer, or no end of answers."""
 
 
+class Overlap(ModelError):
+    """A motion that begins with bodies in each other."""
+
+
 def jam(e: Any, t: float) -> str:
     """What is said where friction in a joint, or where bodies touch, has no force that goes with its own load."""
     if isinstance(e, Touch):
         return (
-            f"{e.title} of {_between(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes "
+            f"{e.title} of {bodies(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes "
             f"itself faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With "
             f"less friction, or contact that gives way (law=), there is a solution; steps by impulses (method='impulse') "
             f"go over it"
@@ -29,6 +33,6 @@ def jam(e: Any, t: float) -> str:
     )
 
 
-def _between(e: Touch) -> str:
+def bodies(e: Touch) -> str:
     """Both bodies of a place of contact."""
     return " and ".join(repr(b) if b != GROUND else GROUND for b in (e.body_i, e.body_j))

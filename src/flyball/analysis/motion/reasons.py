@@ -78,12 +78,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
     text = of_drivers(a, clock) or _not_finite(a, clock)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
-    text = (
-        text
-        or _locked(a, base, clock)
-        or _rivals(a, clock)
-        or _stuck(a, clock)
-    )
+    text = text or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}{after}", None
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import STOP
-from ....equations.tasks import ARRIVE
 from ....tables.system import HELD, HOLD, LOWER, MODE, UPPER
 from .instant import Instant
 

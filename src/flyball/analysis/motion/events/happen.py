@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....constraints.modes import ONE_WAY, STOP
-from ....errors import ModelError
 from ....numerics.cone.dense.problem import FOUND, NONE_FOUND
 from ....tables.system import (
     G_BACK,
@@ -28,7 +27,7 @@ from .actions import act, act_at_start
 from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shock
-from .failed import no_end, no_forces, no_impulses
+from .failed import beyond, guard_names, no_end, no_forces, no_impulses
 from .here import Here
 from .instant import DECIDED, Instant
 from .jump import Jump, jump, must_jump
@@ -98,7 +97,7 @@ def _happen(here: Here, fired: np.ndarray) -> None:
         if not len(fired) or here.stopped:
             return
     if len(fired):
-        raise no_end(here.t, [here.structure.events[int(g)].name for g in fired], ROUNDS)
+        raise no_end(here.t, guard_names(Instant(here), fired.tolist()), ROUNDS)
 
 
 def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) -> None:
@@ -118,16 +117,9 @@ def refuse_violated(n: Instant) -> None:
     """Refuse a start beyond a limit."""
     for s, kind in enumerate(n.kind.tolist()):
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
-        beyond = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else -n.rate[s] if kind == ONE_WAY else 0.0
-        if beyond > VIOLATED * n.unit[s]:
-            element = n.here.structure.switches[s].element
-            if kind == STOP:
-                said = f"its quantity is {n.x[s]:.6g} and must be within {lower:.6g} and {upper:.6g}"
-            else:
-                said = f"its rate is {n.rate[s]:.6g} and must not be negative"
-            raise (Overlap if isinstance(element, Touch) else ModelError)(
-                f"{element.title}: the motion begins beyond it: {said}; change the start or the limit"
-            )
+        past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else -n.rate[s] if kind == ONE_WAY else 0.0
+        if past > VIOLATED * n.unit[s]:
+            raise beyond(n, s)
 
 
 def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
@@ -176,7 +168,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
                 tell_modes(n, (modes, ways), before, hits)
             return
         fired, gone = np.r_[fired, new], np.r_[gone, new]
-    raise no_end(here.t, [n.name(int(n.S.guard_i[g, GUARD_OF])) for g in fired], ROUNDS)
+    raise no_end(here.t, guard_names(n, fired.tolist()), ROUNDS)
 
 
 def misled(n: Instant) -> bool:
