@@ -100,7 +100,7 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
     given = [f"{name}={getattr(o, name)!r}" for name in _given(o)]
     if unknown := _smooth(model):
         raise ModelError(
-            f"{model.name!r} has {', '.join(unknown)}, and {STEPS} do not know that: leave method out, or give "
+            f"{STEPS} do not know {', '.join(unknown)}; the adaptive integrators do: leave method out, or give "
             f"method={USUAL!r}"
         )
     if given:

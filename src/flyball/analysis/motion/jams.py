@@ -21,10 +21,9 @@ def jam(e: Any, t: float) -> str:
     """What is said where friction in a joint, or where bodies touch, has no force that goes with its own load."""
     if isinstance(e, Touch):
         return (
-            f"{e.title} of {bodies(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes "
-            f"itself faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With "
-            f"less friction, or contact that gives way (law=), there is a solution; steps by impulses (method='impulse') "
-            f"go over it"
+            f"{e.title} of {bodies(e)} jams at t = {t:.6g} s: friction there grows with the load that it makes itself "
+            f"faster than that can hold it (Painleve's paradox), so no finite force answers, or several do. With less "
+            f"friction, or contact that gives way (law=), there is a solution; steps by impulses go over it"
         )
     return (
         f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "

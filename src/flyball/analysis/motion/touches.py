@@ -10,7 +10,7 @@ from ...model.touch import Touch
 from ...tables.contact.places import Places, places
 from ...tables.numbers import numbers
 
-FEW = 48  # places; with more, a step with all their rows costs more than many steps by impulses
+FEW = 16  # places; with more, steps with all their rows cost far more than steps by impulses
 KEPT = 4  # copies of one model at other values of the parameters
 IMPULSES = "leave method out, or give method='impulse'"
 
@@ -26,7 +26,7 @@ def impossible(model: Model, parameters: Mapping[str, float] | None) -> str:
     if not (model.contacts or model.bulk):
         return ""
     p = found(model, parameters)
-    return f"{_several(p.why_not)}, which rows of constraint do not know" if p.why_not else ""
+    return f"{_several(p.why_not)}, which only steps by impulses know" if p.why_not else ""
 
 
 def many(model: Model, parameters: Mapping[str, float] | None) -> str:

@@ -9,7 +9,7 @@ from ....tables.system import HELD, HOLD, LOWER, MODE, UPPER
 from .instant import Instant
 
 SLIGHT = 1e-5  # of the mechanism's length, or of a radian: as positions are rounded in a description
-TOLD = 1e-9  # of the same: more than rounding
+TOLD = 1e-7  # of the same: worth a word
 
 
 def put_apart(n: Instant) -> None:
@@ -35,5 +35,5 @@ def put_apart(n: Instant) -> None:
     if told:
         most = max(told, key=lambda s: told[s])
         n.here.doubts.append(
-            f"the start overlaps by up to {told[most]:.2g} ({n.name(most)}), which was taken away by moving what is there"
+            f"the start overlaps by up to {told[most]:.2g} ({n.name(most)}); what is there was moved by as much"
         )

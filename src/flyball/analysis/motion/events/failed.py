@@ -64,8 +64,8 @@ def beyond(n: Instant, s: int) -> ModelError:
     unit, what = "m" if metric else "rad", quantity(n, s)
     if isinstance(e, Touch):
         return Overlap(
-            f"{e.title}: {bodies(e)} overlap at the start by {n.W.switch[LOWER, s] - n.x[s]:.6g} m; move one of them, or "
-            f"give method='impulse', which moves them apart"
+            f"{e.title}: {bodies(e)} overlap at the start by {n.W.switch[LOWER, s] - n.x[s]:.3g} m; move one of them, "
+            f"or give method='impulse', which puts them side by side"
         )
     if n.kind[s] == STOP:
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
