@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints.modes import BRANCH
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
-from ..equations.within import kept
+from ..equations.within import ROWS, kept
 from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
@@ -24,6 +24,7 @@ from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.choice import SimulateOptions, chosen, instead_of, unresolved
+from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import Engine
 from .motion.events.here import Here
@@ -78,6 +79,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     """The motion by a method that is chosen: start, end, output times."""
     started = time.perf_counter()
     t_start, _, times = span
+    announce_motion(model, not isinstance(o.method, Stepping))
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
@@ -195,9 +197,11 @@ def clock_for(
     W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
+    nothing = sampled is not None and not sampled
+    seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system, sampled))
+    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
 
 
 def _energy_size(a: Assembly, span: float) -> float:
@@ -215,7 +219,7 @@ def _energy_size(a: Assembly, span: float) -> float:
 def _width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
-    return 1 + len(a.y) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
+    return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
 
 
 def run_clock(

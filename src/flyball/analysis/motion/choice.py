@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from ...errors import ModelError
@@ -114,7 +114,7 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
 
 def _suitable(model: Model, o: SimulateOptions) -> Way:
     """The method where none is asked for."""
-    adaptive = replace(o, method=USUAL)
+    adaptive = o.known(method=USUAL)
     if not (model.contacts or model.bulk):
         return Way(adaptive)
     asking = [*_smooth(model), *(f"{name}=" for name in _given(o))]
@@ -148,7 +148,7 @@ def _given(o: SimulateOptions) -> list[str]:
 
 def _by_steps(o: SimulateOptions) -> SimulateOptions:
     method = o.method if isinstance(o.method, Stepping) else Stepping()
-    return replace(o, method=method.bounded(o.max_step))
+    return o.known(method=method.bounded(o.max_step))
 
 
 def _went_by_steps(start: Result | None) -> str:

@@ -19,7 +19,7 @@ from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
-from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
+from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
 from .actions import expressions, stepped_over
@@ -34,9 +34,8 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
-HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
+HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
-LEAST_STEPS = 100  # steps at least that the time span of a watched motion is gone through in
 
 
 class Run:
@@ -69,8 +68,6 @@ class Run:
 
     def _loop(self) -> Watched:
         c = self.here.c
-        real = self.here.clock.real  # a wide step in which nothing bends may hide what its ends do not tell
-        real[ex.H_MAX] = min(real[ex.H_MAX], self.span / LEAST_STEPS)
         return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:

@@ -11,7 +11,7 @@ from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
 from ....results.stretches import Stretch, stretched
-from ....tables.system import HELD, MODE, VALUE
+from ....tables.system import MODE, OFF, VALUE
 from .here import Here
 
 
@@ -26,7 +26,7 @@ class Segments:
         c, W = here.c, here.c.work
         n = len(here.structure.switches)
         ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
-        if any(x.switch.kind == BRANCH and W.switch[MODE, k] == HELD for k, x in enumerate(here.structure.switches)):
+        if any(x.switch.kind == BRANCH and W.switch[MODE, k] != OFF for k, x in enumerate(here.structure.switches)):
             ways = _ways(here, rows)
         self.all.append(
             Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
