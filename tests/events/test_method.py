@@ -86,7 +86,9 @@ def test_what_no_method_knows_is_refused_by_name(more):
 def test_events_by_impulses_are_refused():
     m = scene(ball())
     m.add(fb.Event("late", "t > 0.005"))
-    with pytest.raises(fb.ModelError, match=r"steps by impulses do not know Event 'late'; the adaptive(?s:.*)leave method out"):
+    with pytest.raises(
+        fb.ModelError, match=r"steps by impulses do not know Event 'late'; the adaptive(?s:.*)leave method out"
+    ):
         m.simulate(0.1, method="impulse")
 
 
