@@ -47,8 +47,9 @@ def edged(result: Result) -> Result:
     unknown = (np.full((len(at), a.shape[1]), np.nan) for a in (result.vdot, result.multipliers))
     t = np.repeat([e.t for e in edges], 2)
     arrays = (result.t, result.q, result.v, result.states, result.vdot, result.multipliers)
-    parts = (np.insert(a, at, x, axis=0) for a, x in zip(arrays, (t, q, v, z, *unknown), strict=True))
-    out = type(result)(result.model, result.values, *parts, result.health)
+    more = (t, q, v, z, *unknown)
+    t, q, v, z, vdot, lam = (np.insert(a, at, x, axis=0) for a, x in zip(arrays, more, strict=True))
+    out = type(result)(result.model, result.values, t, q, v, z, vdot, lam, result.health)
     out.wound = result.wound
     out.stretches = _longer(stretches, edges)
     out.exchanged |= booked(out)
