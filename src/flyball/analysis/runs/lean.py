@@ -30,7 +30,7 @@ from ...tables.values import Values, values
 from ..compiled import Compiled
 from ..motion.driven import leaves_no_freedom
 from ..motion.engines import LONGEST, Engine
-from ..motion.events.legs import sharp_by_time
+from ..motion.events.legs import laws_of_time
 from ..motion.impulse.settings import Stepping
 from ..motion.known import sampled_laws
 from ..motion.later import open_until_asked, solved
@@ -84,7 +84,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
     s, S = c.structure, c.values.system
     if s.switches or s.guards or s.functions or s.loads or S.glob[SEMIDEFINITE] or leaves_no_freedom(begun):
         return None
-    if sharp_by_time(S):
+    if laws_of_time(c):
         return None
     o = o.sized(begun.base.compiled.values.length)
     made, fixed = None, tuple[tuple[str, int, float], ...]()

@@ -43,6 +43,8 @@ class Here:
         What rigid bodies left open, in words, for the health.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
+    swings : dict
+        Switch -> when the last ways through its corner were (`swings`).
     counts : dict
         Event -> how often it happened so far.
     acted : dict
@@ -70,6 +72,7 @@ class Here:
     blows: list[Any] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
+    swings: dict[int, list[float]] = field(default_factory=dict)
     seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)

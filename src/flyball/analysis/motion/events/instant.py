@@ -29,6 +29,7 @@ from ....tables.system import (
     SWITCH_MEASURED,
     VALUE,
 )
+from .bounds import sizes, units
 from .here import Here
 from .holding import GONE
 
@@ -40,6 +41,7 @@ NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 MOTIONLESS = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
+FAINT = 1e-5  # of that: an acceleration that is none, whatever it is the difference of
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
@@ -86,10 +88,10 @@ class Instant:
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
         self.R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
-        self.unit = np.array([c.values.length if metric else 1.0 for metric in _metric(here)])
+        self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in units(s)]
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
-        self.inertia = np.array([mass if metric else turning for metric in _metric(here)])
+        self.inertia = np.array([mass if m else turning for m in metric])
         fall = np.linalg.norm(S.glob[:3]) / c.values.length + 1.0 / here.clock.real[SPAN] ** 2
         self.tiny = MOTIONLESS * self.unit * fall
         self.over = np.nan
@@ -179,6 +181,7 @@ class Instant:
         self.desk.y[0] = self.here.y
         given = self.S, self.W, self.R, self.desk, self.sheet
         status = int(bare_kernel(engine.address(*given), *given, B, P))
+        P.grain[:] += FAINT * self.tiny[B.which]
         for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
             P.A[i] = P.A[:, i] = 0.0
             if abs(P.b[i]) <= self.tiny[B.which[i]]:
@@ -209,10 +212,3 @@ class Instant:
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""
         return bool(self.mode[s] == HELD)
-
-
-def _metric(here: Here) -> list[bool]:
-    """Of every switch whether its quantity is a length."""
-    s, rows = here.structure, len(here.structure.rows)
-    measures = {t.row - rows: t.formula.measure for t in s.terms if t.measured}
-    return [measures.get(int(m)) == "m" for m in here.c.system.switch_i[:, SWITCH_MEASURED]]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import BRANCH
-from ....laws.breaks import Breaks, found_beforehand, margin, may_be_sharp
+from ....laws.breaks import Breaks, Timed, found_beforehand, margin, timed
 from ....numerics.integrators import clock as ex
-from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW, System
+from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
 from ...compiled import Compiled
 
 LAWS = 3  # of a force
@@ -16,23 +16,22 @@ SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
 
 def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
     """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
+    return found_beforehand(laws_of_time(c), c.system.const, t0, t1)
+
+
+def laws_of_time(c: Compiled) -> Timed:
+    """Laws that may have corners or act briefly by time alone, whatever their constants are."""
+    return c.structure.kept.get("laws of time", None, 1, lambda: _timed(c))
+
+
+def _timed(c: Compiled) -> Timed:
+    """All laws that forces, rows, guards have by time."""
     S = c.system
-    return found_beforehand(S.code.tolist(), S.const, _begins(S), t0, t1)
-
-
-def sharp_by_time(S: System) -> bool:
-    """Whether a law may have a corner or act briefly by time alone, whatever the constants are."""
-    code = S.code.tolist()
-    return any(may_be_sharp(code, at) for at in _begins(S))
-
-
-def _begins(S: System) -> list[int]:
-    """Where in the code the laws of a mechanism begin, those of guards too."""
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
     corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
     starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
-    return [int(at) for at in starts.tolist() if at >= 0]
+    return timed(S.code.tolist(), starts.tolist())
 
 
 class Legs:
