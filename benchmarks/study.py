@@ -18,10 +18,10 @@ import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
 import flyball as fb
+from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs import lean
 from flyball.analysis.runs.compute import Question
 from flyball.analysis.runs.reading import readings
-from flyball.analysis.simulate import SimulateOptions
 from mechanisms import example
 
 VARIED = {"stiffness": 0.1, "torque": 0.1, "d": 0.001}  # by how much, as part of the model's value

@@ -7,13 +7,13 @@ import pytest
 
 import flyball as fb
 from flyball import forces
+from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs.compute import Question, compute
 from flyball.analysis.runs.lean import VARIED, Lean
 from flyball.analysis.runs.readable import of_states
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.runner import runner
 from flyball.analysis.runs.soft import Filling, derived, soft
-from flyball.analysis.simulate import SimulateOptions
 from flyball.errors import ModelError
 from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure

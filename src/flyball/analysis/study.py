@@ -20,6 +20,7 @@ from ..model.words import listing, suggest
 from ..results.study import Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
+from .motion.choice import SimulateOptions
 from .motion.engines import AUTO, worth_making
 from .motion.impulse.settings import Stepping
 from .motion.options import output_times
@@ -30,7 +31,7 @@ from .runs.compute import TODO, Question
 from .runs.designs import DESIGNS, SAMPLED, points
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
-from .simulate import SimulateOptions, simulate
+from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
 USUAL = 501  # output times, where motions are looked at between their ends

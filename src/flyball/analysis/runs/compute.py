@@ -10,7 +10,8 @@ import numpy as np
 
 from ...errors import FlyballError, SimulationError
 from ...model.model import Model
-from ..simulate import SimulateOptions, simulate
+from ..motion.choice import SimulateOptions
+from ..simulate import simulate
 from .reading import CURVE, Reading, read
 
 TODO, DONE, FAILED = 0, 1, 2

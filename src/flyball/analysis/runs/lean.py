@@ -28,6 +28,7 @@ from ...special.recorder import PLAIN
 from ...tables.system import LATER, SEMIDEFINITE, System
 from ...tables.values import Values, values
 from ..compiled import Compiled
+from ..motion.choice import SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.engines import LONGEST, Engine
 from ..motion.events.legs import laws_of_time
@@ -36,7 +37,7 @@ from ..motion.known import sampled_laws
 from ..motion.later import open_until_asked, solved
 from ..motion.reasons import remarks
 from ..motion.start import Start, begin, start_time
-from ..simulate import SimulateOptions, chosen, clock_for
+from ..simulate import clock_for
 from .compute import DONE, Answers, Question, alone
 from .readable import of_states
 from .reading import FUNCTION, read, reduced
@@ -76,7 +77,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
         return None
     if any(r.how == FUNCTION for r in question.asked):
         return None
-    o = chosen(model, question.at(point))
+    o = chosen(model, question.at(point)).options
     if isinstance(o.method, Stepping) or o.stabilization != "projection":
         return None
     begun = begin(model, start_time(o.t_start, None), o.parameters, None, o.coordinates, switches=True)
