@@ -192,7 +192,8 @@ def test_what_hinges_carry_in_a_sudden_stop(coordinates):
     """Momentum of the second rod goes through its hinge, that of both through the first one's: the stop is a couple."""
     m = rows(turning(1.5, -0.5), Row("stop", of=("A.angle",), kind=STOP, par=(-np.inf, 0.0)))
     run = m.simulate(0.01, outputs=2, coordinates=coordinates)
-    (hit,) = run.events.of("impact")
+    hit, *touched = run.events.of("impact")  # the rods in line press on the stop only once they bend
+    assert sum(e.lost for e in touched) < 1e-15
     second = -0.5 + 0.75 * 3.0 - 2.5
     np.testing.assert_allclose(hit.impulses["B"], [0, second, 0, 0, 0, 0], atol=1e-12)
     np.testing.assert_allclose(hit.impulses["A"], [0, second - 1.5, 0, 0, 0, 0], atol=1e-12)

@@ -112,7 +112,7 @@ def test_a_door_with_its_tuples_bound_to_it():
         expected, lam = clock.K.copy(), W.row[LAM].copy()
         clock.K[:], W.row[:], W.vel[:] = 0.0, 0.0, 0.0
         assert bound(MOTION) == status
-        assert (clock.K == expected).all() and (W.row[LAM] == lam).all()
+        assert (expected == clock.K).all() and (W.row[LAM] == lam).all()
 
 
 def test_a_door_is_bound_to_its_kind_of_tuples_only():

@@ -43,7 +43,7 @@ from .tasks import MOTION, SOLVE
 IMPULSES, TRIED = range(2)  # entries of Bench.asks: what x is; how often it was solved
 FORCES, BLOWS, OF_A_STEP = range(3)  # what x is: forces, impulses in no time, or those of a short step of time
 TRIES = 60
-SETTLED = 1e-13  # of the largest impulse
+SETTLED = 1e-13  # of the largest impulse, or of that which would stop what moves
 NUDGE = 1e-6  # part of an impulse that tells how loads follow it
 GRAIN = 1e-13  # of the terms of a quantity's acceleration: their rounding
 BEYOND = 1e30  # more than anything carries
@@ -244,11 +244,13 @@ def balanced(S, W, t, B, P):
         settle(P)
         if not follows or P.info[ENDED] != FOUND:
             return
-        change, size = 0.0, 0.0
+        change, size, least = 0.0, 0.0, 0.0
         for i in range(n):
             s = root(P, i)
-            change, size = max(change, s * magnitude(P.x[i] - B.seen[i])), max(size, s * magnitude(P.x[i]))
-        if change <= SETTLED * size:
+            least = max(least, P.grain[i] / s)
+            change = max(change, s * magnitude(P.x[i] - B.seen[i]))
+            size = max(size, s * magnitude(P.x[i]), magnitude(P.b[i]) / s)
+        if change <= SETTLED * size + least:
             return
     P.info[ENDED] = NONE_FOUND
 

@@ -22,6 +22,7 @@ from ....tables.system import (
     UPPER,
 )
 from .actions import act, act_at_start
+from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shock
 from .failed import beyond, guard_names, no_end, no_forces, no_impulses
@@ -32,9 +33,11 @@ from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
 from .sides import pressed, teeth, turned
+from .slips import stop_slips
 from .told import tell_jump, tell_modes
 
 ROUNDS = 100
+AGAIN = 5  # times that ways of sliding are decided again for the same modes
 RATES = (G_SLIDES, G_BACK, G_TURNS)  # guards of rates
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
@@ -55,6 +58,7 @@ def begin(here: Here) -> None:
         corners.begin()
         n.look()
         n.restored()
+        put_apart(n)
         refuse_violated(n)
         settled(n, corners, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
@@ -123,8 +127,10 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     hits: dict[int, bool] = {}
     calm: list[int] = []
     gone: list[int] = []  # guards of what was held and could not hold
+    again = 0
     for _ in range(ROUNDS):
         n.look()
+        stop_slips(n, fired)
         still = at_rest(n, fired)
         still[calm] = True
         teeth(n, still)
@@ -150,13 +156,24 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
-        new = [g for g in broken(n, found) if g not in gone]
+        guards = n.guards()
+        if again < AGAIN and misled(n, guards):
+            n.look_again()
+            again += 1
+            continue
+        new = [g for g in broken(n, found, guards) if g not in gone]
         if not new:
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return
         fired, gone = np.array([*fired, *new], np.int64), [*gone, *new]
     raise no_end(here.t, guard_names(n, fired.tolist()), ROUNDS)
+
+
+def misled(n: Instant, guards: np.ndarray) -> bool:
+    """Whether something slides against its way: where bounces are cut off, what they were changes other rates too."""
+    sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_TURNS))
+    return any(guards[g] < -n.still[s] for g, s in sliding)
 
 
 def unmoved(n: Instant, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:
@@ -209,11 +226,10 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
     return blow
 
 
-def broken(n: Instant, found: Decided) -> list[int]:
+def broken(n: Instant, found: Decided, guards: np.ndarray) -> list[int]:
     """Guards of what holds that say that it cannot, beyond rounding."""
-    g = n.guards()
     return [
         k
         for k, (kind, s, _) in enumerate(n.guarded)
-        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
+        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and guards[k] < -BROKEN * found.sizes[s]
     ]

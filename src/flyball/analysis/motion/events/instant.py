@@ -40,6 +40,7 @@ NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
 STOPS = (STOP, RATCHET)  # kinds that keep their quantity within bounds
 MOTIONLESS = 1e-9  # of how gravity accelerates: what nothing moves and has no more than that stands still
+FAINT = 1e-5  # of that: an acceleration that is none, whatever it is the difference of
 DECIDED = (*STOPS, FRICTION, ONE_WAY, LOCK, SLIP)  # kinds whose modes follow from the small problem
 
 
@@ -207,6 +208,7 @@ class Instant:
         self.slide(parts)
         self.put()
         status = room.do(BARE)
+        P.grain[:] += FAINT * self.tiny[B.which]
         for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
             P.A[i] = P.A[:, i] = 0.0
             if abs(P.b[i]) <= self.tiny[B.which[i]]:

@@ -36,7 +36,6 @@ PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
 HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
-LEAST_STEPS = 100  # steps at least that the time span of a watched motion is gone through in
 
 
 class Run:
@@ -69,8 +68,6 @@ class Run:
 
     def _loop(self) -> Watched:
         c = self.here.c
-        real = self.here.clock.real  # a wide step in which nothing bends may hide what its ends do not tell
-        real[ex.H_MAX] = min(real[ex.H_MAX], self.span / LEAST_STEPS)
         return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:

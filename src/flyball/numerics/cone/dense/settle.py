@@ -38,7 +38,7 @@ from .problem import (
 )
 from .sets import exchanged, reaching, rounding, scaled, solved, velocity
 
-NOT_EVEN = 1e-6  # of the largest velocity: what holds and is left with more cannot hold
+NOT_EVEN = 1e-6  # of the largest velocity that there would be: what holds and is left with more cannot hold
 ALIGNED = 1e-13
 TRIES = 60  # of the ways of pairs
 
@@ -80,11 +80,22 @@ def found(P):
             P.state[i], P.row[REST, i] = FREE, 0.0
     most = 0.0
     for i in range(n):
-        most = max(most, abs(P.row[BIAS, i]))
+        most = max(most, driving(P, P.row[REST], i))
     for i in range(n):
-        if P.state[i] == EVEN and abs(velocity(P, P.row[REST], i)) > NOT_EVEN * most:
+        least = NOT_EVEN * most + P.grain[i] / P.row[SCALE, i]
+        if P.state[i] == EVEN and abs(velocity(P, P.row[REST], i)) > least:
             return NOT_HELD
     return FOUND
+
+
+@formula
+def driving(P, x, i):
+    """How large the terms of row i are together, without impulses of what holds: where it cannot these say nothing."""
+    size = abs(P.row[BIAS, i])
+    for j in range(x.shape[0]):
+        if P.state[j] != EVEN:
+            size += abs(P.N[i, j] * x[j])
+    return size
 
 
 @formula
