@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from ..constraints.modes import BRANCH
+from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import ROWS, kept
@@ -39,6 +39,7 @@ from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
 from .motion.touches import with_places
 from .progress import Tell, shown
+from .watched import remark_friction
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
 UNMADE = {"partitioning": "partitioning chooses coordinates on the way, which made code does not know"}
@@ -85,7 +86,8 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
-    if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
+    slides = _no_stops(begun) and leaves_no_freedom(begun)  # what drivers prescribe follows no force
+    if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
@@ -95,7 +97,10 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
-        return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
+        result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
+    if slides:
+        remark_friction(result)
+    return result
 
 
 def moved(
@@ -139,10 +144,10 @@ def moved(
     return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
 
 
-def _corners_only(begun: Start) -> bool:
-    """Whether nothing is watched but corners of laws."""
+def _no_stops(begun: Start) -> bool:
+    """Whether nothing is watched but corners of laws and friction."""
     s = begun.assembly.compiled.structure
-    return bool(s.switches) and not s.model.events and all(x.switch.kind == BRANCH for x in s.switches)
+    return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
 
 
 def watched(begun: Start) -> bool:

@@ -26,7 +26,7 @@ from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
 from .happen import begin, happen
 from .here import Here
-from .instant import Instant
+from .instant import instant_of
 from .legs import Legs, breaks
 from .segments import Segments
 
@@ -159,7 +159,7 @@ class Run:
         self.recent.append(here.t)
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
-            raise endless(Instant(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+            raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
         self.happens(fired)
 
     def happens(self, fired: Sequence[int]) -> None:
@@ -184,7 +184,7 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
-        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
