@@ -29,9 +29,10 @@ def test_stop_ends_the_motion_with_success(layer):
     m.add(fb.Initial("A.displacement", rate=3.0), fb.Event("there", "A.displacement > 1.5", do=fb.Stop()))
     r = m.simulate(2, outputs=21, coordinates=layer)
     assert r.health.success
-    assert r.health.message == "event 'there' ended the motion at t = 0.5 s"
-    assert r.health.status == "done"
-    assert dict(r.health.lines())["status"] == f"done: {r.health.message}"
+    assert r.health.message == "ended at 0.5 s by event 'there' (asked: 2 s)"
+    assert r.health.status == dict(r.health.lines())["status"] == r.health.message
+    assert r.health.ended_early
+    assert "ended at 0.5 s by event 'there' (asked: 2 s)" in repr(r)
     assert r.t[-1] == pytest.approx(0.5, abs=1e-12)
     assert r["A.displacement"][-1] == pytest.approx(1.5, abs=1e-12)
     assert [(h.name, h.kind, h.done) for h in r.events] == [("there", "event", ("ended the motion",))]
@@ -332,7 +333,7 @@ def test_a_driver_whose_speed_jumps(layer):
 def test_steps_by_impulses_know_none():
     m = slide()
     m.add(fb.Event("e", "t - 0.5"))
-    with pytest.raises(fb.ModelError, match="'slide' has Event 'e', and steps by impulses know no events"):
+    with pytest.raises(fb.ModelError, match="steps by impulses do not know Event 'e'; the adaptive"):
         m.simulate(1, method="impulse")
 
 

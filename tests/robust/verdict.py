@@ -13,6 +13,7 @@ import flyball as fb
 from flyball.results.doubts import energy_moved
 from flyball.results.result import Result
 
+from .bounds import against
 from .families import Case
 from .holding import misheld
 
@@ -91,7 +92,7 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if not all(np.isfinite(x).all() for x in (r.q, r.v, r.vdot, r.multipliers, r.states)):
         return Verdict("broken", "the result is not finite")
     str(r.health)
-    if wrong := misheld(r, case.mechanism):
+    if wrong := against(r) or misheld(r, case.mechanism):
         return Verdict("broken", wrong)
     lost = r.exchanged.get("impact_loss", np.zeros(1))
     if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):

@@ -16,6 +16,7 @@ from ....model.element import LawOf
 from ....model.event import Event
 from ....model.event_check import coordinate_of
 from ....model.held import held_by
+from ....numerics.integrators.clock import SPAN
 from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
 from ....tables.values import Values
@@ -260,7 +261,8 @@ def _noted(here: Here, found: Found) -> Done:
 
 def _stopped(here: Here, found: Found) -> Done:
     names = " and ".join(repr(e.name) for e, _, _ in found)
-    here.stopped = f"event {names} ended the motion at t = {here.t:.6g} s"
+    asked = here.start.base.t + here.clock.real[SPAN]
+    here.stopped = f"ended at {here.t:.6g} s by event {names} (asked: {asked:.6g} s)"
     return [(e, "ended the motion") for e, _, _ in found]
 
 

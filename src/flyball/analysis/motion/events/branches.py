@@ -24,8 +24,6 @@ from ....results.events import Happening
 from ....tables.system import (
     DRIFT_OFF,
     G_CORNER,
-    GUARD_KIND,
-    GUARD_OF,
     HELD,
     INVERSE_SLOPES,
     MODE,
@@ -74,7 +72,7 @@ class Corners:
 
     def __init__(self, n: Instant) -> None:
         self.n = n
-        self.all = np.flatnonzero(n.kind == BRANCH)
+        self.all = np.array(n.of(BRANCH), np.int64)
         self.at: set[int] = set()
         self.old = n.W.switch[MODE].copy()
         self.sides = n.ways().copy()
@@ -85,6 +83,9 @@ class Corners:
         self.n.ask(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
+            if self.n.W.switch[MODE, s] != OFF and abs(u) <= KEPT * max(least, seen(self.n, s).grain):
+                self.at.add(s)  # it goes on
+                continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
             if abs(u) <= least:
                 self.at.add(s)
@@ -92,8 +93,7 @@ class Corners:
 
     def fired(self, guards: np.ndarray) -> None:
         """Take note of guards that fired."""
-        rows = self.n.S.guard_i[guards]
-        self.at |= set(rows[rows[:, GUARD_KIND] == G_CORNER, GUARD_OF].tolist())
+        self.at |= self.n.fired(guards, G_CORNER)
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""

@@ -26,7 +26,7 @@ from .actions import expressions, stepped_over
 from .failed import endless
 from .happen import begin, happen
 from .here import Here
-from .instant import Instant
+from .instant import instant_of
 from .legs import Legs, breaks
 from .segments import Segments
 
@@ -159,7 +159,7 @@ class Run:
         self.recent.append(here.t)
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
-            raise endless(Instant(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+            raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
         guards = here.c.system.guard_i
         if self.loop is not None and self.loop.desk.count[AWAY]:
             here.crept = frozenset(int(guards[g, GUARD_OF]) for g in fired if guards[g, GUARD_KIND] in DISTANCES)
@@ -190,7 +190,7 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
-        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         near = REACHED * max(1.0, here.c.values.length)
         at = (np.abs(values) <= near) & np.isin(kinds, (*DISTANCES, G_BACK))
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)
