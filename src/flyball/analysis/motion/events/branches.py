@@ -18,7 +18,6 @@ from ....equations.surfaces import drifts
 from ....equations.tasks import MOTION
 from ....errors import SimulationError
 from ....laws.opcodes import BY_MOTION, BY_TIME
-from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
@@ -259,7 +258,7 @@ class Corners:
         if back:
             t = n.here.t
             raise SimulationError(
-                f"at t = {t:.9g} s corners of {listing(list(dict.fromkeys(n.name(s) for s in back)))} meet where their "
+                f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet where their "
                 f"laws push back from every side: how the motion goes on along several such corners, of which one is a "
                 f"rate of another, is not known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x)",
                 t=t,

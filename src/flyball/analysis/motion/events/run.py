@@ -22,7 +22,7 @@ from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES,
 from ....tables.system import G_BACK, G_CONE, G_CORNER, G_HOLDS, G_LOWER, G_PULL, G_UPPER, GUARD_KIND, GUARD_OF
 from ...progress import Tell
 from ..engines import Engine
-from .actions import expressions, stepped_over
+from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
 from .happen import begin, happen
 from .here import Here
@@ -86,6 +86,7 @@ class Run:
                     break
             if here.stopped:
                 self.stop()
+            say_never(here, self.true)
         except KeyboardInterrupt:
             here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
@@ -127,6 +128,7 @@ class Run:
     def begin(self) -> None:
         """What happens as the motion begins."""
         begin(self.here)
+        self.true = true_already(self.here)
         self.here.fresh = False
 
     def integrate(self) -> None:
