@@ -32,6 +32,8 @@ from .motion.engines import Engine, check_specialize
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
+from .motion.implicit.loop import Implicit, run_implicit
+from .motion.implicit.suited import IMPLICIT, explicit, refuse_idle, suited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -40,6 +42,7 @@ from .motion.options import STABILIZATION, Integration, output_times, refuse_unh
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
 from .motion.touches import with_places
+from .options import positive, seconds
 from .progress import Tell, shown
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
@@ -64,15 +67,23 @@ class SimulateOptions(Integration):
     parameters: Mapping[str, float] | None
     start: Result | None
     specialize: bool | str
+    step: float | None
     progress: bool | Callable[[float], None]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_specialize(self.specialize)
+        if self.step is not None:
+            object.__setattr__(self, "step", seconds(self.step, "step"))
+            positive(self.step, "step")
+            if self.method not in IMPLICIT:
+                raise ModelError(f"step is a fixed step of method={IMPLICIT[0]!r}; with {self.method!r} it does nothing")
+        if self.method in IMPLICIT:
+            refuse_idle(self)
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""
-        if not isinstance(self.method, Stepping) and self.method not in (AUTO, IMPULSE):
+        if not isinstance(self.method, Stepping) and self.method not in (AUTO, IMPULSE, *IMPLICIT):
             super().check_method()
 
 
@@ -96,11 +107,15 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
+    if o.method in IMPLICIT and not leaves_no_freedom(begun):
+        begun = suited(begun, o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
-    begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
+    begun.engine = Engine(
+        begun.assembly.compiled, o.specialize and o.method not in IMPLICIT, UNMADE.get(o.stabilization, "")
+    )
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -170,10 +185,14 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if watched(begun) or len(known.times):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and o.method in IMPLICIT:
+        loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
+        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
+        here.failed = loop.failed
+    elif watched(begun) or len(known.times):
+        rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
@@ -242,7 +261,7 @@ def clock_for(
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
-    K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
+    K = np.zeros((len(tableau(explicit(o.method)).c) + 1, len(y)))
     return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), kept(a.compiled.values.system, sampled))
 
 
