@@ -77,7 +77,9 @@ class SimulateOptions(Integration):
             object.__setattr__(self, "step", seconds(self.step, "step"))
             positive(self.step, "step")
             if self.method not in IMPLICIT:
-                raise ModelError(f"step is a fixed step of method={IMPLICIT[0]!r}; with {self.method!r} it does nothing")
+                raise ModelError(
+                    f"step is a fixed step of method={IMPLICIT[0]!r}; with {self.method!r} it does nothing"
+                )
         if self.method in IMPLICIT:
             refuse_idle(self)
 

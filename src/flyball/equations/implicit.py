@@ -1,7 +1,7 @@
 """A motion by an implicit integrator: what it asks of the equations, through the doors of engine and residuals.
 
-Stages are asked of the engine's own residual, Jacobians of the same formulas by complex steps (``residual.py``); ends of
-steps and rows of output are the engine's, projected and solved as everywhere.
+Stages are asked of the engine's own residual, Jacobians of the same formulas by complex steps (``residual.py``); ends
+of steps and rows of output are the engine's, projected and solved as everywhere.
 """
 
 from __future__ import annotations

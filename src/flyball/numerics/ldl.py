@@ -74,9 +74,7 @@ def ldl_solve(P, L, D, x):
         x[k] = v
 
 
-def analyse(
-    n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None = None
-) -> tuple[Pattern, np.ndarray]:
+def analyse(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None = None) -> tuple[Pattern, np.ndarray]:
     """Order of elimination and pattern of L for a symmetric matrix with entries (i, j).
 
     Parameters

@@ -74,9 +74,10 @@ class Implicit:
         if not step or self.clock.count[ex.STATUS] != ex.STUCK:
             return None
         return SimulationError(
-            f"at t = {t:.6g} s the equations of a step of {step:g} s have no solution that Newton's method finds; give a "
-            f"shorter step, or leave it out", t=t,
-        )  # fmt: skip
+            f"at t = {t:.6g} s the equations of a step of {step:g} s have no solution that Newton's method finds; give "
+            f"a shorter step, or leave it out",
+            t=t,
+        )
 
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
         x = self.layout

@@ -40,8 +40,8 @@ def refuse_idle(o: Any) -> None:
 def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> Start:
     """The start in coordinates that implicit integrators are good at.
 
-    Joint coordinates have full matrices, and drivers' coordinates prescribed; so large mechanisms, and those with drivers,
-    go to absolute ones.
+    In joint coordinates matrices are full, and drivers prescribe coordinates; so large mechanisms, and those with
+    drivers, go to absolute ones.
 
     Raises
     ------

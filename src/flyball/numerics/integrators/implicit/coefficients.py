@@ -49,4 +49,4 @@ UNSURE = tuple(
     float(x)
     for x in np.linalg.solve(np.vander(_NODES, increasing=True).T, 1.0 / np.arange(1.0, 5.0)) - np.r_[0.0, _A[2]]
 )
-"""Weights of the integral over a step by its begin and the stages, less those by the stages: what integrals are unsure of."""
+"""Weights of an integral over the step by its begin and the stages, less those by the stages: how unsure it is."""

@@ -15,12 +15,13 @@ import numpy as np
 
 from ...ldl import Pattern
 
-# entries of Desk.count: what was done (iterations of all stages together last); whether the Jacobian is that of the present state; whether a polynomial of the
-# step before is there; steps of refinement of each linear solve; iterations that a step takes at least
+# entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
+# whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
+# iterations of all stages together
 ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, COUNTS = range(9)
-# entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its rate; width and width before
-# for which is factored; width and error of the step before; fixed width or 0; regularisation; size of corrections that are
-# taken for rounding where they do not fall any more
+# entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
+# width that is factored for; width and error of the step before; fixed width or 0; regularisation; size of corrections
+# that are taken for rounding where they do not fall any more
 RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, STEP, SOFT, ROUGH, REALS = range(12)
 START = 3  # row of the state at which a step begins, and of the error estimate
 
@@ -28,7 +29,7 @@ START = 3  # row of the state at which a step begins, and of the error estimate
 class Desk(NamedTuple):
     """Scratch and tables of one run."""
 
-    count: np.ndarray  # (COUNTS,)
+    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
     real: np.ndarray  # (REALS,)
     d: np.ndarray  # (4, nv): increments at the stages; last: of the estimate
     v: np.ndarray  # (4, nv)

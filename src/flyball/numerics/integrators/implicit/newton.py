@@ -10,7 +10,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
-from .coefficients import ALPHA, BETA, GAMMA, T, T_INVERSE
+from .coefficients import ALPHA, BETA, GAMMA, T_INVERSE, T
 from .desk import FACTORS, REFINE, START, WIDTH
 
 TI0, TI1, TI2 = T_INVERSE

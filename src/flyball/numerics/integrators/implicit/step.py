@@ -9,7 +9,7 @@ from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, LOOSER, NOW, SCALE, T
 from ..clock import RTOL as CLOCK_RTOL
-from .coefficients import C, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, UNSURE, A
+from .coefficients import ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, UNSURE, A, C
 from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, START, THETA
 from .newton import correct, solve_real
 
@@ -218,16 +218,21 @@ def unsure(K, c, h):
     s = 0.0
     for n in range(c.accounts.shape[0]):
         i = c.accounts[n] - at
-        e = UNSURE[0] * K.rate[START, i] + UNSURE[1] * K.rate[0, i] + UNSURE[2] * K.rate[1, i] + UNSURE[3] * K.rate[2, i]
+        e = (
+            UNSURE[0] * K.rate[START, i]
+            + UNSURE[1] * K.rate[0, i]
+            + UNSURE[2] * K.rate[1, i]
+            + UNSURE[3] * K.rate[2, i]
+        )
         s += e * e
     return h * sqrt(s / max(c.accounts.shape[0], 1)) / (LOOSER * c.real[CLOCK_RTOL] * size + 1e-300)
 
 
 @formula
 def defect(residual, S, K, c, h, x):
-    """Error that what the polynomial misses of the equations at t + x h would make if it lasted, in units of the tolerance.
+    """Error that what the polynomial misses of the equations at t + x h would make if it lasted for the step.
 
-    Not finite if they cannot be evaluated there.
+    In units of the tolerance; huge if they cannot be evaluated there.
     """
     nv = K.v.shape[1]
     for i in range(nv):

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
-from ..clock import T
 from ...lu import lu_factor, lu_solve, times
+from ..clock import T
 from .coefficients import GAMMA, INVERSE, C
 from .desk import NEWTON, ROUGH, WHOLE
 from .step import STAGES, account, rates
