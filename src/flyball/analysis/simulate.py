@@ -28,7 +28,7 @@ from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import AUTO as EITHER
-from .motion.engines import Engine, check_specialize
+from .motion.engines import TABLES, Engine, check_specialize
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
@@ -115,9 +115,10 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
-    begun.engine = Engine(
-        begun.assembly.compiled, o.specialize and o.method not in IMPLICIT, UNMADE.get(o.stabilization, "")
-    )
+    made = False if o.method in IMPLICIT else o.specialize
+    begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
+    if o.method in IMPLICIT:
+        begun.engine.told = f"{TABLES}: {IMPLICIT[0]} goes through the tables"
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)

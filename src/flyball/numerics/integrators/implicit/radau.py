@@ -2,7 +2,7 @@
 
 Knows nothing of mechanisms: it is given ``residual`` (see `step`); ``linearise(t, k, S, K, c)``, which fills row k of
 the numbers of the Jacobian at stage k, or where the step begins; ``compose(y, d, v, z, out, S)``, which makes a state
-of increments; and ``arrive`` (which leaves the multipliers in ``K.found``), ``inspect`` and ``report`` as explicit loops
+of increments; ``arrive`` (which leaves the multipliers in ``K.found``), ``inspect`` and ``report`` as explicit loops
 are. It returns and goes on as these do. Step control after Hairer and Wanner, *Solving Ordinary Differential Equations
 II* (1996), section IV.8, with Gustafsson's predictive control.
 """
