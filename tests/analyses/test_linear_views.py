@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis.motion import compiling as motion
 from flyball.cli import compiling
+from flyball.compiler import notice
 from flyball.view.frequencies import frequencies, phase
 from flyball.view.linear import _ratio
 from tests.analyses.classical import bicycle, stand
@@ -255,13 +258,42 @@ def test_what_falls_for_ever_has_no_equilibrium(here: Path) -> None:
 
 
 def test_each_kernel_has_its_notice(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setattr(compiling.sys.stderr, "isatty", lambda: True, raising=False)
-    monkeypatch.setattr(compiling, "_will_compile", lambda name: name == "residual_kernel")
-    compiling.announce_compiling(True, "motion_kernel", "residual_kernel")
-    assert "derivatives" in capsys.readouterr().err
-    compiling.announce_compiling(True)
-    compiling.announce_compiling(False, "residual_kernel")
+    """Whatever stderr is; a person who waits must know what for."""
+    monkeypatch.setattr(compiling, "_derivatives_will", lambda: True)
+    with warnings.catch_warnings():
+        compiling.announce_compiling(True, "motion_kernel", "residual_kernel")
+        assert "derivatives" in capsys.readouterr().err
+        compiling.announce_compiling(False, "residual_kernel")
     assert capsys.readouterr().err == ""
+
+
+class Cold:
+    """Code that was never compiled."""
+
+    cold = True
+
+
+def test_a_first_motion_says_what_it_compiles(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
+    """Each once; what looks for events only where there are some; on a command line as plain lines."""
+    m = fb.Mechanism("p", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1))
+    for name in ("ENGINE", "EVENTS"):
+        monkeypatch.setattr(motion, name, getattr(motion, name)._replace(code=(Cold(),)))
+    monkeypatch.setattr(notice, "_said", set())
+    with pytest.warns(fb.PerformanceNotice, match=r"^compiling for this machine, once: the equations of motion, about"):
+        m.simulate(0.1, outputs=2)
+    m.add(fb.Event("half", "t - 0.05"))
+    with pytest.warns(fb.PerformanceNotice, match=r"once: what finds events and decides what happens there, about"):
+        m.simulate(0.1, outputs=2)
+    notice.forget()
+    with warnings.catch_warnings():
+        compiling.announce_compiling(True)
+        m.simulate(0.1, outputs=2)
+    said = capsys.readouterr().err.splitlines()
+    assert [line.split(", about")[0].split("once: ")[1] for line in said] == [
+        "the equations of motion",
+        "what finds events and decides what happens there",
+    ]
 
 
 def test_a_linear_model_has_a_plot(tmp_path) -> None:

@@ -65,12 +65,45 @@ def test_an_instant_with_friction_under_its_own_reactions():
     assert found.derivatives[0, 1, 0] == pytest.approx(-0.5 * expected, rel=1e-6)
 
 
-def test_friction_under_reactions_that_nobody_knows_is_refused():
+def coaxial(**friction) -> fb.Mechanism:
     """Two coaxial bearings, each with all its rows: how they share the load is not determined."""
     m = fb.Mechanism("shaft", gravity=(0, 0, -G))
     m.add(fb.Body("shaft", mass=2, inertia=(0.1, 0.1, 0.1), position=(0.5, 0, 0), angular_velocity=(10, 0, 0)))
     for name, x in (("left", 0.0), ("right", 1.0)):
         m.add(fb.Revolute(name, "ground", "shaft", at=(x, 0, 0), axis=(1, 0, 0)))
-    m.add(fb.JointFriction("bearing", joint="left", static=0.2, radius=0.05, bending_length=0.1))
+    m.add(fb.JointFriction("bearing", joint="left", static=0.2, radius=0.05, bending_length=0.1, **friction))
+    return m
+
+
+def test_friction_under_reactions_that_nobody_knows_is_refused():
+    """Whether it is a plain force, or slides at the end of a motion."""
     with pytest.raises(fb.ModelError, match=r"friction of bearing depends on reactions that redundant"):
-        m.linearize(frozen=True)
+        coaxial(stick_speed=0.01).linearize(frozen=True)
+    m = coaxial()
+    with pytest.raises(fb.ModelError, match=r"friction of bearing depends on reactions that redundant"):
+        m.linearize(about=m.simulate(0.01, outputs=2), frozen=True)
+
+
+def test_friction_in_motion_is_asked_about_a_motion():
+    """Where a mechanism is described in motion nobody says what sticks: a motion does."""
+    said = r"linearize with JointFriction 'bearing' is about rest, and 'shaft' moves: .*about=m.simulate"
+    with pytest.raises(fb.ModelError, match=said):
+        coaxial().linearize(frozen=True)
+
+
+def test_about_a_motion_what_slides_goes_on_sliding():
+    """Friction of one size does not bend the motion: a mass on a spring, sqrt(k / m), and what it gives is its sign's."""
+    m = fb.Mechanism("sled", planar=True, gravity=(0, -G))
+    m.add(fb.Body("sled", mass=2, inertia=1, velocity=(1, 0)))
+    m.add(fb.Prismatic("slide", "ground", "sled", at=(0, 0), axis=(1, 0)))
+    m.add(
+        fb.JointFriction("rub", joint="slide", static=0.1),
+        fb.CoordinateSpring("spring", "slide.displacement", stiffness=8),
+    )
+    m.add(fb.PointForce("load", "sled", force=("0", "0")))
+    run = m.simulate(0.1, outputs=2)
+    assert m.modes(about=run, frozen=True).omega == pytest.approx([2.0], rel=1e-9)
+    found = m.linearize(["load.x", "load.y"], ["sled.x", "sled.vx"], about=run, frozen=True)
+    assert "taken to slide on" in " ".join(found.notes)
+    assert found.B[-1] == pytest.approx([0.5, 0.1 / 2], abs=1e-12)  # lifting takes mu F off the friction
+    assert np.linalg.eigvals(found.A).imag.max() == pytest.approx(2.0, rel=1e-9)

@@ -142,6 +142,7 @@ def test_a_sound_law_leaves_no_remark():
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        warnings.simplefilter("ignore", fb.PerformanceNotice)
         assert cart(A=law).simulate(1.0).health.warnings == ()
 
 

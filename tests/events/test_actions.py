@@ -29,9 +29,10 @@ def test_stop_ends_the_motion_with_success(layer):
     m.add(fb.Initial("A.displacement", rate=3.0), fb.Event("there", "A.displacement > 1.5", do=fb.Stop()))
     r = m.simulate(2, outputs=21, coordinates=layer)
     assert r.health.success
-    assert r.health.message == "event 'there' ended the motion at t = 0.5 s"
-    assert r.health.status == "done"
-    assert dict(r.health.lines())["status"] == f"done: {r.health.message}"
+    assert r.health.message == "ended at 0.5 s by event 'there' (asked: 2 s)"
+    assert r.health.status == dict(r.health.lines())["status"] == r.health.message
+    assert r.health.ended_early
+    assert "ended at 0.5 s by event 'there' (asked: 2 s)" in repr(r)
     assert r.t[-1] == pytest.approx(0.5, abs=1e-12)
     assert r["A.displacement"][-1] == pytest.approx(1.5, abs=1e-12)
     assert [(h.name, h.kind, h.done) for h in r.events] == [("there", "event", ("ended the motion",))]
@@ -332,7 +333,7 @@ def test_a_driver_whose_speed_jumps(layer):
 def test_steps_by_impulses_know_none():
     m = slide()
     m.add(fb.Event("e", "t - 0.5"))
-    with pytest.raises(fb.ModelError, match="'slide' has Event 'e', and steps by impulses know no events"):
+    with pytest.raises(fb.ModelError, match="steps by impulses do not know Event 'e'; the adaptive"):
         m.simulate(1, method="impulse")
 
 
@@ -361,3 +362,14 @@ def test_without_parameters_results_are_saved_too(layer, tmp_path):
         assert (a.t, a.name, a.kind, a.done, a.lost) == (b.t, b.name, b.kind, b.done, b.lost)
     assert again.events["hold"][0].lost == pytest.approx(9.81 * 0.5, abs=1e-6)
     assert again["A.torque"] == pytest.approx(r["A.torque"], abs=1e-9)
+
+
+def test_events_that_come_ever_closer_are_named(monkeypatch):
+    from flyball.analysis.motion.events import run
+
+    monkeypatch.setattr(run, "ENDLESS", 30)
+    monkeypatch.setattr(run, "AT_ONCE", 1e-3)
+    m = slide()
+    m.add(fb.Event("ever faster", "sin(1/(0.3 - t))"))
+    with pytest.raises(fb.SimulationError, match=r"without end \(30 within .* s\): Event 'ever faster'"):
+        m.simulate(0.3)

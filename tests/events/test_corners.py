@@ -162,13 +162,51 @@ def test_drag_by_the_square_is_no_corner():
     assert not r.health.events
 
 
-@pytest.mark.parametrize("start", [1.0, 0.0])
-def test_corners_of_which_one_is_the_rate_of_another_are_refused_where_they_meet(start):
-    """From x = 1 each swing is half as long as the last, until t = 3 / (1 - sqrt(1/2)) / 2, where all should rest."""
-    m = fb.Mechanism("twisting", planar=True)
-    m.add(fb.Body("block", mass=1.0, inertia=0.1, position=(start, 0)))
-    m.add(fb.Translational("rail", "ground", "block", at=(0, 0), axis=(1, 0), displacement=start))
-    m.add(fb.Actuator("pull", "rail.displacement", force="-3*sign(value) - sign(rate)"))
-    with pytest.raises(fb.SimulationError, match="meet where their laws push back from every side") as error:
-        m.simulate(6.0, rtol=1e-10, atol=1e-12)
-    assert error.value.t == pytest.approx(1.5 * start / (1 - np.sqrt(0.5)), abs=1e-6)
+TWISTING = "-3*sign(value) - sign(rate)"
+SHORTER = np.sqrt((3 - 1) / (3 + 1))  # ratio of speeds from one way through x = 0 to the next
+
+
+@pytest.mark.parametrize("rate", [0.5, -2.0])
+def test_swings_that_come_ever_faster_end_on_two_corners(rate):
+    """The twisting algorithm: a swing at speed w lasts w/4 out and w/sqrt(8) back; then x and v are zero for good."""
+    r, x, v = moved(cart(TWISTING, velocity=(rate, 0)), 6.0, outputs=61)
+    end = abs(rate) * (1 / 4 + 1 / np.sqrt(8)) / (1 - SHORTER)
+    assert [e.kind for e in r.events] == ["hold", "hold"]
+    assert [e.t for e in r.events] == pytest.approx([end, end], abs=1e-10)
+    assert np.abs(x[r.t > end]).max() < 1e-13 and np.abs(v[r.t > end]).max() < 1e-13
+
+
+@pytest.mark.parametrize("law", [TWISTING, "-3*sign(value)"])
+def test_what_begins_on_its_corners_stays_there(law):
+    r, x, v = moved(cart(law), 3.0)
+    assert (x == 0.0).all() and (v == 0.0).all()
+
+
+def test_both_corners_bear_as_long_as_they_can():
+    """3 + 1 hold, in proportion: until the force is 4, at t = 6, when both let go at once."""
+    r, x, v = moved(cart(f"{TWISTING} + max(0, t - 2)", velocity=(0.5, 0)), 8.0)
+    assert [e.kind for e in r.events] == ["hold", "hold", "leave", "leave"]
+    assert [e.t for e in r.events[2:]] == pytest.approx([6.0, 6.0], abs=1e-9)
+    assert x[-1] == pytest.approx(2**3 / 6, abs=1e-9) and v[-1] == pytest.approx(2**2 / 2, abs=1e-9)
+
+
+def test_a_relay_holds_what_begins_at_rest_until_it_is_pulled_away():
+    r, x, v = moved(cart("-3*sign(value) + t"), 5.0)
+    assert [e.kind for e in r.events] == ["hold", "leave"] and r.events[1].t == pytest.approx(3.0, abs=1e-9)
+    assert x[-1] == pytest.approx(2**3 / 6, abs=1e-9)
+
+
+@pytest.mark.parametrize(("pull", "moves"), [(2, 0.0), (10, 7.0), (-10, -7.0)])
+@pytest.mark.parametrize("law", ["-3*sign(rate)", "-2*sign(value) - sign(rate)"])
+def test_a_force_that_jumps_pulls_what_is_held_away(law, pull, moves):
+    """A law of time has no zero to be found where it jumps."""
+    r, x, v = moved(cart(f"{law} + where(t < 1, 0, {pull})"), 2.0)
+    assert x[-1] == pytest.approx(moves / 2, abs=1e-9) and v[-1] == pytest.approx(moves, abs=1e-9)
+
+
+def test_what_is_held_stays_where_other_things_happen():
+    """A corner that holds does not let go by rounding when something else is decided."""
+    m = cart("-3*sign(rate) - sign(value - 0.04)", velocity=(0.5, 0))
+    m.add(fb.Event("look", "sin(40*t)", do=[]))
+    r, x, v = moved(m, 2.0)
+    assert np.ptp(x[r.t > 0.2]) < 1e-14

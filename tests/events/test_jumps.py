@@ -181,7 +181,9 @@ def test_driver_gives_what_an_impact_takes(coordinates):
 def test_start_beyond_a_limit_names_it():
     m = rods(ground=True)
     here = standing(rows(m, Row("knee", of=("B.angle",), kind=STOP, par=(0.2, 1.0))), "joint")
-    with pytest.raises(fb.ModelError, match=r"'knee'.*begins beyond it.*is 0 and must be within 0.2 and 1"):
+    with pytest.raises(
+        fb.ModelError, match=r"'knee'.*begins beyond it: B.angle is 0 rad and must be within 0.2 and 1 rad"
+    ):
         begin(here)
 
 
@@ -190,7 +192,8 @@ def test_what_hinges_carry_in_a_sudden_stop(coordinates):
     """Momentum of the second rod goes through its hinge, that of both through the first one's: the stop is a couple."""
     m = rows(turning(1.5, -0.5), Row("stop", of=("A.angle",), kind=STOP, par=(-np.inf, 0.0)))
     run = m.simulate(0.01, outputs=2, coordinates=coordinates)
-    (hit,) = run.events.of("impact")
+    hit, *touched = run.events.of("impact")  # the rods in line press on the stop only once they bend
+    assert sum(e.lost for e in touched) < 1e-15
     second = -0.5 + 0.75 * 3.0 - 2.5
     np.testing.assert_allclose(hit.impulses["B"], [0, second, 0, 0, 0, 0], atol=1e-12)
     np.testing.assert_allclose(hit.impulses["A"], [0, second - 1.5, 0, 0, 0, 0], atol=1e-12)

@@ -44,11 +44,12 @@ def test_a_freewheel_takes_hold(coordinates):
     assert np.abs(r.energy.balance).max() < 1e-8
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_a_freewheel_that_begins_the_wrong_way_is_refused(direction):
+@pytest.mark.parametrize(("direction", "way"), [(1, r"B.angle - A.angle"), (-1, r"- B.angle \+ A.angle")])
+def test_a_freewheel_that_begins_the_wrong_way_is_refused(direction, way):
     m = wheels(0.3, 0.5, rates=(4.0 * direction, 1.0 * direction))
     m.add(fb.OneWay("freewheel", "B.angle", relative_to="A.angle", direction=direction))
-    with pytest.raises(fb.ModelError, match=r"OneWay 'freewheel': the motion begins beyond it: its rate is -3"):
+    said = rf"OneWay 'freewheel': the motion begins beyond it: the rate of {way} is -3 rad/s"
+    with pytest.raises(fb.ModelError, match=said):
         m.simulate(0.5)
 
 
@@ -137,7 +138,7 @@ def test_a_hoist_keeps_what_its_lever_lifts(coordinates):
     second = pitch * np.floor((first + 2 * swing) / pitch)
     assert r["B"].angle.max() == pytest.approx(first + 2 * swing, abs=1e-8)
     assert r["B"].angle[-1] == pytest.approx(second, abs=1e-9)
-    assert r["pawl"].force[-1] == pytest.approx(load, rel=1e-9)
+    assert r["pawl"].force[-2] == pytest.approx(load, rel=1e-9)  # as the last row is written the lever takes it along
     assert np.abs(r.energy.balance).max() < 1e-8
 
 

@@ -11,7 +11,7 @@ from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.expected import expect
 from flyball.numerics.integrators.tableaux import tableau
 from flyball.numerics.integrators.watched import advance_watched
-from flyball.numerics.integrators.watching import EVENT, START, Watch, watching
+from flyball.numerics.integrators.watching import EVENT, STAGE, START, Watch, watching
 
 
 class Equations(NamedTuple):
@@ -26,6 +26,9 @@ def derivative(t, y, dy, S, W):
     n = len(y) // 2
     dy[:n], dy[n:] = y[n:], S.f(t, y[:n], y[n:])
     S.latest[:] = [t, y.copy()]
+    W.count[STAGE] += 1
+    for j in np.flatnonzero(W.met == W.count[STAGE]):
+        W.met_g[j] = S.g(t, y[:n], y[n:])
     return 0
 
 
@@ -70,7 +73,9 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     R, y = tableau(method), np.array(y, float)
     n = len(y) // 2
     S = Equations(f, lambda *a: np.asarray(g(*a), float), [0.0, y])
-    W: Watch = watching(np.array(way), R.c, R.order_i[1], n, [], [], (np.zeros((2, 2 * n)), np.zeros(0)))
+    W: Watch = watching(
+        np.array(way), np.zeros(len(way)), R.c, R.order_i[1], n, [], [], (np.zeros((2, 2 * n)), np.zeros(0))
+    )
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end
     real[ex.H_MAX] = min(h_max, t_end)

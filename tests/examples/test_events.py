@@ -34,7 +34,6 @@ def test_bouncing_ball():
     assert r.health.energy_drift < 1e-9
 
 
-@pytest.mark.xfail(reason="the ratchet misses a turn from a start at rest", strict=False)
 def test_ratchet_hoist():
     """The first stroke takes the wheel by 52 degrees, from where it falls back to the tooth at 45; each one after takes it
     as far beyond its tooth as the lever goes beyond where it meets the wheel again."""

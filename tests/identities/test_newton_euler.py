@@ -15,7 +15,7 @@ from flyball.tables.spanning import spanning
 from flyball.tables.structure import Choices, structure
 from flyball.tables.system import FRAMES, GROUND_FRAMES, NV
 from tests.contract.zoo import CASES
-from tests.examples.test_examples import EQUATIONS, FILES, mechanism
+from tests.examples.test_examples import FILES, mechanism
 from tests.identities.test_joint_layer import PARTS, coupled, with_joint
 from tests.layers import both_layers, started
 from tests.mechanisms import G, bricard, four_bar
@@ -28,7 +28,7 @@ pytestmark = both_layers
 def residual(r):
     """Largest component of a wrench along a tree joint's velocity, relative to the largest that acts.
 
-    Torques and turns are taken by the mechanism's length.
+    Torques and turns are taken by the mechanism's length. What acts: what bodies need, what joints carry, drivers' efforts.
     """
     s, S, W, length = r.values.structure, r.values.system, r.records.W, r.values.length
     through = r.reactions.through
@@ -41,16 +41,24 @@ def residual(r):
         for k in range(S.body_i[b, NV]):
             turn, shift = (np.stack([x + 0.0 * force[0] for x in part]) for part in column(S, W, b, k))
             along = (turn * moment).sum(axis=0) + (shift * force).sum(axis=0) - driven.get(b, 0.0)
-            largest = max(largest, np.abs(along).max() / (length if turn.any() else 1.0))
+            unit = length if turn.any() else 1.0
+            largest = max(largest, np.abs(along).max() / unit)
     needs = [
         S.body_x[b, 0] * np.abs(np.subtract(np.array(r.records.body(b)[5]).T, S.glob[:3])).max()
         for b in range(len(S.body_i))
     ]
-    carried = [np.abs(np.array(r.reactions.of(j.name)[0])).max() for j in r.model.joints]
-    return largest / max(*needs, *carried, 1e-3)
+    acting: list[float] = []
+    for j in r.model.joints:
+        acting += [
+            np.abs(np.array(x)).max() / unit for x, unit in zip(r.reactions.of(j.name), (1.0, length), strict=True)
+        ]
+    for d in r.model.drivers:
+        turns = r.model.unit(d.coordinate, d) == "rad"
+        acting.append(np.abs(r[d.name].effort).max() / (length if turns else 1.0))
+    return largest / max(*needs, *acting, 1e-3)
 
 
-@pytest.mark.parametrize("name", EQUATIONS)
+@pytest.mark.parametrize("name", FILES)
 def test_examples(name):
     r = mechanism(name).simulate(0.05, outputs=5, coordinates="absolute")
     assert residual(r) < 1e-12

@@ -13,6 +13,7 @@ import flyball as fb
 from flyball.results.doubts import energy_moved
 from flyball.results.result import Result
 
+from .bounds import against
 from .families import Case
 
 STEPS = 3000
@@ -89,6 +90,8 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if not all(np.isfinite(x).all() for x in (r.q, r.v, r.vdot, r.multipliers, r.states)):
         return Verdict("broken", "the result is not finite")
     str(r.health)
+    if wrong := against(r):
+        return Verdict("broken", wrong)
     lost = r.exchanged.get("impact_loss", np.zeros(1))
     if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):
         return Verdict("broken", f"an impact gives energy: {np.diff(lost, prepend=0.0).min():.3g} J")

@@ -11,7 +11,7 @@ import flyball as fb
 from tests.robust.families import FAMILIES, made
 
 SMALL = 1e-3  # [m, rad, m/s, rad/s] below which nothing is asked of last digits
-SEED = 20
+SEED, TRIES = 20, 20
 SHORT = 0.1  # [s]: small differences grow
 
 
@@ -22,15 +22,23 @@ def ran(m: fb.Mechanism, t_end: float, wish: bool, **options):
         return error.result, re.sub(r"[\d.e+-]+", "", str(error))[:40]
 
 
+def begun(family: str):
+    """A case that can begin, and its motion by the engine's loops: in the plane and in space, by turns."""
+    first = SEED + list(FAMILIES).index(family)
+    for seed in range(first, first + TRIES, 2):
+        case = made(family, seed)
+        try:
+            return case, *ran(case.mechanism, min(case.t_end, SHORT), False, **case.options)
+        except (fb.AnalysisError, fb.ModelError):  # it cannot be assembled, or begins beyond a stop
+            continue
+    raise AssertionError("a family of which nothing begins tests nothing")
+
+
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("family", [f for f in FAMILIES if f != "crowds"])
 def test_they_are_the_same(family):
-    case = made(family, SEED + list(FAMILIES).index(family))  # in the plane and in space, by turns
+    case, b, why_not = begun(family)
     t_end = min(case.t_end, SHORT)
-    try:
-        b, why_not = ran(case.mechanism, t_end, False, **case.options)
-    except fb.AnalysisError:
-        pytest.skip("it cannot be assembled")
     if b.values.structure.guards:
         with pytest.raises(fb.ModelError, match="for the tables"):
             ran(case.mechanism, t_end, True, **case.options)

@@ -73,7 +73,7 @@ class Compiled:
     @property
     def y(self) -> np.ndarray:
         """The drawn state."""
-        return np.r_[self.values.q, self.values.v, self.z]
+        return np.concatenate([self.values.q, self.values.v, self.z])
 
     def again(self) -> Compiled:
         """The same with scratch of its own; turns and places as here."""
@@ -193,7 +193,8 @@ class Compiled:
 
     def kinetic_energy(self, v: np.ndarray) -> float:
         """Kinetic energy [J] at velocities v (nv,) of absolute coordinates."""
-        i, j, M = self._entries(INERTIA, self.values.system.body_x[:, MASS])
+        x = self.values
+        i, j, M = x.kept.get("mass", None, 1, lambda: self._entries(INERTIA, x.system.body_x[:, MASS]))
         return float(0.5 * (v[i] * M * v[j]).sum())
 
     def inverse_mass_root(self, movable: np.ndarray, dense: bool = False):

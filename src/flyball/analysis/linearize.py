@@ -81,9 +81,14 @@ def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "linearize")
-        out = linearize(joined, there)
+        out = _linear(joined, there)
         out.notes = notes
         return out
+    return _linear(model, o)
+
+
+def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
+    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
     for name in o.outputs:
         one(model, name)  # refuses those that do not exist; inputs are looked up where they are added
     here = model

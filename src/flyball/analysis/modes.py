@@ -40,7 +40,12 @@ def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "modes")
-        return replace(modes(joined, there), notes=notes)
+        return replace(_modes(joined, there), notes=notes)
+    return _modes(model, o)
+
+
+def _modes(model: Model, o: ModesOptions) -> Modes:
+    """Of a mechanism in which nothing holds at times any more, but friction that slides."""
     count, frozen = o.count, o.frozen
     x = o.state(model, DENSE)
     if is_large(x):

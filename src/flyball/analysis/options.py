@@ -6,6 +6,7 @@ the method alone (`flyball.methods`); ``tests/program/test_options.py`` holds th
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from numbers import Number
@@ -28,6 +29,13 @@ class Options:
     def asked(cls, given: Mapping[str, Any]) -> Self:
         """From the arguments of a method: its ``locals()``."""
         return cls(**{f.name: given[f.name] for f in fields(cls)})
+
+    def known(self, **values: Any) -> Self:
+        """The same with values that need no check."""
+        out = copy.copy(self)
+        for name, value in values.items():
+            object.__setattr__(out, name, value)
+        return out
 
     def __post_init__(self) -> None:
         for f in fields(self):

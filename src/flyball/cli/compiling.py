@@ -1,33 +1,52 @@
-"""Word of the first compilation, on a terminal."""
+"""Word of the first compilation, as a line of its own."""
 
 from __future__ import annotations
 
-import sys
 import warnings
+from typing import Any
 
 import typer
 
 from ..errors import PerformanceNotice
 
-KERNELS = {  # what to say before they are compiled
-    "motion_kernel": "compiling for this machine, once: about half a minute",
-    "residual_kernel": "compiling the derivatives of the equations for this machine, once: about a quarter of a minute",
-}
+DERIVATIVES = "compiling the derivatives of the equations for this machine, once: about a quarter of a minute"
 
 
 def announce_compiling(talk: bool, *kernels: str) -> None:
-    """On a terminal, say that the first use takes long, if it is the first use of kernels: the motion's by default.
+    """Say that the first use takes long, if it is the first use of kernels: the motion's by default.
 
-    The analyses' own notices, which are for those who call them from Python, are then not needed.
+    Notices of the analyses, which know better what they need, are printed as they come; without ``talk`` none is.
     """
-    warnings.filterwarnings("ignore", "compiling ", PerformanceNotice)
-    for name in kernels or ("motion_kernel",):
-        if talk and sys.stderr.isatty() and _will_compile(name):
-            typer.echo(KERNELS[name], err=True)
+    if not talk:
+        warnings.filterwarnings("ignore", "compiling ", PerformanceNotice)
+        return
+    warnings.filterwarnings("always", "compiling ", PerformanceNotice)
+    warnings.filterwarnings("ignore", "compiling the derivatives ", PerformanceNotice)
+    _print_notices()
+    from ..analysis.motion.compiling import ENGINE
+    from ..compiler.notice import announce
+
+    if not kernels or "motion_kernel" in kernels:
+        announce((ENGINE,))
+    if "residual_kernel" in kernels and _derivatives_will():
+        typer.echo(DERIVATIVES, err=True)
 
 
-def _will_compile(name: str) -> bool:
-    from ..equations.engine import engine
+def _print_notices() -> None:
+    """Have notices printed as they are, without the line of code that they are about."""
+    usual = warnings.showwarning
+
+    def show(message: Any, category: type[Warning], *more: Any, **where: Any) -> None:
+        if issubclass(category, PerformanceNotice):
+            typer.echo(str(message), err=True)
+        else:
+            usual(message, category, *more, **where)
+
+    if getattr(usual, "__name__", "") != show.__name__:
+        warnings.showwarning = show
+
+
+def _derivatives_will() -> bool:
     from ..equations.residual import stepped
 
-    return {"motion_kernel": engine, "residual_kernel": stepped}[name].cold  # type: ignore[attr-defined]
+    return stepped.cold

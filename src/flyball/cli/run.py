@@ -59,6 +59,7 @@ def _conclude(
         "name": result.model.name,
         "success": result.health.success,
         "message": result.health.message,
+        "ended_early": result.health.ended_early,
         "t": float(result.t[-1]) if len(result.t) else None,
         "health": result.health.as_dict(),
         "files": [str(f) for f in files],

@@ -56,12 +56,15 @@ from ..tables.system import (
 )
 from .dispatch import effort
 from .loads import law, wide
-from .rows import way_of
+from .rows import measured, way_of
 from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
 GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
+NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
+KEPT = (G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CONE)  # guards above zero as long as modes are right
 RESTING = 1e-9  # of the same a second: not coming nearer
+CREEP = 1e-13  # of the same a second: a rate that is none, as of what nothing moves
 
 
 @formula
@@ -97,7 +100,7 @@ def watched(S, W, t, kind, s):
                 return NOT_WATCHED
             return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
-            return rate
+            return 0.0 if magnitude(rate) <= CREEP * max(1.0, S.glob[LENGTH]) else rate
         return NOT_WATCHED
     if kind == G_PULL:
         return way * W.row[LAM, k]
@@ -111,6 +114,28 @@ def distance(S, x, rate):
     """How far something is from a stop; none where that is rounding, as where it parts with no speed."""
     size = max(1.0, S.glob[LENGTH])
     return 0.0 if magnitude(x) <= GRAIN * size and rate >= -RESTING * size else x
+
+
+@formula
+def grains(S, W, out):
+    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,): of distances, rates, forces."""
+    fastest, strongest = 0.0, 0.0
+    for m in range(measured(S)):
+        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+    for k in range(S.row_i.shape[0]):
+        strongest = max(strongest, magnitude(W.row[LAM, k]))
+    for g in range(S.guard_i.shape[0]):
+        kind, of = S.guard_i[g, GUARD_KIND], S.guard_i[g, GUARD_OF]
+        out[g] = 0.0
+        if kind == G_LOWER or kind == G_UPPER:
+            x = W.sensed[VALUE, S.switch_i[of, SWITCH_MEASURED]]
+            out[g] = GRAIN * max(1.0, S.glob[LENGTH], magnitude(x))
+        elif kind == G_SLIDES or kind == G_BACK:
+            out[g] = NOISE * fastest
+        elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
+            out[g] = NOISE * strongest
+        elif kind == G_LAW or kind == G_CORNER:  # of places
+            out[g] = GRAIN * max(1.0, S.glob[LENGTH])
 
 
 @formula

@@ -3,6 +3,10 @@
 The side of the corner, a number between -1 and 1, is such that du/dt = 0 (Filippov, *Differential Equations with
 Discontinuous Righthand Sides*, 1988, section 4). Accelerations depend on it by one more solve; it is found by Newton's
 method with Broyden's slopes, which are kept from one evaluation to the next.
+
+Where du/dt does not follow from the sides and is zero, it is d^2u/dt^2 that they keep at zero (sliding of second order:
+Levant, *International Journal of Control* 58, 1993): the switch is STEADY. Of a corner and that of its rate both
+do; they bear in proportion to what they can.
 """
 
 from __future__ import annotations
@@ -14,13 +18,14 @@ from ..tables.system import (
     BIAS,
     DRIFT_BEFORE,
     DRIFT_OFF,
-    HELD,
     INVERSE_SLOPES,
     MODE,
+    OFF,
     RATE,
     SIDE_BEFORE,
     SIDE_MOVED,
     SIDE_TOLD,
+    STEADY,
     SWITCH_KIND,
     SWITCH_LAW,
     VALUE,
@@ -37,7 +42,7 @@ FLAT = 1e-9
 @formula
 def along(S, W, s):
     """Whether the motion is held on the corner of switch s."""
-    return S.switch_i[s, SWITCH_KIND] == BRANCH and W.switch[MODE, s] == HELD
+    return S.switch_i[s, SWITCH_KIND] == BRANCH and W.switch[MODE, s] != OFF
 
 
 @formula
@@ -51,7 +56,7 @@ def bound(S, W):
 
 @formula
 def drifts(S, W, t):
-    """How fast u of each corner changes with the accelerations at hand, into row DRIFT_OFF."""
+    """How fast u of each corner changes, or its rate, with the accelerations at hand, into row DRIFT_OFF."""
     nr = S.row_i.shape[0]
     nm = measured(S)
     for m in range(nm):
@@ -59,11 +64,16 @@ def drifts(S, W, t):
         for e in range(S.row_p[nr + m], S.row_p[nr + m + 1]):
             a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
         W.sensed[RATE, nm + m] = a
+        W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
+        W.sensed[BIAS, m] = a
     for s in range(S.switch_i.shape[0]):
         if S.switch_i[s, SWITCH_KIND] == BRANCH:
             law = S.switch_i[s, SWITCH_LAW]
-            W.switch[DRIFT_OFF, s] = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)[1]
+            jet = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)
+            W.switch[DRIFT_OFF, s] = jet[2] if W.switch[MODE, s] == STEADY else jet[1]
     for m in range(nm):
+        W.sensed[BIAS, m] = W.sensed[BIAS, nm + m]
+        W.sensed[BIAS, nm + m] = 0.0 * W.sensed[VALUE, m]
         W.sensed[RATE, nm + m] = 0.0 * W.sensed[VALUE, m]
 
 

@@ -16,8 +16,9 @@ from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
 from ..numerics.integrators.watching import STAGE, START, watching
-from ..tables.system import BIAS, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
+from ..tables.system import BIAS, GUARD_KIND, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
 from .engine import Sheet, engine
+from .guards import KEPT, grains
 from .guards import watch as guards
 from .rows import measured
 from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
@@ -52,6 +53,9 @@ def derivative(t, y, dy, A, K):
     for j in range(K.stages.shape[0]):
         if K.stages[j] == K.count[STAGE]:
             levels(A, K, 1 + j)
+    for j in range(K.met.shape[0]):
+        if K.met[j] == K.count[STAGE]:
+            guards(A[S_], A[W_], t, K.met_g[j])
     return status
 
 
@@ -128,6 +132,7 @@ def note(A, K, row):
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     guards(S, W, A[OWN].real[T], K.g[row])
+    grains(S, W, K.grain)
 
 
 @formula
@@ -178,7 +183,8 @@ class Watched:
         spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
         self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
         there = self.expected.sensed, self.expected.row[LAM]
-        self.desk = watching(S.guard_i[:, GUARD_WAY], R.c, int(R.order_i[1]), nm, rows, np.array(spots, int), there)
+        guarded = S.guard_i[:, GUARD_WAY], np.isin(S.guard_i[:, GUARD_KIND], KEPT)
+        self.desk = watching(*guarded, R.c, int(R.order_i[1]), nm, rows, np.array(spots, int), there)
         ny = clock.y.shape[1]
         self.own = Clock(
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,

@@ -32,15 +32,28 @@ class Breaks(NamedTuple):
 NO_BREAKS = Breaks(NONE, np.zeros(0, bool), ())
 
 
-def found_beforehand(code: Sequence[int], const: np.ndarray, starts: Iterable[int], t0: float, t1: float) -> Breaks:
-    """Where laws that start at ``starts`` in the code have corners or act briefly between two times [s].
+Timed = tuple[tuple[int, list[Step]], ...]
+"""Laws by where they start in the code, with their steps."""
+
+
+def timed(code: Sequence[int], starts: Iterable[int]) -> Timed:
+    """The laws among those that start at ``starts`` that may have corners or act briefly by time alone.
+
+    Negative starts are left out. It follows from the programs, whatever their constants are.
+    """
+    every = ((at, read(code, at)) for at in dict.fromkeys(int(a) for a in starts if a >= 0))
+    return tuple((at, steps) for at, steps in every if any(s.on == TIME and brief(s, steps) for s in steps))
+
+
+def found_beforehand(laws: Timed, const: np.ndarray, t0: float, t1: float) -> Breaks:
+    """Where laws have corners or act briefly between two times [s].
 
     Parameters
     ----------
-    code, const
-        Programs of the laws and their constants.
-    starts : integers
-        Negative ones are left out, equal laws are looked at once.
+    laws : Timed
+        Equal ones are looked at once.
+    const : ndarray
+        Constants of their programs.
     t0, t1 : float
         The time [s] that is looked at, without its ends.
 
@@ -50,12 +63,13 @@ def found_beforehand(code: Sequence[int], const: np.ndarray, starts: Iterable[in
         Where a law is sharp it may belong to either side at the time itself: a step ends `margin` before, and the
         next begins as much behind.
     """
+    if not laws:
+        return NO_BREAKS
     times: list[np.ndarray] = [NONE]
     smooth: list[np.ndarray] = [NONE]
     given_up = []
     done: dict[Any, bool] = {}
-    for at in dict.fromkeys(int(a) for a in starts if a >= 0):
-        steps = read(code, at)
+    for at, steps in laws:
         key = _meaning(steps, const)
         if key not in done:
             sharp, brief, done[key] = _of_law(steps, const, t0, t1)
@@ -126,7 +140,7 @@ def acts_briefly(code: Sequence[int], at: int) -> bool:
 
 def _of_law(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[np.ndarray, np.ndarray, bool]:
     """Its corners, where brief actions of it begin and end, and whether these are all."""
-    if not t1 > t0 or not any(s.on == TIME and brief(s, steps) for s in steps):
+    if not t1 > t0:
         return NONE, NONE, True
     law, spans, complete = _cut(steps, const, t0, t1)
     if not complete:

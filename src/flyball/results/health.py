@@ -33,6 +33,7 @@ class Health:
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
+    method: str = ""  # by what a motion with contact was computed, and why
     engine: str = ""  # "table-driven: why", or "made for this mechanism: where from"
     crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
@@ -54,13 +55,13 @@ class Health:
 
     @property
     def status(self) -> str:
-        """How it ended: ``"done"``, or why not."""
-        return "done" if self.success and self._simulated else self.message
+        """How it ended: ``"done"``, or where and by which event of the model, or why it could not go on."""
+        return "done" if self.success and self._simulated and not self.ended_early else self.message
 
     @property
     def ended_early(self) -> bool:
         """Whether an event of the model ended the motion, as asked for."""
-        return self.success and self.message.startswith("event ")
+        return self.success and self.message.startswith("ended at ")
 
     @property
     def freedoms(self) -> int:
@@ -109,7 +110,8 @@ class Health:
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
-            ("status", f"done: {self.message}" if self.ended_early else self.status),
+            ("status", self.status),
+            *([("method", self.method)] if self.method else []),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             *([("engine", self.engine)] if self.engine else []),
             *([("assembly", summary(self.departures))] if self.departures else []),

@@ -14,7 +14,8 @@ from .animate import kept, record
 from .figures import figures
 from .page import document
 from .recording import Channel, Figure
-from .tables import Table, tables
+from .tabled import Table
+from .tables import tables
 
 if TYPE_CHECKING:
     from ..results.result import Result
@@ -44,7 +45,7 @@ def report(result: Result, **options: Any) -> str:
     chosen = tuple(_thinned(f, every) for f in figures(result))
     parts = tables(result)
     names = {"animation": "Animation", **{f"plot-{f.name}": f.title for f in chosen}}
-    names |= {f"table-{t.name}": t.title for t in parts} | {"file": "Model file"}
+    names |= {f"table-{t.name}": t.title for t in parts if t.title} | {"file": "Model file"}
     links = "".join(f'<a href="#{key}">{escape(title)}</a>' for key, title in names.items())
     before = (
         f'<div class="report">\n<div class="top"><h1>{escape(result.model.name)}</h1>'
@@ -89,6 +90,8 @@ def _verdict(result: Result) -> str:
     """One line that says whether the run came to its end."""
     h = result.health
     kind, text = ("good", "The run reached its end.") if h.success else ("bad", f"The run stopped: {h.message}")
+    if h.ended_early:
+        kind, text = "early", f"The run {h.message}."
     return f'<p class="verdict {kind}" role="status">{escape(text)}</p>'
 
 
@@ -132,11 +135,14 @@ def _table(table: Table) -> str:
     body = "".join(map(row, table.rows))
     foot = f"<tfoot>{row(table.total)}</tfoot>" if table.total else ""
     note = f"<p>{escape(table.note)}</p>" if table.note else ""
-    return (
-        f'<section class="listing" id="table-{table.name}"><h2>{escape(table.title)}</h2>{note}'
-        f'<div class="wide"><table>'
-        f"<thead>{row(table.columns, 'th')}</thead><tbody>{body}</tbody>{foot}</table></div></section>\n"
+    title = f"<h2>{escape(table.title)}</h2>" if table.title else ""
+    grid = (
+        f'<div class="wide"><table><thead>{row(table.columns, "th")}</thead><tbody>{body}</tbody>{foot}</table></div>'
     )
+    if table.folded:
+        grid = f"<details><summary>{escape(table.folded)}</summary>{note}{grid}</details>"
+        note = ""
+    return f'<section class="listing" id="table-{table.name}">{title}{note}{grid}</section>\n'
 
 
 def _file(result: Result) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,6 +12,8 @@ from ..model.element import written
 from ..model.joint import Joint
 from ..results.numbers import tuple_of
 from .facts import between
+from .happened import events, holding
+from .tabled import Table
 
 if TYPE_CHECKING:
     from ..results.result import Result
@@ -19,22 +21,12 @@ if TYPE_CHECKING:
 MOST = 200  # rows of one table
 
 
-@dataclass(frozen=True)
-class Table:
-    """Columns, rows of texts, and what stands above and below."""
-
-    name: str
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
-    total: tuple[str, ...] = ()
-    note: str = ""
-
-
 def tables(result: Result) -> list[Table]:
     """Every table that has a row."""
     made = [
         health(result),
+        *events(result),
+        holding(result),
         parameters(result),
         bodies(result),
         joints(result),
@@ -46,7 +38,7 @@ def tables(result: Result) -> list[Table]:
 
 
 def _cut(t: Table) -> Table:
-    if len(t.rows) <= MOST:
+    if len(t.rows) <= MOST or t.folded:
         return t
     note = "; ".join(x for x in (t.note, f"the first {MOST} of {len(t.rows)}") if x)
     return Table(t.name, t.title, t.columns, t.rows[:MOST], t.total, note)

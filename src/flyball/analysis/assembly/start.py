@@ -43,7 +43,7 @@ class Assembly:
     @property
     def y(self) -> np.ndarray:
         """State vector with work states zero."""
-        return np.r_[self.q, self.v, self.compiled.z]
+        return np.concatenate([self.q, self.v, self.compiled.z])
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people: where every mass centre begins and how it moves, what could not be kept."""

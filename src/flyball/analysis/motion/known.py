@@ -9,9 +9,15 @@ from ..compiled import Compiled
 
 def sampled_laws(c: Compiled, breaks: Breaks) -> frozenset[int]:
     """Starts of the laws that samples have to guard within steps: what they do follows the state, or is not known."""
-    S, code = c.system, c.system.code.tolist()
-    every = {int(at) for at in law_starts(S) if at >= 0}
-    return frozenset(at for at in every if at in breaks.given_up or acts_briefly(code, at))
+    by_state = c.structure.kept.get("laws that follow the state", None, 1, lambda: _by_state(c))
+    if not breaks.given_up:
+        return by_state
+    return by_state | {int(at) for at in law_starts(c.system) if at in breaks.given_up}
+
+
+def _by_state(c: Compiled) -> frozenset[int]:
+    code = c.system.code.tolist()
+    return frozenset(at for at in set(law_starts(c.system).tolist()) if at >= 0 and acts_briefly(code, at))
 
 
 def told_of(c: Compiled, sampled: frozenset[int]) -> str:

@@ -91,7 +91,7 @@ class Integration(Options):
 
     def sized(self, length: float) -> Self:
         """With its `tolerance` as ``atol``."""
-        return dataclasses.replace(self, atol=self.tolerance(length))
+        return self.known(atol=self.tolerance(length))
 
     def tolerance(self, length: float) -> float:
         """The ``atol`` given, or that of a mechanism of that length [m]."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from functools import partial
+from itertools import accumulate
 
 import numpy as np
 
@@ -58,8 +59,9 @@ def outcome(
     health.watched = here.watched
     health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
-    cuts = np.cumsum([1, s.nq, s.nv, len(s.states), s.nv])
-    t_out, q, v, z, vdot, lam = (np.ascontiguousarray(p) for p in np.split(rows, cuts, axis=1))
+    cuts = list(accumulate((1, s.nq, s.nv, len(s.states), s.nv), initial=0))
+    parts = zip(cuts, (*cuts[1:], rows.shape[1]), strict=True)
+    t_out, q, v, z, vdot, lam = (np.ascontiguousarray(rows[:, a:b]) for a, b in parts)
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved

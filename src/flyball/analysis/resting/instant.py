@@ -16,6 +16,7 @@ from ..assemble import assemble
 from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..linear.rest import Rest
+from ..untouched import holding_parts
 from .closed import closed
 from .copy import joined_copy, open_copy
 from .holds import supported
@@ -79,9 +80,7 @@ def _base(model: Model, o: Any, analysis: str) -> Assembly:
     if o.about is None:
         base = assemble(model, t=o.t or 0.0, parameters=o.parameters)
         if np.abs(base.v).max(initial=0.0) > 0.0:
-            raise ModelError(
-                f"{analysis} with contact is about rest, and {model.name!r} moves: ask about=m.equilibrium()"
-            )
+            raise moves(model, analysis)
         return base
     if not isinstance(o.about, Equilibrium):
         raise ModelError(f"{analysis} with contact is about rest: give about=m.equilibrium(), not a motion")
@@ -90,6 +89,15 @@ def _base(model: Model, o: Any, analysis: str) -> Assembly:
         raise ModelError(f"about is an equilibrium of {old.compiled.structure.model.name!r}, which has other bodies")
     c = compiled(model, parameters={**o.about.parameters, **(o.parameters or {})})
     return Assembly(c, old.t, *c.take(old.compiled, old.t, old.q, 0.0 * old.v))
+
+
+def moves(model: Model, analysis: str) -> ModelError:
+    """What to say of parts that hold at times, where a mechanism is described in motion."""
+    other = "" if model.contacts or model.bulk else ", or about the end of a motion: about=m.simulate(...)"
+    parts = ", ".join(e.title for e in holding_parts(model))
+    return ModelError(
+        f"{analysis} with {parts} is about rest, and {model.name!r} moves: ask about=m.equilibrium(){other}"
+    )
 
 
 def _notes(touches: tuple[Touch, ...], t: float) -> tuple[str, ...]:

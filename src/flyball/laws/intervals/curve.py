@@ -50,7 +50,9 @@ class Curve:
             most = np.where(between, _over(np.maximum, high, first + 1, last), -np.inf)
             lows, highs = (before[k][0], behind[k][0], least), (before[k][1], behind[k][1], most)
             out.append((np.minimum.reduce(lows), np.maximum.reduce(highs)))
-        return out[0], out[1]
+        (least, most), slope = out  # at an end of a piece that is the range's own, slopes are those inside
+        way = near * np.maximum(np.abs(slope[0]), np.abs(slope[1]))
+        return (least - way, most + way), slope
 
 
 def _over(ufunc: Any, x: Array, first: Array, stop: Array) -> Array:

@@ -1,29 +1,41 @@
 """Where in a step a guard may pass zero, as far as can be told without the equations.
 
 A step is looked at in panels. In each the guards are a polynomial through values at eight places; two more places say
-whether that is so, else the panel is halved. ``look(t, h, x, S, W, row)`` writes the guards expected at t + x h to a
-row of ``W.g``; W is a `Watch`.
+whether that is so, else the panel is halved. `glance.glance` writes the guards at t + x h to a row of ``W.g``; W is a
+`Watch`.
 """
 
 from __future__ import annotations
 
 from ...compiler.jit import formula
+from .clock import T
+from .glance import NOISE, glance
 from .watching import (
+    AWAY,
     CHECKS,
+    CUTS,
+    DONE_TO,
     END,
     FRESH,
+    LEAST,
     LOOKS,
     MARK,
+    MOST,
     NODE,
     NODES,
     PANEL,
+    PLAIN,
     SIDE,
+    SOUGHT,
     START,
     THERE,
     WIDTH,
 )
 
 MANY = 4000  # places that are looked at before panels are taken as they are: what is not smooth then is rounding
+DEARLY = 1000  # of those with the equations, before the step is cut where it was looked through to
+ALONG = 0.1  # part of a step below which it is not cut but taken as it is
+OFTEN = 8  # times that a step is cut before it is taken as it is
 NARROWEST = 2.0**-14  # part of a step that a panel is not narrower than
 ODD = 1e-2  # part of a guard's change over a panel by which it may differ from the polynomial
 BLURRED = 1e-9  # part of its size that is nothing
@@ -33,25 +45,28 @@ GRAZE = 2e-2  # part of its change within which an extremum is looked at with th
 PARTS = 16  # of a panel, in which slopes are compared
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
 NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
-NOISE = 4.0  # times its value at the start that is about zero as well
 ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
 
 
 @formula
-def survey(look, S, W, t, h, first):
+def survey(callbacks, S, W, R, c, h, first):
     """The first place after ``first`` where a guard passes zero or comes near: (guard or -1, from, to).
 
-    From and to are parts of the step. Sides go on from W.g[SIDE].
+    From and to are parts of the step. Sides go on from W.g[SIDE]. W.real[DONE_TO] is 1, or how far it has come.
     """
     a = first
     w = 1.0 - first
     most = W.count[LOOKS] + MANY
+    W.real[DONE_TO] = 1.0
     while a < 1.0:
         w = min(w, 1.0 - a)
         W.real[PANEL], W.real[WIDTH] = a, w
-        fill(look, S, W, t, h, a, w)
+        fill(callbacks, S, W, R, c, h, a, w)
         smooth = resolved(W)
         if not smooth and w > NARROWEST and W.count[LOOKS] < most:
+            if W.count[PLAIN] == 0 and W.count[SOUGHT] > DEARLY and a > ALONG and W.count[CUTS] < OFTEN:
+                W.real[DONE_TO] = a
+                return -1, a, a
             w *= 0.5
             continue
         best = -1
@@ -71,7 +86,7 @@ def survey(look, S, W, t, h, first):
 
 
 @formula
-def fill(look, S, W, t, h, a, w):
+def fill(callbacks, S, W, R, c, h, a, w):
     """Guards at the nodes of a panel and where it is checked; at the ends of the step they are known."""
     for j in range(NODES + CHECKS):
         x = a + w * W.nodes[j]
@@ -80,8 +95,7 @@ def fill(look, S, W, t, h, a, w):
             for i in range(W.way.shape[0]):
                 W.g[row, i] = W.g[START if x <= 0.0 else END, i]
         else:
-            look(t, h, x, S, W, row)
-            W.count[LOOKS] += 1
+            glance(callbacks, S, W, R, c, h, x, row)
 
 
 @formula
@@ -91,7 +105,7 @@ def resolved(W):
         low, high = extent(W, i)
         if not finite(low, high):
             continue
-        allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high))
+        allowed = ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + NOISE * W.grain[i]
         for j in range(CHECKS):
             f = W.g[NODE + NODES + j, i]
             for k in range(NODES):
@@ -226,32 +240,21 @@ def value(W, x):
 
 
 @formula
-def begin_sides(look, S, W, t, h):
+def begin_sides(callbacks, S, W, R, c, h):
     """Sides as the step begins, in W.g[SIDE]: (guard that leaves its side at once or -1, from, to, where to go on).
 
     A guard that is about zero as a segment of the motion begins, above all one that has just fired (its side is 0), is
     on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
-    soon.
+    soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
     """
-    ng = W.way.shape[0]
-    near = False
-    if W.count[FRESH] == 0:
+    look, t, ng = callbacks[5], c.real[T], W.way.shape[0]
+    W.count[AWAY] = 0
+    if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):
             W.g[SIDE, i] = W.side[i]
+            W.g[MARK, i] = -1.0
         return -1, 0.0, 0.0, 0.0
-    fill(look, S, W, t, h, 0.0, 1.0)
-    for i in range(ng):
-        low, high = extent(W, i)
-        W.g[SIDE, i] = side_of(W.g[START, i])
-        W.g[MARK, i] = -1.0
-        size = max(abs(low), abs(high))
-        now = abs(W.g[START, i])
-        just = W.side[i] == 0.0
-        if finite(low, high) and now <= (NEAR if just else ROUNDING) * size:
-            W.g[SIDE, i] = 0.0
-            W.g[MARK, i] = NOISE * now if just else ROUNDING * size
-            near = True
-    if not near:
+    if not begins_near(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0
     before = 0.0
     for n in range(CLOSEST, FARTHEST - 1, -1):
@@ -266,13 +269,48 @@ def begin_sides(look, S, W, t, h):
 
 
 @formula
+def doubtful(W):
+    """Whether a guard that has to stay above zero is about zero since the motion's segment began."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.kept[i] == 1 and W.side[i] <= 0.0 and W.g[START, i] == W.g[START, i]:
+            n += 1
+    return n > 0
+
+
+@formula
+def begins_near(callbacks, S, W, R, c, h):
+    """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
+    fill(callbacks, S, W, R, c, h, 0.0, 1.0)
+    near = False
+    for i in range(W.way.shape[0]):
+        low, high = extent(W, i)
+        W.g[SIDE, i] = side_of(W.g[START, i]) if W.count[FRESH] == 1 else W.side[i]
+        W.g[MARK, i] = -1.0
+        if W.count[FRESH] == 0 and not (W.kept[i] == 1 and W.side[i] <= 0.0):
+            continue
+        size = max(abs(low), abs(high))
+        now = abs(W.g[START, i])
+        just = W.side[i] == 0.0
+        below = W.kept[i] == 1 and W.g[START, i] < 0.0
+        if finite(low, high) and (below or now <= (NEAR if just else ROUNDING) * size):
+            W.g[SIDE, i] = 0.0
+            W.g[MARK, i] = NOISE * now if just or below else ROUNDING * size
+            near = True
+    return near
+
+
+@formula
 def begun(W):
-    """A guard that leaves at once the side that it first went to, as W.g[THERE] has it; or -1."""
+    """A guard that leaves at once the side that it first went to, or has to keep, as W.g[THERE] has it; or -1."""
     for i in range(W.way.shape[0]):
         f = W.g[THERE, i]
         s = W.g[SIDE, i]
         if W.g[MARK, i] < 0.0 or W.fired[i] != 0:
             continue
+        if W.kept[i] == 1 and s <= 0.0 and f < -band(W, i):
+            W.count[AWAY] = 1
+            return i
         if s == 0.0:
             if abs(f) > W.g[MARK, i]:
                 W.g[SIDE, i] = side_of(f)
@@ -281,3 +319,10 @@ def begun(W):
                 return i
             W.g[SIDE, i] = side_of(f)
     return -1
+
+
+@formula
+def band(W, i):
+    """How far below zero a guard that has to stay above may be by rounding."""
+    size = max(abs(W.g[LEAST, i]), abs(W.g[MOST, i]))
+    return max(W.g[MARK, i], ROUNDING * size, NOISE * W.grain[i], NOISE * -W.g[START, i])

@@ -1,19 +1,17 @@
-"""A step that ends on the first event in it.
+"""Where on the dense output a guard passes zero, and a step that ends there.
 
-Where a guard may pass zero (`panels.survey`) it is looked for with the equations, on the dense output: bracketed, or
-shown not to get there. Then the step is taken again, by the secant of its width, until it ends on the event: what is
-found is as good as the integration, not as its interpolant. ``watch(t, y, S, W, row)`` evaluates the equations and
-writes the guards there, ``note(S, W, row)`` keeps what the guards depend on at the state last evaluated, and writes
-them.
+Where a guard may pass zero it is bracketed, or shown not to get there. Then the step is taken again, by the secant of
+its width, until it ends on the event: what is found is as good as the integration, not as its interpolant.
 """
 
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import BETWEEN, LARGEST, T
-from .panels import begin_sides, fires, survey
-from .step import attempt, extend, interpolate
-from .watching import AGAIN, END, EXTENDED, SAME, SIDE, STAGE, START, THERE, TRUE
+from .clock import LARGEST, T
+from .glance import true_guard
+from .panels import fires
+from .step import attempt
+from .watching import AGAIN, END, EXTENDED, STAGE
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -22,65 +20,45 @@ FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
 ULP = 2.3e-16
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
-AT_ONCE = 1e-11  # part of the step within which events are at the same instant
-SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
-OTHERS = 20  # guards that may turn out to be earlier
 
 
 @formula
-def true_guard(derivative, watch, S, W, R, c, h, x, i):
-    """Guard i on the projected dense output at a place in the step. Returns (status, value)."""
-    if x <= 0.0:
-        return 0, W.g[START, i]
-    if x >= 1.0:
-        return 0, W.g[END, i]
-    if W.count[EXTENDED] == 0:
-        if extend(derivative, S, W, R, c, h) != 0:
-            return 1, 0.0
-        W.count[EXTENDED] = 1
-    interpolate(R, c, x, h, c.y[BETWEEN])
-    if watch(c.real[T] + x * h, c.y[BETWEEN], S, W, TRUE) != 0:
-        return 1, 0.0
-    return 0, W.g[TRUE, i]
-
-
-@formula
-def crossing(derivative, watch, S, W, R, c, h, i, a, b, s):
+def crossing(callbacks, S, W, R, c, h, i, a, b, s):
     """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
 
     Where it only fires as it comes back to that side, it has to be on the other one in between.
     """
-    status, fa = true_guard(derivative, watch, S, W, R, c, h, a, i)
+    status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     wide = b - a
     while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
         b = a
         a = max(0.0, a - wide)
         wide *= 4.0
-        status, fa = true_guard(derivative, watch, S, W, R, c, h, a, i)
+        status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
-    status, fb = true_guard(derivative, watch, S, W, R, c, h, b, i)
+    status, fb = true_guard(callbacks, S, W, R, c, h, b, i)
     if status != 0:
         return status, -1.0
     if s * fb > 0.0:  # it may come back in between
-        status, m, fm = lowest(derivative, watch, S, W, R, c, h, i, a, b, s)
+        status, m, fm = lowest(callbacks, S, W, R, c, h, i, a, b, s)
         if status != 0 or s * fm > 0.0:
             return status, -1.0
         if fires(W.way[i], s):
             b, fb = m, fm
         else:
             a, fa = m, fm
-    return bracketed(derivative, watch, S, W, R, c, h, i, (a, fa, b, fb))
+    return bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
 
 
 @formula
-def lowest(derivative, watch, S, W, R, c, h, i, a, b, s):
+def lowest(callbacks, S, W, R, c, h, i, a, b, s):
     """The least of s times guard i between a and b, or a place where it is not above zero: (status, place, value).
 
     Golden section with parabolas (Brent 1973, chapter 5).
     """
     x = w = v = a + GOLDEN * (b - a)
-    status, f = true_guard(derivative, watch, S, W, R, c, h, x, i)
+    status, f = true_guard(callbacks, S, W, R, c, h, x, i)
     fx = fw = fv = s * f
     e = d = 0.0
     for _ in range(ROUNDS):
@@ -106,7 +84,7 @@ def lowest(derivative, watch, S, W, R, c, h, i, a, b, s):
             e = (b if x < m else a) - x
             d = GOLDEN * e
         u = x + (d if abs(d) >= tol else (tol if d > 0.0 else -tol))
-        status, f = true_guard(derivative, watch, S, W, R, c, h, u, i)
+        status, f = true_guard(callbacks, S, W, R, c, h, u, i)
         fu = s * f
         if fu <= fx:
             if u < x:
@@ -127,7 +105,7 @@ def lowest(derivative, watch, S, W, R, c, h, i, a, b, s):
 
 
 @formula
-def bracketed(derivative, watch, S, W, R, c, h, i, bracket):
+def bracketed(callbacks, S, W, R, c, h, i, bracket):
     """Where in a bracket (a, f, b, f) guard i passes zero: (status, place). Chandrupatla (1997)."""
     x2, f2, x1, f1 = bracket  # the newest is 1; 1 and 2 are on two sides
     x3, f3 = x2, f2
@@ -142,7 +120,7 @@ def bracketed(derivative, watch, S, W, R, c, h, i, bracket):
             break
         t = min(max(t, tol), 1.0 - tol)
         x = x1 + t * (x2 - x1)
-        status, f = true_guard(derivative, watch, S, W, R, c, h, x, i)
+        status, f = true_guard(callbacks, S, W, R, c, h, x, i)
         if status != 0:
             return status, -1.0
         if (f > 0.0) == (f1 > 0.0):
@@ -220,100 +198,3 @@ def halved(h, low, high, stride, lower, upper, onward):
     if onward:
         return min(h + stride, 0.5 * (h + high)) if h + stride >= high else h + stride
     return max(h - stride, 0.5 * (low + h))
-
-
-@formula
-def first_event(callbacks, S, W, R, c, h, error):
-    """End the step on the first event in it, if there is one: (status, width, error, whether there is one).
-
-    Callbacks: derivative, arrive, tangent, watch, note, look.
-    """
-    derivative, arrive, tangent, watch, note, look = callbacks
-    most = h
-    hit = False
-    for i in range(W.fired.shape[0]):
-        W.fired[i] = 0
-    W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
-    for _ in range(OTHERS):
-        status, i, x, s = next_event(callbacks, S, W, R, c, h)
-        if status != 0 or i < 0:
-            return status, h, error, hit
-        if hit and x * h >= h - W.real[SAME]:
-            W.fired[i] = 1
-            continue
-        for j in range(W.fired.shape[0]):
-            W.fired[j] = 0
-        slope = expected_slope(look, S, W, c.real[T], h, x, i)
-        W.fired[i] = 1
-        status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, most)
-        if status != 0:
-            return status, h, error, False
-        hit = True
-        at_once(look, S, W, c.real[T], h, i, s)
-    return 0, h, error, hit
-
-
-@formula
-def next_event(callbacks, S, W, R, c, h):
-    """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
-    derivative, _, _, watch, _, look = callbacks
-    i, a, b, at = begin_sides(look, S, W, c.real[T], h)
-    if i < 0:
-        i, a, b = survey(look, S, W, c.real[T], h, at)
-    skip = SKIPPED
-    while i >= 0:
-        s = W.g[SIDE, i]
-        status, x = crossing(derivative, watch, S, W, R, c, h, i, a, b, s)
-        if status != 0 or x > 0.0:
-            return status, i, x, (s if fires(W.way[i], s) else -s)
-        at = max(at + skip, b)
-        skip *= 2.0  # of what is rounding there is no end
-        if at >= 1.0:
-            break
-        b = at
-        resume(look, S, W, c.real[T], h, b)
-        i, a, b = survey(look, S, W, c.real[T], h, b)
-    return 0, -1, 0.0, 0.0
-
-
-@formula
-def resume(look, S, W, t, h, x):
-    """Sides at a place in the step up to which nothing happened."""
-    look(t, h, x, S, W, THERE)
-    for i in range(W.way.shape[0]):
-        f = W.g[THERE, i]
-        if f > 0.0:
-            W.g[SIDE, i] = 1.0
-        elif f < 0.0:
-            W.g[SIDE, i] = -1.0
-
-
-@formula
-def expected_slope(look, S, W, t, h, x, i):
-    """How fast guard i is expected to change there [1/s]."""
-    d = 1e-4
-    a, b = max(0.0, x - d), min(1.0, x + d)
-    f = W.g[START, i]
-    if a > 0.0:
-        look(t, h, a, S, W, THERE)
-        f = W.g[THERE, i]
-    g = W.g[END, i]
-    if b < 1.0:
-        look(t, h, b, S, W, THERE)
-        g = W.g[THERE, i]
-    return (g - f) / ((b - a) * h)
-
-
-@formula
-def at_once(look, S, W, t, h, first, s):
-    """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
-    d = 1e-4
-    look(t, h, 1.0 - d, S, W, THERE)
-    for i in range(W.way.shape[0]):
-        if i == first:
-            continue
-        f = W.g[END, i]
-        slope = (f - W.g[THERE, i]) / (d * h)
-        came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
-        if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
-            W.fired[i] = 1

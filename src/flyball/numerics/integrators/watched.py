@@ -31,10 +31,10 @@ from .clock import (
     T,
 )
 from .explicit import overlooked, start, width, write
-from .pinned import first_event
 from .refusal import enter, refuse, shorten
+from .sought import CUT, first_event
 from .step import attempt
-from .watching import END, EVENT, EVENTS, EXTENDED, FRESH, SIDE, STAGE, START, STEPS
+from .watching import CUTS, END, EVENT, EVENTS, EXTENDED, FRESH, SIDE, STAGE, START, STEPS
 
 
 @formula
@@ -102,6 +102,10 @@ def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
         if hit:
             inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
         status, used = write(derivative, report, S, W, R, c, h, out, used)
+    if status == CUT:
+        W.count[CUTS] += 1
+        shorten(c, h)
+        return used, False
     if status != 0:  # what lies inside the step cannot be told: take a shorter one
         shorten(c, 0.25 * whole)
         return used, False
@@ -113,6 +117,7 @@ def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
         return used, True  # the buffer is full inside this step: it is taken again by the next call
     enter(R, c, t, h, error)
     W.count[STEPS] += 1
+    W.count[CUTS] = 0
     if hit:
         c.real[H] = max(c.real[H], whole)
         c.count[STATUS] = EVENT

@@ -9,16 +9,21 @@ import numpy as np
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
-# making; what is zero of those that begin near it; then at the nodes of a panel, and where these are checked
-START, END, TRUE, THERE, SIDE, MARK, NODE = range(7)
+# making; what is zero of those that begin near it; least, largest and farthest from what is expected at stages; then
+# at the nodes of a panel, and where these are checked
+START, END, TRUE, THERE, SIDE, MARK, LEAST, MOST, MISS, NODE = range(10)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
-# entries of Watch.real: panel's begin and width; time within which events are at the same instant
-PANEL, WIDTH, SAME, REAL = range(4)
+# entries of Watch.real: panel's begin and width; time within which events are at the same instant;
+# the part of the step that was looked through
+PANEL, WIDTH, SAME, DONE_TO, REAL = range(5)
 # entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
-# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events
-STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, COUNT = range(8)
+# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events; whether what
+# is expected within the step is borne out; places looked at with the equations since it was taken, and in all; whether
+# they could not be evaluated at one; times that a step was cut since it could not be looked through; whether a guard
+# leaves the side that it has to keep
+STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(14)
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
 
@@ -26,6 +31,8 @@ class Watch(NamedTuple):
     """What a watched integration keeps besides its clock."""
 
     way: np.ndarray  # (ng,): which passing of zero is an event
+    kept: np.ndarray  # (ng,): 1 of those that are above zero by what holds now
+    grain: np.ndarray  # (ng,): what is rounding of them
     side: (
         np.ndarray
     )  # (ng,): 1 where the guard is above zero now, -1 below; in the first step 0 where it has just fired
@@ -38,6 +45,9 @@ class Watch(NamedTuple):
     real: np.ndarray  # (REAL,)
     count: np.ndarray  # type: ignore[assignment]  # (COUNT,)
     stages: np.ndarray  # of a step, where levels are kept
+    met: np.ndarray  # of a step, at which guards are kept
+    met_at: np.ndarray  # where in the step these are
+    met_g: np.ndarray  # (met, ng): guards there
     moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
     levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
     places: np.ndarray  # (2 + stages,): where in the step these were seen
@@ -62,19 +72,26 @@ def checks() -> np.ndarray:
     return np.ascontiguousarray(np.vander(CHECKED, NODES, increasing=True) @ basis())
 
 
-def kept_stages(c: np.ndarray, stages: int) -> list[int]:
-    """Stages of a method at which levels are kept: not the first, whose order is low; as evenly apart as there are."""
-    good = range(max(2, stages // 3), stages)
+def kept_stages(c: np.ndarray, stages: int) -> tuple[list[int], list[int]]:
+    """Stages of a method at which levels are kept, as evenly apart as there are, and at which guards are.
+
+    Not the first ones, whose order is low. One at least tells whether levels are what those kept let expect.
+    """
+    good = [i for i in range(max(2, stages // 3), stages) if c[i] < 0.95]
     found: list[int] = []
     for x in (0.25, 0.6, 0.857):
         best = min(good, key=lambda i: (abs(c[i] - x), -i))
-        if c[best] < 0.95 and best not in found:
+        if best not in found:
             found.append(best)
-    return sorted(found, key=lambda i: c[i])
+    others = [i for i in good if all(abs(c[i] - c[k]) > 0.03 for k in found)]
+    if not others:
+        others = [found.pop(1)]
+    return sorted(found, key=lambda i: c[i]), sorted({*found, *others}, key=lambda i: c[i])
 
 
 def watching(
     way: np.ndarray,
+    holding: np.ndarray,
     c: np.ndarray,
     stages: int,
     measured: int,
@@ -88,6 +105,8 @@ def watching(
     ----------
     way : ndarray (ng,)
         Of the guards.
+    holding : ndarray (ng,)
+        1 for those that are above zero as long as what holds now is right.
     c : ndarray
         Where in a step a method's stages are.
     stages : int
@@ -102,10 +121,12 @@ def watching(
         Where expected values of what is sensed, and of multipliers, are written.
     """
     ng = len(way)
-    kept = np.array(kept_stages(c, stages), np.int64)
+    kept, met = (np.array(x, np.int64) for x in kept_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
     return Watch(
         way=np.array(way, np.int64),
+        kept=np.array(holding, np.int64),
+        grain=np.zeros(ng),
         side=np.ones(ng),
         fired=np.zeros(ng, np.int64),
         g=np.full((GUARDS, ng), np.nan),
@@ -116,6 +137,9 @@ def watching(
         real=np.zeros(REAL),
         count=np.zeros(COUNT, np.int64),
         stages=kept,
+        met=met,
+        met_at=c[met],
+        met_g=np.full((len(met), ng), np.nan),
         moving=np.zeros((2, 3, measured)),
         levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
         places=np.r_[0.0, c[kept], 1.0],

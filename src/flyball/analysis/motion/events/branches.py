@@ -7,6 +7,8 @@ not fall, on s = -1 not rise, and where both sides push towards u = 0 they are z
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ....constraints.modes import BRANCH
@@ -15,29 +17,45 @@ from ....equations.rows import measured
 from ....equations.surfaces import drifts
 from ....equations.tasks import MOTION
 from ....errors import SimulationError
-from ....laws.evaluation import evaluate_jet
-from ....model.words import listing
+from ....laws.opcodes import BY_MOTION, BY_TIME
 from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
     DRIFT_OFF,
     G_CORNER,
-    GUARD_KIND,
-    GUARD_OF,
     HELD,
     INVERSE_SLOPES,
     MODE,
     OFF,
-    SWITCH_LAW,
+    STEADY,
     VALUE,
 )
 from .instant import Instant
+from .swings import halt, jet, low, note, remaining, seen, shared
 
 ROUNDING = 1e-12  # of the terms that u is the sum of: as good as zero
 REACHED = 1e-9  # how near to 1 the side is where the motion leaves a corner
 LEVEL = 1e-9  # part of what sides can do to du/dt, or of du/dt on both sides, that is nothing
 SWEEPS = 500
+KEPT = 1e3  # times rounding: where the motion is held on a corner it is still there
+ALIKE = 1e-6  # of u: what is left of it where the same rate that is taken away was all of it
 AHEAD = 1e-7  # part of the time span by which it is tried where the motion goes
+
+
+class Pushed(NamedTuple):
+    """Corners and what sides do to them: du/dt = d + B sides, of the second ones d^2u/dt^2; and the sides that follow.
+
+    ``held``: with a side between, ``left``: where the motion has come to the end of such a one.
+    """
+
+    which: list[int]
+    second: list[int]
+    d: np.ndarray
+    B: np.ndarray
+    size: np.ndarray
+    sides: np.ndarray
+    held: np.ndarray
+    left: np.ndarray
 
 
 class Corners:
@@ -53,15 +71,20 @@ class Corners:
 
     def __init__(self, n: Instant) -> None:
         self.n = n
-        self.all = np.flatnonzero(n.kind == BRANCH)
+        self.all = np.array(n.of(BRANCH), np.int64)
         self.at: set[int] = set()
         self.old = n.W.switch[MODE].copy()
+        self.sides = n.ways().copy()
+        self.over = np.nan
 
     def begin(self) -> None:
         """Sides as the motion begins."""
         self.n.ask(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
+            if self.n.W.switch[MODE, s] != OFF and abs(u) <= KEPT * max(least, seen(self.n, s).grain):
+                self.at.add(s)  # it goes on
+                continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
             if abs(u) <= least:
                 self.at.add(s)
@@ -69,8 +92,7 @@ class Corners:
 
     def fired(self, guards: np.ndarray) -> None:
         """Take note of guards that fired."""
-        rows = self.n.S.guard_i[guards]
-        self.at |= set(rows[rows[:, GUARD_KIND] == G_CORNER, GUARD_OF].tolist())
+        self.at |= self.n.fired(guards, G_CORNER)
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""
@@ -83,8 +105,8 @@ class Corners:
             if s in self.at:
                 continue
             u, least = self.value(s)
-            if n.W.switch[MODE, s] == HELD:
-                if abs(u) <= 1e3 * least:
+            if n.W.switch[MODE, s] != OFF:
+                if abs(u) <= KEPT * max(least, seen(n, s).grain):
                     self.at.add(s)
                     continue
                 n.W.switch[MODE, s] = OFF
@@ -102,70 +124,109 @@ class Corners:
     def value(self, s: int) -> tuple[float, float]:
         """The u of a corner at the state last evaluated, and what of it is rounding."""
         S, W, t = self.n.S, self.n.W, self.n.here.t
-        law, nm = int(S.switch_i[s, SWITCH_LAW]), measured(S)
-        size = abs(t * self._jet(law, -2)[1])
-        for m in range(2 * nm):
-            size += abs(W.sensed[VALUE, m] * self._jet(law, m)[1])
+        size = abs(t * jet(self.n, s, BY_TIME)[1])
+        for m in range(2 * measured(S)):
+            size += abs(W.sensed[VALUE, m] * jet(self.n, s, m)[1])
         return float(corner(S, W, t, s)), ROUNDING * float(size)
 
-    def _jet(self, law: int, seed: int) -> tuple[float, float, float]:
-        n = self.n
-        return evaluate_jet(n.S.code, n.S.const, law, n.W.stack, n.here.t, n.W.sensed, seed)
-
-    def rates(self, which: list[int], sides: np.ndarray) -> np.ndarray:
-        """How fast u of these corners changes with these sides."""
+    def rates(self, which: list[int], sides: np.ndarray, second: list[int]) -> np.ndarray:
+        """How fast u of these corners changes with these sides; of the second ones, how fast the rate of u does."""
         n = self.n
         n.ways()[which] = sides
         n.ask(MOTION)
+        n.W.switch[MODE, second] = STEADY
         drifts(n.S, n.W, n.here.t)
+        n.W.switch[MODE, second] = OFF
         return n.W.switch[DRIFT_OFF, which].copy()
+
+    def pushed(self, which: list[int], second: list[int]) -> Pushed:
+        """What sides do to these corners."""
+        d = self.rates(which, np.zeros(len(which)), second)
+        B = np.column_stack([self.rates(which, e, second) - d for e in np.eye(len(which))])
+        size = np.abs(d) + np.abs(B).sum(axis=1)
+        B[np.abs(B) <= LEVEL * size[:, None]] = 0.0
+        old = self.sides[which]
+        left = np.array([self.old[s] != OFF for s in which]) & (np.abs(np.abs(old) - 1.0) <= REACHED)
+        sides = _sides(d, B, old)
+        sides = np.where(left & (np.abs(sides) > 0.5), np.sign(old), sides)
+        none = (np.abs(d + B @ sides) <= LEVEL * size) & (np.diag(B) < 0.0) & ~left
+        if none.any():  # in proportion to what they can, where the equations leave it open
+            even = sides.copy()
+            even[none] = -shared(B[np.ix_(none, none)]) @ (d[none] + B[np.ix_(none, ~none)] @ sides[~none])
+            if (np.abs(even[none]) < 1.0).all() and (np.abs(B @ (even - sides))[none] <= LEVEL * size[none]).all():
+                sides = even
+        held = np.abs(sides) < 1.0
+        return Pushed(which, second, d, B, size, sides, held, left)
 
     def decide(self) -> bool:
         """Sides of the corners that the motion is at. Returns whether forces depend on them."""
         n, W = self.n, self.n.W
         which = sorted(self.at)
-        old = n.ways()[which].copy()
+        self.sides = n.ways().copy()
         W.switch[MODE, which] = OFF
-        d = self.rates(which, np.zeros(len(which)))
-        B = np.column_stack([self.rates(which, e) - d for e in np.eye(len(which))])
-        size = np.abs(d) + np.abs(B).sum(axis=1)
-        B[np.abs(B) <= LEVEL * size[:, None]] = 0.0
-        left = np.array([self.old[s] == HELD for s in which]) & (np.abs(np.abs(old) - 1.0) <= REACHED)
-        sides = _sides(d, B, old)
-        sides = np.where(left & (np.abs(sides) > 0.5), np.sign(old), sides)
-        held = np.abs(sides) < 1.0
+        found = self.ended(self.pushed(which, []))
+        which, sides, held = found.which, found.sides, found.held
         n.ways()[which] = sides
-        flat = ~held & (np.abs(d + B @ sides) <= LEVEL * size)
+        flat = ~held & (np.abs(found.d + found.B @ sides) <= LEVEL * found.size)
         if held.any():
-            self._hold([s for s, h in zip(which, held, strict=True) if h], B[np.ix_(held, held)])
-        for k in np.flatnonzero(flat & ~left):
-            self._tried(which, int(k), sides, old)
+            self._hold([s for s, h in zip(which, held, strict=True) if h], found)
+        for k in np.flatnonzero(flat & ~found.left):
+            self._tried(which, int(k), sides, self.sides[which])
         if len(which) > 1:
-            self._goes_on([s for s, h in zip(which, held, strict=True) if not h])
+            self._goes_on([s for s, going in zip(which, ~held & ~found.left, strict=True) if going])
         n.ask(MOTION)
         self._tell(which)
-        return bool(B.any())
+        return bool(found.B.any())
 
-    def _hold(self, which: list[int], B: np.ndarray) -> None:
+    def ended(self, found: Pushed) -> Pushed:
+        """The same, with the corners on which swings have come to their end: the motion may rest on these."""
+        n, y, ways = self.n, self.n.here.y.copy(), self.n.ways().copy()
+        n.ways()[found.which] = found.sides
+        n.ask(MOTION)
+        maybe = [
+            (s, float(found.d[k]), at)
+            for k, s in enumerate(found.which)
+            if not found.B[k].any() and not (at := seen(n, s)).rates
+        ]
+        still = [s for s, rate, at in maybe if abs(rate) <= at.still]
+        for s, _rate, _ in maybe:
+            if s not in still and self.old[s] == OFF:
+                note(n, s)
+        series = [s for s, _, _ in maybe if s not in still and remaining(n, s) >= 0.0]
+        second = [*still, *series]
+        if not second:
+            return found
+        rates = {s: rate for s, rate, _ in maybe}
+        before = {s: self.value(s)[0] for s in self.all.tolist()}
+        halt(n, np.array([seen(n, s).row for s in second]), np.array([rates[s] for s in second]))
+        n.ask(MOTION)
+        also = [s for s in before if s not in self.at and abs(self.value(s)[0]) <= ALIKE * abs(before[s])]
+        other = self.pushed(sorted({*found.which, *also}), second)
+        ends = all(
+            other.held[k] and low(n, s, rates[s], float(other.size[k]))
+            for k, s in enumerate(other.which)
+            if s in series
+        )
+        if ends:
+            self.at |= set(also)
+            self.over = n.here.t + max((remaining(n, s) for s in series), default=0.0)
+            return other
+        n.here.y[:] = y
+        n.ways()[:] = ways
+        return found if not still else self.pushed(found.which, still)
+
+    def _hold(self, which: list[int], found: Pushed) -> None:
         """Hold the motion on these corners: u is put to zero by what moves it least, and the slopes are known."""
         n, W = self.n, self.n.W
-        inverse = np.linalg.inv(B)
-        W.switch[MODE, which] = HELD
-        for i, s in enumerate(which):
-            W.switch[INVERSE_SLOPES + np.array(which), s] = inverse[:, i]
-        S, nv, nm = n.S, n.here.structure.nv, measured(n.S)
+        inverse = shared(found.B[np.ix_(found.held, found.held)])
         n.ask(MOTION)
-        D = np.zeros((len(which), nv))
+        rows = np.array([seen(n, s).row for s in which])
+        misses = np.array([jet(n, s, BY_MOTION)[1] if s in found.second else self.value(s)[0] for s in which])
         for i, s in enumerate(which):
-            for m in range(nm):
-                slope = self._jet(int(S.switch_i[s, SWITCH_LAW]), nm + m)[1]
-                at = slice(S.row_p[len(S.row_i) + m], S.row_p[len(S.row_i) + m + 1])
-                D[i, S.col_i[at]] += slope * W.G[at]
-        u = np.array([self.value(s)[0] for s in which])
-        Y = np.column_stack([n.response(row)[0] for row in D])
-        A = D @ Y
-        if np.linalg.matrix_rank(A) == len(which):
-            n.here.v[:] -= Y @ np.linalg.solve(A, u)
+            W.switch[MODE, s] = STEADY if s in found.second else HELD
+            W.switch[INVERSE_SLOPES + np.array(which), s] = inverse[:, i]
+        n.ask(MOTION)
+        halt(n, rows, misses)
 
     def _tried(self, which: list[int], k: int, sides: np.ndarray, old: np.ndarray) -> None:
         """The side on which the motion goes on where u does not change at once: it is tried."""
@@ -197,7 +258,7 @@ class Corners:
         if back:
             t = n.here.t
             raise SimulationError(
-                f"at t = {t:.9g} s corners of {listing(list(dict.fromkeys(n.name(s) for s in back)))} meet where their "
+                f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet where their "
                 f"laws push back from every side: how the motion goes on along several such corners, of which one is a "
                 f"rate of another, is not known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x)",
                 t=t,
@@ -208,10 +269,11 @@ class Corners:
         for s in which:
             now = n.W.switch[MODE, s]
             if now != self.old[s]:
-                said = "stays on the corner of its law" if now == HELD else "leaves the corner of its law"
+                said = "stays on the corner of its law" if now != OFF else "leaves the corner of its law"
                 y = n.here.y.copy()
-                kind = "hold" if now == HELD else "leave"
-                n.here.records.append(Happening(n.here.t, n.name(s), kind, (said,), 0.0, {}, y, y))
+                kind = "hold" if now != OFF else "leave"
+                t = self.over if now != OFF and self.over > n.here.t else n.here.t
+                n.here.records.append(Happening(t, n.name(s), kind, (said,), 0.0, {}, y, y))
                 self.old[s] = now
 
 

@@ -43,12 +43,16 @@ class Here:
         What rigid bodies left open, in words, for the health.
     bounces : dict
         Switch -> `rest.Bounces`: how often it closed lately.
+    swings : dict
+        Switch -> when the last ways through its corner were (`swings`).
     counts : dict
         Event -> how often it happened so far.
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
         Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
+    decider : Instant, optional
+        What decides at its instants (`events.instant`).
     failed : Exception
         Why the motion cannot go on here.
     watched : str
@@ -63,6 +67,7 @@ class Here:
     lost: float = 0.0
     stopped: str = ""
     fresh: bool = False
+    decider: Any = None
     failed: Exception | None = None
     watched: str = ""
     given: float = 0.0
@@ -70,6 +75,7 @@ class Here:
     blows: list[Any] = field(default_factory=list)
     doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
+    swings: dict[int, list[float]] = field(default_factory=dict)
     seen: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)

@@ -65,7 +65,10 @@ def let_go(here: Here, e: Event, a: Release) -> str:
     W = here.c.work
     ways = W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :]
     held, kinds = held_by(here.structure.model, e, a), here.c.system.switch_i[:, SWITCH_KIND]
-    for k in switches(here, held.coordinates, held.joint, held.element):
+    every = switches(here, held.coordinates, held.joint, held.element)
+    if not any(W.switch[SPARE, k] == 0.0 if held.element else W.switch[MODE, k] != OFF for k in every):
+        return f"{a.what} was {'released already' if held.element else 'not locked'}"
+    for k in every:
         if held.element:
             here.given -= stored(here, k)
         W.switch[MODE, k], ways[k] = OFF, FROZEN if kinds[k] == ELASTIC else 0.0

@@ -70,8 +70,9 @@ def jump(n: Instant, parts: list[Part], kick: np.ndarray | None) -> Jump:
     if kick is not None:
         before = before + kicked(n, kick, out, B, drive)
     P.grain[:] = n.still[B.which]
-    B.loaded[:] = 0.0
-    P.b[:] = before
+    B.loaded[:] = out.rows[: len(B.loaded)]  # what the kick alone asks of joints
+    unmoved = (P.A.diagonal() == 0.0) & (np.abs(before) <= P.grain)  # by impulses: its rate is rounding
+    P.b[:] = np.where(unmoved, 0.0, before)
     out.ended = n.balance(B, P, BLOWS)
     x, u = P.x.copy(), P.u.copy()
     if out.ended != FOUND:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....constraints.modes import BRANCH
-from ....laws.breaks import Breaks, found_beforehand, margin
+from ....laws.breaks import Breaks, Timed, found_beforehand, margin, timed
 from ....numerics.integrators import clock as ex
 from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
 from ...compiled import Compiled
@@ -16,12 +16,17 @@ SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
 
 def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
     """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
+    return found_beforehand(c.structure.kept.get("laws of time", None, 1, lambda: _timed(c)), c.system.const, t0, t1)
+
+
+def _timed(c: Compiled) -> Timed:
+    """All laws that forces, rows, guards have by time."""
     S = c.system
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
     corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
     starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
-    return found_beforehand(S.code.tolist(), S.const, starts.tolist(), t0, t1)
+    return timed(S.code.tolist(), starts.tolist())
 
 
 class Legs:

@@ -13,20 +13,20 @@ import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.watched import Watched
-from ....errors import FlyballError, ModelError, SimulationError
+from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
-from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
-from ....tables.system import G_CONE, G_HOLDS, G_PULL, GUARD_KIND
+from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
-from .actions import expressions, stepped_over
+from .actions import expressions, say_never, stepped_over, true_already
+from .failed import endless
 from .happen import begin, happen
 from .here import Here
-from .instant import Instant
+from .instant import instant_of
 from .legs import Legs, breaks
 from .segments import Segments
 
@@ -34,9 +34,8 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
-HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
+HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
-LEAST_STEPS = 100  # steps at least that the time span of a watched motion is gone through in
 
 
 class Run:
@@ -62,14 +61,13 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
+        self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i)
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 
     def _loop(self) -> Watched:
         c = self.here.c
-        real = self.here.clock.real  # a wide step in which nothing bends may hide what its ends do not tell
-        real[ex.H_MAX] = min(real[ex.H_MAX], self.span / LEAST_STEPS)
         return Watched(self.method, self.here.clock, c.system, c.work, self.width)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
@@ -86,6 +84,7 @@ class Run:
                     break
             if here.stopped:
                 self.stop()
+            say_never(here, self.true)
         except KeyboardInterrupt:
             here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
@@ -127,6 +126,7 @@ class Run:
     def begin(self) -> None:
         """What happens as the motion begins."""
         begin(self.here)
+        self.true = true_already(self.here)
         self.here.fresh = False
 
     def integrate(self) -> None:
@@ -155,10 +155,12 @@ class Run:
     def event(self) -> None:
         """Have it decided what happens, and begin anew."""
         here = self.here
+        fired = self.loop.fired if self.loop else ()
         self.recent.append(here.t)
+        self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
-            raise self.endless()
-        self.happens(self.loop.fired if self.loop else ())
+            raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+        self.happens(fired)
 
     def happens(self, fired: Sequence[int]) -> None:
         """What happens where these guards fired."""
@@ -182,19 +184,10 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
-        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
-
-    def endless(self) -> SimulationError:
-        """What to say where events follow each other without end."""
-        names = dict.fromkeys(r.name for r in self.here.records[-LATEST:])
-        return SimulationError(
-            f"at t = {self.here.t:.9g} s events follow each other without end ({ENDLESS} within "
-            f"{self.recent[-1] - self.recent[0]:.2g} s): {listing(list(names))}",
-            t=self.here.t,
-        )
 
     def stop(self) -> None:
         """The motion ends here: the last row is written."""

@@ -7,11 +7,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....constraints.modes import ELASTIC, RATCHET, STOP
 from ....equations.kinematics import ground_frames
 from ....errors import FlyballError, SimulationError
+from ....model.touch import Touch
+from ....tables.contact.places import places
 from ....tables.numbers import words
-from ....tables.system import G_VALUE, LOWER, NU, SPARE, SWITCH_LOWER, SWITCH_UPPER, UPPER
+from ....tables.system import G_VALUE, LOWER, NU, SPARE, SWITCH_KIND, SWITCH_LOWER, SWITCH_UPPER, UPPER, VALUE
 from ....tables.values import Values, values
+from .bounds import beyond, rule, sizes, units
 from .here import Here
 
 NEAR = 1e-9  # of the mechanism's length, or of a radian: what may be elsewhere by rounding
@@ -44,14 +48,82 @@ def set_parameters(here: Here, new: Mapping[str, float], who: str) -> None:
         found = values(here.structure, told)
     except FlyballError as error:
         raise SimulationError(f"at t = {here.t:.9g} s {who}: {error}", t=here.t) from None
-    before = _places(here, old)
-    c.values, c.system, c.parameters = found, found.system, told
-    ground_frames(c.system, c.work)
-    _refuse_moved(here, who, before, _places(here, found))
-    for row, column in ((LOWER, SWITCH_LOWER), (UPPER, SWITCH_UPPER)):
-        moved = (old.system.switch_x[:, column] != found.system.switch_x[:, column]) & (c.work.switch[SPARE] == 0.0)
-        c.work.switch[row, moved] = found.system.switch_x[moved, column]
+    _refuse_other_places(here, found, who)
+    before, bounds, kept = _places(here, old), c.work.switch.copy(), c.parameters
+    _take(here, found, told)
+    try:
+        _refuse_moved(here, who, before, _places(here, found))
+        _move_bounds(here, old)
+        _refuse_beyond(here, who)
+    except SimulationError:
+        _take(here, old, kept)
+        c.work.switch[:] = bounds
+        raise
     here.fresh = True
+
+
+def _take(here: Here, x: Values, told: Mapping[str, float]) -> None:
+    """Go on by these numbers."""
+    c = here.c
+    c.values, c.system, c.parameters = x, x.system, dict(told)
+    ground_frames(c.system, c.work)
+
+
+def _move_bounds(here: Here, old: Values) -> None:
+    """Bounds of stops, and teeth, as the numbers now say."""
+    S, W = here.c.system, here.c.work
+    now, then, pair = S.switch_x, old.system.switch_x, [SWITCH_LOWER, SWITCH_UPPER]
+    for s in np.flatnonzero((W.switch[SPARE] == 0.0) & (now[:, pair] != then[:, pair]).any(axis=1)).tolist():
+        if S.switch_i[s, SWITCH_KIND] in (STOP, ELASTIC, RATCHET):
+            W.switch[[LOWER, UPPER], s] = now[s, pair]
+
+
+def _refuse_other_places(here: Here, new: Values, who: str) -> None:
+    """Refuse that shapes that may touch are others: their places are laid out when a motion begins."""
+    model, had = here.structure.model, [e for e in here.structure.model.forces if isinstance(e, Touch)]
+    if not had:
+        return
+    has = places(model, new.given).touches
+    moved = np.array([_apart(a, b) for a, b in zip(had, has, strict=False)] if len(had) == len(has) else [np.inf])
+    if not moved.max() <= NEAR * here.c.values.length:
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would put what touches at {had[int(moved.argmax())].title} elsewhere in no "
+            f"time, by {moved.max():.3g} m: shapes of contacts keep their sizes and places while they move",
+            t=here.t,
+        )
+    for a, b in zip(had, has, strict=True):
+        if (a.friction, a.restitution) != (b.friction, b.restitution):
+            raise SimulationError(
+                f"at t = {here.t:.9g} s {who} would change friction or restitution of {a.title}, which a motion that "
+                f"is integrated takes as they are at its start; let one motion end there (fb.Stop), and go on from it "
+                f"with the other value: simulate(start=run, parameters=...)",
+                t=here.t,
+            )
+
+
+def _apart(a: Touch, b: Touch) -> float:
+    """How far the numbers of two places are apart."""
+    pairs = [(a.gap, b.gap), *zip(a.slips, b.slips, strict=False), *zip(a.frames, b.frames, strict=True)]
+    return max((abs(x - y) for one, other in pairs for x, y in zip(one, other, strict=True)), default=0.0)
+
+
+def _refuse_beyond(here: Here, who: str) -> None:
+    """Refuse that a stop, a rope or a tooth is where its quantity may not be."""
+    s, W = here.structure, here.c.work
+    past = beyond(here, NEAR * sizes(s, here.c.values.length))
+    if past:
+        k = max(past, key=past.__getitem__)
+        spec, unit = s.switches[k], units(s)[k]
+        bounds, x = W.switch[[LOWER, UPPER], k], W.sensed[VALUE, spec.measured]
+        said = (
+            "it is held where no tooth is" if spec.switch.kind == RATCHET else rule(spec, float(x), tuple(bounds), unit)
+        )
+        raise SimulationError(
+            f"at t = {here.t:.9g} s {who} would put {spec.element.title} elsewhere in no time, by {past[k]:.3g} "
+            f"{unit}: {said}. Set it where nothing is beyond it, give it stiffness=..., or let a Driver move what it "
+            f"is fixed to",
+            t=here.t,
+        )
 
 
 def _changed(old: Mapping[str, float], new: Mapping[str, float]) -> set[str]:

@@ -6,12 +6,14 @@ import numpy as np
 
 from ....constraints.modes import BY_RATE, ELASTIC, FRICTION, FROZEN, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....model.touch import Touch
+from ....numerics.integrators.clock import LEDGER
 from ....results.events import Happening
 from ....results.struck import Struck
 from ....tables.system import MODE, OFF, SWITCH_PARTNER
 from .instant import Instant
 from .jump import Jump
 
+NOISE = 1e-14  # of the energy that a motion is about: as good as nothing lost
 HELD_WORDS = {
     STOP: ("close", "closes"),
     FRICTION: ("stick", "sticks"),
@@ -107,6 +109,6 @@ def record(
 ) -> None:
     """Append a record."""
     t = n.over if kind == "rest" and not np.isnan(n.over) else n.here.t
-    lost = jumped.lost if jumped else 0.0
+    lost = jumped.lost if jumped and abs(jumped.lost) > NOISE * n.here.clock.real[LEDGER] else 0.0
     known = Struck(impulses, jumped.rows, jumped.blows) if jumped else impulses
     n.here.records.append(Happening(t, names, kind, done, lost, known, before.copy(), n.here.y.copy()))

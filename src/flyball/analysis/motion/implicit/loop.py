@@ -19,7 +19,7 @@ from ....numerics.integrators.implicit.desk import Desk
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import FREE, NV, Q0, SCHUR, SOLVER, SPHERICAL, TREE, V0
 from ...compiled import Compiled
-from ...linear.derivatives import announce, refuse_functions
+from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, complex_tables
 from ...progress import Tell
 from ..events.legs import Legs
@@ -134,7 +134,6 @@ class Implicit:
     def go_on(self, out: np.ndarray) -> int:
         """Go on until the end, or what else `radau.advance` returns for. Returns rows written."""
         S, W = self.c.system, self.c.work
-        announce(implicit_kernel)
         doors = (
             engine.address(S, W, self.R, self.own, self.sheet),
             residual.address(self.SC, self.WC, self.benches[0]),

@@ -1,0 +1,86 @@
+"""Guards within a step: as expected from what was kept of it, or with the equations on its dense output.
+
+What is expected is borne out by what stages of the step have met. Where it is not, as in a wide step of a state that
+hardly bends, of which a distance or a force does, the equations are evaluated at every place that is looked at.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from .clock import BETWEEN, T
+from .step import extend, interpolate
+from .watching import END, EXTENDED, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, THERE, TRUE, TRULY
+
+ODD = 1e-2  # part of its change over a step by which a guard may differ from what is expected
+FAR = 0.1  # part of its least distance from zero by which it may
+BLURRED = 1e-9  # part of its size that is nothing
+SHORT = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
+NOISE = 4.0  # times what is rounding of a guard
+
+
+@formula
+def glance(callbacks, S, W, R, c, h, x, row):
+    """Write guards at a part x of the step to a row."""
+    W.count[LOOKS] += 1
+    if W.count[PLAIN] == 1:
+        callbacks[5](c.real[T], h, x, S, W, row)
+    elif exactly(callbacks, S, W, R, c, h, x, row) != 0:
+        W.count[LOST] = 1
+
+
+@formula
+def exactly(callbacks, S, W, R, c, h, x, row):
+    """Write guards of the equations on the dense output at a part x of the step to a row. Returns a status."""
+    if W.count[EXTENDED] == 0:
+        if extend(callbacks[0], S, W, R, c, h) != 0:
+            return 1
+        W.count[EXTENDED] = 1
+    W.count[SOUGHT] += 1
+    W.count[TRULY] += 1
+    interpolate(R, c, x, h, c.y[BETWEEN])
+    return callbacks[3](c.real[T] + x * h, c.y[BETWEEN], S, W, row)
+
+
+@formula
+def true_guard(callbacks, S, W, R, c, h, x, i):
+    """Guard i on the dense output at a part x of the step. Returns (status, value)."""
+    if x <= 0.0:
+        return 0, W.g[START, i]
+    if x >= 1.0:
+        return 0, W.g[END, i]
+    if exactly(callbacks, S, W, R, c, h, x, TRUE) != 0:
+        return 1, 0.0
+    return 0, W.g[TRUE, i]
+
+
+@formula
+def compare(look, S, W, t, h, span):
+    """Note in W.count[PLAIN] whether guards are as expected where stages of the step have met them."""
+    ng = W.way.shape[0]
+    W.count[SOUGHT] = W.count[LOST] = 0
+    W.count[PLAIN] = 1
+    for i in range(ng):
+        W.g[LEAST, i] = min(W.g[START, i], W.g[END, i])
+        W.g[MOST, i] = max(W.g[START, i], W.g[END, i])
+        W.g[MISS, i] = 0.0
+    for j in range(W.met.shape[0]):
+        look(t, h, W.met_at[j], S, W, THERE)
+        for i in range(ng):
+            f, g = W.met_g[j, i], W.g[THERE, i]
+            if f == g or (f != f and g != g):
+                continue
+            if not f - g == f - g:  # a number, and none
+                W.count[PLAIN] = 0
+            W.g[LEAST, i] = min(W.g[LEAST, i], f, g)
+            W.g[MOST, i] = max(W.g[MOST, i], f, g)
+            W.g[MISS, i] = max(W.g[MISS, i], abs(f - g))
+    if h <= SHORT * span:
+        W.count[PLAIN] = 1
+        return
+    for i in range(ng):
+        low, high, miss = W.g[LEAST, i], W.g[MOST, i], W.g[MISS, i]
+        if miss == 0.0 or miss <= ODD * (high - low) + BLURRED * max(abs(low), abs(high)) + NOISE * W.grain[i]:
+            continue
+        if miss < FAR * low or miss < -FAR * high:
+            continue
+        W.count[PLAIN] = 0

@@ -1,0 +1,205 @@
+"""The first event in a step, and a step that ends on it.
+
+Where a guard may pass zero (`panels.survey`) it is looked for with the equations, and the step is taken again
+(`pinned.py`). At last, whatever was seen in between: what has to stay above zero does so at the step's end, or where
+it first does not is found by halves.
+"""
+
+from __future__ import annotations
+
+from ...compiler.jit import formula
+from .clock import NEW, SPAN, T
+from .glance import compare, exactly, glance, true_guard
+from .panels import band, begin_sides, fires, survey
+from .pinned import ULP, crossing, end_on, retake
+from .watching import (
+    AWAY,
+    CUTS,
+    DONE_TO,
+    END,
+    EXTENDED,
+    FRESH,
+    LOST,
+    MARK,
+    PLAIN,
+    SAME,
+    SIDE,
+    START,
+    THERE,
+    TRUE,
+)
+
+AT_ONCE = 1e-11  # part of the step within which events are at the same instant
+SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
+OTHERS = 20  # guards that may turn out to be earlier
+HALVES = 44  # times that it is halved where a guard has been left unseen
+SHORTER = 6  # times that a step is made shorter since what begins at zero does not go as expected
+CUT, UNKNOWN = 2, 1  # why a step is not gone on from: not looked through; not to be evaluated
+
+
+@formula
+def first_event(callbacks, S, W, R, c, h, error):
+    """End the step on the first event in it, if there is one: (status, width, error, whether there is one).
+
+    Callbacks: derivative, arrive, tangent, watch, note, look. Where the status is `CUT` the width is one to try next.
+    """
+    derivative, arrive, tangent, watch, note, look = callbacks
+    most = h
+    hit = False
+    for i in range(W.fired.shape[0]):
+        W.fired[i] = 0
+    W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
+    compare(look, S, W, c.real[T], h, c.real[SPAN])
+    if W.count[PLAIN] == 0 and W.count[FRESH] == 1 and W.count[CUTS] < SHORTER and begins_at_zero(W):
+        return CUT, 0.25 * h, error, False
+    for _ in range(OTHERS):
+        status, i, x, s = next_event(callbacks, S, W, R, c, h)
+        if status == CUT and not hit:
+            return CUT, max(W.real[DONE_TO], SKIPPED) * h, error, False
+        if status == UNKNOWN:
+            return UNKNOWN, h, error, False
+        if status != 0 or i < 0:
+            break
+        if hit and x * h >= h - W.real[SAME]:
+            W.fired[i] = 1
+            continue
+        for j in range(W.fired.shape[0]):
+            W.fired[j] = 0
+        if W.count[AWAY] == 1:
+            h *= x
+            status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+        else:
+            slope = expected_slope(callbacks, S, W, R, c, h, x, i)
+            status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, most)
+        if status != 0:
+            return UNKNOWN, h, error, False
+        hit = True
+        compare(look, S, W, c.real[T], h, c.real[SPAN])
+        W.fired[i] = 1
+        if W.count[AWAY] == 1:
+            break
+        at_once(callbacks, S, W, R, c, h, i)
+    if hit and W.count[EXTENDED] == 1:  # places within were looked at: back to the end
+        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, error, True
+    return 0, h, error, hit
+
+
+@formula
+def begins_at_zero(W):
+    """Whether a guard is zero as the step begins."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.g[START, i] == 0.0 or W.side[i] == 0.0:
+            n += 1
+    return n > 0
+
+
+@formula
+def next_event(callbacks, S, W, R, c, h):
+    """The first place where a guard leaves its side: (status, guard or -1, place, side)."""
+    W.real[DONE_TO] = 1.0
+    i, a, b, at = begin_sides(callbacks, S, W, R, c, h)
+    if i >= 0 and W.count[AWAY] == 1:
+        return left(callbacks, S, W, R, c, h, i, b)
+    if i < 0:
+        i, a, b = survey(callbacks, S, W, R, c, h, at)
+    skip = SKIPPED
+    while i >= 0:
+        s = W.g[SIDE, i]
+        status, x = crossing(callbacks, S, W, R, c, h, i, a, b, s)
+        if status != 0 or x > 0.0:
+            return status, i, x, (s if fires(W.way[i], s) else -s)
+        at = max(at + skip, b)
+        skip *= 2.0  # of what is rounding there is no end
+        if at >= 1.0:
+            break
+        b = at
+        if resume(callbacks, S, W, R, c, h, b) != 0:
+            return UNKNOWN, -1, 0.0, 0.0
+        i, a, b = survey(callbacks, S, W, R, c, h, b)
+    if W.count[LOST] == 1:
+        return UNKNOWN, -1, 0.0, 0.0
+    if W.real[DONE_TO] < 1.0:
+        return CUT, -1, 0.0, 0.0
+    return trespass(callbacks, S, W, R, c, h)
+
+
+@formula
+def trespass(callbacks, S, W, R, c, h):
+    """The guard that is first below zero at the end of the step, and has not to be, as `next_event` returns it."""
+    best, at = -1, 2.0
+    for i in range(W.way.shape[0]):
+        f = W.g[END, i]
+        if W.kept[i] == 0 or W.fired[i] == 1 or not W.g[START, i] == W.g[START, i] or not f < -band(W, i):
+            continue
+        status, _, x, _ = left(callbacks, S, W, R, c, h, i, 1.0)
+        if status != 0:
+            return UNKNOWN, -1, 0.0, 0.0
+        if x < at:
+            best, at = i, x
+    return 0, best, at, 1.0
+
+
+@formula
+def left(callbacks, S, W, R, c, h, i, b):
+    """Where guard i, below zero at b, goes there by more than rounding, as `next_event` returns it."""
+    W.count[AWAY] = 1
+    least = band(W, i)
+    a = 0.0
+    for _ in range(HALVES):
+        x = 0.5 * (a + b)
+        status, f = true_guard(callbacks, S, W, R, c, h, x, i)
+        if status != 0:
+            return UNKNOWN, i, x, 1.0
+        if f < -least:
+            b = x
+        else:
+            a = x
+    return 0, i, b, 1.0
+
+
+@formula
+def resume(callbacks, S, W, R, c, h, x):
+    """Sides at a place in the step up to which nothing happened, by the equations. Returns a status."""
+    if exactly(callbacks, S, W, R, c, h, x, THERE) != 0:
+        return UNKNOWN
+    for i in range(W.way.shape[0]):
+        f = W.g[THERE, i]
+        if W.kept[i] == 1 and f <= 0.0 and W.g[MARK, i] < 0.0:
+            continue
+        if f > 0.0:
+            W.g[SIDE, i] = 1.0
+        elif f < 0.0:
+            W.g[SIDE, i] = -1.0
+    return 0
+
+
+@formula
+def expected_slope(callbacks, S, W, R, c, h, x, i):
+    """How fast guard i is expected to change there [1/s]."""
+    d = 1e-4
+    a, b = max(0.0, x - d), min(1.0, x + d)
+    f = W.g[START, i]
+    if a > 0.0:
+        glance(callbacks, S, W, R, c, h, a, THERE)
+        f = W.g[THERE, i]
+    g = W.g[END, i]
+    if b < 1.0:
+        glance(callbacks, S, W, R, c, h, b, THERE)
+        g = W.g[THERE, i]
+    return (g - f) / ((b - a) * h)
+
+
+@formula
+def at_once(callbacks, S, W, R, c, h, first):
+    """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
+    d = 1e-4
+    glance(callbacks, S, W, R, c, h, 1.0 - d, THERE)
+    for i in range(W.way.shape[0]):
+        if i == first:
+            continue
+        f = W.g[END, i]
+        slope = (f - W.g[THERE, i]) / (d * h)
+        came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
+        if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
+            W.fired[i] = 1

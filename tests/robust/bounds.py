@@ -1,0 +1,39 @@
+"""What stops, ropes, freewheels and ratchets must have held: no bound is passed, and nothing pulls that can only push."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flyball.constraints.modes import ONE_WAY, RATCHET, STOP
+from flyball.results.result import Result
+from flyball.tables.system import SWITCH_LOWER, SWITCH_PITCH, SWITCH_UPPER
+
+PAST, PULLED = 1e-7, 1e-6
+
+
+def against(r: Result) -> str:
+    """What was passed or pulled, in words; empty if nothing was."""
+    for x, row in zip(r.values.structure.switches, r.values.system.switch_x, strict=True):
+        e = x.element
+        if e.category not in ("forces", "limits") or x.switch.kind not in (STOP, ONE_WAY, RATCHET):
+            continue
+        told = r[e.name]
+        rope = e.category == "forces"
+        way = 1.0 if x.switch.kind == STOP else float(e.outward(r.values.numbers[e.name]))
+        value, rate = way * (told.length if rope else told.value), way * told.rate
+        push, closed = (told.tension, told.taut) if rope else (way * told.force, np.abs(told.closed))
+        if x.switch.kind == STOP and not rope:
+            push = push * told.closed
+        past = {
+            STOP: np.maximum(row[SWITCH_LOWER] - value, value - row[SWITCH_UPPER]),
+            ONE_WAY: np.maximum.accumulate(value) - value,
+            RATCHET: np.maximum.accumulate(value) - value - row[SWITCH_PITCH],
+        }[x.switch.kind]
+        size = max(1.0, r.values.length)
+        if past.max() > PAST * size:
+            return f"{e.title} is passed by {past.max():.3g}"
+        if x.switch.kind == ONE_WAY and -rate.min() > PAST * (size + np.abs(rate).max()):
+            return f"{e.title} goes back with {-rate.min():.3g}"
+        if -push.min() > PULLED * (1.0 + np.abs(push).max()):
+            return f"{e.title} pulls with {-push.min():.3g} while it is closed: {closed[push.argmin()]:.0f}"
+    return ""
