@@ -16,7 +16,11 @@ def against(r: Result) -> str:
     """What was passed or pulled, in words; empty if nothing was."""
     for x, row in zip(r.values.structure.switches, r.values.system.switch_x, strict=True):
         e = x.element
-        if isinstance(e, Touch) or e.category not in ("forces", "limits") or x.switch.kind not in (STOP, ONE_WAY, RATCHET):
+        if (
+            isinstance(e, Touch)
+            or e.category not in ("forces", "limits")
+            or x.switch.kind not in (STOP, ONE_WAY, RATCHET)
+        ):
             continue
         told = r[e.name]
         rope = e.category == "forces"
