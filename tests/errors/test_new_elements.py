@@ -91,8 +91,11 @@ PLANAR = {
     "Revolute with an axis": ({**AT2, "axis": (1, 0)}, "its axis is the normal; leave axis out"),
     # ropes and bushings
     "Rope of one point": ({"bodies": ["arm"], "at": [(0, 0)]}, r"two ends at least, got bodies \('arm',\); name"),
-    "Rope on one body": ({"bodies": ["arm", "arm"], "at": [(0, 0), (1, 0)]}, "points 1 and 2 are both on 'arm'.*leave"),
-    "Rope by a frame": ({"bodies": ["cart", "eye", "arm"], "at": None}, "points 2 and 3 are both on 'arm'"),
+    "Rope on one body": (
+        {"bodies": ["arm", "arm"], "at": [(0, 0), (1, 0)]},
+        "all its points are on 'arm'.*name another",
+    ),
+    "Rope by a frame": ({"bodies": ["eye", "arm"], "at": None}, "all its points are on 'arm'"),
     "Rope short of points": ({"bodies": ["arm", "cart"], "at": [(0, 0)]}, "2 bodies need as many points.*got 1"),
     "Rope coincident": ({"bodies": ["arm", "cart"], "at": [(1, 0), (1, 0)]}, "points 1 and 2 are both at.*direction"),
     "Rope unknown": ({"bodies": ["arm", "crat"], "at": None}, "no body or frame named 'crat'.*mean 'cart'"),

@@ -6,9 +6,10 @@ import inspect
 
 import numpy as np
 
+from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.motion.events.here import Here
 from flyball.analysis.motion.start import begin
-from flyball.analysis.simulate import SimulateOptions, clock_for
+from flyball.analysis.simulate import clock_for
 from flyball.tables.system import MODE, VALUE
 
 ASKED = {

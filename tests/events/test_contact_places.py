@@ -8,7 +8,7 @@ import pytest
 import flyball as fb
 from flyball.analysis.compiled import compiled
 from flyball.analysis.motion.start import begin
-from flyball.analysis.motion.touches import stepped, with_places
+from flyball.analysis.motion.touches import impossible, with_places
 from flyball.equations.engine import MOTION
 from flyball.equations.friction import FORGOTTEN
 from flyball.model.touch import Touch
@@ -73,7 +73,7 @@ def test_what_rows_do_not_know_is_named_and_left_to_steps():
     m = scene(floor(), a, b)
     with pytest.raises(fb.ModelError, match=r"the box of 'a' on the box of 'b'; leave method out, or give method='imp"):
         with_places(m, None)
-    assert "the box of 'a' on the box of 'b'" in stepped(m, None)
+    assert "the box of 'a' on the box of 'b'" in impossible(m, None)
 
 
 @pytest.mark.parametrize("coordinates", ["absolute", "joint"])

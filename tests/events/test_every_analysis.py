@@ -145,5 +145,5 @@ def test_friction_of_a_driven_joint_slides_the_way_it_is_driven():
 
 def test_drivers_do_not_lead_past_a_stop():
     m = links(fb.Limit("part", "A.angle", lower=-1.0, upper=0.003))
-    with pytest.raises(fb.ModelError, match=r"Limit 'part': the drivers take A.angle past it at t = 0.2 s"):
+    with pytest.raises(fb.ModelError, match=r"Limit 'part': the drivers take A.angle past it at t = 0.1[5-9]"):
         driven(m).kinematics(3, t_end=0.2)

@@ -97,3 +97,17 @@ def test_block_rocks_itself_to_rest(coordinates):
     assert rest.t == pytest.approx(total, abs=1e-8)
     assert sum(x.lost for x in hits) == pytest.approx(3.0 * energy, rel=1e-9)
     assert abs(run["block.angle"][-1]) < 1e-15
+
+
+def test_what_a_brake_has_stopped_stands_still():
+    """A flywheel of 2 kg m^2 at 3 rad/s, braked by 4 N m, stands at 1.5 s; from then on its rate is 0, to the bit."""
+    m = fb.Mechanism("flywheel", planar=True)
+    m.add(fb.Body("w", mass=1, inertia=2), fb.Revolute("A", "ground", "w", at=(0, 0)))
+    m.add(fb.Brake("b", "A.angle", capacity=4), fb.Initial("A.angle", rate=3))
+    m.add(fb.Motor("load", "A", torque="where(t > 1.5, sin(7*t), 0)"))
+    r = m.simulate(3, outputs=301, coordinates="joint")
+    stands = r.t > 1.5 + 1e-9
+    assert r.events["b"].t == pytest.approx([1.5], abs=1e-9)
+    assert not r["A.angle_rate"][stands].any()
+    assert not r["w.angular_velocity"][stands].any()
+    assert r["A.angle"][-1] == pytest.approx(2.25, abs=1e-8)

@@ -26,7 +26,7 @@ def test_a_belt_takes_things_along() -> None:
     """At mu g up to the speed of the belt: after t1 = v / (mu g) it has come v t1 / 2 and rests on the belt."""
     m = floor(friction=0.2, surface_velocity=(0, 1, 0))
     m.add(box(), fb.Contact())
-    run = m.simulate(1.5)
+    run = m.simulate(1.5, method="impulse")
     t1 = 1 / (0.2 * G)
     assert run["box"].velocity[-1] == pytest.approx([0, 1, 0], abs=1e-6)
     assert run["box"].y[-1] == pytest.approx(t1 / 2 + (1.5 - t1), abs=5e-3)
@@ -39,7 +39,7 @@ def test_friction_along_the_grain_and_across_it() -> None:
     m.add(box("along", velocity=(0, 1, 0), angular_velocity=(0, 0, 0)))
     m.add(box("across", velocity=(1, 0, 0), angular_velocity=(0, 0, 0), position=(5, 0, 0.05)))
     m.add(fb.Contact(between="floor", others=["along", "across"]))
-    run = m.simulate(1.0)
+    run = m.simulate(1.0, method="impulse")
     assert run["along"].y[-1] == pytest.approx(1 / (2 * 0.2 * G), rel=2e-2)
     assert run["across"].x[-1] - 5 == pytest.approx(1 / (2 * 0.4 * G), rel=2e-2)
 
@@ -47,7 +47,7 @@ def test_friction_along_the_grain_and_across_it() -> None:
 def test_what_is_excluded_goes_through() -> None:
     m = floor(friction=0.2)
     m.add(box("a"), box("b", position=(1, 0, 0.05)), fb.Contact(friction=0.2, exclude=[("a", "floor")]))
-    run = m.simulate(0.5)
+    run = m.simulate(0.5, method="impulse")
     assert run["a"].z[-1] == pytest.approx(0.05 - G * 0.5**2 / 2, abs=1e-9)
     assert run["b"].z[-1] == pytest.approx(0.05, abs=1e-5)
 
@@ -58,7 +58,7 @@ def test_a_plane_that_moves() -> None:
     m.add(fb.Body("board", mass=2, inertia=(1, 1, 1), shape=fb.Plane(), velocity=(0, 0, 1), angular_velocity=(0, 0, 0)))
     m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=1, position=(0, 0, 0.5)))
     m.add(fb.Contact(friction=0.3, restitution=1))
-    run = m.simulate(1.0)
+    run = m.simulate(1.0, method="impulse")
     assert run["board"].vz[-1] == pytest.approx(1 / 3)
     assert run["ball"].vz[-1] == pytest.approx(4 / 3)
 
@@ -72,7 +72,7 @@ def test_many_bodies_move_as_single_ones() -> None:
     runs = []
     for m in (one, many):
         m.add(fb.Contact(friction=0.3))
-        runs.append(m.simulate(1.0))
+        runs.append(m.simulate(1.0, method="impulse"))
     for k in range(3):
         assert runs[1][f"b[{k}]"].position[-1] == pytest.approx(runs[0][f"b{k}"].position[-1], abs=1e-9)
 
@@ -89,7 +89,7 @@ def test_outlines_roll_and_rest_in_the_plane() -> None:
     bar = fb.Capsule(radius=0.1, length=0.3, orientation=(0, np.pi / 2, 0))
     m.add(fb.Body("bar", shape=bar, density=1000, position=(-2, 0.3), angle=0.3))
     m.add(fb.Contact(friction=0.3))
-    run = m.simulate(2.0)
+    run = m.simulate(2.0, method="impulse")
     assert run["discs[0]"].velocity[-1] == pytest.approx([1 / 3, 0], abs=1e-6)
     for name in ("box", "bar"):
         assert run[name].y[-1] == pytest.approx(0.1, abs=1e-5)

@@ -22,7 +22,7 @@ def test_a_lever_that_lies_on_the_floor_shares_its_weight_with_the_hinge():
     m.add(fb.Body("lever", mass=3.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0, 0.1), shape=fb.Sphere(radius=0.1)))
     m.add(fb.Revolute("hinge", "ground", "lever", at=(-1.0, 0, 0.1), axis=(0, 1, 0)))
     m.add(fb.SpringDamper("s", "ground", "lever", at=((0.0, 0, 2.1), (0.0, 0, 0.1)), stiffness=G / 0.2, length=1.8))
-    r = m.simulate(0.5, outputs=3)
+    r = m.simulate(0.5, outputs=3, method="impulse")
     force = r.contacts.total("floor", "lever")[-1] if hasattr(r.contacts, "total") else r.contacts.force.sum(axis=0) / 2
     assert np.abs(force[2]) == pytest.approx(3 * G - G / 2, rel=1e-5)
     assert r["hinge"].fz[-1] == pytest.approx(3 * G - G - (3 * G - G / 2), rel=1e-5)
@@ -61,7 +61,7 @@ def test_a_chain_that_falls_on_a_floor_accounts_for_its_energy(tip, part):
 
     A tip of 1000 kg that stops pulls so hard at light links that steps have to be shorter for a while.
     """
-    r = chain(tip).simulate(1.0, outputs=101)
+    r = chain(tip).simulate(1.0, outputs=101, method="impulse")
     assert r.energy.drift < part * r.energy.kinetic.max()
     assert r.exchanged["impact_loss"][-1] > 0.1 * r.energy.kinetic.max()
     assert np.diff(r.energy.total).max() < part * r.energy.kinetic.max()
@@ -76,7 +76,7 @@ def test_a_limit_stops_a_free_body_and_a_joint():
     m.add(fb.Limit("stop", "hinge.angle", lower=-1.0))
     m.add(fb.Body("block", mass=1.0, inertia=0.1, position=(5, 0)))
     m.add(fb.Limit("bottom", "block.y", lower=-0.5, restitution=0.5))
-    r = m.simulate(1.0, outputs=101)
+    r = m.simulate(1.0, outputs=101, method="impulse")
     assert r["hinge"].angle.min() == pytest.approx(-1.0, abs=1e-9)
     assert r["hinge"].angle[-1] == pytest.approx(-1.0, abs=1e-9)
     y = r["block"].position[:, 1]
@@ -101,7 +101,7 @@ def test_a_gripper_lifts_a_box_by_friction():
         m.add(fb.Prismatic(f"{name}_slide", "carriage", name, at=(side * 0.2, 0, 0.1), axis=(-side, 0, 0)))
         m.add(fb.Actuator(f"{name}_push", f"{name}_slide.displacement", force="15"))
     m.add(fb.Body("box", mass=1.0, inertia=(0.01,) * 3, position=(0, 0, 0.1), shape=fb.Box(edges=(0.2, 0.2, 0.2))))
-    r = m.simulate(1.5, outputs=31)
+    r = m.simulate(1.5, outputs=31, method="impulse")
     lifted = 0.2 * 1.0**2
     assert r["carriage"].position[-1, 2] == pytest.approx(1.0 + lifted, abs=1e-9)
     assert r["box"].position[-1, 2] == pytest.approx(0.1 + lifted, abs=2e-3)
@@ -114,7 +114,7 @@ def test_a_force_that_is_no_number_is_told():
     m.add(fb.Prismatic("rail", "ground", "bob", at=(1.0, 0, 1.1), axis=(0, 0, 1)))
     m.add(fb.Actuator("push", "rail.displacement", force="sqrt(0.2 - t)"))
     with pytest.raises(fb.SimulationError, match="cannot go on") as told:
-        m.simulate(1.0, outputs=11)
+        m.simulate(1.0, outputs=11, method="impulse")
     assert told.value.t == pytest.approx(0.2, abs=5e-3)
 
 
@@ -138,7 +138,7 @@ def test_what_steps_by_impulses_cannot_do_is_refused():
     m = scene(friction=0.0)
     m.add(fb.Body("bob", mass=1.0, inertia=(0.1,) * 3, position=(1.0, 0, 1.1), shape=fb.Sphere(radius=0.1)))
     with pytest.raises(fb.ModelError, match="absolute coordinates"):
-        m.simulate(0.1, coordinates="joint")
+        m.simulate(0.1, coordinates="joint", method="impulse")
 
 
 def test_a_motion_with_contact_goes_on_from_where_one_ended():
@@ -152,9 +152,9 @@ def test_a_motion_with_contact_goes_on_from_where_one_ended():
     m.add(fb.Body("cart", mass=1.0, inertia=(0.1,) * 3, position=(0, -4, 1)))
     m.add(fb.Prismatic("rail", "ground", "cart", at=(0, -4, 1), axis=(1, 0, 0)))
     m.add(fb.Driver("push", "rail.displacement", law="sin(3*t)"))
-    whole = m.simulate(0.8, outputs=9)
-    first = m.simulate(0.4, outputs=5)
-    then = m.simulate(0.8, outputs=5, start=first)
+    whole = m.simulate(0.8, outputs=9, method="impulse")
+    first = m.simulate(0.4, outputs=5, method="impulse")
+    then = m.simulate(0.8, outputs=5, start=first, method="impulse")
     assert then.t[0] == 0.4
     for name in ("ball", "bob", "cart"):
         for part, at in ((first, slice(0, 5)), (then, slice(4, 9))):
@@ -163,4 +163,4 @@ def test_a_motion_with_contact_goes_on_from_where_one_ended():
     assert then.bulk["many"].position == pytest.approx(whole.bulk["many"].position[4:], abs=1e-6)
     assert then["push"].work == pytest.approx(whole["push"].work[4:], abs=1e-9)
     with pytest.raises(fb.ModelError, match="start"):
-        m.simulate(0.8, t_start=0.1, start=first)
+        m.simulate(0.8, t_start=0.1, start=first, method="impulse")

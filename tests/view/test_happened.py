@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.view.edged import edged
 from flyball.view.report import report
 from flyball.view.tables import tables
 from tests.program.test_cli import Said
@@ -46,8 +47,8 @@ def test_many_events_are_counted_and_folded():
     r = m.simulate(3, outputs=31)
     found = by_name(r)
     assert found["events"].rows == (
-        ("tick", "event", "299", f"{r.events['tick'].t[0]:.6g}", f"{r.events['tick'].t[-1]:.6g}", ""),
-        ("tock", "event", "15", f"{r.events['tock'].t[0]:.6g}", f"{r.events['tock'].t[-1]:.6g}", ""),
+        ("tick", "event", "299", f"{r.events['tick'].t[0]:.6g}", f"{r.events['tick'].t[-1]:.6g}"),
+        ("tock", "event", "15", f"{r.events['tock'].t[0]:.6g}", f"{r.events['tock'].t[-1]:.6g}"),
     )
     assert r.events["tick"].t == pytest.approx(np.arange(1, 300) / 100, abs=1e-9)
     listed = found["all-events"]
@@ -121,3 +122,44 @@ def test_what_was_not_locked_is_not_released():
     assert done["late"] == ("released A.angle",)
     assert done["open"] == ("released stop",)
     assert done["again"] == ("stop was released already",)
+
+
+def test_jumps_are_upright_and_forces_broken():
+    """The ball hits at 0.5 s with 5 m/s: 25 J before, 6.25 J after, at one time; its weight's support is known later."""
+    r = ball().simulate(2.4, outputs=25)
+    whole = edged(r)
+    at = np.flatnonzero(whole.t == r.events["floor"].t[0])
+    assert whole.t[at] == pytest.approx([0.5, 0.5], abs=1e-12)
+    assert whole["b.vy"][at] == pytest.approx([-5, 2.5], abs=1e-9)
+    assert whole.energy.kinetic[at] == pytest.approx([25, 6.25], abs=1e-9)
+    assert np.abs(whole.energy.balance).max() < 1e-9
+    assert (np.diff(whole.t) >= 0.0).all()
+    kept = np.isin(whole.t, r.t)
+    assert whole["b.y"][kept] == pytest.approx(r["b.y"], abs=0)
+    assert np.isnan(whole["floor.force"][at]).any()
+    assert np.nanmax(whole["floor.force"]) == pytest.approx(20.0, abs=1e-9)
+    (ax,) = r.plot("energy.kinetic").axes
+    assert max(ax.lines[0].get_ydata()) == pytest.approx(25.0, abs=1e-9)
+
+
+def test_jumps_of_parameters_and_of_files(tmp_path: Path):
+    """A spring of 8 N/m, stretched by 1 m, that becomes one of 16 N/m at 0.5 s: 4 J to 8 J; read from a file too."""
+    m = fb.Mechanism("s", planar=True, parameters={"k": 8.0})
+    m.add(fb.Body("b", mass=2, inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("s", "A.displacement", stiffness="k"), fb.Initial("A.displacement", value=1.0))
+    m.add(fb.Event("hold", "start", do=fb.Lock("A")), fb.Event("hard", "t - 0.55", do=fb.Set("k", 16)))
+    r = m.simulate(1, outputs=11)
+    r.save(tmp_path / "r.nc")
+    for run in (r, fb.load_result(tmp_path / "r.nc")):
+        whole = edged(run)
+        assert whole.t[6:8] == pytest.approx([0.55, 0.55], abs=1e-12)
+        assert whole["s.energy"][5:9] == pytest.approx([4, 4, 8, 8], abs=1e-12)
+        assert np.abs(whole.energy.balance).max() < 1e-12
+
+
+def test_names_of_marks_are_written_once():
+    r = ball(0.8).simulate(3, outputs=61)
+    (ax,) = r.plot("b.y").axes
+    texts = [t.get_text() for t in ax.texts]
+    assert sum(t.startswith("floor (1 of") for t in texts) == 1
+    assert len(texts) <= 2

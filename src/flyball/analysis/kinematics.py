@@ -30,7 +30,7 @@ from .motion.engines import Engine, check_specialize
 from .motion.options import output_times, projected
 from .motion.start import Start, begin_at
 from .options import Options
-from .progress import shown
+from .progress import shown, unwatched
 from .simulate import moved
 from .untouched import refuse_contact
 from .watched import KNOWN, refuse_passed
@@ -70,13 +70,19 @@ def kinematics(model: Model, o: KinematicsOptions) -> Result:
     start.since = started
     start.engine = Engine(start.assembly.compiled, o.specialize)
     holonomic = all(r.holonomic for r in base.compiled.structure.rows)
+    task = FOLLOW if holonomic else INTEGRATE
     with shown(o.progress, "following the drivers") as tell:
         try:
-            task = FOLLOW if holonomic else INTEGRATE
             result = moved(start, float(outputs[-1]), outputs, projected(o.coordinates, 1e-10, 1e-12), task, tell)
         except SimulationError as error:
             raise _locked(start, error) or error from None
-    refuse_passed(result, "kinematics")
+
+    def again(times: np.ndarray) -> Result:
+        start = begin_at(base, o.parameters, o.coordinates)
+        start.engine = Engine(start.assembly.compiled, o.specialize)
+        return moved(start, float(times[-1]), times, projected(o.coordinates, 1e-10, 1e-12), task, unwatched)
+
+    refuse_passed(result, "kinematics", again)
     return result
 
 

@@ -33,11 +33,12 @@ from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
 from .linearize import without_inputs
 from .motion.ahead import refuse_missing
+from .motion.choice import SimulateOptions
 from .motion.layer import known
 from .motion.options import output_times, projected
 from .motion.start import begin
 from .options import Options, positive
-from .simulate import SimulateOptions, clock_for, simulate
+from .simulate import clock_for, simulate
 from .untouched import refuse_contact
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined

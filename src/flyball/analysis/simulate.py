@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from ..constraints.modes import BRANCH
+from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import ROWS, kept
-from ..errors import ModelError, StartWarning, warn
+from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
-from ..model.touching import smooth_only
 from ..numerics.integrators import clock as ex
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..results.departure import changed_velocities, not_allowed
@@ -26,10 +23,10 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.choice import SimulateOptions, chosen, instead_of, unresolved
 from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
-from .motion.engines import AUTO as EITHER
-from .motion.engines import Engine, check_specialize
+from .motion.engines import Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
@@ -42,60 +39,55 @@ from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
 from .motion.touches import with_places
 from .progress import Tell, shown
+from .watched import remark_friction
 
 NEARER = 1e-8  # tolerances below this ask the stages to be nearer to the constraints by their square
-AUTO, IMPULSE, USUAL = "auto", "impulse", "dop853"  # methods beside the integrators by name; what auto is
-IDLE = {
-    "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
-}  # fmt: skip
-"""Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
 UNMADE = {"partitioning": "partitioning chooses coordinates on the way, which made code does not know"}
 """Stabilizations that code made for a mechanism does nothing for, and why."""
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 
 
-@dataclass(frozen=True, kw_only=True)
-class SimulateOptions(Integration):
-    """What `Mechanism.simulate` is asked."""
-
-    method: str | Stepping  # type: ignore[assignment]
-    t_end: float
-    t_start: float | None
-    outputs: int | Sequence[float]
-    parameters: Mapping[str, float] | None
-    start: Result | None
-    specialize: bool | str
-    progress: bool | Callable[[float], None]
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_specialize(self.specialize)
-
-    def check_method(self) -> None:
-        """An integrator, steps by impulses, or what suits the model."""
-        if not isinstance(self.method, Stepping) and self.method not in (AUTO, IMPULSE):
-            super().check_method()
-
-
 def simulate(model: Model, o: SimulateOptions) -> Result:
-    """Integrate the equations of motion: see `Mechanism.simulate`."""
-    started = time.perf_counter()
+    """The motion by the method asked for, or by the one that suits the model: see `Mechanism.simulate`."""
     model = model.snapshot()
     t_start = start_time(o.t_start, o.start)
-    times = output_times(t_start, o.t_end, o.outputs)
-    o = chosen(model, o)
+    span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
+    way = chosen(model, o)
+    try:
+        return _told(model, way.options, span, way.why)
+    except (ModelError, SimulationError) as error:
+        if way.instead is None or not unresolved(error):
+            raise
+        try:
+            return _told(model, way.instead, span, instead_of(error))
+        except FlyballError:
+            raise error from None
+
+
+def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], why: str) -> Result:
+    """The motion, which says by what it was computed, and why."""
+    try:
+        result = _computed(model, o, span)
+    except SimulationError as error:
+        if isinstance(error.result, Result):
+            error.result.health.method = why
+        raise
+    result.health.method = why
+    return result
+
+
+def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray]) -> Result:
+    """The motion by a method that is chosen: start, end, output times."""
+    started = time.perf_counter()
+    t_start, _, times = span
     announce_motion(model, not isinstance(o.method, Stepping))
     if isinstance(o.method, Stepping):
-        if model.events:
-            raise ModelError(
-                f"{model.name!r} has {model.events[0].title}, and steps by impulses know no events: give "
-                f"method='dop853'"
-            )
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
     model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
-    if _corners_only(begun) and leaves_no_freedom(begun):  # what drivers prescribe follows no force
+    slides = _no_stops(begun) and leaves_no_freedom(begun)  # what drivers prescribe follows no force
+    if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.stabilization != "projection":
@@ -105,43 +97,10 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
-        return moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
-
-
-def chosen(model: Model, o: SimulateOptions) -> SimulateOptions:
-    """With the method that is meant.
-
-    Raises
-    ------
-    ModelError
-        If there is contact and the method does not know it, or options have no effect on steps by impulses.
-    """
-    if o.method == AUTO:
-        stepped = (model.contacts or model.bulk) and not smooth_only(model)
-        o = o.known(method=Stepping() if stepped else USUAL)
-    elif o.method == IMPULSE:
-        o = o.known(method=Stepping())
-    if not isinstance(o.method, Stepping):
-        if model.bulk:
-            part = model.bulk[0]
-            raise ModelError(
-                f"method={o.method!r} integrates from event to event, which does not know {part.title}: leave method "
-                f"out, or give method='impulse'"
-            )
-        return o
-    if unknown := smooth_only(model):
-        raise ModelError(
-            f"steps by impulses do not know {', '.join(e.title for e in unknown)}; the adaptive integrators do: leave "
-            f"method out, or give method={USUAL!r}"
-        )
-    for name, usual in IDLE.items():
-        if getattr(o, name) != usual:
-            raise ModelError(f"{name}={getattr(o, name)!r} does nothing with steps by impulses; leave it out")
-    if o.coordinates == "joint":
-        raise ModelError(
-            "steps by impulses are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
-        )
-    return o.known(method=o.method.bounded(o.max_step))
+        result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
+    if slides:
+        remark_friction(result)
+    return result
 
 
 def moved(
@@ -185,10 +144,10 @@ def moved(
     return outcome(here, rows, o, interrupted, owed, partial(solved, begun, rows) if later else None)
 
 
-def _corners_only(begun: Start) -> bool:
-    """Whether nothing is watched but corners of laws."""
+def _no_stops(begun: Start) -> bool:
+    """Whether nothing is watched but corners of laws and friction."""
     s = begun.assembly.compiled.structure
-    return bool(s.switches) and not s.model.events and all(x.switch.kind == BRANCH for x in s.switches)
+    return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
 
 
 def watched(begun: Start) -> bool:

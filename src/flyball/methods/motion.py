@@ -66,7 +66,8 @@ class Motions(Model):
         method : {"auto", "dop853", "rk45", "impulse"} or Stepping
             ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``impulse``, or a
             `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
-            those where the mechanism has contact, else ``dop853``.
+            ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
+            ways that it does not know: ``health.method`` says why.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least.
         atol : float [m, rad, m/s, rad/s], optional
@@ -106,7 +107,8 @@ class Motions(Model):
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
         """
-        from ..analysis.simulate import SimulateOptions, simulate
+        from ..analysis.motion.choice import SimulateOptions
+        from ..analysis.simulate import simulate
 
         return simulate(self, SimulateOptions.asked(locals()))
 

@@ -31,6 +31,7 @@ from .model import Model, suggest
 from .sensor import IMU, Sensor
 from .shapes.mesh import Mesh, paths_from
 from .table import Table
+from .touch import Touch
 
 M = TypeVar("M", bound=Model)
 
@@ -298,6 +299,8 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         kinds = {k: c for k, c in Element.registry.items() if issubclass(c, base) and c.category == category}
         known = sorted(k for k, c in kinds.items() if c.__module__.count(f".{room}."))
     name = fields.pop("type", None)
+    if category == "forces" and name == Touch.__name__:  # of a motion with contact, in its result file
+        return Touch
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
         raise ModelError(f"{where}: {problem}; {category} are {', '.join(known)}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from typing import TYPE_CHECKING
 
 from ..errors import ModelError
@@ -61,9 +60,7 @@ def _check_path(model: Model, e: CoordinateForce) -> None:
     for text in e.along() or ((e.coordinate,) if hasattr(e, "coordinate") else ()):
         model.coordinate(text, e)
     carriers = [model.carrier(name, e) for name in e.ends().values()]
-    for k, (a, b) in enumerate(itertools.pairwise(carriers)):
-        if a == b:
-            raise ModelError(
-                f"{e.title}: points {k + 1} and {k + 2} are both on {a!r}, so the rope between them never changes "
-                f"its length; leave one out"
-            )
+    if len(carriers) > 1 and len(set(carriers)) == 1:
+        raise ModelError(
+            f"{e.title}: all its points are on {carriers[0]!r}, so that it never changes its length; name another body"
+        )

@@ -33,6 +33,7 @@ class Health:
     options: dict[str, Any] = field(default_factory=dict)
     late: dict[str, Callable[[], Any]] = field(default_factory=dict, repr=False, compare=False)
     coordinates: str = ""  # "absolute: why", or "joint: why"
+    method: str = ""  # by what a motion with contact was computed, and why
     engine: str = ""  # "table-driven: why", or "made for this mechanism: where from"
     crowd: int = 0  # bodies in sets, whose freedoms are not counted
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
@@ -110,6 +111,7 @@ class Health:
         """Label and text of what a reader wants to see first."""
         out = [
             ("status", self.status),
+            *([("method", self.method)] if self.method else []),
             *([("coordinates", self.coordinates)] if self.coordinates else []),
             *([("engine", self.engine)] if self.engine else []),
             *([("assembly", summary(self.departures))] if self.departures else []),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -28,7 +29,16 @@ ROPE, PLACE = ("taut", "slack"), ("touches", "apart")
 
 def events(result: Result) -> list[Table]:
     """The list of what happened; of many, how often each comes first, and the list is folded."""
-    every = list(result.events)
+    found = _events(list(result.events))
+    return found if result.events.lost.any() else [_without_last(t) for t in found]
+
+
+def _without_last(t: Table) -> Table:
+    """A table without its last column."""
+    return replace(t, columns=t.columns[:-1], rows=tuple(row[:-1] for row in t.rows), total=t.total[:-1])
+
+
+def _events(every: list[Happening]) -> list[Table]:
     columns = ("t [s]", "name", "kind", "what was done", "energy lost [J]")
     if len(every) <= FEW:
         return [Table("events", "Events", columns, tuple(_rows(every)))]

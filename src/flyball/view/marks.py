@@ -17,7 +17,7 @@ LINES = 30  # lines through a panel; of more events there are short ticks at its
 SELDOM = 5  # times that an event may happen to be a line among very many others
 NEAR = 0.004  # of the time span: what happens within it is one mark
 APART = 0.03  # of the time span between two names
-LONG = 22  # letters of a name beside a line
+LONG = 30  # letters of a name beside a line
 DASHED = (0, (3, 2))
 COLOR = "#8a8a8a"
 MOST = 3  # names of one mark
@@ -71,16 +71,18 @@ def draw_marks(axes: Sequence[Axes], every: Sequence[Mark]) -> None:
 
 
 def _named(ax: Axes, inside: Sequence[Mark], span: float) -> None:
-    """Names along the lines, from the upper edge down, where the last one is far enough."""
-    last = -float("inf")
+    """Names along the lines, from the upper edge down: each once, where the name before it is far enough."""
+    last, counts, said = -float("inf"), Counter(m.text for m in inside), set[str]()
     for m in inside:
-        if m.t - last < APART * span:
+        if m.text in said or m.t - last < APART * span:
             continue
         last = m.t
+        said.add(m.text)
         text = m.text if len(m.text) <= LONG else f"{m.text[: LONG - 1]}…"
+        text += f" (1 of {counts[m.text]})" if counts[m.text] > 1 else ""
         right = m.t > ax.get_xlim()[1] - 0.5 * APART * span
         ax.annotate(
             text, (m.t, 1.0), xycoords=ax.get_xaxis_transform(), xytext=(-2 if right else 2, -2),
             textcoords="offset points", rotation=90, va="top", ha="right" if right else "left", fontsize=7, color=COLOR,
-            annotation_clip=False,
+            annotation_clip=False, bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.4},
         ).set_in_layout(False)  # fmt: skip

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..model.body import GROUND
-from .figures import centre, few, figures, movers, some
+from .edged import edged
+from .figures import centre, contacts, few, figures, movers, some
 from .marks import marks
 from .recording import Figure, Picture, PointPaths
 
@@ -23,11 +24,14 @@ def standard_pictures(result: Result) -> list[Picture]:
     ``energy``, ``coordinates`` (of joints), ``positions`` (of spatial bodies over time), ``paths`` (of points, seen
     in the plane or from three sides), ``contacts``, ``reactions``, ``actuation`` and ``sensors``.
     """
-    found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(result)}
+    whole = edged(result)
+    found: dict[str, tuple[Result, Figure | PointPaths]] = {f.name: (whole, f) for f in figures(whole)}
+    touching = contacts(result) if len(result.t) else None  # at output times only
+    found |= {f.name: (result, f) for f in (touching,) if f is not None}
     if len(result.t):
-        found["paths"] = _paths(result)
-    when = marks(result)
-    return [Picture(k, f"{result.model.name}: {k}", result.t, found[k], when) for k in ORDER if k in found]
+        found["paths"] = whole, _paths(whole)
+    when, name = marks(result), result.model.name
+    return [Picture(k, f"{name}: {k}", found[k][0].t, found[k][1], when) for k in ORDER if k in found]
 
 
 def _paths(result: Result) -> PointPaths:

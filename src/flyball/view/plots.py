@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .artist import draw
 from .drawing import handed_out, headed, stacked, styled
+from .edged import edged
 from .figures import panels
 from .marks import marks
 from .pictures import standard_pictures
@@ -38,9 +39,10 @@ def plot(result: Result, *names: str, path: str | os.PathLike | None = None) -> 
     ModelError
         If there is no such curve or part, the suffix is of no known kind, or the file cannot be written.
     """
-    curves = {c.name: c for name in names or ("energy",) for c in _curves(result, name)}
+    whole = edged(result) if result.contacts is None else result
+    curves = {c.name: c for name in names or ("energy",) for c in _curves(whole, name)}
     with styled():
-        drawing = stacked(result.t, tuple(panels(list(curves.values()), len(curves))), marks=marks(result))
+        drawing = stacked(whole.t, tuple(panels(list(curves.values()), len(curves))), marks=marks(result))
         headed(drawing, result.model.name)
         return handed_out(drawing, path)
 

@@ -39,6 +39,7 @@ from ...tables.system import (
 from ..assembly.start import Assembly
 from ..compiled import Compiled
 from ..freedom.contradiction import story
+from .jams import Unresolved, jam
 from .residual import missed
 
 NEAR = 1e-10  # part of the time span within which a law that jumps is looked for
@@ -74,14 +75,10 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
     found = fault(stack, a.compiled.structure.functions) or a.compiled.structure.missed(stack)
     if found is not None:
         return f"{name!r}: just after t = {t:.6g} s, {found.message}{after}", found.exception
-    text = (
-        of_drivers(a, clock)
-        or _not_finite(a, clock)
-        or _jammed(a, clock)
-        or _locked(a, base, clock)
-        or _rivals(a, clock)
-        or _stuck(a, clock)
-    )
+    text = of_drivers(a, clock) or _not_finite(a, clock)
+    if not text and (text := _jammed(a, clock)):
+        return f"{name!r}: {text}{after}", Unresolved(text, t=t)
+    text = text or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}{after}", None
 
 
@@ -287,15 +284,6 @@ def _jammed(a: Assembly, clock: ex.Clock) -> str:
     if W.info[STATUS] != motion.JAMMED:
         return ""
     return jam(a.compiled.structure.forces[int(W.info[GUILTY])], float(clock.real[ex.T]))
-
-
-def jam(e: Any, t: float) -> str:
-    """What is said where friction in a joint has no force that goes with its own load."""
-    return (
-        f"{e.title} jams joint {e.joint!r} at t = {t:.6g} s: friction loads the joint by as much as the "
-        f"load that it comes from, so no finite force answers, or several do. Check its coefficients, and the lengths "
-        f"over which the joint carries moments (bending_length, twist_length)"
-    )
 
 
 def _stuck(a: Assembly, clock: ex.Clock) -> str:

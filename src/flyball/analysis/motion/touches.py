@@ -10,7 +10,7 @@ from ...model.touch import Touch
 from ...tables.contact.places import Places, places
 from ...tables.numbers import numbers
 
-FEW = 48  # places; with more, a step with all their rows costs more than many steps by impulses
+FEW = 16  # places; with more, steps with all their rows cost far more than steps by impulses
 KEPT = 4  # copies of one model at other values of the parameters
 IMPULSES = "leave method out, or give method='impulse'"
 
@@ -21,15 +21,18 @@ def found(model: Model, parameters: Mapping[str, float] | None) -> Places:
     return model.kept.get("places", given.key, KEPT, lambda: places(model, given))
 
 
-def stepped(model: Model, parameters: Mapping[str, float] | None) -> str:
-    """Why a motion of a model with contact is better computed by steps by impulses; empty if it is not."""
+def impossible(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """What of its contacts rows of constraint do not know; empty if they know all."""
     if not (model.contacts or model.bulk):
         return ""
     p = found(model, parameters)
-    if p.why_not:
-        return f"{_several(p.why_not)}, which rows of constraint do not know"
-    n = len(p.touches)
-    return f"bodies may touch at {n} places, too many to integrate from touch to touch (most {FEW})" if n > FEW else ""
+    return f"{_several(p.why_not)}, which only steps by impulses know" if p.why_not else ""
+
+
+def many(model: Model, parameters: Mapping[str, float] | None) -> str:
+    """Whether there are so many places that steps by impulses cost less; empty if not."""
+    n = len(found(model, parameters).touches)
+    return f"bodies may touch at {n} places, too many to go from touch to touch (most {FEW})" if n > FEW else ""
 
 
 def with_places(model: Model, parameters: Mapping[str, float] | None) -> Model:

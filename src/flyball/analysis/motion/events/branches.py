@@ -85,6 +85,9 @@ class Corners:
         self.n.ask(MOTION)
         for s in self.all.tolist():
             u, least = self.value(s)
+            if self.n.W.switch[MODE, s] != OFF and abs(u) <= KEPT * max(least, seen(self.n, s).grain):
+                self.at.add(s)  # it goes on
+                continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
             if abs(u) <= least:
                 self.at.add(s)

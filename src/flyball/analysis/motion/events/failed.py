@@ -7,10 +7,11 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
-from ....errors import ModelError, SimulationError
+from ....errors import ModelError
+from ....model.touch import Touch
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from ....tables.system import G_LAW, GUARD_KIND, GUARD_OF, LOWER, UPPER
-from ..reasons import jam
+from ..jams import Overlap, Unresolved, bodies, jam
 from .instant import Instant, Part
 from .modes import Decided, elements
 
@@ -61,6 +62,11 @@ def beyond(n: Instant, s: int) -> ModelError:
     e, model = x.element, n.here.structure.model
     metric = not x.switch.along or model.unit(x.switch.along[0], e) == "m"
     unit, what = "m" if metric else "rad", quantity(n, s)
+    if isinstance(e, Touch):
+        return Overlap(
+            f"{e.title}: {bodies(e)} overlap at the start by {n.W.switch[LOWER, s] - n.x[s]:.3g} m; move one of them, "
+            f"or give method='impulse', which puts them side by side"
+        )
     if n.kind[s] == STOP:
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
         if not np.isfinite(upper):
@@ -75,31 +81,31 @@ def beyond(n: Instant, s: int) -> ModelError:
     return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
-def endless(n: Instant, recent: Iterable[Sequence[int]], many: int, within: float) -> SimulationError:
+def endless(n: Instant, recent: Iterable[Sequence[int]], many: int, within: float) -> Unresolved:
     """Events that come ever closer; ``recent``: the guards that fired at the last of them."""
     names = guard_names(n, (g for fired in recent for g in fired))
-    return SimulationError(
+    return Unresolved(
         f"at t = {n.here.t:.9g} s events follow each other without end ({many} within {within:.2g} s): "
         f"{', '.join(names)}",
         t=n.here.t,
     )
 
 
-def no_impulses(n: Instant, parts: list[Part]) -> SimulationError:
+def no_impulses(n: Instant, parts: list[Part]) -> Unresolved:
     """Velocities cannot change as all ask."""
-    return SimulationError(
+    return Unresolved(
         f"at t = {n.here.t:.9g} s no impulses let the velocities fulfil all that is asked of them at once; it is asked "
         f"by {who(n, parts)}. Where a driver moves what a stop or a lock holds, one of them must give way",
         t=n.here.t,
     )
 
 
-def no_forces(n: Instant, found: Decided) -> SimulationError:
+def no_forces(n: Instant, found: Decided) -> Unresolved:
     """Accelerations cannot be as all ask."""
     sliding = [p for p in found.parts if p.rule in (DRIVEN, GRIPS)]
     jammed = [n.here.structure.switches[p.switch].element for p in sliding]
     if found.ended != NOT_HELD and len(jammed) == 1 and hasattr(jammed[0], "joint"):
-        return SimulationError(jam(jammed[0], n.here.t), t=n.here.t)
+        return Unresolved(jam(jammed[0], n.here.t), t=n.here.t)
     if found.ended == NOT_HELD or not sliding:
         why = "what they hold cannot be held together: one of them must give way"
     else:
@@ -108,16 +114,16 @@ def no_forces(n: Instant, found: Decided) -> SimulationError:
             f"paradox), at {' and '.join(elements(n, sliding))}: with less friction, or an elastic stop or joint, "
             "there is a solution"
         )
-    return SimulationError(
+    return Unresolved(
         f"at t = {n.here.t:.9g} s no forces fulfil all that is asked of them at once; it is asked by "
         f"{who(n, found.parts)}; {why}",
         t=n.here.t,
     )
 
 
-def no_end(t: float, names: list[str], rounds: int) -> SimulationError:
+def no_end(t: float, names: list[str], rounds: int) -> Unresolved:
     """What happens at an instant has no end."""
-    return SimulationError(
+    return Unresolved(
         f"at t = {t:.9g} s events follow each other without end ({rounds} times at one instant): "
         f"{', '.join(dict.fromkeys(names))}; each undoes what the other did",
         t=t,

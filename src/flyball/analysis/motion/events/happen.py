@@ -24,6 +24,7 @@ from ....tables.system import (
     UPPER,
 )
 from .actions import act, act_at_start
+from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shock
 from .failed import beyond, guard_names, no_end, no_forces, no_impulses
@@ -34,9 +35,11 @@ from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
 from .rest import coming_to_rest, note_bounces
 from .sides import pressed, teeth, turned
+from .slips import stop_slips
 from .told import tell_jump, tell_modes
 
 ROUNDS = 100
+AGAIN = 5  # times that ways of sliding are decided again for the same modes
 RATES = (G_SLIDES, G_BACK, G_TURNS)  # guards of rates
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
@@ -57,6 +60,7 @@ def begin(here: Here) -> None:
         corners.begin()
         n.look()
         n.restored()
+        put_apart(n)
         refuse_violated(n)
         settled(n, corners, np.zeros(0, np.int64), told=False)
     acts.told(["start"])
@@ -125,8 +129,10 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     hits: dict[int, bool] = {}
     calm: list[int] = []
     gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
+    again = 0
     for _ in range(ROUNDS):
         n.look()
+        stop_slips(n, fired)
         still = at_rest(n, fired)
         still[calm] = True
         teeth(n, still)
@@ -152,6 +158,10 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
+        if again < AGAIN and misled(n):
+            n.look_again()
+            again += 1
+            continue
         new = np.setdiff1d(broken(n, found), gone)
         if not len(new):
             if told:
@@ -159,6 +169,13 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             return
         fired, gone = np.r_[fired, new], np.r_[gone, new]
     raise no_end(here.t, guard_names(n, fired.tolist()), ROUNDS)
+
+
+def misled(n: Instant) -> bool:
+    """Whether something slides against its way: where bounces are cut off, what they were changes other rates too."""
+    kind, of = n.S.guard_i[:, GUARD_KIND], n.S.guard_i[:, GUARD_OF]
+    sliding = np.flatnonzero(np.isin(kind, (G_SLIDES, G_TURNS)))
+    return len(sliding) > 0 and bool((n.guards()[sliding] < -n.still[of[sliding]]).any())
 
 
 def unmoved(n: Instant, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:

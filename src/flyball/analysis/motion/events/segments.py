@@ -11,7 +11,7 @@ from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
 from ....results.stretches import Stretch, stretched
-from ....tables.system import MODE, OFF, VALUE
+from ....tables.system import HELD, MODE, OFF, SWITCH_ROW, VALUE
 from .here import Here
 
 
@@ -28,6 +28,7 @@ class Segments:
         ways = W.sensed[VALUE, W.sensed.shape[1] - n :].copy()
         if any(x.switch.kind == BRANCH and W.switch[MODE, k] != OFF for k, x in enumerate(here.structure.switches)):
             ways = _ways(here, rows)
+        _quiet(here, rows)
         self.all.append(
             Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
         )
@@ -39,6 +40,17 @@ class Segments:
             return
         result.stretches = stretched(self.all)
         result.exchanged |= booked(result)
+
+
+def _quiet(here: Here, rows: np.ndarray) -> None:
+    """Take the rounding from the rates of coordinates that are held by a row alone, at rows of output."""
+    S, W, s = here.c.system, here.c.work, here.structure
+    first, ny = 1 + s.nq, 1 + len(here.y)
+    for k in np.flatnonzero(W.switch[MODE] == HELD).tolist():
+        row = S.switch_i[k, SWITCH_ROW]
+        if row >= 0 and S.row_p[row + 1] - S.row_p[row] == 1:
+            column = S.col_i[S.row_p[row]]
+            rows[:, [first + column, ny + column]] = 0.0
 
 
 def _ways(here: Here, rows: np.ndarray) -> np.ndarray:

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....constraints.modes import EDGE, SLIP
-from ....numerics.cone.dense.problem import DRIVEN, EVEN, GRIPS, SLIPS, TURNS, WITH, Dense
+from ....constraints.modes import EDGE, SLIP, STOP
+from ....numerics.cone.dense.problem import DRIVEN, EVEN, GRIPS, HOLDS, SLIPS, TURNS, WITH, Dense
 from ....tables.system import (
     G_CONE,
     G_TURNS,
@@ -50,6 +50,28 @@ def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:
         elif s < other:
             slow = np.hypot(n.rate[s], n.rate[other]) <= SLOW * (n.still[s] + n.still[other])
             still[[s, other]] = (still[s] and still[other]) or (slow and s in done)
+
+
+def stop_slips(n: Instant, fired: np.ndarray) -> None:
+    """Take what is left of their speed from slips in space that are over: what follows slides by its acceleration.
+
+    What was closed stays so; all else is looked at again.
+    """
+    done = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_TURNS}
+    over = []
+    for s in sorted(done):
+        pair = [s, int(n.S.switch_i[s, SWITCH_PARTNER])]
+        speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
+        if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW * still:
+            over += pair
+    if not over:
+        return
+    gaps = np.flatnonzero((n.kind == STOP) & (n.mode != OFF)).tolist()
+    B, P, _ = n.problem([Part(s, HOLDS) for s in (*over, *gaps)])
+    rates = np.zeros(len(B.which))
+    rates[: len(over)] = n.rate[over]
+    n.here.v[:] -= np.linalg.lstsq(P.A, rates, rcond=1e-12)[0] @ B.Y
+    n.look_again()
 
 
 def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> list[Part]:
