@@ -91,7 +91,8 @@ def test_quantities_in_formulas_stand_in_parentheses(text, expected):
     ("text", "says"),
     [
         ("(2 foo)*t", ["unknown unit 'foo'", "    (2 foo)*t\n     ^^^^^\n"]),
-        ("2*30 deg", ["in parentheses, as in (60 rpm)*t"]),
+        ("2*30 deg", ["in parentheses, here (30 deg)"]),
+        ("2**", ["in parentheses, as in (60 rpm)*t"]),
         ("é*(2 foo)", ["    é*(2 foo)\n       ^^^^^\n"]),
         ("(5 N)*q + (3 m)", ["unknown name 'q'", "    (5 N)*q + (3 m)\n          ^\n"]),
         ("2 N + 3 N", ["a quantity stands in parentheses"]),

@@ -98,19 +98,27 @@ def test_a_method_by_another_name(called, meant):
         scene(ball()).simulate(0.1, method=called)
 
 
-@pytest.mark.parametrize("planar", [False, True])
 @pytest.mark.parametrize("off", [0.0, 1e-9, -1e-9, -1e-6])
-def test_what_is_put_on_the_ground_rests(planar, off):
+def test_what_is_put_on_the_ground_rests(off):
     """At its height, to rounding, above and below: it lies there, and its weight is carried."""
-    at = (0.3, 0.15 + off) if planar else (0.3, 0.2, 0.1 + off)
-    b = fb.Body("box", shape=fb.Box(edges=(0.4, 0.3, 0.2)), density=500, position=at)
-    run = scene(b, planar=planar).simulate(0.1, outputs=3)
+    b = fb.Body("box", shape=fb.Box(edges=(0.4, 0.3, 0.2)), density=500, position=(0.3, 0.15 + off))
+    run = scene(b, planar=True).simulate(0.1, outputs=3)
     assert run.health.method == ADAPTIVE
     p = run["box"].position
-    assert np.allclose(p[:, -1], 0.15 if planar else 0.1, rtol=0, atol=1e-8)
+    assert np.allclose(p[:, -1], 0.15, rtol=0, atol=1e-8)
     assert np.abs(p - p[0]).max() < 1e-8
     assert run["box"].contact_force[-1, -1] == pytest.approx(500 * 0.024 * G, rel=1e-8)
     assert bool(run.health.warnings) == (off == -1e-6)
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+@pytest.mark.parametrize("off", [0.0, -1e-9])
+def test_a_box_in_space_rests(friction, off):
+    """With friction its corners share it in many ways: by steps."""
+    run = scene(box(at=(0, 0, 0.1 + off)), friction=friction).simulate(0.1, outputs=3)
+    assert run.health.method.startswith(STEPS if friction else ADAPTIVE)
+    assert ("share friction among 8 corners is not determined" in run.health.method) == (friction > 0)
+    assert np.allclose(run["box"].position, (0, 0, 0.1), rtol=0, atol=1e-8)
 
 
 def test_a_stack_that_overlaps_by_rounding_stands():
@@ -123,12 +131,12 @@ def test_a_stack_that_overlaps_by_rounding_stands():
 
 
 def test_what_is_deep_in_something_is_left_to_steps():
-    m = scene(box(at=(0, 0, 0.09)))
+    m = scene(ball(at=(0, 0, 0.09)))
     run = m.simulate(0.02, outputs=2)
     assert run.health.method.startswith(f"{STEPS}, since")
-    assert "ground and 'box' overlap at the start by 0.01 m" in run.health.method
-    assert run["box.z"][-1] == pytest.approx(0.1, abs=1e-5)
-    with pytest.raises(fb.ModelError, match=r"Touch 'floor-box-\d'.* overlap at the start by 0.01 m; move one"):
+    assert "ground and 'ball' overlap at the start by 0.01 m" in run.health.method
+    assert run["ball.z"][-1] == pytest.approx(0.1, abs=1e-5)
+    with pytest.raises(fb.ModelError, match=r"Touch 'floor-ball'.* overlap at the start by 0.01 m; move one"):
         m.simulate(0.02, method="dop853")
     m.add(fb.Event("late", "t > 0.005"))
     with pytest.raises(fb.ModelError, match=r"overlap at the start"):

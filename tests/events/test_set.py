@@ -65,7 +65,7 @@ def test_a_taut_rope_that_gets_longer_goes_slack(layer):
     """The bob flies on, with what speed it had: x = x0 + v t, until the line of 1.2 m is taut."""
     m = swing()
     m.add(fb.Event("slack", "t - 0.3", do=fb.Set("L", 1.2)), fb.Event("taut", "line.length > 1.2", do=fb.Stop()))
-    r = m.simulate(1, outputs=1001, coordinates=layer)
+    r = m.simulate(1, outputs=1001, coordinates=layer, rtol=1e-10)
     cut = r.events["slack"][0].after
     x, y, vx, vy = (float(cut[f"bob.{k}"]) for k in ("x", "y", "vx", "vy"))
     late = (r.t > 0.3) & (r.t < r.t[-1])
@@ -80,7 +80,7 @@ def test_an_elastic_rope_gets_its_energy(layer):
     """Its free length is a number of a force: 0.2 m shorter, it stores k d^2 / 2 more."""
     m = swing(stiffness=1000.0)
     m.add(fb.Event("pull", "t - 0.3", do=fb.Set("L", 0.8)))
-    r = m.simulate(0.6, outputs=61, coordinates=layer)
+    r = m.simulate(0.6, outputs=61, coordinates=layer, rtol=1e-10)
     now = r.events["pull"][0]
     d = float(now.before["line.length"]) - 1.0
     assert r["energy.event_work"][-1] == pytest.approx(500 * ((d + 0.2) ** 2 - d**2), rel=1e-9)
@@ -100,7 +100,7 @@ def test_a_stop_does_not_lift_what_is_below_it(layer):
 def test_a_stop_that_is_left_where_nothing_is_beyond_it(layer):
     m = drop()
     m.add(fb.Event("up", "t - 0.3", do=fb.Set("lo", 0.2)))
-    r = m.simulate(0.6, outputs=61, coordinates=layer)
+    r = m.simulate(0.6, outputs=61, coordinates=layer, rtol=1e-10)
     hit = math.sqrt(2 * 0.8 / G)
     assert r.events["floor"].t == pytest.approx([hit], abs=1e-9)
     assert r["p.y"][-1] == pytest.approx(0.2, abs=1e-9)

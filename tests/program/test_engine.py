@@ -5,6 +5,7 @@ import pytest
 
 import flyball as fb
 from flyball.analysis.motion.start import begin
+from flyball.compiler.bound import Bound, Written
 from flyball.compiler.door import enter
 from flyball.compiler.held import held
 from flyball.compiler.jit import formula, kernel
@@ -97,3 +98,25 @@ def test_other_tables_than_those_it_was_made_for_are_refused():
     complex_tables = S._replace(body_x=S.body_x.astype(complex))
     with pytest.raises(Exception, match="no door was made for"):
         motion_kernel(complex_tables, W, R, clock, sheet.rows, MOTION)
+
+
+def test_a_door_with_its_tuples_bound_to_it():
+    """Called from Python by its address it writes what the kernel writes, also after the arrays have changed."""
+    model = fb.load("examples/slider_crank.toml")
+    s, S, W, R, clock, sheet = desk(model, "absolute")
+    bound = Bound(engine, *map(Written, (S, W, R, clock, sheet)))
+    for t in (0.0, 0.3):
+        clock.real[T] = t
+        clock.y[0, s.nq : s.nq + s.nv] *= 1.0 - t
+        status = motion_kernel(S, W, R, clock, sheet.rows, MOTION)
+        expected, lam = clock.K.copy(), W.row[LAM].copy()
+        clock.K[:], W.row[:], W.vel[:] = 0.0, 0.0, 0.0
+        assert bound(MOTION) == status
+        assert (expected == clock.K).all() and (W.row[LAM] == lam).all()
+
+
+def test_a_door_is_bound_to_its_kind_of_tuples_only():
+    _, S, W, R, clock, sheet = desk(fb.load("examples/slider_crank.toml"), "absolute")
+    for other in (sheet._replace(rows=sheet.rows.astype(complex)), sheet._replace(rows=np.asfortranarray(sheet.rows))):
+        with pytest.raises(TypeError, match="not made for such"):
+            Bound(engine, *map(Written, (S, W, R, clock, other)))

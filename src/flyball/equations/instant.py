@@ -12,19 +12,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.door import door, enter
+from ..compiler.jit import formula
 from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.dense.problem import ENDED, FOUND, NONE_FOUND
 from ..numerics.cone.dense.settle import settle
+from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.tableaux import Tableau
 from ..tables.system import (
     BIAS,
+    COORDINATES,
     EFFORT,
     FORCE_F,
     FORCE_KIND,
     FORCE_LOAD,
     LAM,
+    RATE,
     RETURNED,
     SWITCH_FORCE,
     SWITCH_MEASURED,
@@ -32,6 +35,7 @@ from ..tables.system import (
     X_SOLVED,
 )
 from .dispatch import effort
+from .engine import Sheet
 from .friction import reaction_loads
 from .loads import law, wide
 from .tasks import MOTION, SOLVE
@@ -44,6 +48,20 @@ NUDGE = 1e-6  # part of an impulse that tells how loads follow it
 GRAIN = 1e-13  # of the terms of a quantity's acceleration: their rounding
 BEYOND = 1e30  # more than anything carries
 FAR = 1e8  # times a load, beside which what friction has besides it is nothing
+
+
+BARE, BALANCE, AGAIN, LOOK = range(4)  # tasks of `instant`
+STILL = 1e-11  # of the terms of a rate: their rounding
+SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
+
+
+class Desk(NamedTuple):
+    """What the engine is asked with."""
+
+    address: np.ndarray  # (1,): of the engine
+    R: Tableau
+    clock: Clock  # time, and state in its first row
+    sheet: Sheet
 
 
 class Bench(NamedTuple):
@@ -237,13 +255,34 @@ def balanced(S, W, t, B, P):
     P.info[ENDED] = NONE_FOUND
 
 
-@kernel
-def bare_kernel(address, S, W, R, clock, sheet, B, P):
-    """`bare`, called from Python."""
-    return bare(address, held(S), held(W), held(R), held(clock), held(sheet), B, P)
+@formula
+def look(S, W, y, B):
+    """Value, rate, and rounding of the rate, of the quantities of B's switches, into ``now``, ``rate``, ``seen``."""
+    nq, most = S.kinds[COORDINATES], 0.0
+    for d in range(W.vel.shape[1]):
+        most = max(most, magnitude(y[nq + d]))
+    for i in range(B.which.shape[0]):
+        m = S.switch_i[B.which[i], SWITCH_MEASURED]
+        B.now[i] = B.rate[i] = B.seen[i] = 0.0
+        if m >= 0:
+            B.now[i], B.rate[i] = W.sensed[VALUE, m], W.sensed[RATE, m]
+            r = S.row_i.shape[0] + m
+            for e in range(S.row_p[r], S.row_p[r + 1]):
+                B.seen[i] += magnitude(W.G[e]) * (STILL * magnitude(y[nq + S.col_i[e]]) + SILENT * most)
 
 
-@kernel
-def balanced_kernel(S, W, t, B, P):
-    """`balanced`, called from Python."""
-    balanced(held(S), held(W), t, B, P)
+@door
+def instant(S, W, desk, B, P, task):
+    """What is done at an instant, by its task: BARE, BALANCE, AGAIN (the problem from the states in it), LOOK."""
+    if task == BALANCE:
+        balanced(S, W, desk.clock.real[T], B, P)
+        return P.info[ENDED]
+    if task == AGAIN:
+        settle(P)
+        return P.info[ENDED]
+    address = desk.address[0]
+    if task == BARE:
+        return bare(address, S, W, desk.R, desk.clock, desk.sheet, B, P)
+    status = enter(address, S, W, desk.R, desk.clock, desk.sheet, MOTION)
+    look(S, W, desk.clock.y[0], B)
+    return status

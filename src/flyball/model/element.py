@@ -136,7 +136,11 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
     name = kwargs.get("name", args[0] if args else None)
     who = f"{kind} {name!r}" if isinstance(name, str) else kind
     lines = []
-    by_place = {known[int(e["loc"][0])] for e in error.errors() if e["type"] == "unexpected_positional_argument"}
+    late = [int(e["loc"][0]) for e in error.errors() if e["type"] == "unexpected_positional_argument"]
+    by_place = {known[k] for k in late if k < len(known)}
+    if any(k >= len(known) for k in late):
+        has = f"it has {len(known)}: {', '.join(known)}" if known else "it has none"
+        return f"{kind}: {len(args)} values are given for its fields; {has}"
     wrong: dict[str, list[str]] = {}  # field -> what it may be: a union complains once for each of its members
     for e in error.errors():
         place = [str(p) for p in e["loc"] if not _is_branch(str(p))]

@@ -107,6 +107,15 @@ def difference(text: str, e: Event) -> str:
     ModelError
         If there are several comparisons, or words between them.
     """
+    sides = compared(text, e)
+    if sides is None:
+        return text
+    small, large = sides
+    return large if small in ("0", "0.0") else f"({large}) - ({small})"
+
+
+def compared(text: str, e: Event) -> tuple[str, str] | None:
+    """Both sides of a comparison, first the one that is to be less; None if it is none. See `difference`."""
     depth, found = 0, []
     for k, c in enumerate(text):
         depth += (c in OPENING) - (c in CLOSING)
@@ -118,7 +127,7 @@ def difference(text: str, e: Event) -> str:
                 f"direction='either'"
             )
     if not found:
-        return text
+        return None
     if len(found) > 1:
         raise ModelError(
             f"when of {e.title}: {text!r} has {len(found)} comparisons; write one: both of two are true where "
@@ -126,5 +135,4 @@ def difference(text: str, e: Event) -> str:
         )
     at = found[0]
     left, right = text[:at].strip(), text[at + 1 :].removeprefix("=").strip()
-    small, large = (right, left) if text[at] == ">" else (left, right)
-    return large if small in ("0", "0.0") else f"({large}) - ({small})"
+    return (right, left) if text[at] == ">" else (left, right)

@@ -8,10 +8,11 @@ from ..errors import ModelError
 from .actions import Action, Impulse, Lock, Release, Set, Stop, listed
 from .body import GROUND, Body, Driver, Frame
 from .element import LawOf, si_numbers
-from .event import START, Event
+from .event import START, Event, compared
 from .expressions import is_number_text
 from .held import held_by
 from .joint import Joint
+from .quantities import quantities
 from .units import same_kind
 from .words import listing, suggest
 
@@ -44,10 +45,23 @@ def _check_when(model: Model, e: Event) -> None:
     """It names something that changes along a motion."""
     law = model.law(e.law, e.of, f"when of {e.title}")
     set_anywhere = {a.parameter for x in (*model.events, e) for a in x.do if isinstance(a, Set)}
+    _refuse_unlike(model, e)
     if law is not None and law.function is None and law.names <= {*model.parameters} - set_anywhere:
         raise ModelError(
             f"{e.title}: when is {e.when!r}, which never changes; name t, a sensor, or a curve such as 'A.angle' in it"
         )
+
+
+def _refuse_unlike(model: Model, e: Event) -> None:
+    """A curve is compared with a quantity of its own kind: no length with an angle."""
+    if not isinstance(e.when, str) or (sides := compared(e.when, e)) is None:
+        return
+    for curve, quantity in (sides, sides[::-1]):
+        name, _, what = curve.partition(".")
+        if what and model.find(name) is not None and is_number_text(quantity):
+            known = quantities(model, name).get(what)
+            if known is not None and known.unit:
+                same_kind(f"1 {known.unit}", quantity, f"{e.title}: in {e.when!r} {curve}")
 
 
 def _check_action(model: Model, e: Event, a: Action) -> None:

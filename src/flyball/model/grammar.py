@@ -259,7 +259,12 @@ def refuse(text: str, start: int, stop: int, problem: str, remedy: str) -> NoRet
     raise ExpressionError(f"{problem}\n    {shown}\n    {pointer}\n{remedy}")
 
 
+_BARE = re.compile(r"(?<![\w.])\d[\d.]*(?:[eE][+-]?\d+)?\s+[^\W\d][\w/*^]*")  # a number and a word
+
+
 def _remedy(text: str) -> str:
+    if bare := _BARE.search(text):
+        return f"{_ALLOWED}; a quantity in a formula stands in parentheses, here ({bare[0]})"
     if any(a.isdigit() and b.isalpha() for a, b in pairwise(text)):
         return "write every multiplication, as in 2*x; a quantity in a formula stands in parentheses: 2*(5 mm)"
     return _ALLOWED + "; a quantity in a formula stands in parentheses, as in (60 rpm)*t"

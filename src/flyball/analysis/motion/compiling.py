@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from ...compiler.notice import Part, announce
 from ...equations.engine import engine
-from ...equations.instant import balanced_kernel, bare_kernel
+from ...equations.instant import instant
 from ...equations.watched import watched_kernel
 from ...model.model import Model
 from ...tables.switches import declared
 
 ENGINE = Part("the equations of motion", 22.0, (engine,))
-EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, bare_kernel, balanced_kernel))
+EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, instant))
 
 
 def announce_motion(model: Model, integrated: bool) -> None:

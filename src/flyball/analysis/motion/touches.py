@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 
 from ...errors import ModelError
 from ...model.model import Model
@@ -11,6 +12,7 @@ from ...tables.contact.places import Places, places
 from ...tables.numbers import numbers
 
 FEW = 16  # places; with more, steps with all their rows cost far more than steps by impulses
+CORNERS = 3  # of two bodies in space, by whose friction no two ways of sharing it are told apart
 KEPT = 4  # copies of one model at other values of the parameters
 IMPULSES = "leave method out, or give method='impulse'"
 
@@ -30,9 +32,20 @@ def impossible(model: Model, parameters: Mapping[str, float] | None) -> str:
 
 
 def many(model: Model, parameters: Mapping[str, float] | None) -> str:
-    """Whether there are so many places that steps by impulses cost less; empty if not."""
-    n = len(found(model, parameters).touches)
-    return f"bodies may touch at {n} places, too many to go from touch to touch (most {FEW})" if n > FEW else ""
+    """Whether there are so many places that steps by impulses are better; empty if not."""
+    places = found(model, parameters).touches
+    if len(places) > FEW:
+        return f"bodies may touch at {len(places)} places, too many to go from touch to touch (most {FEW})"
+    return "" if model.planar else _open(places)
+
+
+def _open(places: Sequence[Touch]) -> str:
+    """Bodies in space whose friction at many corners rigid bodies leave open; empty if there are none."""
+    pairs = Counter((e.body_i, e.body_j) for e in places if e.slips)
+    for (a, b), n in pairs.items():
+        if n > CORNERS:
+            return f"how {a!r} and {b!r} share friction among {n} corners is not determined"
+    return ""
 
 
 def with_places(model: Model, parameters: Mapping[str, float] | None) -> Model:

@@ -13,7 +13,7 @@ from ....errors import SimulationError
 from ....model.actions import Action, Impulse, Lock, Note, Release, Set, Stop, listed
 from ....model.body import Body, Frame
 from ....model.element import LawOf
-from ....model.event import Event
+from ....model.event import Event, compared
 from ....model.event_check import coordinate_of
 from ....model.held import held_by
 from ....numerics.integrators.clock import SPAN
@@ -152,6 +152,23 @@ def expressions(here: Here) -> dict[int, float]:
     if here.structure.events:
         here.evaluate()
     return {g: expression(here, g) for g in here.structure.events}
+
+
+def true_already(here: Here) -> list[str]:
+    """Titles of events whose comparisons are true now: they become true only after they were false."""
+    every = here.structure.events
+    texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
+    values = expressions(here) if texts else {}
+    return [every[g].name for g, text in texts.items() if values[g] > 0.0 and compared(text, every[g]) is not None]
+
+
+def say_never(here: Here, true: Sequence[str]) -> None:
+    """Say which events, true as the motion began, did not happen in it."""
+    for e in here.structure.model.events:
+        if e.name in true and not here.counts.get(e.name):
+            here.doubts.append(
+                f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
+            )
 
 
 def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:

@@ -39,7 +39,7 @@ def told(x: float, unit: str) -> str:
     """A value with its unit; an angle in degrees too."""
     if abs(x) < NOTHING:
         return f"0 {unit}"
-    return f"{x:.6g} m" if unit == "m" else f"{x:.6g} rad ({math.degrees(x):.6g} deg)"
+    return f"{x:.6g} m" if unit == "m" else f"{x:.6g} rad ({math.degrees(x):.4g} deg)"
 
 
 def rule(spec: SwitchSpec, x: float, bounds: tuple[float, float], unit: str) -> str:

@@ -18,14 +18,11 @@ from ....equations.surfaces import drifts
 from ....equations.tasks import MOTION
 from ....errors import SimulationError
 from ....laws.opcodes import BY_MOTION, BY_TIME
-from ....model.words import listing
 from ....numerics.integrators import clock as ex
 from ....results.events import Happening
 from ....tables.system import (
     DRIFT_OFF,
     G_CORNER,
-    GUARD_KIND,
-    GUARD_OF,
     HELD,
     INVERSE_SLOPES,
     MODE,
@@ -74,7 +71,7 @@ class Corners:
 
     def __init__(self, n: Instant) -> None:
         self.n = n
-        self.all = np.flatnonzero(n.kind == BRANCH)
+        self.all = np.array(n.of(BRANCH), np.int64)
         self.at: set[int] = set()
         self.old = n.W.switch[MODE].copy()
         self.sides = n.ways().copy()
@@ -95,8 +92,7 @@ class Corners:
 
     def fired(self, guards: np.ndarray) -> None:
         """Take note of guards that fired."""
-        rows = self.n.S.guard_i[guards]
-        self.at |= set(rows[rows[:, GUARD_KIND] == G_CORNER, GUARD_OF].tolist())
+        self.at |= self.n.fired(guards, G_CORNER)
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""
@@ -262,7 +258,7 @@ class Corners:
         if back:
             t = n.here.t
             raise SimulationError(
-                f"at t = {t:.9g} s corners of {listing(list(dict.fromkeys(n.name(s) for s in back)))} meet where their "
+                f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet where their "
                 f"laws push back from every side: how the motion goes on along several such corners, of which one is a "
                 f"rate of another, is not known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x)",
                 t=t,

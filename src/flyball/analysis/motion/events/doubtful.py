@@ -11,7 +11,6 @@ import numpy as np
 
 from ....equations.instant import BLOWS, OF_A_STEP
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
-from ....numerics.cone.dense.settle import solve
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing
 from .modes import Decided, elements
@@ -33,11 +32,11 @@ def doubt(n: Instant, found: Decided) -> None:
 
 def _several(n: Instant, found: Decided) -> str:
     """Other solutions of the problem that was solved last, looked for from the opposite modes."""
-    _, P = n.rooms[len(found.parts)]
+    P = n.rooms[len(found.parts)].P
     size = np.abs(P.b).max()
     for state in (FREE, EVEN):
         P.state[:] = state
-        if solve(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
+        if n.again(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
             who = " and ".join(elements(n, found.parts))
             return (
                 f"at t = {n.here.t:.6g} s rigid bodies with friction can go on in several ways (Painleve's paradox) at "

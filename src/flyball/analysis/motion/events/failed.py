@@ -12,6 +12,7 @@ from ....model.touch import Touch
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
 from ....tables.system import G_LAW, GUARD_KIND, GUARD_OF, LOWER, UPPER
 from ..jams import Overlap, Unresolved, bodies, jam
+from .bounds import told
 from .instant import Instant, Part
 from .modes import Decided, elements
 
@@ -70,12 +71,12 @@ def beyond(n: Instant, s: int) -> ModelError:
     if n.kind[s] == STOP:
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
         if not np.isfinite(upper):
-            rule = f"at least {lower:.6g} {unit}"
+            rule = f"at least {told(lower, unit)}"
         elif not np.isfinite(lower):
-            rule = f"at most {upper:.6g} {unit}"
+            rule = f"at most {told(upper, unit)}"
         else:
-            rule = f"within {lower:.6g} and {upper:.6g} {unit}"
-        said = f"{what} is {n.x[s]:.6g} {unit} and must be {rule}"
+            rule = f"within {told(lower, unit)} and {told(upper, unit)}"
+        said = f"{what} is {told(n.x[s], unit)} and must be {rule}"
     else:
         said = f"the rate of {what} is {n.rate[s]:.6g} {unit}/s and must not be negative"
     return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")

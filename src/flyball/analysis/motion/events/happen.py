@@ -16,8 +16,6 @@ from ....tables.system import (
     G_PULL,
     G_SLIDES,
     G_TURNS,
-    GUARD_KIND,
-    GUARD_OF,
     LOWER,
     MODE,
     OFF,
@@ -29,7 +27,7 @@ from .branches import Corners
 from .doubtful import doubt, shock
 from .failed import beyond, guard_names, no_end, no_forces, no_impulses
 from .here import Here
-from .instant import DECIDED, Instant
+from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
 from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
@@ -55,7 +53,7 @@ def begin(here: Here) -> None:
     """
     acts = act_at_start(here)
     if len(here.c.system.switch_i) or here.kick is not None:
-        n = Instant(here)
+        n = instant_of(here)
         corners = Corners(n)
         corners.begin()
         n.look()
@@ -89,7 +87,7 @@ def _happen(here: Here, fired: np.ndarray) -> None:
     for _ in range(ROUNDS if len(fired) else 0):
         acts = act(here, fired.tolist())
         if len(here.c.system.switch_i) or here.kick is not None:
-            n = Instant(here)
+            n = instant_of(here)
             settled(n, Corners(n), fired)
         acts.told(["start"])
         fired = acts.passed()
@@ -97,17 +95,17 @@ def _happen(here: Here, fired: np.ndarray) -> None:
         if not len(fired) or here.stopped:
             return
     if len(fired):
-        raise no_end(here.t, guard_names(Instant(here), fired.tolist()), ROUNDS)
+        raise no_end(here.t, guard_names(instant_of(here), fired.tolist()), ROUNDS)
 
 
 def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) -> None:
     """Jumps and modes, and the sides of laws' corners: each by what the others are, until they agree."""
     corners.fired(fired)
-    by_rows = n.S.guard_i[fired, GUARD_KIND] != G_CORNER
-    if not len(fired) or by_rows.any():
-        resolve(n, fired[by_rows], told)
+    by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
+    if not len(fired) or by_rows:
+        resolve(n, np.array(by_rows, np.int64), told)
     for _ in range(ROUNDS):
-        if not corners.settle() or not np.isin(n.kind, DECIDED).any():
+        if not corners.settle() or not n.decided:
             return
         resolve(n, fired[:0], told)
     raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
@@ -115,7 +113,7 @@ def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) 
 
 def refuse_violated(n: Instant) -> None:
     """Refuse a start beyond a limit."""
-    for s, kind in enumerate(n.kind.tolist()):
+    for s, kind in enumerate(n.kinds):
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
         past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else -n.rate[s] if kind == ONE_WAY else 0.0
         if past > VIOLATED * n.unit[s]:
@@ -128,7 +126,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     before, modes, ways = here.y.copy(), n.W.switch[MODE].copy(), n.ways().copy()
     hits: dict[int, bool] = {}
     calm: list[int] = []
-    gone = np.zeros(0, np.int64)  # guards of what was held and could not hold
+    gone: list[int] = []  # guards of what was held and could not hold
     again = 0
     for _ in range(ROUNDS):
         n.look()
@@ -158,32 +156,30 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         n.arrive()
         if jumped is not None:
             tell_jump(n, jumped, before)
-        if again < AGAIN and misled(n):
+        guards = n.guards()
+        if again < AGAIN and misled(n, guards):
             n.look_again()
             again += 1
             continue
-        new = np.setdiff1d(broken(n, found), gone)
-        if not len(new):
+        new = [g for g in broken(n, found, guards) if g not in gone]
+        if not new:
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return
-        fired, gone = np.r_[fired, new], np.r_[gone, new]
+        fired, gone = np.array([*fired, *new], np.int64), [*gone, *new]
     raise no_end(here.t, guard_names(n, fired.tolist()), ROUNDS)
 
 
-def misled(n: Instant) -> bool:
+def misled(n: Instant, guards: np.ndarray) -> bool:
     """Whether something slides against its way: where bounces are cut off, what they were changes other rates too."""
-    kind, of = n.S.guard_i[:, GUARD_KIND], n.S.guard_i[:, GUARD_OF]
-    sliding = np.flatnonzero(np.isin(kind, (G_SLIDES, G_TURNS)))
-    return len(sliding) > 0 and bool((n.guards()[sliding] < -n.still[of[sliding]]).any())
+    sliding = ((g, s) for g, (kind, s, _) in enumerate(n.guarded) if kind in (G_SLIDES, G_TURNS))
+    return any(guards[g] < -n.still[s] for g, s in sliding)
 
 
 def unmoved(n: Instant, fired: np.ndarray, rate: np.ndarray) -> np.ndarray:
     """Guards that fired, without those of rates that were something else before a jump."""
     other = np.abs(n.rate - rate) > n.still
-    return np.array(
-        [g for g in fired if n.S.guard_i[g, GUARD_KIND] not in RATES or not other[n.S.guard_i[g, GUARD_OF]]], int
-    )
+    return np.array([g for g in fired.tolist() if n.guarded[g][0] not in RATES or not other[n.guarded[g][1]]], np.int64)
 
 
 def jumps(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> Jump | None:
@@ -230,12 +226,10 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
     return blow
 
 
-def broken(n: Instant, found: Decided) -> np.ndarray:
+def broken(n: Instant, found: Decided, guards: np.ndarray) -> list[int]:
     """Guards of what holds that say that it cannot, beyond rounding."""
-    g = n.guards()
-    out = [
+    return [
         k
-        for k, (kind, s, _) in enumerate(n.S.guard_i.tolist())
-        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and g[k] < -BROKEN * found.sizes[s]
+        for k, (kind, s, _) in enumerate(n.guarded)
+        if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and guards[k] < -BROKEN * found.sizes[s]
     ]
-    return np.array(out, np.int64)

@@ -51,6 +51,8 @@ class Here:
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
         Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
+    decider : Instant, optional
+        What decides at its instants (`events.instant`).
     failed : Exception
         Why the motion cannot go on here.
     watched : str
@@ -65,6 +67,7 @@ class Here:
     lost: float = 0.0
     stopped: str = ""
     fresh: bool = False
+    decider: Any = None
     failed: Exception | None = None
     watched: str = ""
     given: float = 0.0

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 
+from ....compiler.bound import Bound, Written
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
-from ....equations.engine import Sheet, engine, through
-from ....equations.instant import IMPULSES, Bench, balanced_kernel, bare_kernel, bench
-from ....equations.tasks import ARRIVE, MOTION, SOLVE, WATCH
-from ....numerics.cone.dense.problem import ENDED, FREE, Dense, dense
+from ....equations.engine import Sheet, engine
+from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, Desk, bench, instant
+from ....equations.tasks import ARRIVE, SOLVE, WATCH
+from ....numerics.cone.dense.problem import FREE, Dense, dense
 from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
 from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
@@ -22,7 +24,6 @@ from ....tables.system import (
     MASS,
     MODE,
     OFF,
-    RATE,
     SPARE,
     SWITCH_FORCE,
     SWITCH_KIND,
@@ -34,8 +35,6 @@ from .here import Here
 from .holding import GONE
 
 NEAR = 1e-10  # of the mechanism's length, or of a radian: what is no farther from a side is at it
-STILL = 1e-11  # of the terms of a rate: their rounding
-SILENT = 1e-14  # of the fastest velocity: the same, whatever the terms
 REST = 1e-12  # of the length of the mechanism (or a radian) in the time of the motion: the same where all is at rest
 NO_KIND = -1  # of what was released: it takes no part
 IMMOVABLE = 1e-12  # of all mass: what moves less by a force is moved by drivers only
@@ -60,6 +59,14 @@ class Part(NamedTuple):
     state: int = FREE
 
 
+class Room(NamedTuple):
+    """Arrays of a small problem, and what works on them."""
+
+    B: Bench
+    P: Dense
+    do: Bound
+
+
 class Instant:
     """A motion at an instant, with all that is decided on its own.
 
@@ -79,34 +86,67 @@ class Instant:
         c, self.here = here.c, here
         self.S, self.W = c.system, c.work
         S, s = self.S, c.structure
-        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, S.switch_i[:, SWITCH_KIND])
         self.m = S.switch_i[:, SWITCH_MEASURED]
         self.force = S.switch_i[:, SWITCH_FORCE]
-        self.first = self.W.sensed.shape[1] - len(self.kind)
+        self.first = self.W.sensed.shape[1] - len(self.m)
         ny, width = len(here.y), max(s.nv, len(S.row_i), len(S.guard_i), 1)
         none, y = np.zeros(0, np.int64), np.zeros((STATES, ny))
         seen = np.zeros((here.clock.seen.shape[0], 0))
         self.desk = Clock(np.zeros(REALS), np.zeros(COUNTS, np.int64), np.zeros(0), y, np.zeros((1, ny)), none, seen)
-        self.R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
+        R, self.sheet = tableau("rk45"), Sheet(np.zeros((4, width)))
+        self.tables = Written(S), Written(self.W)
+        self.engine = Bound(engine, *self.tables, Written(R), Written(self.desk), Written(self.sheet))
+        self.asked = Written(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
         self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in units(s)]
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
         self.inertia = np.array([mass if m else turning for m in metric])
         fall = np.linalg.norm(S.glob[:3]) / c.values.length + 1.0 / here.clock.real[SPAN] ** 2
         self.tiny = MOTIONLESS * self.unit * fall
+        self.near, self.least = NEAR * self.unit, REST * self.unit / here.clock.real[SPAN]
+        self.rooms: dict[int, Room] = {}
+        self.guarded: list[list[int]] = S.guard_i.tolist()
+        self.all = self.room(len(self.m))
+        self.all.B.which[:] = np.arange(len(self.m))
+        self.rooms.clear()
+        self.begin()
+
+    def begin(self) -> None:
+        """At another instant, where other elements may have been released."""
         self.over = np.nan
-        self.rooms: dict[int, tuple[Bench, Dense]] = {}
+        self.kind = np.where(self.W.switch[SPARE] == GONE, NO_KIND, self.S.switch_i[:, SWITCH_KIND])
+        self.kinds = self.kind.tolist()
+        self.decided = [s for s in self.of(*DECIDED) if self.m[s] >= 0]
+
+    def of(self, *kinds: int) -> list[int]:
+        """Switches of these kinds."""
+        return [s for s, kind in enumerate(self.kinds) if kind in kinds]
+
+    def fired(self, guards: Iterable[int], *kinds: int) -> set[int]:
+        """Switches of those of some guards that are of these kinds."""
+        rows = (self.guarded[g] for g in guards)
+        return {s for kind, s, _ in rows if kind in kinds}
+
+    def room(self, n: int) -> Room:
+        """Room for a small problem of n rows."""
+        if n not in self.rooms:
+            B, P = bench(n, self.here.structure.nv, len(self.S.row_i)), dense(n)
+            self.rooms[n] = Room(B, P, Bound(instant, *self.tables, self.asked, Written(B), Written(P)))
+        return self.rooms[n]
 
     def ways(self) -> np.ndarray:
         """Ways of all switches, in place."""
         return self.W.sensed[VALUE, self.first :]
 
-    def ask(self, task: int) -> int:
-        """Have the engine do a task at the state of the motion; the desk has a copy of it."""
+    def put(self) -> None:
+        """Lay time and state of the motion on the desk."""
         self.desk.real[T] = self.here.t
         self.desk.y[0] = self.here.y
-        given = self.S, self.W, self.R, self.desk, self.sheet
-        return int(through(engine.address(*given), *given, task))
+
+    def ask(self, task: int) -> int:
+        """Have the engine do a task at the state of the motion; the desk has a copy of it."""
+        self.put()
+        return self.engine(task)
 
     def look(self) -> None:
         """Quantities and rates of all switches, where none of those that are decided acts."""
@@ -115,29 +155,20 @@ class Instant:
 
     def look_again(self) -> None:
         """The same after a jump."""
-        S, W = self.S, self.W
         self.bared()
-        self.ask(MOTION)
-        self.x, self.rate = W.sensed[VALUE, self.m].copy(), W.sensed[RATE, self.m].copy()
-        self.near = NEAR * self.unit
-        self.still, v = REST * self.unit / self.here.clock.real[SPAN], np.abs(self.here.v)
-        most, nr = v.max(initial=0.0), len(S.row_i)
-        for s, m in enumerate(self.m.tolist()):
-            if m >= 0:
-                at = slice(S.row_p[nr + m], S.row_p[nr + m + 1])
-                G = np.abs(W.G[at])
-                self.still[s] += STILL * (G @ v[S.col_i[at]]) + SILENT * G.sum() * most
+        self.put()
+        self.all.do(LOOK)
+        B = self.all.B
+        self.x, self.rate, self.still = B.now.copy(), B.rate.copy(), B.seen + self.least
 
     def bared(self) -> None:
         """Switch off what is decided."""
-        for s, kind in enumerate(self.kind.tolist()):
-            if kind in DECIDED and self.m[s] >= 0:
-                self.W.switch[MODE, s] = OFF
+        self.W.switch[MODE, self.decided] = OFF
 
     def slide(self, parts: list[Part]) -> None:
         """Let friction that is no row of the problem slide as it does; that of its rows acts by them alone."""
         ways, own = self.ways(), {p.switch for p in parts}
-        for s in np.flatnonzero(self.kind == FRICTION).tolist():
+        for s in self.of(FRICTION):
             loaded = self.S.force_i[self.force[s], FORCE_LOAD] >= 0
             ways[s] = 0.0 if s in own or loaded else np.sign(self.rate[s])
 
@@ -165,10 +196,8 @@ class Instant:
 
     def problem(self, parts: list[Part]) -> tuple[Bench, Dense, int]:
         """The small problem of these rows at the state of the motion; and how its evaluation ended."""
-        n = len(parts)
-        if n not in self.rooms:
-            self.rooms[n] = bench(n, self.here.structure.nv, len(self.S.row_i)), dense(n)
-        B, P = self.rooms[n]
+        room = self.room(len(parts))
+        B, P = room.B, room.P
         for x in (B.asks, P.const, P.gain, P.lean, P.grain):
             x[...] = 0
         for i, part in enumerate(parts):
@@ -177,10 +206,8 @@ class Instant:
             if part.of >= 0:
                 P.gain[i, part.of] = part.gain
         self.slide(parts)
-        self.desk.real[T] = self.here.t
-        self.desk.y[0] = self.here.y
-        given = self.S, self.W, self.R, self.desk, self.sheet
-        status = int(bare_kernel(engine.address(*given), *given, B, P))
+        self.put()
+        status = room.do(BARE)
         P.grain[:] += FAINT * self.tiny[B.which]
         for i in np.flatnonzero(P.A.diagonal() * self.inertia[B.which] < IMMOVABLE).tolist():
             P.A[i] = P.A[:, i] = 0.0
@@ -191,8 +218,12 @@ class Instant:
     def balance(self, B: Bench, P: Dense, impulses: int) -> int:
         """Solve it for forces or impulses, as `equations.instant` names them. Returns how it ended."""
         B.asks[IMPULSES] = impulses
-        balanced_kernel(self.S, self.W, self.here.t, B, P)
-        return int(P.info[ENDED])
+        self.desk.real[T] = self.here.t
+        return self.rooms[len(P.b)].do(BALANCE)
+
+    def again(self, P: Dense) -> int:
+        """Solve it once more from the states that stand in it, with reaches as they are. Returns how it ended."""
+        return self.rooms[len(P.b)].do(AGAIN)
 
     def arrive(self) -> None:
         """Put the state on the rows as they are now held."""
@@ -212,3 +243,12 @@ class Instant:
     def holds(self, s: int) -> bool:
         """Whether switch s held when it was looked at."""
         return bool(self.mode[s] == HELD)
+
+
+def instant_of(here: Here) -> Instant:
+    """What decides at the instants of a motion, at the present one: the same as long as tables and scratch are."""
+    n = here.decider
+    if n is None or n.S is not here.c.system or n.W is not here.c.work:
+        here.decider = n = Instant(here)
+    n.begin()
+    return n

@@ -64,7 +64,7 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
 
 def _loose(n: Instant, found: Decided, fired: np.ndarray) -> dict[int, Part]:
     """Rows that hold and whose guards fired, as they are when they do not."""
-    ends = {int(s): int(kind) for kind, s, _ in n.S.guard_i[fired] if int(kind) in (G_PULL, G_HOLDS)}
+    ends = {s: kind for kind, s, _ in (n.guarded[g] for g in fired) if kind in (G_PULL, G_HOLDS)}
     out = loose(n, found.parts, (found.x, found.state, found.reach, np.full(len(found.x), np.inf)), fired)
     asked = {(G_PULL, PUSHES), (G_HOLDS, GRIPS)}
     for i, p in enumerate(found.parts):
@@ -101,10 +101,10 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     ended = FOUND
     for _ in range(CASCADE):
         ended = n.balance(B, P, FORCES)
-        slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN))
-        if ended != FOUND or not (slide_on(n, parts, P) or len(slips)):
+        slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN)).tolist()
+        if ended != FOUND or not (slide_on(n, parts, P) or slips):
             break
-        for i in slips.tolist():
+        for i in slips:
             P.rule[i], P.lean[i] = DRIVEN, 1.0 if P.state[i] == LOW else -1.0
             B.way[i] = P.lean[i] if parts[i].way != 0.0 else 0.0
     x = P.x.copy()
@@ -122,18 +122,20 @@ def elements(n: Instant, parts: list[Part]) -> list[str]:
 
 def come_to_rest(n: Instant, found: Decided) -> None:
     """Take the rounding from the rates of what holds."""
-    B, P = n.rooms[len(found.parts)]
+    room = n.rooms[len(found.parts)]
+    B, P = room.B, room.P
     held = [i for i, p in enumerate(found.parts) if found.state[i] == EVEN and n.rate[p.switch] != 0.0]
     if held:
         rates = B.sign[held] * n.rate[B.which[held]]
-        x = np.linalg.lstsq(P.A[np.ix_(held, held)], -rates, rcond=1e-12)[0]
+        A = P.A[np.ix_(held, held)]
+        x = -rates / A[0] if len(held) == 1 and A[0, 0] > 0.0 else np.linalg.lstsq(A, -rates, rcond=1e-12)[0]
         n.here.v[:] += x @ B.Y[held]
 
 
 def write(n: Instant, found: Decided, still: np.ndarray) -> None:
     """Modes, ways and places to hold into the motion."""
     W, ways, taking = n.W, n.ways(), {p.switch for p in found.parts}
-    for s, kind in enumerate(n.kind.tolist()):
+    for s, kind in enumerate(n.kinds):
         if kind in DECIDED and n.m[s] >= 0:
             W.switch[MODE, s] = OFF
             ways[s] = np.sign(n.rate[s]) if kind == FRICTION and not still[s] else 0.0

@@ -25,10 +25,10 @@ SIDES = {G_LOWER: 1.0, G_UPPER: -1.0}
 
 def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
     """Of every stop the sides that it is at: +1 the lower one, -1 the upper one."""
-    hit = {(int(s), SIDES[int(k)]) for k, s, _ in n.S.guard_i[fired] if int(k) in SIDES}
+    hit = {(s, SIDES[k]) for k, s, _ in (n.guarded[g] for g in fired) if k in SIDES}
     out = {}
     gone = astray(n)
-    for s in np.flatnonzero(np.isin(n.kind, STOPS)).tolist():
+    for s in n.of(*STOPS):
         if s in gone:
             continue
         gaps = {1.0: n.x[s] - n.W.switch[LOWER, s], -1.0: n.W.switch[UPPER, s] - n.x[s]}
@@ -42,9 +42,7 @@ def sides(n: Instant, fired: np.ndarray) -> dict[int, tuple[float, ...]]:
 def at_rest(n: Instant, fired: np.ndarray) -> np.ndarray:
     """Whether the rate of each switch is none, (ns,)."""
     still = np.abs(n.rate) <= n.still
-    for kind, s, _ in n.S.guard_i[fired]:
-        if int(kind) in (G_SLIDES, G_BACK):
-            still[int(s)] = True
+    still[list(n.fired(fired, G_SLIDES, G_BACK))] = True
     ended(n, fired, still)
     return still
 
@@ -52,7 +50,7 @@ def at_rest(n: Instant, fired: np.ndarray) -> np.ndarray:
 def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[Part]:
     """Rows that impulses may act along."""
     out = []
-    for s, kind in enumerate(n.kind.tolist()):
+    for s, kind in enumerate(n.kinds):
         if kind in STOPS and s in at:
             out += _stop(s, at[s])
             out += slips_at(n, s, len(out) - 1, still, led=False)
@@ -71,7 +69,7 @@ def of_velocities(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarra
 def of_accelerations(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray) -> list[Part]:
     """Rows that forces may act along: of those that move apart, or slide, only friction that follows its load."""
     out = []
-    for s, kind in enumerate(n.kind.tolist()):
+    for s, kind in enumerate(n.kinds):
         if kind in STOPS and s in at and still[s]:
             out += _stop(s, at[s], EVEN if n.mode[s] != OFF else FREE)
             out += slips_at(n, s, len(out) - 1, still, led=True)

@@ -22,11 +22,11 @@ from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND
 from ...progress import Tell
 from ..engines import Engine
-from .actions import expressions, stepped_over
+from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
 from .happen import begin, happen
 from .here import Here
-from .instant import Instant
+from .instant import instant_of
 from .legs import Legs, breaks
 from .segments import Segments
 
@@ -84,6 +84,7 @@ class Run:
                     break
             if here.stopped:
                 self.stop()
+            say_never(here, self.true)
         except KeyboardInterrupt:
             here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
@@ -125,6 +126,7 @@ class Run:
     def begin(self) -> None:
         """What happens as the motion begins."""
         begin(self.here)
+        self.true = true_already(self.here)
         self.here.fresh = False
 
     def integrate(self) -> None:
@@ -157,7 +159,7 @@ class Run:
         self.recent.append(here.t)
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
-            raise endless(Instant(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+            raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
         self.happens(fired)
 
     def happens(self, fired: Sequence[int]) -> None:
@@ -182,7 +184,7 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
-        values, kinds = Instant(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
+        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)

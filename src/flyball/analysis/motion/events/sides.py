@@ -36,7 +36,7 @@ BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
 
 def teeth(n: Instant, still: np.ndarray) -> None:
     """Ratchets that do not hold: going on, or back to the last tooth that was passed; ``still``: those at rest."""
-    for s in np.flatnonzero(n.kind == RATCHET).tolist():
+    for s in n.of(RATCHET):
         first, n.W.switch[UPPER, s] = n.W.switch[UPPER, s] < np.inf, np.inf
         if n.mode[s] != OFF:
             n.W.switch[LOWER, s] = n.hold[s]  # of a motion that goes on, too
@@ -52,7 +52,7 @@ def turned(n: Instant, hit: Collection[int]) -> None:
     """Ratchets whose tooth let go, or threw back what it was ``hit`` by, go on, and those that begin to; modes are
     decided.
     """
-    for s in np.flatnonzero(n.kind == RATCHET).tolist():
+    for s in n.of(RATCHET):
         if n.W.switch[MODE, s] != OFF:
             continue
         if n.mode[s] != OFF or s in hit or (abs(n.rate[s]) <= 2.0 * TURN and _acceleration(n, s) > SLOW * n.unit[s]):
@@ -77,8 +77,8 @@ def _acceleration(n: Instant, s: int) -> float:
 
 def pressed(n: Instant, fired: np.ndarray) -> None:
     """Which sides of elastic stops are pressed now; ``n`` has looked there."""
-    for s in np.flatnonzero(n.kind == ELASTIC).tolist():
-        n.ways()[s] = FROZEN + _side(n, s, {int(k) for k, of, _ in n.S.guard_i[fired] if of == s})
+    for s in n.of(ELASTIC):
+        n.ways()[s] = FROZEN + _side(n, s, {k for k, of, _ in (n.guarded[g] for g in fired) if of == s})
 
 
 def _side(n: Instant, s: int, hit: set[int]) -> float:

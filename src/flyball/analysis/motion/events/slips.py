@@ -31,19 +31,19 @@ SLOW = 1e3  # times what is still: slower where the end of a slip in space was f
 
 def slips_of(n: Instant, gap: int) -> list[int]:
     """Slips of the place of a gap: none, one or two in a row."""
-    return np.flatnonzero((n.kind == SLIP) & (n.S.switch_i[:, SWITCH_OTHER] == gap)).tolist()
+    return [s for s in n.of(SLIP) if n.S.switch_i[s, SWITCH_OTHER] == gap]
 
 
 def astray(n: Instant) -> set[int]:
     """Gaps of corners that leave their face: at its end, and going on."""
-    leaving = (n.kind == EDGE) & (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
-    return {int(n.S.switch_i[s, SWITCH_OTHER]) for s in np.flatnonzero(leaving)}
+    leaving = (n.x <= n.near) & ((n.rate < -n.still) | (n.x < -n.near))
+    return {int(n.S.switch_i[s, SWITCH_OTHER]) for s in n.of(EDGE) if leaving[s]}
 
 
 def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:
     """Whether slips are over, into ``still``: of a pair both or none."""
-    done = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_TURNS}
-    for s in np.flatnonzero(n.kind == SLIP).tolist():
+    done = n.fired(fired, G_TURNS)
+    for s in n.of(SLIP):
         other = int(n.S.switch_i[s, SWITCH_PARTNER])
         if other < 0:
             still[s] |= s in done
@@ -57,9 +57,8 @@ def stop_slips(n: Instant, fired: np.ndarray) -> None:
 
     What was closed stays so; all else is looked at again.
     """
-    done = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_TURNS}
     over = []
-    for s in sorted(done):
+    for s in sorted(n.fired(fired, G_TURNS)):
         pair = [s, int(n.S.switch_i[s, SWITCH_PARTNER])]
         speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
         if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW * still:
@@ -108,7 +107,7 @@ def loose(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...], fire
     ``found`` are forces, states, reaches, and forces that are nothing.
     """
     x, state, reach, least = found
-    ends = {int(s) for kind, s, _ in n.S.guard_i[fired] if int(kind) == G_CONE}
+    ends = n.fired(fired, G_CONE)
     out = {}
     for i, p in enumerate(parts):
         own = [i] if p.rule == GRIPS else [i, i + 1]
@@ -129,7 +128,7 @@ def write_slips(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...]
     """
     state, x, u, lean = found
     W, ways = n.W, n.ways()
-    slips = np.flatnonzero(n.kind == SLIP)
+    slips = n.of(SLIP)
     W.switch[MODE, slips], W.switch[HOLD, slips] = OFF, 0.0
     for i, p in enumerate(parts):
         own = slips_of(n, int(n.S.switch_i[p.switch, SWITCH_OTHER])) if n.kind[p.switch] == SLIP else [-1]

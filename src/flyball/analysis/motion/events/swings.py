@@ -11,11 +11,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ....equations.instant import SILENT, STILL
 from ....equations.rows import measured
 from ....laws.evaluation import evaluate_jet
 from ....numerics.integrators.clock import SPAN
 from ....tables.system import SWITCH_LAW
-from .instant import REST, SILENT, STILL, Instant
+from .instant import REST, Instant
 from .rest import LOW
 
 SERIES = 4  # ways through a corner that tell whether swings get shorter

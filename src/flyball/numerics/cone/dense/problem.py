@@ -27,7 +27,7 @@ FREE, EVEN, LOW, HIGH, LED, SLIPS = range(6)
 ENDED, PASSES, PIVOTS = range(3)
 FOUND, NONE_FOUND, NOT_HELD = range(3)  # NOT_HELD: rows that must hold cannot
 # rows of Dense.row
-SCALE, BIAS, CONST, FIRST, REST, STEP, WAY, KEEN = range(8)
+SCALE, BIAS, CONST, FIRST, REST, STEP, WAY, KEEN, BEFORE, MISSED = range(10)
 
 
 class Dense(NamedTuple):
@@ -49,7 +49,7 @@ class Dense(NamedTuple):
     gained: np.ndarray  # (n, n): the same of the gain
     K: np.ndarray  # (n, n): equations of a set of states; its factor
     swap: np.ndarray  # (n,): order of its pivots
-    row: np.ndarray  # (8, n)
+    row: np.ndarray  # (10, n)
     T: np.ndarray  # (m, 2 m + 2): pivoting
     basis: np.ndarray  # (m,)
     at: np.ndarray  # (n + 1,): first unknown of each row in it
@@ -62,5 +62,5 @@ def dense(n: int) -> Dense:
     z, i = np.zeros, np.int64
     return Dense(
         z((n, n)), z(n), z(n), z(n, i), z(n), z((n, n)), z(n), z(n, i), z(n), z(n), z(n), z(3, i),
-        z((n, n)), z((n, n)), z((n, n)), z(n, i), z((8, n)), z((m, 2 * m + 2)), z(m, i), z(n + 1, i), z((2, n, n + 1)),
+        z((n, n)), z((n, n)), z((n, n)), z(n, i), z((10, n)), z((m, 2 * m + 2)), z(m, i), z(n + 1, i), z((2, n, n + 1)),
     )  # fmt: skip

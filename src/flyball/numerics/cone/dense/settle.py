@@ -7,9 +7,10 @@ where everything else has its own rules: Josephy 1979).
 from __future__ import annotations
 
 from ....compiler.jit import formula, kernel
-from ....math.scalar import sqrt
+from ....math.scalar import exp, log, sqrt
 from .pivots import pivoted
 from .problem import (
+    BEFORE,
     BIAS,
     DRIVEN,
     ENDED,
@@ -23,6 +24,7 @@ from .problem import (
     KEEN,
     LED,
     LOW,
+    MISSED,
     NONE_FOUND,
     NOT_HELD,
     PASSES,
@@ -41,6 +43,12 @@ from .sets import exchanged, reaching, rounding, scaled, solved, velocity
 NOT_EVEN = 1e-6  # of the largest velocity that there would be: what holds and is left with more cannot hold
 ALIGNED = 1e-13
 TRIES = 60  # of the ways of pairs
+BRAKED = 200  # the same by the other way
+CLOSE = 1e-12  # of what a pair can hold: found
+ROUGH = 1e-6  # of what a pair can hold, or of its way: missed; redundancy leaves rounding of 1e-7
+FLAT = 1e-6  # least slope of the logarithm of what it carries over that of k
+FAR = 3.0  # longest step of the logarithm of k
+STUCK = 1e8  # as large a k, of a mass of one, as is at rest
 
 
 @formula
@@ -115,6 +123,57 @@ def slipped(P):
 
 
 @formula
+def brake(P):
+    """Pairs that hardly slip, whose ways Newton's method does not find: x = -k u, with k so that |x| is the reach.
+
+    |x| grows with k (as in the subproblem of a trust region, More and Sorensen 1983), so k is found by secants. What
+    carries less with any k is at rest: where redundancy leaves open what it carries, only the least sum of squares
+    was more than it can hold.
+    """
+    most = 0.0
+    for i in range(P.b.shape[0]):
+        P.row[KEEN, i] = 1.0
+    for turn in range(BRAKED):
+        for i in range(P.b.shape[0]):
+            P.row[WAY, i] = 0.0
+        P.info[PASSES] += 1
+        P.info[ENDED] = found(P)
+        if P.info[ENDED] == NONE_FOUND:
+            return
+        most = 0.0
+        for i in range(P.b.shape[0]):
+            if P.rule[i] == TURNS and P.state[i] == SLIPS:
+                most = max(most, tightened(P, i, turn))
+        if most <= CLOSE:
+            break
+    if most > ROUGH:
+        P.info[ENDED] = NONE_FOUND
+    for i in range(P.b.shape[0]):
+        if P.rule[i] == TURNS and P.state[i] == SLIPS and P.row[KEEN, i] >= STUCK:
+            P.state[i] = P.state[i + 1] = EVEN
+
+
+@formula
+def tightened(P, i, turn):
+    """Another k of the pair i, i + 1. Returns by what part its |x| missed the reach."""
+    x = P.row[REST]
+    size, reach = sqrt(x[i] * x[i] + x[i + 1] * x[i + 1]), reaching(P, x, i)
+    if not (size > 0.0 and reach > 0.0):  # nothing holds it
+        P.row[KEEN, i] *= 0.5
+        return 0.0 if size <= rounding(P, x, i) + rounding(P, x, i + 1) else 1.0
+    if size < reach and P.row[KEEN, i] >= STUCK:
+        return 0.0
+    k, miss = log(P.row[KEEN, i]), log(size / reach)
+    slope = 1.0
+    if turn > 0 and k != P.row[BEFORE, i]:
+        slope = (miss - P.row[MISSED, i]) / (k - P.row[BEFORE, i])
+        slope = slope if abs(slope) > FLAT else 1.0
+    P.row[BEFORE, i], P.row[MISSED, i] = k, miss
+    P.row[KEEN, i] = exp(k - min(max(miss / slope, -FAR), FAR))
+    return abs(miss)
+
+
+@formula
 def written(P):
     """Impulses, velocities and reaches in the units of the problem."""
     n = P.b.shape[0]
@@ -135,11 +194,15 @@ def settle(P):
     P.info[PASSES] = P.info[PIVOTS] = 0
     scaled(P)
     admitted(P)
+    turned = 0.0
     for _ in range(TRIES):
         P.info[PASSES] += 1
         P.info[ENDED] = found(P)
-        if P.info[ENDED] == NONE_FOUND or slipped(P) <= ALIGNED:
+        turned = slipped(P) if P.info[ENDED] != NONE_FOUND else 0.0
+        if turned <= ALIGNED:
             break
+    if turned > ROUGH:
+        brake(P)
     written(P)
 
 
