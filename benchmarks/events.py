@@ -4,7 +4,9 @@
 
 Ratios to the same motion without a guard, in one process, of the least time each took; and what an event takes with all
 that belongs to it: it is located, the step is taken again, Python decides, the motion goes on. Most of what a guard
-costs is the quantity that it measures, found in every evaluation of the equations (0.14 us for an angle).
+costs is the quantity that it measures, found in every evaluation of the equations (0.14 us for an angle). Then whole
+calls of examples, and how long what is decided at an instant takes, of jumps and modes too. What motions without events
+cost beside an earlier flyball: `against.py`; stick: `stick.py`.
 """
 
 from __future__ import annotations
@@ -12,8 +14,20 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable
+from typing import Any
 
 import flyball as fb
+import mechanisms
+from flyball.analysis.motion.events import run as eventful
+
+EXAMPLES = {
+    "bouncing_ball.toml": 4.0,
+    "geneva_drive.toml": 2.0,
+    "ratchet.toml": 2.0,
+    "clock_escapement.toml": 5.0,
+    "stick_slip.toml": 10.0,
+}
+"""Examples, and how long they are followed [s]."""
 
 
 def pendulums(n: int) -> fb.Mechanism:
@@ -60,6 +74,31 @@ def happening(rounds: int) -> tuple[float, int]:
     return (b - a) / n, n
 
 
+def decided(name: str, seconds: float, rounds: int) -> tuple[float, float, int]:
+    """CPU seconds of a whole call and of one instant in it, the least of some rounds; how many instants there are."""
+    m = mechanisms.example(name)
+    m.simulate(seconds, outputs=2)
+    happen, spent = eventful.happen, [0.0, 0.0]
+
+    def timed(*given: Any) -> None:
+        begun = time.process_time()
+        happen(*given)
+        spent[0] += time.process_time() - begun
+        spent[1] += 1.0
+
+    call, one = 1e9, 1e9
+    eventful.happen = timed
+    try:
+        for _ in range(rounds):
+            spent[:] = 0.0, 0.0
+            begun = time.process_time()
+            m.simulate(seconds, outputs=2)
+            call, one = min(call, time.process_time() - begun), min(one, spent[0] / max(spent[1], 1.0))
+    finally:
+        eventful.happen = happen
+    return call, one, int(spent[1])
+
+
 def main() -> None:
     rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 10
     print(f"{'chain of':>9} {'guards':>7} {'coordinates':>12} {'without':>10} {'time':>6} {'evaluations':>12}")
@@ -69,6 +108,10 @@ def main() -> None:
             print(f"{n:9d} {guards:7d} {coordinates:>12} {1e3 * a:7.2f} ms {ratio:6.2f} {more:12.2f}")
     each, n = happening(rounds)
     print(f"an event takes {1e6 * each:.0f} us ({n} in a second)")
+    print(f"\n{'example':>22} {'motion':>7} {'whole call':>11} {'instants':>9} {'one of them':>12}")
+    for name, seconds in EXAMPLES.items():
+        call, one, n = decided(name, seconds, rounds)
+        print(f"{name:>22} {seconds:5.0f} s {1e3 * call:8.1f} ms {n:9d} {1e6 * one:9.0f} us")
 
 
 if __name__ == "__main__":

@@ -58,13 +58,15 @@ Ask what a number changes
     any analysis takes ``parameters={"rod": 0.6}``
     m.sensitivity(of, to)         -> Sensitivity: exact derivatives
     m.optimize(of, to)            -> Optimum: the values that fit best
+    m.study(vary, of, t_end=...)  -> Study: many runs on all cores, grids and samples; study.indices() -> Indices
 
 Read a result
     run["crank"].position, run["crank.x"], run["A"].force, run["A.force"], run["motor.effort"], run.energy.total
     run.names()                   every such name; ``run["<tab>`` and ``run["A"].<tab>`` complete them
     lines(), as_dict(), plot()    text, plain data and, of most results, a picture
     run.to_html(path)             one page that plays; run.to_report(path) adds plots and tables
-    run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray
+    run.save(path)                load_result reads it back; also to_csv, to_dataframe, to_xarray; a study's file is
+                                  read by load_study
 
 When something is wrong
     FlyballError is the base of all errors: ModelError, UnitError and ExpressionError for what was written;
@@ -84,6 +86,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .analysis.assembly.start import Assembly as Assembly
     from .analysis.motion.impulse.settings import Stepping as Stepping
     from .analysis.prepared import Prepared as Prepared
+    from .analysis.study import load_study as load_study
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -127,6 +130,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.comparison import Comparison as Comparison
     from .results.equilibria import EquilibriumSeries as EquilibriumSeries
     from .results.equilibrium import Equilibrium as Equilibrium
+    from .results.indices import Indices as Indices
     from .results.inverse import InverseDynamics as InverseDynamics
     from .results.linear import LinearModel as LinearModel
     from .results.mass import MassReport as MassReport
@@ -137,6 +141,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .results.root_locus import RootLocus as RootLocus
     from .results.sensitivity import Sensitivity as Sensitivity
     from .results.singularities import Singularities as Singularities
+    from .results.study import Study as Study
     from .results.touch import Touch as Touch
     from .symbolic.equations import Equations as Equations
     from .symbolic.explicit.explicit import ExplicitEquations as ExplicitEquations
@@ -175,6 +180,7 @@ _HOME = {
     "PerformanceNotice": "errors",
     "StartWarning": "errors",
     "load_result": "files",
+    "load_study": "analysis.study",
     "Result": "results.result",
     "FlyballError": "errors",
     "ModelError": "errors",
@@ -196,6 +202,7 @@ _HOME = {
     "Comparison": "results.comparison",
     "Equilibrium": "results.equilibrium",
     "EquilibriumSeries": "results.equilibria",
+    "Indices": "results.indices",
     "InverseDynamics": "results.inverse",
     "LinearModel": "results.linear",
     "Modes": "results.modes",
@@ -203,6 +210,7 @@ _HOME = {
     "RootLocus": "results.root_locus",
     "Sensitivity": "results.sensitivity",
     "Singularities": "results.singularities",
+    "Study": "results.study",
     "Touch": "results.touch",
     "Code": "symbolic.export.code",
     "Equations": "symbolic.equations",

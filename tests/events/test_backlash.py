@@ -92,3 +92,8 @@ def test_play_and_a_stop_of_one_coordinate_count_it_each_their_own_way(elastic):
     assert [e.t for e in r.events] == pytest.approx([0.05], rel=1e-9)
     assert r["play"].value[-1] == pytest.approx(0.005, rel=1e-9)
     assert r["stop"].value[-1] == pytest.approx(1.005, rel=1e-9)
+
+
+def test_a_gear_pair_says_where_its_play_is():
+    with pytest.raises(fb.ModelError, match=r"unknown field 'backlash'.*gears with play are a Backlash in its place"):
+        fb.GearPair("mesh", "A", "B", teeth=(20, 60), backlash="0.2 deg")

@@ -32,6 +32,7 @@ ELSEWHERE = {  # arguments that do not stand on the command line, or otherwise
     "parameters": "--set",
     "progress": "a bar unless --json or --quiet",
     "minimize": "a function",
+    "executor": "an object",
 }
 NOT_FILED = {("equilibrium", "start"), ("equilibria", "start")}  # equilibria have no files
 OTHERWISE = {("singularities", "branch")}  # by its number in the table, of a second search

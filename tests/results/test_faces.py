@@ -42,6 +42,7 @@ MADE = {
     "Singularities": lambda: crank().singularities("motor", (0, 3)),
     "Comparison": lambda: rig().compare(0.02, formulations=["projection", "baumgarte"]),
     "Sensitivity": lambda: rig().sensitivity(["bob.x"], ["length"], t=0),
+    "Study": lambda: rig().study({"length": [1.0, 1.1]}, ["end(bob.x)", "bob.y"], t_end=0.01, outputs=3),
     "Optimum": lambda: rig().optimize(["bob.x"], ["length"], target=[2.0]),
     "Equilibrium": lambda: rig().equilibrium(),
     "EquilibriumSeries": lambda: rig().equilibria("length", [1, 1.1]),

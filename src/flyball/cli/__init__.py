@@ -22,6 +22,7 @@ from . import (  # noqa: F401  (each adds its subcommand)
     run,
     sensitivity,
     singularities,
+    study,
     view,
 )
 from .common import app

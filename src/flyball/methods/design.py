@@ -2,19 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from concurrent.futures import Executor
+    from os import PathLike
+
+    from ..analysis.motion.impulse.settings import Stepping
     from ..model.model import Model
     from ..results.optimum import Optimum
+    from ..results.result import Result
     from ..results.sensitivity import Sensitivity
+    from ..results.study import Study
 else:
     Model = object  # a mechanism is one; signatures alone load nothing
 
 
 class Design(Model):
-    """Derivatives by parameters, and the best of them."""
+    """Derivatives by parameters, the best of them, and many runs."""
 
     def sensitivity(
         self,
@@ -159,3 +166,109 @@ class Design(Model):
         from ..analysis.optimize import OptimizeOptions, optimize
 
         return optimize(self, OptimizeOptions.asked(locals()))
+
+    def study(
+        self,
+        vary: Mapping[str, Any],
+        of: Sequence[str] | Mapping[str, Callable[[Any], float]],
+        *,
+        t_end: float | str,
+        t_start: float | str | None = None,
+        outputs: int | Sequence[float] | None = None,
+        design: str = "grid",
+        samples: int | None = None,
+        seed: int | None = None,
+        parameters: Mapping[str, float | str] | None = None,
+        start: Result | None = None,
+        coordinates: str = "auto",
+        method: str | Stepping = "auto",
+        rtol: float = 1e-7,
+        atol: float | None = None,
+        max_step: float | str = math.inf,
+        max_steps: int = 10_000_000,
+        stabilization: str = "projection",
+        alpha: float | None = None,
+        beta: float | None = None,
+        specialize: bool | str = "auto",
+        file: str | PathLike[str] | None = None,
+        executor: Executor | None = None,
+        threads: int | None = None,
+        progress: bool | Callable[[float], None] = True,
+    ) -> Study:
+        """Simulate at many values of parameters, on all cores: grids, samples, Monte Carlo, Sobol' indices.
+
+        Each run is to the last bit what `simulate` makes of it (``m.simulate(**study.question(k))``). One that fails is
+        left out, and the study says why.
+
+        Parameters
+        ----------
+        vary : mapping
+            Parameter -> its values (grid, list); or what samples of it are drawn from: (low, high), a distribution of
+            ``scipy.stats``, or ``"normal(mean, sd)"``, ``"uniform(low, high)"``, ``"loguniform(low, high)"``,
+            ``"lognormal(median, sd of the logarithm)"``.
+        of : sequence of str, or mapping of str to callable
+            Curves of a result (``"slider.x"``), or one number of each: ``"end(slider.x)"``, ``max``, ``min``, ``mean``,
+            ``rms``, over the output times. Or name -> function of a `Result` that returns a number.
+        t_end : float or str [s]
+            End of the motions.
+        t_start : float or str [s], optional
+            Their start: 0 if not given; where ``start`` ended if that is.
+        outputs : int or sequence of float [s], optional
+            Output times, as for `simulate`; if not given 501, or the end alone where nothing else is looked at.
+        design : {"grid", "list", "random", "latin", "sobol", "saltelli"}
+            ``grid``: all combinations of the values; ``list``: the first of all, the second of all, and so on.
+            ``random``: Monte Carlo; ``latin``: a Latin hypercube; ``sobol``: scrambled points of Sobol; ``saltelli``:
+            the runs that `Study.indices` needs.
+        samples : int, optional
+            How many are drawn; a power of two for ``sobol`` and ``saltelli``, which makes (parameters + 2) times as
+            many runs.
+        seed : int, optional
+            Of the samples: 0 if not given, so that the same call draws the same.
+        parameters : mapping, optional
+            Values of other parameters in place of the model's, in SI units or with a unit.
+        start : Result, optional
+            Every run goes on from where this result ended.
+        coordinates : {"auto", "absolute", "joint"}
+            As for `simulate`.
+        method : {"auto", "dop853", "rk45", "impulse"} or Stepping
+            As for `simulate`.
+        rtol : float [1]
+            As for `simulate`.
+        atol : float [m, rad, m/s, rad/s], optional
+            As for `simulate`.
+        max_step : float or str [s]
+            As for `simulate`.
+        max_steps : int
+            As for `simulate`.
+        stabilization : str
+            As for `simulate`.
+        alpha : float [1/s], optional
+            As for `simulate`.
+        beta : float [1/s], optional
+            As for `simulate`.
+        specialize : bool or "auto"
+            As for `simulate`; auto is decided once, for all runs together.
+        file : path, optional
+            Where the study is kept while it runs (NetCDF, by `load_study` read back): the same call with the same file
+            goes on where it was interrupted or killed.
+        executor : concurrent.futures.Executor, optional
+            Who computes the runs, for instance processes or ``client.get_executor()`` of Dask; threads if not given.
+        threads : int, optional
+            How many; one for each core if not given.
+        progress : bool or callable
+            As for `simulate`: the part of the runs that are done.
+
+        Returns
+        -------
+        Study
+
+        Raises
+        ------
+        ModelError
+            If a parameter, quantity, distribution or option does not exist, or the file is of another study.
+        AnalysisError
+            If the executor fails.
+        """
+        from ..analysis.study import StudyOptions, study
+
+        return study(self, StudyOptions.asked(locals()))

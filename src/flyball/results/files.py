@@ -90,7 +90,7 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
             writer.writerow(header)
             writer.writerows(zip(*columns, strict=True))
 
-    _replaced(path, write)
+    replaced(path, write)
 
 
 def save(result: Result, path: str | os.PathLike) -> None:
@@ -100,10 +100,10 @@ def save(result: Result, path: str | os.PathLike) -> None:
         _write(result, part)
         seal(part)
 
-    _replaced(path, write)
+    replaced(path, write)
 
 
-def _replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
+def replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
     """Write beside the file and put it in place when done: a file that is there is a whole file."""
     path = Path(path)
     part = path.with_name(f".{path.name}.part")
@@ -125,7 +125,7 @@ def _write(result: Result, path: Path) -> None:
         file.create_variable(TIME, (TIME,), data=result.t).attrs["units"] = "s"
         for name, labels in coordinates(result).items():
             file.dimensions[name] = len(labels)
-            file.create_variable(name, (name,), dtype=_text_type(), data=np.array(labels, object))
+            file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
         shown = list(labelled(result, MOST))
         if all(x.name.startswith(f"{ENERGY}.") for x in shown):
             file.attrs["comment"] = "too many parts to list: read this file with flyball.load_result"
@@ -135,7 +135,8 @@ def _write(result: Result, path: Path) -> None:
         _write_solution(result, file.create_group(GROUP), path.parent)
 
 
-def _text_type() -> Any:
+def text_type() -> Any:
+    """Of texts of any length in a file."""
     import h5py
 
     return h5py.string_dtype()
@@ -205,7 +206,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
     happened, states = events_packed(result)
     texts, more = texts | told | happened, more | states | stretches_packed(result)
     for name, text in texts.items():
-        group.create_variable(name, (), dtype=_text_type(), data=np.array(text, object))
+        group.create_variable(name, (), dtype=text_type(), data=np.array(text, object))
     for name, (_, *rest) in ARRAYS.items():
         values = getattr(result, name)
         for k, dim in enumerate(rest):

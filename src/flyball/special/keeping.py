@@ -124,6 +124,11 @@ def _in_memory(p: Plan, S: System) -> Made | None:
     return None
 
 
+def entries(made: Made) -> list[Entry] | None:
+    """Entries of the tables whose very values are in some code; None if it is forgotten."""
+    return next((known for known, its in list(_found.values()) if its is made), None)
+
+
 def _remember(p: Plan, S: System, entries: list[Entry], made: Made) -> None:
     _found[p.key, digest(S, entries)] = entries, made
     while len(_found) > IN_MEMORY:

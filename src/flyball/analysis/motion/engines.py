@@ -22,6 +22,7 @@ from ...errors import ModelError
 from ...numerics.integrators import clock as ex
 from ...numerics.integrators.refusal import afresh
 from ...tables.system import EVALUATIONS
+from ...tables.values import Values
 from ..compiled import Compiled
 from .account import SPENT, kind
 
@@ -49,6 +50,15 @@ def check_specialize(value: Any) -> None:
     """
     if not isinstance(value, bool) and value != AUTO:
         raise ModelError(f"specialize is True, False or {AUTO!r}, not {value!r}")
+
+
+def worth_making(x: Values, evaluations: int, runs: int) -> bool:
+    """Whether made code pays for so many motions, of which one took so many evaluations by the tables."""
+    plan = special.plan(x)
+    if x.structure.guards or special.refusal(plan):
+        return False
+    computing = runs * evaluations * kind(x.structure)[1]
+    return computing * (1.0 - 1.0 / GAIN) >= MARGIN * special.price(plan, special.known(plan, x))
 
 
 def _bound(c: Compiled) -> str:

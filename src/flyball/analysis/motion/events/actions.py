@@ -26,6 +26,7 @@ from .holding import gone_on, hold, let_go
 from .setting import set_parameters
 
 AT_ONCE = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
+MOST = 1000  # expressions of events that are kept as they were read
 CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
 
 
@@ -143,7 +144,7 @@ def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
 def expression(here: Here, g: int) -> float:
     """Value of the expression of an event, by its guard, at the state last evaluated."""
     model, e = here.structure.model, here.structure.events[g]
-    law = model.law(e.law, e.of, f"when of {e.title}")
+    law = here.structure.kept.get("law of event", g, MOST, lambda: model.law(e.law, e.of, f"when of {e.title}"))
     return float(law.evaluate(here.names(), {x.name: x for x in model.tables}))
 
 

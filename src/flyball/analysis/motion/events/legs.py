@@ -16,7 +16,12 @@ SLIVER = 2e-14  # part of the largest time: what is left of a stretch is no step
 
 def breaks(c: Compiled, t0: float, t1: float) -> Breaks:
     """Where laws of a mechanism, and guards, have corners or act briefly by time alone, between two times [s]."""
-    return found_beforehand(c.structure.kept.get("laws of time", None, 1, lambda: _timed(c)), c.system.const, t0, t1)
+    return found_beforehand(laws_of_time(c), c.system.const, t0, t1)
+
+
+def laws_of_time(c: Compiled) -> Timed:
+    """Laws that may have corners or act briefly by time alone, whatever their constants are."""
+    return c.structure.kept.get("laws of time", None, 1, lambda: _timed(c))
 
 
 def _timed(c: Compiled) -> Timed:

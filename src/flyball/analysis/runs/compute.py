@@ -1,0 +1,99 @@
+"""Some runs of a study, one after the other: each is what `Mechanism.simulate` makes of it, failures by themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+
+from ...errors import FlyballError, SimulationError
+from ...model.model import Model
+from ..motion.choice import SimulateOptions
+from ..simulate import simulate
+from .reading import CURVE, Reading, read
+
+TODO, DONE, FAILED = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Question:
+    """What each run of a study is asked: the options of `simulate`, and what is read of it.
+
+    ``model`` is a snapshot, ``names`` are the parameters that are varied, ``times`` the output times [s].
+    """
+
+    model: Model
+    options: SimulateOptions
+    names: tuple[str, ...]
+    asked: tuple[Reading, ...]
+    times: np.ndarray
+
+    def at(self, point: np.ndarray) -> SimulateOptions:
+        """The options of the run at a point."""
+        values = dict(zip(self.names, point.tolist(), strict=True))
+        return replace(self.options, parameters={**(self.options.parameters or {}), **values})
+
+    def empty(self, n: int) -> Answers:
+        """Answers of n runs that are not there yet."""
+        shapes = [(n, len(self.times)) if r.how == CURVE else (n,) for r in self.asked]
+        return Answers([np.full(s, np.nan) for s in shapes], np.zeros(n, np.int8))
+
+
+@dataclass
+class Answers:
+    """Values (runs, ...) of each quantity, how far each run is; why some failed, and remarks, by their numbers."""
+
+    values: list[np.ndarray]
+    status: np.ndarray
+    reasons: dict[int, str] = field(default_factory=dict)
+    remarks: dict[int, str] = field(default_factory=dict)
+
+    def take(self, at: np.ndarray, other: Answers) -> None:
+        """Write those of some runs, ``at`` being their numbers here."""
+        for mine, its in zip(self.values, other.values, strict=True):
+            mine[at] = its
+        self.status[at] = other.status
+        self.reasons.update({int(at[k]): text for k, text in other.reasons.items()})
+        self.remarks.update({int(at[k]): text for k, text in other.remarks.items()})
+
+
+def compute(question: Question, points: np.ndarray, stopped: Callable[[], bool] = lambda: False) -> Answers:
+    """The runs at some points; those that are left when ``stopped`` says so stay to be done."""
+    out = question.empty(len(points))
+    for k, point in enumerate(points):
+        if stopped():
+            break
+        alone(question, point, out, k)
+    return out
+
+
+def alone(question: Question, point: np.ndarray, out: Answers, k: int) -> None:
+    """One run by itself, as number k."""
+    guarded(out, k, partial(_told, question, point, out, k))
+
+
+def guarded(out: Answers, k: int, run: Callable[[], Sequence[np.ndarray]]) -> None:
+    """Write what a run makes, or why it fails: whatever it raises is its own, but an interrupt."""
+    try:
+        for values, found in zip(out.values, run(), strict=True):
+            values[k] = found
+    except Exception as error:
+        out.status[k], out.reasons[k] = FAILED, _reason(error)
+        return
+    out.status[k] = DONE
+
+
+def _told(question: Question, point: np.ndarray, out: Answers, k: int) -> list[np.ndarray]:
+    result = simulate(question.model, question.at(point))
+    if not result.health.success:
+        raise SimulationError(result.health.message, result)
+    if result.health.remarks:
+        out.remarks[k] = "; ".join(map(str, result.health.remarks))
+    return read(result, question.asked, question.times)
+
+
+def _reason(error: Exception) -> str:
+    text = str(error) or type(error).__name__
+    return text if isinstance(error, FlyballError) else f"{type(error).__name__}: {text}"

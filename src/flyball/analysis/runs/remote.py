@@ -1,0 +1,65 @@
+"""Runs in other processes: what is sent there, and what they keep of it."""
+
+from __future__ import annotations
+
+import hashlib
+import pickle
+import threading
+import warnings
+from collections import OrderedDict
+from dataclasses import replace
+
+import numpy as np
+
+from ...errors import ModelError, StartWarning
+from .compute import Answers, Question
+from .runner import Runner, runner
+
+HELD = 4  # questions that a worker process keeps
+
+
+def packed(question: Question) -> tuple[str, bytes]:
+    """For other processes: bytes, and what they are known by.
+
+    Raises
+    ------
+    ModelError
+        If it holds something that cannot be sent.
+    """
+    try:
+        data = pickle.dumps(question)
+    except Exception as pickling:
+        data = _by_value(question, pickling)
+    return hashlib.sha256(data).hexdigest(), data
+
+
+def _by_value(question: Question, pickling: Exception) -> bytes:
+    """With functions that have no name in a module, if what Dask brings for that is there."""
+    try:
+        import cloudpickle
+    except ImportError:
+        raise ModelError(
+            f"the study cannot be sent to another process ({pickling}): define its functions in a module that workers "
+            f"can import, or leave executor out"
+        ) from None
+    return cloudpickle.dumps(question)
+
+
+_HELD: OrderedDict[str, Runner] = OrderedDict()
+_LOCK = threading.Lock()
+
+
+def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
+    """Some runs in another process, which keeps what it made ready for the runs before."""
+    with _LOCK:
+        run = _HELD.get(key)
+    if run is None:
+        question = pickle.loads(data)
+        run = runner(replace(question, model=question.model.snapshot()), points)
+        with _LOCK:
+            _HELD[key] = run
+            while len(_HELD) > HELD:
+                _HELD.popitem(last=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", StartWarning)  # remarks say it
+        return run(points, lambda: False)

@@ -1,0 +1,24 @@
+"""How the runs of a study are computed: with all that they share, or each by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import numpy as np
+
+from .compute import Answers, Question, compute
+from .lean import Lean, shared
+
+FEW = 3  # runs for which it is not worth while to look for what they share
+Runner = Callable[[np.ndarray, Callable[[], bool]], Answers]
+"""(points, whether to stop) -> answers."""
+
+
+def runner(question: Question, points: np.ndarray) -> Runner:
+    """What computes the runs of a question, of which some points are given."""
+    if len(points) > FEW:
+        for k in (0, len(points) // 2, len(points) - 1):  # one may fail
+            if (found := shared(question, points[k])) is not None:
+                return Lean(found).compute
+    return partial(compute, question)

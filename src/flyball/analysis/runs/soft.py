@@ -1,0 +1,93 @@
+"""Parameters that only forces and their laws see: structure, start and most tables are the same at all values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...model.element import Element, resolve
+from ...model.expressions import Expression, law_expression, number
+from ...model.force import Force
+from ...model.model import Model
+from ...tables.numbers import words
+from ...tables.values import Values
+
+PLACES = ("at", "angle", "orientation", "axis")
+"""Fields of forces that say where their frames are."""
+
+
+def derived(model: Model, names: Sequence[str]) -> list[tuple[str, Expression]]:
+    """Parameters that depend on some others, but not those themselves, in an order in which they can be found."""
+    formulas = {}
+    for name, text in model.parameters.items():
+        if name not in names and isinstance(text, (str, Expression)) and set(words(text)) & model.parameters.keys():
+            formulas[name] = law_expression(text, None, f"parameter '{name}'")
+    out: dict[str, Expression] = {}
+    reached = set(names)
+    while more := {k: f for k, f in formulas.items() if k not in out and reached.intersection(f.names)}:
+        reached |= more.keys()
+        out |= more
+    order: list[tuple[str, Expression]] = []
+    while out:
+        ready = {k: f for k, f in out.items() if not out.keys() & set(f.names)}
+        order += ready.items()
+        out = {k: f for k, f in out.items() if k not in ready}
+    return order
+
+
+def soft(model: Model, names: Sequence[str]) -> list[Element] | None:
+    """The forces whose numbers change with these parameters; None if something else does."""
+    reached = {*names, *(k for k, _ in derived(model, names))}
+    if reached.intersection(words(model.gravity)):
+        return None
+    found = [e for e in model.elements() if reached.intersection(words(e))]
+    return found if all(_only_acts(e, reached) for e in found) else None
+
+
+def _only_acts(e: Element, reached: set[str]) -> bool:
+    """Whether what changes of an element are numbers of its formula: neither frames nor rows have any of them."""
+    if not isinstance(e, Force) or hasattr(e, "total"):
+        return False
+    return not reached.intersection(words(tuple(getattr(e, name, None) for name in PLACES)))
+
+
+@dataclass(frozen=True)
+class Filling:
+    """What fills the numbers of the forces that change into tables, as `tables.values` does."""
+
+    names: tuple[str, ...]
+    derived: tuple[tuple[str, Expression], ...]
+    slots: tuple[tuple[int, str], ...]  # of parameters in the table of constants
+    rows: tuple[tuple[int, Any, float], ...]  # of forces: row of their table, force, drawn distance of its ends
+    env: Mapping[str, float]
+
+    @classmethod
+    def of(cls, x: Values, names: Sequence[str], changed: Sequence[Element]) -> Filling:
+        """From the values at any point."""
+        s = x.structure
+        later = derived(s.model, names)
+        reached = {*names, *(k for k, _ in later)}
+        slots = [(k, name) for k, name in enumerate(s.model.parameters) if name in reached]
+        rows = [(k, e, x.poses.apart(e)) for k, e in enumerate(s.forces) if any(e is c for c in changed)]
+        return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
+
+    def fill(self, point: np.ndarray, force_x: np.ndarray, const: np.ndarray) -> None:
+        """Write them.
+
+        Raises
+        ------
+        ModelError
+            If a number makes no sense.
+        """
+        env = dict(self.env)
+        env.update(zip(self.names, point.tolist(), strict=True))
+        for name, formula in self.derived:
+            env[name] = number(formula, env, None, f"parameter '{name}'")
+        for k, name in self.slots:
+            const[k] = env[name]
+        for k, e, apart in self.rows:
+            par = e.parameters(resolve(e, env), apart)
+            force_x[k], force_x[k, : len(par)] = 0.0, par

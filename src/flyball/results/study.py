@@ -1,0 +1,271 @@
+"""Many runs of one model at different values of its parameters."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import AnalysisError, ModelError
+from ..model.words import listing, suggest
+from .indices import Indices
+from .numbers import plain, span
+from .study_file import RUN, save_study, to_xarray
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from .result import Result
+
+TODO, DONE, FAILED = 0, 1, 2
+TOLD = 6  # reasons in a text
+NO_CROSS = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
+
+
+@dataclass(repr=False)
+class Study:
+    """Quantities of many runs, by the values of the parameters.
+
+    ``study["max(slider.x)"]`` is a quantity of all runs: an array with an axis for each parameter of a grid, else with
+    one for the runs; behind it one for the times of a curve. nan where a run failed or is still to be done.
+
+    Attributes
+    ----------
+    design : str
+    parameters : tuple of str
+        Those that were varied.
+    points : ndarray (runs, parameters)
+        Their values in each run, in SI units; of a grid the last one changes first.
+    axes : tuple of ndarray
+        Their values along each axis of a grid; empty for other designs.
+    of, units : tuple of str
+        The quantities, and their units.
+    t : ndarray (n,) [s]
+        Output times.
+    values : dict of str to ndarray
+        Each quantity, (runs,), or (runs, n) if it is a curve.
+    status : ndarray (runs,) of int
+        0: still to be done, 1: done, 2: failed.
+    reasons : dict of int to str
+        Why runs failed, by their numbers.
+    remarks : dict of int to str
+        What was noted about runs that are done.
+    options : dict
+        How each run was computed.
+    base : dict
+        What the model says of the parameters that were varied.
+    start : Result or None
+        What all runs went on from.
+    seconds : float
+    message : str
+        Why it ended before its time; empty if it did not.
+    """
+
+    name: str
+    design: str
+    parameters: tuple[str, ...]
+    points: np.ndarray
+    axes: tuple[np.ndarray, ...]
+    of: tuple[str, ...]
+    units: tuple[str, ...]
+    t: np.ndarray
+    values: dict[str, np.ndarray]
+    status: np.ndarray
+    options: dict[str, Any]
+    base: dict[str, float]
+    mark: str = ""
+    reasons: dict[int, str] = field(default_factory=dict)
+    remarks: dict[int, str] = field(default_factory=dict)
+    start: Result | None = None
+    seconds: float = 0.0
+    message: str = ""
+
+    def __len__(self) -> int:
+        """Number of runs."""
+        return len(self.points)
+
+    @property
+    def done(self) -> np.ndarray:
+        """Which runs are done and did not fail, (runs,)."""
+        return self.status == DONE
+
+    @property
+    def complete(self) -> bool:
+        """Whether no run is still to be done."""
+        return bool((self.status != TODO).all())
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Numbers of values along the axes of a grid; else the number of runs."""
+        return tuple(len(a) for a in self.axes) or (len(self),)
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """A quantity of all runs.
+
+        Raises
+        ------
+        ModelError
+            If there is none of that name.
+        """
+        found = self.values.get(name)
+        if found is None:
+            raise ModelError(f"the study has no {name!r}{suggest(str(name), self.of)}; {listing(list(self.of))}")
+        return found.reshape(*self.shape, *found.shape[1:])
+
+    def unit(self, name: str) -> str:
+        """Unit of a quantity."""
+        self[name]
+        return self.units[self.of.index(name)]
+
+    def at(self, run: int) -> dict[str, float]:
+        """Values of the parameters in a run, for ``parameters=`` of any analysis.
+
+        Raises
+        ------
+        ModelError
+            If there is no such run.
+        """
+        if not -len(self) <= run < len(self):
+            raise ModelError(f"there is no run {run}: they are numbered from 0 to {len(self) - 1}")
+        return dict(zip(self.parameters, self.points[run].tolist(), strict=True))
+
+    def question(self, run: int) -> dict[str, Any]:
+        """What to ask `simulate` for the same motion, to the last bit: ``m.simulate(**study.question(17))``."""
+        told = {k: x for k, x in self.options.items() if x is not None}
+        told["parameters"] = {**self.options["parameters"], **self.at(run)}
+        if told.get("method") == "impulse" or not isinstance(told.get("method"), str):
+            told = {k: x for k, x in told.items() if k not in ("specialize", "rtol", "stabilization")}
+        return told | {"outputs": self.t.copy()} | ({} if self.start is None else {"start": self.start})
+
+    def indices(self, *of: str) -> Indices:
+        """Sobol' indices: which part of the variance of each quantity each parameter accounts for.
+
+        By SciPy's ``sobol_indices``: first-order and total indices (Saltelli et al., Computer Physics Communications
+        181, 2010). A sample of which one run failed is left out with all its runs.
+
+        Parameters
+        ----------
+        of : str
+            Quantities; all that are one number a run if none is named.
+
+        Returns
+        -------
+        Indices
+
+        Raises
+        ------
+        ModelError
+            If the study has another design than ``saltelli``, or a quantity is a curve.
+        AnalysisError
+            If too few samples are left.
+        """
+        if self.design != "saltelli":
+            raise ModelError(NO_CROSS.format(self.design))
+        names = of or tuple(name for name in self.of if self.values[name].ndim == 1)
+        if curves := [name for name in names if self[name].ndim > 1]:
+            raise ModelError(f"{curves[0]} is a curve; ask for end({curves[0]}), or max, min, mean, rms of it")
+        d = len(self.parameters)
+        y = np.array([self.values[name] for name in names]).reshape(len(names), d + 2, -1)
+        whole = np.isfinite(y).all(axis=(0, 1))
+        if whole.sum() < 2:
+            raise AnalysisError(
+                f"{int(whole.sum())} of {y.shape[2]} samples have all their runs: no variances are known"
+            )
+        return Indices.of_runs(names, self.parameters, y[:, :, whole])
+
+    def lines(self) -> list[tuple[str, str]]:
+        """A table for people: what was varied, how the quantities spread, and what failed."""
+        done, failed = int(self.done.sum()), int((self.status == FAILED).sum())
+        sizes = " x ".join(map(str, self.shape)) if self.axes else f"{len(self)} runs"
+        out = [("study", f"{self.name}, {self.design}, {sizes}")]
+        left = len(self) - done - failed
+        told = [f"{done} done"] + [f"{n} {what}" for n, what in ((failed, "failed"), (left, "still to be done")) if n]
+        out.append(("runs", ", ".join(told) + (f"; {self.message}" if self.message else "")))
+        for k, name in enumerate(self.parameters):
+            out.append((name, f"{span(self.points[:, k])} (in the model {self.base[name]:.6g})"))
+        for name, unit in zip(self.of, self.units, strict=True):
+            y = self.values[name][self.done]
+            y = y[np.isfinite(y)]
+            if len(y):
+                text = f"{span(y)} {unit.replace('*', ' ')}".rstrip()
+                out.append((name, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}"))
+        for k, text in list(self.reasons.items())[:TOLD]:
+            out.append(("failed", f"run {k} ({', '.join(f'{n} = {x:.6g}' for n, x in self.at(k).items())}): {text}"))
+        if failed > TOLD:
+            out.append(("failed", f"and {failed - TOLD} more: study.reasons"))
+        seen = list(dict.fromkeys(self.remarks.values()))
+        for text in seen[:TOLD]:
+            first = next(k for k, x in self.remarks.items() if x == text)
+            out.append(("remark", f"{list(self.remarks.values()).count(text)} runs, first {first}: {text}"))
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything as plain numbers and names."""
+        return {
+            "name": self.name,
+            "design": self.design,
+            "points": {name: self.points[:, k].tolist() for k, name in enumerate(self.parameters)},
+            "t": self.t.tolist(),
+            "units": dict(zip(self.of, self.units, strict=True)),
+            "values": {name: plain(x) for name, x in self.values.items()},
+            "status": self.status.tolist(),
+            "reasons": {str(k): text for k, text in self.reasons.items()},
+            "remarks": {str(k): text for k, text in self.remarks.items()},
+            "message": self.message,
+        }
+
+    def to_xarray(self) -> xarray.Dataset:
+        """A labelled dataset: of a grid by the parameters, else by runs with the parameters as coordinates."""
+        return to_xarray(self)
+
+    def to_dataframe(self) -> pandas.DataFrame:
+        """A table with a row for each run: parameters, and the quantities that are one number."""
+        import pandas as pd
+
+        columns = {name: self.points[:, k] for k, name in enumerate(self.parameters)}
+        columns |= {name: x for name, x in self.values.items() if x.ndim == 1}
+        frame = pd.DataFrame(columns, index=pd.RangeIndex(len(self), name=RUN))
+        frame.attrs["units"] = dict(zip(self.of, self.units, strict=True))
+        return frame
+
+    def to_csv(self, path: str | os.PathLike) -> None:
+        """The table of `to_dataframe`; numbers are written exactly."""
+        self.to_dataframe().to_csv(path)
+
+    def save(self, path: str | os.PathLike) -> None:
+        """Write it as one NetCDF file; ``flyball.load_study`` reads it back."""
+        save_study(self, path)
+
+    def plot(self, *of: str, path: str | os.PathLike | None = None) -> Any:
+        """Quantities over one parameter, as a surface over two, or scattered over each of more.
+
+        Of curves what half and nine tenths of the runs stay within. Returns the Matplotlib figure, or writes it to
+        ``path``.
+        """
+        from ..view.study import study
+
+        return study(self, of, path)
+
+    def histogram(self, *of: str, path: str | os.PathLike | None = None) -> Any:
+        """How often values of quantities occur; returns the Matplotlib figure, or writes it to ``path``."""
+        from ..view.study import histogram
+
+        return histogram(self, of, path)
+
+    def scatter(self, *of: str, path: str | os.PathLike | None = None) -> Any:
+        """Quantities over each parameter, a point for each run; returns the figure, or writes it to ``path``."""
+        from ..view.study import scatter
+
+        return scatter(self, of, path)
+
+    def surface(self, of: str, x: str, y: str, path: str | os.PathLike | None = None) -> Any:
+        """A quantity over two parameters as colours, the mean over others; the figure, or written to ``path``."""
+        from ..view.study import surface
+
+        return surface(self, of, x, y, path)
+
+    def __repr__(self) -> str:
+        return "\n".join(f"{a:<16} {b}" for a, b in self.lines())

@@ -1,0 +1,143 @@
+"""Runs that share their tables: which parameters are for that, and that the tables are those of a run by itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball import forces
+from flyball.analysis.motion.choice import SimulateOptions
+from flyball.analysis.runs.compute import Question, compute
+from flyball.analysis.runs.lean import VARIED, Lean
+from flyball.analysis.runs.readable import of_states
+from flyball.analysis.runs.reading import readings
+from flyball.analysis.runs.runner import runner
+from flyball.analysis.runs.soft import Filling, derived, soft
+from flyball.errors import ModelError
+from flyball.tables.spanning import spanning
+from flyball.tables.structure import Choices, structure
+from flyball.tables.values import values
+from tests.complex_steps import with_parameters
+from tests.identities.test_complex_values import with_forces
+from tests.mechanisms import example
+from tests.study.rigs import oscillator
+
+
+def question(m, names, of, specialize=False, **more):
+    """What the runs of a study are asked."""
+    times = np.array([0.0, 0.01])
+    usual = {k: p.default for k, p in __import__("inspect").signature(m.simulate).parameters.items()}
+    given = usual | {"t_end": 0.01, "outputs": times, "specialize": specialize, "progress": False} | more
+    o = SimulateOptions.asked(given)
+    return Question(m.snapshot(), o, tuple(names), readings(m, of), times)
+
+
+@pytest.mark.parametrize("where", ["space", "plane"])
+def test_every_number_of_every_force_changes_its_own_table_or_is_not_shared(where):
+    """Each number is a parameter: where that is taken for one that only forces see, no other table knows it, and what
+    fills the tables of a study makes the same of it, to the bit.
+    """
+    m, names = with_parameters(with_forces(where))
+    m = m.snapshot()
+    kinds = set()
+    for s in (structure(m), structure(m, Choices(tree=spanning(m), switches=True))):
+        first = values(s)
+        for field, name in names.items():
+            if (changed := soft(m, [name])) is None:
+                continue
+            kinds |= {type(e) for e in changed}
+            try:
+                x = values(s, {name: 1.0 + 1e-3})
+            except ModelError:
+                continue
+            for table, a in x.system._asdict().items():
+                if table not in (*VARIED, "ldl", "flat", "switch_x"):
+                    np.testing.assert_array_equal(a, getattr(first.system, table), err_msg=f"{field} {table}")
+            assert x.q.tobytes() == first.q.tobytes()
+            force_x, const = first.system.force_x.copy(), first.system.const.copy()
+            Filling.of(first, [name], changed).fill(np.array([1.0 + 1e-3]), force_x, const)
+            assert force_x.tobytes() == x.system.force_x.tobytes(), field
+            assert const.tobytes() == x.system.const.tobytes(), field
+    assert kinds >= set(forces.ALL) - {
+        fb.Backlash,
+        fb.PointForce,
+        fb.PointTorque,
+        fb.Motor,
+        fb.Actuator,
+    }  # the last four are laws
+
+
+def test_which_parameters_only_forces_see():
+    m = example("andrews.toml").snapshot()
+    assert [e.name for e in soft(m, ["stiffness"])] == ["spring"]
+    assert [e.name for e in soft(m, ["torque"])] == ["motor"]
+    for name in ("d", "beta", "xc"):
+        assert soft(m, [name]) is None
+    falling = fb.Mechanism("m", planar=True, gravity=(0, "-g"), parameters={"g": 9.81})
+    falling.add(fb.Body("b", mass=1, inertia=1))
+    assert soft(falling.snapshot(), ["g"]) is None
+    driven = oscillator()
+    driven.add(fb.Body("c", mass=1, inertia=1), fb.Prismatic("rail", "ground", "c", at=(0, 0), axis=(1, 0)))
+    driven.add(fb.Driver("drive", "rail.displacement", "k*t"))
+    assert soft(driven.snapshot(), ["k"]) is None
+
+
+def test_parameters_that_depend_on_others_are_found_in_order():
+    m = oscillator()
+    m.parameters |= {"z": "2*y", "y": "k + 1", "x": "z*y", "w": "mass"}
+    assert [name for name, _ in derived(m, ["k"])] == ["y", "z", "x"]
+    assert [name for name, _ in derived(m, ["k", "y"])] == ["z", "x"]
+
+
+@pytest.mark.parametrize("specialize", [False, True])
+def test_shared_runs_are_the_runs_by_themselves(specialize):
+    q = question(example("andrews.toml"), ("stiffness",), ["K5.x", "end(P3.fy)", "rms(spring.force)"], specialize)
+    points = np.linspace(4000, 5000, 5)[:, None]
+    run = runner(q, points)
+    assert isinstance(run.__self__, Lean)
+    a, b = run(points, lambda: False), compute(q, points)
+    assert a.status.tolist() == b.status.tolist() == [1] * 5
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x.tobytes() == y.tobytes()
+    assert a.remarks == b.remarks
+    assert not np.isnan(np.concatenate([x.ravel() for x in a.values])).any()
+
+
+def test_a_value_that_made_code_takes_for_granted_is_computed_by_itself():
+    """Damping is 0 in the first run, which made code knows; it is 2 in the second."""
+    m = oscillator()
+    points = np.array([[0.0], [2.0], [0.0], [1.0]])
+    q = question(m, ("c",), ["end(b.x)"], True)
+    a, b = runner(q, points)(points, lambda: False), compute(q, points)
+    assert a.values[0].tobytes() == b.values[0].tobytes()
+    assert a.values[0][1] != a.values[0][0] == a.values[0][2]
+
+
+@pytest.mark.parametrize("more", [{"stabilization": "projection-steps"}, {"start": True}])
+def test_what_is_unusual_is_not_shared(more):
+    m = oscillator()
+    if more.get("start"):
+        more = {"start": m.simulate(0.001)}
+    if "stabilization" in more:
+        more |= {"coordinates": "absolute"}
+    run = runner(question(m, ("k",), ["end(b.x)"], **more), np.linspace(1, 9, 5)[:, None])
+    assert not hasattr(run, "__self__")
+
+
+def test_laws_that_are_sharp_in_time_are_not_shared():
+    """A corner's time may be what is varied."""
+    m = oscillator()
+    m.add(fb.Actuator("push", "slide.displacement", force="step(t, k/1e5, 0, k/1e5 + 1e-3, 1)"))
+    points = np.linspace(100, 900, 5)[:, None]
+    q = question(m, ("k",), ["end(b.x)"])
+    run = runner(q, points)
+    assert not hasattr(run, "__self__")
+
+
+def test_curves_that_follow_from_positions_and_velocities():
+    m = example("andrews.toml")
+    m.add(fb.Sensor("seen", "crank.angle"), fb.Sensor("pulled", "spring.force"))
+    yes = ["K1.x", "K1.vx", "K1.omega", "crank.angle", "crank.rate", "seen", "seen.value"]
+    no = ["K1.ax", "P3.fx", "spring.force", "motor.work", "pulled", "energy.total", "crank.acceleration"]
+    assert [of_states(m, name) for name in yes + no] == [True] * len(yes) + [False] * len(no)

@@ -1,0 +1,116 @@
+"""Studies on the command line and as pictures."""
+
+from __future__ import annotations
+
+import json
+
+import matplotlib.figure
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import flyball as fb
+from flyball.cli import app
+from tests.study.rigs import oscillator, pushed
+
+
+def invoke(*words: str):
+    return CliRunner().invoke(app, ["study", "m.toml", *words])
+
+
+@pytest.fixture
+def model(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    oscillator().save("m.toml")
+
+
+@pytest.mark.usefixtures("model")
+def test_a_grid(tmp_path):
+    said = invoke("--vary", "k=50:150:3", "--vary", "x0=0.1,20 cm", "--of", "end(b.x)", "--t-end", "1", "--json", "-o", "s.nc",
+                  "--csv", "s.csv", "--plot", "s.png", "--histogram", "h.png", "--set", "c=0.5")  # fmt: skip
+    assert said.exit_code == 0, said.stderr
+    data = json.loads(said.stdout)
+    assert data["points"]["k"] == [50, 50, 100, 100, 150, 150]
+    assert data["points"]["x0"][:2] == [0.1, 0.2]
+    assert data["files"] == ["s.nc", "s.csv", "s.png", "h.png"]
+    m = oscillator()
+    m.parameters["c"] = 0.5
+    expected = m.study({"k": [50, 100, 150], "x0": [0.1, 0.2]}, ["end(b.x)"], t_end=1)
+    assert data["values"]["end(b.x)"] == expected.values["end(b.x)"].tolist()
+    assert (tmp_path / "s.png").stat().st_size > 5000
+    assert (tmp_path / "s.csv").read_text().splitlines()[0] == "run,k,x0,end(b.x)"
+    again = invoke("--vary", "k=50:150:3", "--vary", "x0=0.1,20 cm", "--of", "end(b.x)", "--t-end", "1", "-o", "s.nc",
+                   "--set", "c=0.5")  # fmt: skip
+    assert again.exit_code == 0, again.stderr
+    assert "6 done" in again.stdout
+    other = invoke("--vary", "k=50:150:4", "--of", "end(b.x)", "--t-end", "1", "--file", "s.nc")
+    assert other.exit_code == 2
+    assert "another study" in other.stderr
+
+
+@pytest.mark.usefixtures("model")
+def test_samples_and_indices():
+    said = invoke("--vary", "k=50:150", "--vary", "mass=normal(2, 0.1)", "--of", "end(b.x)", "--t-end", "0.1", "--design", "saltelli",
+                  "--samples", "8")  # fmt: skip
+    assert said.exit_code == 0, said.stderr
+    assert "32 done" in said.stdout
+    assert "first" in said.stdout
+    bad = invoke("--vary", "k", "--of", "end(b.x)", "--t-end", "1")
+    assert bad.exit_code == 2
+    assert "write name=values" in bad.stderr
+
+
+def pictures(s: fb.Study):
+    yield s.plot()
+    if any(x.ndim == 1 for x in s.values.values()):
+        yield s.histogram()
+        yield s.scatter()
+
+
+@pytest.mark.parametrize(
+    ("vary", "of", "more"),
+    [
+        ({"k": [1.0, 2.0, 3.0]}, ["end(b.x)", "b.x"], {}),
+        ({"k": [1.0, 2.0, 3.0], "mass": [1.0, 2.0]}, ["end(b.x)"], {}),
+        ({"k": (1.0, 3.0), "mass": (1.0, 2.0)}, ["end(b.x)", "max(b.x)"], {"design": "latin", "samples": 20}),
+        ({"k": [1.0, 2.0], "mass": [1.0, 2.0], "c": [0.0, 1.0]}, ["end(b.x)"], {}),
+        ({"k": (1.0, 3.0)}, ["b.x"], {"design": "random", "samples": 50}),
+        ({"k": [1.0, 1e300], "mass": [1.0, -1.0]}, ["end(b.x)", "b.x"], {}),
+        ({"mass": [-1.0]}, ["end(b.x)"], {}),
+    ],
+)
+def test_pictures(vary, of, more):
+    s = oscillator().study(vary, of, t_end=0.01, outputs=3, **more)
+    for figure in pictures(s):
+        assert isinstance(figure, matplotlib.figure.Figure)
+        figure.canvas.draw()
+
+
+def test_a_surface_is_the_mean_over_other_parameters():
+    s = oscillator().study(
+        {"k": [1.0, 2.0, 3.0], "mass": [1.0, 2.0], "x0": [0.1, 0.3]}, ["end(b.x)", "b.x"], t_end=1.0, outputs=3
+    )
+    ax = s.surface("end(b.x)", "mass", "k").axes[0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("mass", "k")
+    low, high = ax.collections[0].get_clim()
+    mean = s["end(b.x)"].mean(axis=2)
+    assert low <= mean.min()
+    assert high >= mean.max()
+    with pytest.raises(fb.ModelError, match=r"b.x is a curve; ask for end\(b.x\)"):
+        s.surface("b.x", "mass", "k")
+    with pytest.raises(fb.ModelError, match="not 'kk'"):
+        s.surface("end(b.x)", "mass", "kk")
+
+
+def test_indices_have_a_picture(tmp_path):
+    s = pushed().study({"a": (0, 1), "b": (0, 1)}, ["end(block.x)"], t_end=1.0, design="saltelli", samples=16)
+    s.indices().plot(tmp_path / "i.svg")
+    assert (tmp_path / "i.svg").stat().st_size > 3000
+    assert json.loads(json.dumps(s.indices().as_dict()))["samples"] == 16
+    assert len(repr(s.indices()).splitlines()) == 3
+
+
+def test_what_does_not_vary_has_no_indices():
+    s = pushed().study({"idle": (0, 1)}, ["end(block.x)"], t_end=0.1, design="saltelli", samples=8)
+    assert np.isnan(s.indices().first_range).all()
+    assert s.indices().total.tolist() == [[0.0]]
