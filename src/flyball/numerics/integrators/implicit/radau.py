@@ -61,6 +61,7 @@ SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 FIRST = 1e-4  # part of the time span that is tried first
 WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
 ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
+JUMPED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
 SINGULAR = 3
 
 
@@ -71,8 +72,8 @@ def start(callbacks, S, K, c, out, used):
     y = c.y[NEW]
     for i in range(y.shape[0]):
         y[i] = c.y[NOW, i]
-    status, _ = arrive(c.real[T], y, c.K[0], S, K)
-    if status != 0:
+    status, moved = arrive(c.real[T], y, c.K[0], S, K)
+    if status != 0 or moved > JUMPED:
         return STUCK, used
     for i in range(y.shape[0]):
         c.y[NOW, i] = y[i]
