@@ -198,7 +198,7 @@ def clock_for(
     real[ex.SPAN] = (t_end - t) or 1.0
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = _energy_size(start.base, (t_end - t) or 1.0)
+    real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
@@ -220,7 +220,7 @@ def clock_for(
     return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
 
 
-def _energy_size(a: Assembly, span: float) -> float:
+def energy_size(a: Assembly, span: float) -> float:
     """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
     much in the time there is, besides what it has.
     """
