@@ -79,3 +79,8 @@ def test_play_of_one_coordinate_is_a_pair_of_stops(coordinates):
     m.add(fb.Backlash("key", ("A.angle",), gap=0.2, restitution=1))
     r = run(m, 1.0, coordinates)
     assert times(r, "key") == pytest.approx([0.05 + 0.1 * k for k in range(10)], abs=1e-9)
+
+
+def test_a_gear_pair_says_where_its_play_is():
+    with pytest.raises(fb.ModelError, match=r"unknown field 'backlash'.*gears with play are a Backlash in its place"):
+        fb.GearPair("mesh", "A", "B", teeth=(20, 60), backlash="0.2 deg")

@@ -11,6 +11,7 @@ import flyball as fb
 from .dice import Dice, plus
 from .forces import FORCES, driven
 from .joints import coordinates, coupling, joint
+from .shaken import MAKERS, noted
 from .switching import switched
 
 
@@ -302,11 +303,23 @@ def happenings(d: Dice) -> Case:
     return _switching(d, "happenings", kinds, 4)
 
 
+def shaken(d: Dice) -> Case:
+    """What holds at times under loads that go to and fro, some of it at rest for long."""
+    make = d.pick(MAKERS)
+    if make.__name__ == "landing":
+        d.planar = False
+    case, m = _case(d, "shaken", d.pick([3.0, 8.0]), outputs=401)
+    make(d, m, case)
+    if d.chance(0.4):
+        noted(d, m, case)
+    return case
+
+
 FAMILIES = {
     f.__name__: f
     for f in (
         chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, drivers, couplings, friction,
-        crowds, stops, sticking, ropes, latches, happenings,
+        crowds, stops, sticking, ropes, latches, happenings, shaken,
     )
 }  # fmt: skip
 

@@ -15,8 +15,10 @@ from flyball.results.result import Result
 
 from .bounds import against
 from .families import Case
+from .holding import misheld
 
 STEPS = 3000
+OUTPUTS = 21
 VIOLATION, UNBALANCED, RESIDUAL = 1e-7, 1e-4, 1e-6
 
 
@@ -47,7 +49,7 @@ def _judged(case: Case) -> Verdict:
     with warnings.catch_warnings():
         warnings.simplefilter("error", RuntimeWarning)  # NumPy's: they tell of numbers that are none
         try:
-            result = case.mechanism.simulate(case.t_end, outputs=21, max_steps=STEPS, **case.options)
+            result = case.mechanism.simulate(case.t_end, **{"outputs": OUTPUTS, "max_steps": STEPS} | case.options)
         except fb.SimulationError as error:
             problem = _partial(error)
             return Verdict("broken", problem) if problem else _refused(error, case)
@@ -90,7 +92,7 @@ def _healthy(r: Result, case: Case) -> Verdict:
     if not all(np.isfinite(x).all() for x in (r.q, r.v, r.vdot, r.multipliers, r.states)):
         return Verdict("broken", "the result is not finite")
     str(r.health)
-    if wrong := against(r):
+    if wrong := against(r) or misheld(r, case.mechanism):
         return Verdict("broken", wrong)
     lost = r.exchanged.get("impact_loss", np.zeros(1))
     if np.diff(lost, prepend=0.0).min(initial=0.0) < -1e-9 * (1.0 + np.abs(lost).max(initial=0.0)):

@@ -56,7 +56,7 @@ def test_every_number_of_every_force_changes_its_own_table_or_is_not_shared(wher
                     np.testing.assert_array_equal(a, getattr(first.system, table), err_msg=f"{field} {table}")
             assert x.q.tobytes() == first.q.tobytes()
             force_x, const = first.system.force_x.copy(), first.system.const.copy()
-            Filling.of(first, [name], changed).fill(np.array([1.0 + 1e-3]), force_x, const)
+            Filling.of(first, [name], changed).fill(np.array([1.0 + 1e-3]), {"force_x": force_x, "const": const})
             assert force_x.tobytes() == x.system.force_x.tobytes(), field
             assert const.tobytes() == x.system.const.tobytes(), field
     assert kinds >= set(forces.ALL) - {
@@ -141,3 +141,43 @@ def test_curves_that_follow_from_positions_and_velocities():
     yes = ["K1.x", "K1.vx", "K1.omega", "crank.angle", "crank.rate", "seen", "seen.value"]
     no = ["K1.ax", "P3.fx", "spring.force", "motor.work", "pulled", "energy.total", "crank.acceleration"]
     assert [of_states(m, name) for name in yes + no] == [True] * len(yes) + [False] * len(no)
+
+
+def swinging():
+    """Two links that start at rest; what they weigh, and gravity, are parameters."""
+    m = fb.Mechanism(
+        "swing", planar=True, gravity=(0, "-g"), parameters={"g": 9.81, "mass": 1.0, "J": 0.1, "l": 1.0, "w": 0.0}
+    )
+    m.add(fb.Body("a", mass="mass", inertia="J", position=("l/2", 0)))
+    m.add(fb.Body("b", mass="2*mass", inertia="0.5*J", position=("1.5*l", 0), angular_velocity="w"))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=("l", 0)))
+    m.add(fb.Distance("rod", "ground", "b", at=((1.5, -1.0), ("2*l", 0))))
+    m.add(fb.TorsionalSpringDamper("spring", "A", stiffness="10*mass", damping="g/10"))
+    return m
+
+
+@pytest.mark.parametrize("coordinates", ["joint", "absolute"])
+@pytest.mark.parametrize("specialize", [False, True])
+@pytest.mark.parametrize("names", [("mass",), ("J", "g"), ("g",)])
+def test_masses_and_gravity_of_what_starts_at_rest_are_shared(names, specialize, coordinates):
+    of = ["b.y", "end(b.angle)", "min(A.rate)", "end(rod.fx)", "max(energy.kinetic)"]
+    q = question(swinging(), names, of, specialize, coordinates=coordinates)
+    points = np.random.default_rng(2).uniform(0.5, 1.5, (5, len(names)))
+    points[3] = 1.0  # made code goes by what is 1
+    run = runner(q, points)
+    assert isinstance(run.__self__, Lean)
+    a, b = run(points, lambda: False), compute(q, points)
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x.tobytes() == y.tobytes()
+    assert len(set(a.values[2])) == 5
+    assert run.__self__.alone_count < 5
+
+
+@pytest.mark.parametrize("name", ["l", "w"])
+def test_lengths_and_velocities_are_not(name):
+    q = question(swinging(), (name,), ["b.y", "end(A.rate)"])
+    points = np.linspace(0.9, 1.1, 5)[:, None]
+    a, b = runner(q, points)(points, lambda: False), compute(q, points)
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x.tobytes() == y.tobytes()
+    assert len({x.tobytes() for x in a.values[0]}) == 5

@@ -68,13 +68,17 @@ def test_each_run_is_the_single_run(vary, options):
         assert r["motor.work"][-1] == s.values["end(motor.work)"][k]
 
 
-def test_each_run_of_a_motion_with_contact_is_the_single_run():
+@pytest.mark.parametrize("more", [{}, {"method": "impulse"}, {"method": fb.Stepping(step="2 ms")}])
+def test_each_run_of_a_motion_with_contact_is_the_single_run(more, tmp_path):
     m = example("bouncing_ball.toml")
     body = m.bodies[0].name
     name = next(iter(m.parameters))
     value = m.environment()[name]
-    s = m.study({name: [value, 0.9 * value]}, [f"{body}.vy"], t_end=0.3, outputs=4)
+    s = m.study({name: [value, 0.9 * value]}, [f"{body}.vy"], t_end=0.3, outputs=4, **more)
+    assert s.done.all()
+    s.save(tmp_path / "s.nc")
     for k in range(2):
+        assert fb.load_study(tmp_path / "s.nc").question(k)["method"] == s.question(k)["method"]
         assert m.simulate(**s.question(k))[f"{body}.vy"].tobytes() == s.values[f"{body}.vy"][k].tobytes()
 
 

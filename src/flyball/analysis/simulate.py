@@ -26,10 +26,12 @@ from .motion.ahead import refuse_missing
 from .motion.choice import SimulateOptions, chosen, instead_of, unresolved
 from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
-from .motion.engines import Engine
+from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
+from .motion.implicit.loop import Implicit, run_implicit
+from .motion.implicit.suited import IMPLICIT, explicit, suited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -80,7 +82,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     """The motion by a method that is chosen: start, end, output times."""
     started = time.perf_counter()
     t_start, _, times = span
-    announce_motion(model, not isinstance(o.method, Stepping))
+    announce_motion(model, not isinstance(o.method, Stepping), o.method in IMPLICIT)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
@@ -90,11 +92,16 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
+    if o.method in IMPLICIT and not leaves_no_freedom(begun):
+        begun = suited(begun, o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
         warn(not_allowed(d), StartWarning)
-    begun.engine = Engine(begun.assembly.compiled, o.specialize, UNMADE.get(o.stabilization, ""))
+    made = False if o.method in IMPLICIT else o.specialize
+    begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
+    if o.method in IMPLICIT:
+        begun.engine.told = f"{TABLES}: {IMPLICIT[0]} goes through the tables"
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -131,10 +138,14 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if watched(begun) or len(known.times):
-        rows, interrupted = run_events(here, tableau(o.method), _width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and o.method in IMPLICIT:
+        loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
+        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
+        here.failed = loop.failed
+    elif watched(begun) or len(known.times):
+        rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(o.method), tell, task, engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
@@ -187,7 +198,7 @@ def clock_for(
     real[ex.SPAN] = (t_end - t) or 1.0
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = _energy_size(start.base, (t_end - t) or 1.0)
+    real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
@@ -205,11 +216,11 @@ def clock_for(
     nothing = sampled is not None and not sampled
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
-    K = np.zeros((len(tableau(o.method).c) + 1, len(y)))
+    K = np.zeros((len(tableau(explicit(o.method)).c) + 1, len(y)))
     return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
 
 
-def _energy_size(a: Assembly, span: float) -> float:
+def energy_size(a: Assembly, span: float) -> float:
     """An energy [J] that errors of works are small against: to lift the mechanism by its length, and to move it by as
     much in the time there is, besides what it has.
     """

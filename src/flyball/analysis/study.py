@@ -20,7 +20,7 @@ from ..model.words import listing, suggest
 from ..results.study import Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
-from .motion.choice import SimulateOptions
+from .motion.choice import IMPULSE, SimulateOptions
 from .motion.engines import AUTO, worth_making
 from .motion.impulse.settings import Stepping
 from .motion.options import output_times
@@ -131,31 +131,26 @@ def _options(o: SimulateOptions) -> dict[str, Any]:
 
 
 def _decided(question: Question, found: Study) -> Question:
-    """With the engine that all runs have: one choice, so that none depends on what was computed before it."""
-    o = question.options
-    if o.specialize != AUTO:
+    """With the engine that all runs have: one choice, so that none depends on what was computed before it.
+
+    Contact and partitioning are for the tables in any case; to ask for these would be to ask for an integrator.
+    """
+    model, o = question.model, question.options
+    if o.specialize != AUTO or model.contacts or model.bulk or o.method == IMPULSE or isinstance(o.method, Stepping):
         return question
     if found.options["specialize"] == AUTO:
-        found.options["specialize"] = _made_code_pays(question, found)
-    chosen = found.options["specialize"]
-    return replace(question, options=replace(o, specialize=chosen)) if chosen is not None else question
+        found.options["specialize"] = o.stabilization != "partitioning" and _made_code_pays(question, found)
+    return replace(question, options=replace(o, specialize=found.options["specialize"]))
 
 
-def _made_code_pays(question: Question, found: Study) -> bool | None:
-    """Whether code for this mechanism pays, by what the first run that does not fail computes; None: it has no say."""
-    o = question.options
-    if isinstance(o.method, Stepping) or o.method == "impulse" or o.stabilization == "partitioning":
-        return None
+def _made_code_pays(question: Question, found: Study) -> bool:
+    """Whether code for this mechanism pays, by what the first run that does not fail computes."""
     todo = np.flatnonzero(found.status == TODO)
     for k in todo[:TRIED]:
         try:
             run = simulate(question.model, replace(question.at(found.points[k]), specialize=False))
-        except FlyballError:
-            continue
         except Exception:  # its reason is told when its turn comes
             continue
-        if run.health.contact is not None:
-            return None
         return worth_making(run.values, run.health.evaluations, len(todo))
     return False
 

@@ -131,7 +131,7 @@ def grains(S, W, out):
             x = W.sensed[VALUE, S.switch_i[of, SWITCH_MEASURED]]
             out[g] = GRAIN * max(1.0, S.glob[LENGTH], magnitude(x))
         elif kind == G_SLIDES or kind == G_BACK:
-            out[g] = NOISE * fastest
+            out[g] = max(NOISE * fastest, GRAIN * max(1.0, S.glob[LENGTH]))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:  # of places

@@ -42,6 +42,10 @@ class GearPair(Coupling):
     internal: Flag = False
 
     drawn: ClassVar[str] = "gear"
+    hints: ClassVar[dict[str, str]] = {
+        "backlash": "gears with play are a Backlash in its place: Backlash('mesh', ('A.angle', 'B.angle'), "
+        "weights=(z1, z2), gap='0.2 deg')"
+    }
     dimensions: ClassVar = {"teeth": ("1", "m")}
 
     def coupled(self) -> tuple[str, ...]:

@@ -38,6 +38,7 @@ class Motions(Model):
         alpha: float | None = None,
         beta: float | None = None,
         specialize: bool | str = "auto",
+        step: float | str | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
         """Integrate the equations of motion.
@@ -63,8 +64,9 @@ class Motions(Model):
             Go on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
-        method : {"auto", "dop853", "rk45", "impulse"} or Stepping
-            ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``impulse``, or a
+        method : {"auto", "dop853", "rk45", "radau", "impulse"} or Stepping
+            ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``radau``: implicit,
+            Radau IIA of order 5, for stiff springs and strong damping. ``impulse``, or a
             `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
             ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
             ways that it does not know: ``health.method`` says why.
@@ -90,6 +92,8 @@ class Motions(Model):
             takes to make it, once for all values of its parameters, and kept on disk. False: by the engine that serves
             every mechanism. auto: whichever takes less time; what code is there already is used. Results agree within
             the tolerance, and not to the last digit, with those of the other; ``health.engine`` says which it was.
+        step : float or str [s], optional
+            A fixed step, of ``radau`` alone: errors are then not looked at.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.

@@ -74,7 +74,7 @@ def ldl_solve(P, L, D, x):
         x[k] = v
 
 
-def analyse(n: int, i: np.ndarray, j: np.ndarray) -> tuple[Pattern, np.ndarray]:
+def analyse(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray | None = None) -> tuple[Pattern, np.ndarray]:
     """Order of elimination and pattern of L for a symmetric matrix with entries (i, j).
 
     Parameters
@@ -83,6 +83,8 @@ def analyse(n: int, i: np.ndarray, j: np.ndarray) -> tuple[Pattern, np.ndarray]:
         Order of the matrix. The diagonal is always part of the pattern.
     i, j : ndarray of int
         Rows and columns of the entries, either triangle, repeats allowed.
+    order : ndarray of int, optional
+        Place of every unknown in the order of elimination; if not given, one that makes little work.
 
     Returns
     -------
@@ -92,7 +94,7 @@ def analyse(n: int, i: np.ndarray, j: np.ndarray) -> tuple[Pattern, np.ndarray]:
     """
     i = np.r_[np.asarray(i, np.int64), np.arange(n)]
     j = np.r_[np.asarray(j, np.int64), np.arange(n)]
-    L = _best(n, i, j)
+    L = _best(n, i, j) if order is None else _lower(n, i, j, order)
     row, column = np.minimum(L.perm[i], L.perm[j]), np.maximum(L.perm[i], L.perm[j])
     keys, place = np.unique(column * n + row, return_inverse=True)
     Ap = np.r_[0, np.cumsum(np.bincount(keys // n, minlength=n))].astype(np.int64)

@@ -136,8 +136,6 @@ class Study:
         """What to ask `simulate` for the same motion, to the last bit: ``m.simulate(**study.question(17))``."""
         told = {k: x for k, x in self.options.items() if x is not None}
         told["parameters"] = {**self.options["parameters"], **self.at(run)}
-        if told.get("method") == "impulse" or not isinstance(told.get("method"), str):
-            told = {k: x for k, x in told.items() if k not in ("specialize", "rtol", "stabilization")}
         return told | {"outputs": self.t.copy()} | ({} if self.start is None else {"start": self.start})
 
     def indices(self, *of: str) -> Indices:

@@ -27,18 +27,20 @@ def study(found: Study, of: Sequence[str], path: Path = None) -> Any:
     curves = [name for name in names if found.values[name].ndim > 1]
     d = len(found.parameters)
     with styled():
-        columns = d if d > 2 and not curves else 1
+        columns = d if d > 2 and len(curves) < len(names) else 1
         drawing = new_figure(0.9 + 2.6 * len(names), max(8.0, 2.6 * columns))
-        axes = drawing.subplots(len(names), columns, squeeze=False)
-        for row, name in zip(axes, names, strict=True):
+        grid = drawing.add_gridspec(len(names), columns)
+        for i, name in enumerate(names):
+            if d > 2 and name not in curves:
+                _scattered([drawing.add_subplot(grid[i, k]) for k in range(d)], found, name)
+                continue
+            ax = drawing.add_subplot(grid[i, :])
             if name in curves:
-                _over_time(row[0], found, name)
+                _over_time(ax, found, name)
             elif d == 1:
-                _over_one(row[0], found, name)
-            elif d == 2:
-                _surface(drawing, row[0], found, name, *found.parameters)
+                _over_one(ax, found, name)
             else:
-                _scattered(row, found, name)
+                _surface(drawing, ax, found, name, *found.parameters)
         headed(drawing, _title(found))
         return handed_out(drawing, path)
 

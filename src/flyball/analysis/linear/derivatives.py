@@ -205,8 +205,15 @@ class Equations:
     @property
     def _groups(self):
         """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together."""
-        s = self.state.c.structure
-        return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, self.width, self.state.c.values.system))
+        return grouped_sparsity(self.state.c.structure, self.width, self.state.c.values.system)
+
+
+def grouped_sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
+    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
+
+    ``width`` is that of the residuals.
+    """
+    return s.kept.get("sparsity", None, 1, lambda: _sparsity(s, width, S))
 
 
 def _sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:

@@ -12,15 +12,25 @@ from ...model.touching import smooth_only
 from ...model.words import suggest
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.result import Result
+from ..options import positive, seconds
 from .engines import AUTO as EITHER
 from .engines import check_specialize
+from .implicit.suited import IMPLICIT, refuse_idle
 from .impulse.settings import Stepping
 from .jams import Overlap, Unresolved
 from .options import MOST, Integration
 from .touches import impossible, many
 
 AUTO, IMPULSE, USUAL = "auto", "impulse", "dop853"  # methods beside the integrators by name; what auto is
-CALLED = {"impulses": IMPULSE, "stepping": IMPULSE, "steps": IMPULSE, "adaptive": USUAL, "rk": "rk45"}
+CALLED = {
+    "impulses": IMPULSE,
+    "stepping": IMPULSE,
+    "steps": IMPULSE,
+    "adaptive": USUAL,
+    "rk": "rk45",
+    "stiff": "radau",
+    "implicit": "radau",
+}
 """What methods are called in words."""
 IDLE = {
     "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
@@ -41,17 +51,27 @@ class SimulateOptions(Integration):
     parameters: Mapping[str, float] | None
     start: Result | None
     specialize: bool | str
+    step: float | None
     progress: bool | Callable[[float], None]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_specialize(self.specialize)
+        if self.step is not None:
+            object.__setattr__(self, "step", seconds(self.step, "step"))
+            positive(self.step, "step")
+            if self.method not in IMPLICIT:
+                raise ModelError(
+                    f"step is a fixed step of method={IMPLICIT[0]!r}; with method={self.method!r} it does nothing"
+                )
+        if self.method in IMPLICIT:
+            refuse_idle(self)
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""
-        if isinstance(self.method, Stepping) or self.method in (AUTO, IMPULSE):
+        if isinstance(self.method, Stepping) or self.method in (AUTO, IMPULSE, *IMPLICIT):
             return
-        known = [*sorted(TABLEAUX), IMPULSE, AUTO]
+        known = [*sorted(TABLEAUX), *IMPLICIT, IMPULSE, AUTO]
         meant = CALLED.get(str(self.method).lower())
         if self.method not in TABLEAUX:
             hint = f" (did you mean {meant!r}?)" if meant else suggest(str(self.method), known)

@@ -73,7 +73,9 @@ class Integration(Options):
         try:
             tableau(self.method)
         except ValueError as error:
-            raise ModelError(f"{error}; simulate knows impulse too, for contact") from None
+            raise ModelError(
+                f"{error}; simulate knows radau too, for stiff mechanisms, and impulse, for contact"
+            ) from None
 
     def _rates(self) -> None:
         """Baumgarte's rates have their usual values, or are refused where nothing asks for them."""

@@ -121,8 +121,10 @@ def constraint(e: Any, w: Switch, x: Values, value: float) -> Element:
         frames = [tuple(np.real(np.r_[p, np.ravel(R)]).tolist()) for p, R, _ in ends]
         at = frames[0][: 2 if x.structure.model.planar else 3]
         return Centres(e.name, *e.bodies, at=at, frames=(frames[0], frames[1]), radii=(0.0, value))
+    more = len(w.path) - 1
+    points = "a point" if more == 1 else f"{more} points"
     raise ModelError(
-        f"{e.title} is taut, and runs over {len(w.path) - 1} more points: nothing here holds the sum of its parts. "
+        f"{e.title} is taut, and runs over {points} between its ends: nothing here holds the sum of its parts. "
         f"Give it a stiffness"
     )
 

@@ -1,4 +1,4 @@
-"""Many runs that share all but the numbers of some forces, to the last bit what each is by itself.
+"""Many runs that share all but the numbers of forces or masses, to the last bit what each is by itself.
 
 A run of a small mechanism takes less time in compiled code than to be made ready. Where only forces and laws see what
 is varied, structure, coordinates, start and clock are those of the first run, and a run is: numbers into two tables,
@@ -39,6 +39,7 @@ from ..motion.reasons import remarks
 from ..motion.start import Start, begin, start_time
 from ..simulate import clock_for
 from .compute import DONE, Answers, Question, alone
+from .firm import Weighing, rests_as_drawn
 from .readable import of_states
 from .reading import FUNCTION, read, reduced
 from .soft import Filling, soft
@@ -51,7 +52,7 @@ class Shared:
     question: Question
     options: SimulateOptions
     begun: Start
-    filling: Filling
+    filling: Filling | Weighing
     made: special.Made | None
     plain: tuple[np.ndarray, ...]  # where tables of the first run are 0, 1 or -1: made code goes by that
     fixed: tuple[tuple[str, int, float], ...]  # entries that made code knows, and their values
@@ -72,8 +73,7 @@ def shared(question: Question, point: np.ndarray) -> Shared | None:
 
 def _shared(question: Question, point: np.ndarray) -> Shared | None:
     model, o = question.model, question.options
-    changed = soft(model, question.names)
-    if changed is None or not isinstance(o.specialize, bool) or o.start is not None or _watched(model):
+    if not isinstance(o.specialize, bool) or o.start is not None or _watched(model):
         return None
     if any(r.how == FUNCTION for r in question.asked):
         return None
@@ -95,11 +95,22 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
         if made is None or (entries := special.entries(made)) is None:
             return None
         fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in VARIED)
-    filling = Filling.of(c.values, question.names, changed)
+    if (filling := _filling(question, o, begun)) is None:
+        return None
     return Shared(question, o, begun, filling, made, _plain(S), fixed)
 
 
-VARIED = ("force_x", "const")
+def _filling(question: Question, o: SimulateOptions, begun: Start) -> Filling | Weighing | None:
+    """What fills in the numbers that change; None if more changes than that."""
+    changed = soft(question.model, question.names)
+    if changed is not None:
+        return Filling.of(begun.assembly.compiled.values, question.names, changed)
+    if not rests_as_drawn(begun):
+        return None
+    return Weighing(question.names, question.options.parameters or {}, begun, float(o.t_end - begun.base.t))
+
+
+VARIED = ("force_x", "const", "body_x", "glob")
 """Tables that change from run to run."""
 
 
@@ -119,7 +130,6 @@ class Desk:
         self.of = of
         a, x = of.begun.assembly.again(), of.values
         own = {name: getattr(x.system, name).copy() for name in VARIED}
-        self.force_x, self.const = own["force_x"], own["const"]
         c = Compiled(replace(x, system=x.system._replace(**own)), a.compiled.z, a.compiled.parameters)
         if of.made is not None:
             c.run_on(of.made)
@@ -129,6 +139,7 @@ class Desk:
         sampled = sampled_laws(c, NO_BREAKS)
         self.clock = clock_for(self.start, self.start.base.t, float(o.t_end), times, o, sampled)
         self.clock.count[ex.QUOTA] = LONGEST
+        self.own = own | {"ledger": self.clock.real[[ex.LEDGER]]}
         self.later = open_until_asked(self.start, o, INTEGRATE)
         c.work.option[LATER] = float(self.later)
         forget(c.work.stack)
@@ -146,7 +157,8 @@ class Desk:
     def run(self, point: np.ndarray) -> bool:
         """Compute the motion at a point into ``rows``; False if it is not for us."""
         of, c = self.of, self.compiled
-        of.filling.fill(point, self.force_x, self.const)
+        if not of.filling.fill(point, self.own):
+            return False
         S = c.values.system
         if of.made is not None:
             if not all(np.array_equal(a, b) for a, b in zip(of.plain, _plain(S), strict=True)):
@@ -157,6 +169,7 @@ class Desk:
         for array, new in self.kept:
             array[...] = new
         clock, used = self.clock, 0
+        clock.real[ex.LEDGER] = self.own["ledger"][0]
         while clock.count[ex.STATUS] == ex.RUNNING:
             used += motion_kernel(c.system, c.work, self.method, clock, self.rows[used:], INTEGRATE)
         return bool(clock.count[ex.STATUS] == ex.DONE and used == len(clock.times))
@@ -168,6 +181,7 @@ class Lean:
     def __init__(self, of: Shared) -> None:
         self.of = of
         self._own = threading.local()
+        self.alone_count = 0  # runs that were computed by themselves after all
         q = of.question
         self.stacked = [k for k, r in enumerate(q.asked) if of_states(q.model, r.name)]
         self.alone = [k for k in range(len(q.asked)) if k not in self.stacked]
@@ -193,6 +207,7 @@ class Lean:
             except Exception:  # `alone` tells what it is
                 mine[k] = False
             if not mine[k]:
+                self.alone_count += 1
                 alone(q, point, out, k)
                 continue
             rows[k] = desk.rows[: len(q.times), : 1 + ny]

@@ -74,15 +74,15 @@ class Filling:
         rows = [(k, e, x.poses.apart(e)) for k, e in enumerate(s.forces) if any(e is c for c in changed)]
         return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
 
-    def fill(self, point: np.ndarray, force_x: np.ndarray, const: np.ndarray) -> None:
-        """Write them.
+    def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
+        """Write them into ``own["force_x"]`` and ``own["const"]``: it always can.
 
         Raises
         ------
         ModelError
             If a number makes no sense.
         """
-        env = dict(self.env)
+        env, force_x, const = dict(self.env), own["force_x"], own["const"]
         env.update(zip(self.names, point.tolist(), strict=True))
         for name, formula in self.derived:
             env[name] = number(formula, env, None, f"parameter '{name}'")
@@ -91,3 +91,4 @@ class Filling:
         for k, e, apart in self.rows:
             par = e.parameters(resolve(e, env), apart)
             force_x[k], force_x[k, : len(par)] = 0.0, par
+        return True

@@ -141,7 +141,7 @@ def restless(W, i):
     low, high = extent(W, i)
     if not finite(low, high):  # not watched, or not everywhere
         return finite(W.g[NODE, i], 0.0) or finite(W.g[NODE + NODES - 1, i], 0.0)
-    if max(abs(low), abs(high)) < NOTHING:
+    if max(abs(low), abs(high)) < NOTHING + W.kept[i] * NOISE * W.grain[i]:
         return False
     most = QUIET * (high - low)
     if low > most and W.g[SIDE, i] >= 0.0:

@@ -11,7 +11,7 @@ from .clock import LARGEST, T
 from .glance import true_guard
 from .panels import fires
 from .step import attempt
-from .watching import AGAIN, END, EXTENDED, STAGE
+from .watching import AGAIN, BEYOND, END, EXTENDED, STAGE, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -26,8 +26,10 @@ REACHED = 1e-14  # part of a step's width to which it ends on an event: solution
 def crossing(callbacks, S, W, R, c, h, i, a, b, s):
     """Where in the step guard i fires, on side s at a, expected by b: (status, place or -1 if it does not).
 
-    Where it only fires as it comes back to that side, it has to be on the other one in between.
+    Where it only fires as it comes back to that side, it has to be on the other one in between. W.real[BEYOND] is a
+    place where it has not fired yet, which the start need not be.
     """
+    W.real[BEYOND] = 0.0
     status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     wide = b - a
     while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
@@ -48,6 +50,8 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
             b, fb = m, fm
         else:
             a, fa = m, fm
+    if a > 0.0 and W.g[START, i] * fa < 0.0:
+        W.real[BEYOND] = a
     return bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
 
 
@@ -149,15 +153,16 @@ def retake(derivative, arrive, tangent, note, S, W, R, c, h):
 
 
 @formula
-def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
+def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, between):
     """Take the step again until it ends where guard i leaves side s, near width h: (status, width, error).
 
-    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``most``: the width of the
-    step as it was.
+    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``between``: a width at
+    which it has not left, and the width of the step as it was. An error of -1 says that it was on that side nowhere.
     """
+    least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
     near = 2.0 * ulp + REACHED * h
-    low, high = 0.0, most
+    low, high = least, most
     bound = False  # whether a step that does not reach the event is known
     rough = stride = CLOSE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
@@ -187,6 +192,8 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, most):
         else:
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
+    if least > 0.0 and not bound and not done and abs(W.g[END, i]) > 1e3 * near * abs(slope):
+        error = -1.0
     return status, h, error
 
 

@@ -10,10 +10,11 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import NEW, SPAN, T
 from .glance import compare, exactly, glance, true_guard
-from .panels import band, begin_sides, fires, survey
+from .panels import band, begin_sides, fires, side_of, survey
 from .pinned import ULP, crossing, end_on, retake
 from .watching import (
     AWAY,
+    BEYOND,
     CUTS,
     DONE_TO,
     END,
@@ -70,7 +71,11 @@ def first_event(callbacks, S, W, R, c, h, error):
             status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
         else:
             slope = expected_slope(callbacks, S, W, R, c, h, x, i)
-            status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, most)
+            between = W.real[BEYOND] * h, most
+            whole = h
+            status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, between)
+            if error < 0.0 and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
+                return CUT, 0.5 * whole, error, False
         if status != 0:
             return UNKNOWN, h, error, False
         hit = True
@@ -109,14 +114,14 @@ def next_event(callbacks, S, W, R, c, h):
         status, x = crossing(callbacks, S, W, R, c, h, i, a, b, s)
         if status != 0 or x > 0.0:
             return status, i, x, (s if fires(W.way[i], s) else -s)
-        at = max(at + skip, b)
+        before, at = at, max(at + skip, b)
         skip *= 2.0  # of what is rounding there is no end
         if at >= 1.0:
             break
-        b = at
-        if resume(callbacks, S, W, R, c, h, b) != 0:
-            return UNKNOWN, -1, 0.0, 0.0
-        i, a, b = survey(callbacks, S, W, R, c, h, b)
+        status, i, x, s = resume(callbacks, S, W, R, c, h, before, at)
+        if status != 0 or i >= 0:
+            return status, i, x, s
+        i, a, b = survey(callbacks, S, W, R, c, h, at)
     if W.count[LOST] == 1:
         return UNKNOWN, -1, 0.0, 0.0
     if W.real[DONE_TO] < 1.0:
@@ -126,18 +131,29 @@ def next_event(callbacks, S, W, R, c, h):
 
 @formula
 def trespass(callbacks, S, W, R, c, h):
-    """The guard that is first below zero at the end of the step, and has not to be, as `next_event` returns it."""
-    best, at = -1, 2.0
+    """The first guard that is not where it began, or not above zero as it has to be, as `next_event` returns it.
+
+    Whatever was seen of it within the step.
+    """
+    best, at, side, away = -1, 2.0, 0.0, 0
     for i in range(W.way.shape[0]):
-        f = W.g[END, i]
-        if W.kept[i] == 0 or W.fired[i] == 1 or not W.g[START, i] == W.g[START, i] or not f < -band(W, i):
+        f, s = W.g[END, i], side_of(W.g[START, i])
+        if W.fired[i] == 1 or not W.g[START, i] == W.g[START, i]:
             continue
-        status, _, x, _ = left(callbacks, S, W, R, c, h, i, 1.0)
+        if W.g[MARK, i] < 0.0 and s * f < 0.0 and fires(W.way[i], s):
+            W.count[AWAY] = 0
+            status, x = crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
+        elif W.kept[i] == 1 and f < -band(W, i):
+            W.real[BEYOND] = 0.0
+            status, _, x, s = left(callbacks, S, W, R, c, h, i, 1.0)
+        else:
+            continue
         if status != 0:
             return UNKNOWN, -1, 0.0, 0.0
-        if x < at:
-            best, at = i, x
-    return 0, best, at, 1.0
+        if 0.0 < x < at:
+            best, at, side, away = i, x, s, W.count[AWAY]
+    W.count[AWAY] = away
+    return 0, best, at, side
 
 
 @formula
@@ -159,19 +175,27 @@ def left(callbacks, S, W, R, c, h, i, b):
 
 
 @formula
-def resume(callbacks, S, W, R, c, h, x):
-    """Sides at a place in the step up to which nothing happened, by the equations. Returns a status."""
+def resume(callbacks, S, W, R, c, h, a, x):
+    """Sides at a place in the step, by the equations, nothing having happened up to a; as `next_event` returns it.
+
+    What has left its side in between is an event.
+    """
     if exactly(callbacks, S, W, R, c, h, x, THERE) != 0:
-        return UNKNOWN
+        return UNKNOWN, -1, 0.0, 0.0
+    best, at, side = -1, 2.0, 0.0
     for i in range(W.way.shape[0]):
-        f = W.g[THERE, i]
-        if W.kept[i] == 1 and f <= 0.0 and W.g[MARK, i] < 0.0:
+        f, s = W.g[THERE, i], W.g[SIDE, i]
+        if W.fired[i] == 1 or (W.kept[i] == 1 and f <= 0.0 and W.g[MARK, i] >= 0.0):
             continue
-        if f > 0.0:
-            W.g[SIDE, i] = 1.0
-        elif f < 0.0:
-            W.g[SIDE, i] = -1.0
-    return 0
+        if s * f < 0.0 and fires(W.way[i], s):
+            status, z = crossing(callbacks, S, W, R, c, h, i, a, x, s)
+            if status != 0:
+                return UNKNOWN, -1, 0.0, 0.0
+            if 0.0 < z < at:
+                best, at, side = i, z, s
+        elif f != 0.0 and f == f:
+            W.g[SIDE, i] = side_of(f)
+    return 0, best, at, side
 
 
 @formula

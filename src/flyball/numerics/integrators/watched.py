@@ -31,6 +31,7 @@ from .clock import (
     T,
 )
 from .explicit import overlooked, start, width, write
+from .glance import NOISE
 from .refusal import enter, refuse, shorten
 from .sought import CUT, first_event
 from .step import attempt
@@ -143,7 +144,7 @@ def settled(W):
     """The end of the step is the start of the next."""
     W.count[FRESH] = 0
     for i in range(W.way.shape[0]):
-        W.side[i] = W.g[SIDE, i]
+        W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END, i]) <= NOISE * W.grain[i] else W.g[SIDE, i]
         W.g[START, i] = W.g[END, i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):

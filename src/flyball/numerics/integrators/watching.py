@@ -16,8 +16,8 @@ NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant;
-# the part of the step that was looked through
-PANEL, WIDTH, SAME, DONE_TO, REAL = range(5)
+# the part of the step that was looked through; where a guard that comes back is beyond zero
+PANEL, WIDTH, SAME, DONE_TO, BEYOND, REAL = range(6)
 # entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
 # the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events; whether what
 # is expected within the step is borne out; places looked at with the equations since it was taken, and in all; whether

@@ -140,7 +140,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         if jumped is None:
             still |= n.mode != OFF
         else:
-            hits |= {s: s in jumped.even for s in jumped.closing}
+            hits |= {s: s in jumped.even for s in jumped.closing if s not in here.crept}
             fired = unmoved(n, fired, rate)
             still = at_rest(n, fired)
             still[list(jumped.even)] = True
@@ -154,7 +154,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         turned(n, hits)
         come_to_rest(n, found)
         n.arrive()
-        if jumped is not None:
+        if jumped is not None and not jumped.closing.keys() <= here.crept:
             tell_jump(n, jumped, before)
         guards = n.guards()
         if again < AGAIN and misled(n, guards):

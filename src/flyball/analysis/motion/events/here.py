@@ -57,6 +57,8 @@ class Here:
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    crept : frozenset of int
+        Switches that were at a side and left it the wrong way, with no speed: they close there without a bounce.
     seen : Segments, optional
         What held at the rows of output so far (`events.segments`).
     """
@@ -80,6 +82,7 @@ class Here:
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
+    crept: frozenset[int] = frozenset()
 
     @property
     def c(self) -> Compiled:

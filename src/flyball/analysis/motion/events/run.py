@@ -18,8 +18,8 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
-from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
-from ....tables.system import G_CONE, G_CORNER, G_HOLDS, G_PULL, GUARD_KIND
+from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....tables.system import G_BACK, G_CONE, G_CORNER, G_HOLDS, G_LOWER, G_PULL, G_UPPER, GUARD_KIND, GUARD_OF
 from ...progress import Tell
 from ..engines import Engine
 from .actions import expressions, say_never, stepped_over, true_already
@@ -34,6 +34,8 @@ SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
+DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
+REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
 HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
@@ -160,7 +162,11 @@ class Run:
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+        guards = here.c.system.guard_i
+        if self.loop is not None and self.loop.desk.count[AWAY]:
+            here.crept = frozenset(int(guards[g, GUARD_OF]) for g in fired if guards[g, GUARD_KIND] in DISTANCES)
         self.happens(fired)
+        here.crept = frozenset()
 
     def happens(self, fired: Sequence[int]) -> None:
         """What happens where these guards fired."""
@@ -179,13 +185,17 @@ class Run:
             here.fresh = False
 
     def jumped(self, before: Mapping[int, float]) -> None:
-        """Forces may have jumped: what held may not hold any more, without a guard that passed zero.
+        """Forces may have jumped: what held may not hold any more, or what was at a stop be pressed on it.
+
+        No guard has passed zero there.
 
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
         values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
-        against = np.flatnonzero((values < 0.0) & np.isin(kinds, HOLDING))
+        near = REACHED * max(1.0, here.c.values.length)
+        at = (np.abs(values) <= near) & np.isin(kinds, (*DISTANCES, G_BACK))
+        against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
 

@@ -1,0 +1,1 @@
+"""Motions by implicit integrators."""

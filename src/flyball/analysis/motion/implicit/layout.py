@@ -1,0 +1,148 @@
+"""Where the numbers of an implicit integrator's Jacobian come from, and where they go in its sparse matrix."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....equations.engine import MOTION
+from ....equations.tree import quaternion_at
+from ....numerics.integrators.implicit.step import STAGES
+from ....numerics.integrators.implicit.whole import PLAIN
+from ....numerics.integrators.implicit.whole import SOFT as SOFTENED
+from ....numerics.ldl import Pattern, analyse
+from ....numerics.lu import constrained_order
+from ....tables.specs import Structure
+from ....tables.system import NV, SCHUR, SOLVER, System
+from ...compiled import Compiled
+from ...linear.derivatives import grouped_sparsity
+from ...linear.loads import pressing
+
+THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
+
+
+class Layout:
+    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu).
+
+    Parameters
+    ----------
+    s : Structure
+    S : System
+    """
+
+    def __init__(self, s: Structure, S: System) -> None:
+        self.s, self.nv, self.nr = s, s.nv, len(s.rows)
+        self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
+        self.touched, self.group = grouped_sparsity(s, self.width, S)
+        self.groups = int(self.group.max(initial=-1)) + 1
+        self.pressing = pressing(s).astype(np.int64)
+        self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
+        self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
+        self.row_p, self.col_i = S.row_p[: self.nr + 1], S.col_i[: S.row_p[self.nr]]
+        self._entries()
+
+    def _entries(self) -> None:
+        """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""
+        nv, nr = self.nv, self.nr
+        v, lam, mu = nv, 2 * nv, 2 * nv + nr
+        all_rows, all_columns = self.touched.indices, np.repeat(np.arange(nv), np.diff(self.touched.indptr))
+        r = all_rows < nv
+        n = (all_rows >= nv + nr) & (all_rows < nv + 2 * nr)
+        self.pick = np.concatenate([
+            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
+            np.column_stack([self.group[all_columns[n]], all_rows[n]]),
+            np.column_stack([self.groups + self.group[all_columns[r]], all_rows[r]]),
+            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
+        ]).astype(np.int64)  # fmt: skip
+        i, j = all_rows[r], all_columns[r]
+        k, m = all_rows[n] - nv - nr, all_columns[n]
+        a, b, nG = len(i), len(k), len(self.col_i)
+        first = np.cumsum([1, 2 * a + b, a, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        self.first = first.astype(np.int64)
+        picked, mass, rows, metric, sizes, turns, presses, _ = first.tolist()
+        row = np.repeat(np.arange(nr), np.diff(self.row_p))
+        held = self.valued[row] == 1
+        pressed = np.isin(row, self.pressing)
+        free = np.flatnonzero(self.valued == 0)
+        ways = np.arange(nv)
+        at = np.arange
+        one = [
+            (ways, v + ways, None),  # - v: see below
+            (v + i, j, picked + at(a)),
+            (lam + k, m, picked + a + at(b)),
+            (v + i, v + j, picked + a + b + at(a)),
+            (lam + row, v + self.col_i, rows + at(nG)),
+            (self.col_i[held], mu + row[held], metric + at(nG)[held]),
+            (mu + row[held], self.col_i[held], rows + at(nG)[held]),
+            (v + self.col_i[~pressed], lam + row[~pressed], None),
+            (mu + free, mu + free, np.zeros(len(free), int)),
+        ]
+        for n_th, w in enumerate(self.turns.tolist()):
+            x, y = np.meshgrid(at(3), at(3))
+            one.append((w + x.ravel(), w + y.ravel(), turns + 9 * n_th + at(9)))
+        for n_th, p in enumerate(self.pressing.tolist()):
+            one.append((v + ways, np.full(nv, lam + p), presses + n_th * nv + at(nv)))
+        scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a))]
+        valued = np.flatnonzero(self.valued == 1)
+        soft = [(lam + at(nr), lam + at(nr), sizes + at(nr)), (mu + valued, mu + valued, sizes + valued)]
+        self._place(one, scaled, soft, rows + at(nG)[~pressed])
+
+    def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
+        """Pattern and order of elimination; places of all entries in the matrix."""
+        nv, nr = self.nv, self.nr
+        n = 2 * nv + 2 * nr
+        minus = int(self.first[-1])  # numbers behind the others: -1, and the negative entries of rows
+        self.negative = negative
+        one[0] = (*one[0][:2], np.full(nv, minus))
+        one[7] = (*one[7][:2], minus + 1 + np.arange(len(negative)))
+        groups = [one, scaled, soft]
+        i, j, number = (np.concatenate([e[k] for g in groups for e in g]).astype(np.int64) for k in range(3))
+        count = [sum(len(e[0]) for e in g) for g in groups]
+        self._whole(i, j, number, count)
+        self.P, self.put = self._ordered(n, i, j, number, 1)
+        self.part = np.cumsum(count)[:2].astype(np.int64)
+
+    def _whole(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
+        """The same of all three stages at once: what F' has couples them."""
+        n = 2 * (self.nv + self.nr)
+        own, scaled = np.r_[: count[0], sum(count[:2]) : sum(count)], np.arange(count[0], sum(count[:2]))
+        parts = [(own, k, k, np.where(own < count[0], PLAIN, SOFTENED)) for k in range(STAGES)]
+        parts += [(scaled, k, m, np.full(len(scaled), m)) for k in range(STAGES) for m in range(STAGES)]
+        at_i, at_j = (np.concatenate([x[p[0]] + n * p[w] for p in parts]) for x, w in ((i, 1), (j, 2)))
+        self.whole_P, put = self._ordered(STAGES * n, at_i, at_j, np.concatenate([number[p[0]] for p in parts]), STAGES)
+        stage = np.concatenate([np.full(len(p[0]), p[1]) for p in parts])
+        self.whole_put = np.ascontiguousarray(
+            np.column_stack([put[:, 0], stage, put[:, 1], np.concatenate([p[3] for p in parts])])
+        ).astype(np.int64)
+
+    def _ordered(
+        self, n: int, i: np.ndarray, j: np.ndarray, number: np.ndarray, stages: int
+    ) -> tuple[Pattern, np.ndarray]:
+        """Pattern of a matrix with such entries; places of these with the numbers that stand there."""
+        body_i = self.s.tables["body_i"]
+        body, bodies = np.repeat(np.arange(len(body_i)), body_i[:, NV]), len(body_i)
+        rows = bodies + np.arange(self.nr)
+        groups = np.tile(np.concatenate([body, body, rows, rows]), stages)
+        P, place = analyse(n, i, j, constrained_order(groups, np.arange(bodies + self.nr) >= bodies, i, j))
+        lower = P.perm[i] > P.perm[j]
+        return P, np.ascontiguousarray(np.column_stack([place[: len(i)] + lower * len(P.Ai), number]))
+
+
+def layout(s: Structure, S: System) -> Layout:
+    """The same for every run of a structure."""
+    return s.kept.get("implicit", None, 1, lambda: Layout(s, S))
+
+
+def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:
+    """Of each velocity the inverse of its inertia, (nv,), which is at least a small part of the largest."""
+    s, S, W = c.structure, c.system, c.work
+    if not len(s.rows):
+        return np.ones(s.nv)
+    if S.kinds[SOLVER] == SCHUR:
+        inertia = c.mass().diagonal()
+    else:
+        c.at(t, y[: s.nq].copy(), y[s.nq : s.nq + s.nv].copy(), MOTION)
+        own = S.mass_i[:, 0] == S.mass_i[:, 1]
+        inertia = np.zeros(s.nv)
+        inertia[S.mass_i[own, 0]] = W.M[own]
+    size = c.sizes**2
+    return 1.0 / (size * np.maximum(inertia / size, THIN * (inertia / size).max(initial=0.0)))

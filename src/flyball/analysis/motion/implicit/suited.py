@@ -1,0 +1,74 @@
+"""What implicit integrators know, and in which coordinates they are at their best; the rest is refused by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from ....errors import ModelError
+from ..start import Start, begin_at
+
+IMPLICIT = ("radau",)
+"""Implicit integrators by name."""
+SMALL = 30  # unknown velocities and rows in joint coordinates up to which full matrices are no loss
+
+
+def explicit(method: str) -> str:
+    """The explicit integrator whose tableau the engine is handed: of implicit ones any, which is not looked at."""
+    return "rk45" if method in IMPLICIT else method
+
+
+def refuse_idle(o: Any) -> None:
+    """Refuse options that implicit integrators do nothing with.
+
+    Raises
+    ------
+    ModelError
+        Naming the option.
+    """
+    if o.stabilization != "projection":
+        raise ModelError(
+            f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
+            f"velocities on the constraints itself; leave it out"
+        )
+    if o.specialize is True:
+        raise ModelError(
+            f"specialize=True does nothing with method={o.method!r}, which is computed by the tables; leave it out"
+        )
+
+
+def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> Start:
+    """The start in coordinates that implicit integrators are good at.
+
+    In joint coordinates matrices are full, and drivers prescribe coordinates; so large mechanisms, and those with
+    drivers, go to absolute ones.
+
+    Raises
+    ------
+    ModelError
+        For what implicit integrators do not know.
+    """
+    s = begun.assembly.compiled.structure
+    if s.guards or s.switches or s.model.events:
+        names = [x.title for x in s.model.events] + [x.element.title for x in s.switches]
+        what = ", ".join(dict.fromkeys(names)) or "what switches"
+        raise ModelError(
+            f"method='radau' does not know events, nor what holds at times and lets go at others: {what}; leave method "
+            f"out, or give method='dop853'"
+        )
+    if not s.tree or wish == "absolute":
+        return begun
+    if s.prescribed:
+        if wish == "joint":
+            raise ModelError(
+                f"method='radau' does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as they "
+                f"are in joint coordinates: leave coordinates out"
+            )
+        why = "drivers' coordinates are rows in an implicit method"
+    elif wish == "auto" and s.nv + len(s.rows) > SMALL:
+        why = f"{s.nv} joint coordinates have full matrices"
+    else:
+        return begun
+    out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
+    out.since, out.coordinates = begun.since, f"absolute: {why}"
+    return out

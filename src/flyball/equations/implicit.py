@@ -1,0 +1,289 @@
+"""A motion by an implicit integrator: what it asks of the equations, through the doors of engine and residuals.
+
+Stages are asked of the engine's own residual, Jacobians of the same formulas by complex steps (``residual.py``); ends
+of steps and rows of output are the engine's, projected and solved as everywhere.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.door import enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..numerics.integrators.clock import GROW, NEXT, NOW, SPAN, H, T
+from ..numerics.integrators.implicit.desk import JACOBIANS, SOFT, START
+from ..numerics.integrators.implicit.radau import advance
+from ..tables.system import COORDINATES, FORCE_WORK, LAM, NU, ROW_WORK
+from .dispatch import progress
+from .tasks import ARRIVE, INSPECT, POSITION, REPORT, RESIDUAL, STEPS
+from .tree import retract
+
+STEP = 1e-40
+ENGINE, RESIDUALS, S_, W_, R_, OWN, SHEET, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN = range(13)
+# entries of Plan.first: numbers of the Jacobian that begin there
+PICKED, PICKED_MASS, ROWS, ROWS_METRIC, SIZES, TURNS, PRESSES, END = range(8)
+
+
+class Plan(NamedTuple):
+    """Where the numbers of the Jacobian come from."""
+
+    first: np.ndarray  # (END + 1,)
+    pick: np.ndarray  # (n, 2): by positions and velocities, then by accelerations: step, residual
+    metric: np.ndarray  # (nv,): D
+    valued: np.ndarray  # (nr,): whether a row restrains positions
+    turns: np.ndarray  # first angular velocity of each quaternion
+    pressing: np.ndarray  # rows whose multipliers some friction depends on
+    fixed: np.ndarray  # (1,): whether the mass matrix does not change
+    negative: np.ndarray  # numbers whose negatives stand behind all others and a -1
+
+
+@formula
+def through(A, task):
+    """Have the engine do a task at the state on its desk."""
+    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
+
+
+@formula
+def compose(y, d, v, z, out, A):
+    """The state with positions an increment d from those of y, and velocities v."""
+    nq = A[S_].kinds[COORDINATES]
+    nv = v.shape[0]
+    for i in range(nq):
+        out[i] = y[i]
+    retract(A[S_], out[:nq], d)
+    for i in range(nv):
+        out[nq + i] = v[i]
+    for i in range(z.shape[0]):
+        out[nq + nv + i] = z[i]
+
+
+@formula
+def residual(t, k, A, K, c):
+    """What the equations miss at stage k, into its row; rates of integrals there. Returns a status."""
+    S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[SHEET].rows
+    nv, nr = K.v.shape[1], K.lam.shape[1]
+    own.real[T] = t
+    compose(c.y[NOW], K.d[k], K.v[k], K.z[k], own.y[0], A)
+    for i in range(nv):
+        rows[1, i] = K.a[k, i]
+    for i in range(nr):
+        rows[2, i] = K.lam[k, i]
+    through(A, RESIDUAL)
+    out = K.out[k]
+    bad = 0.0
+    for i in range(nv):
+        out[i] = K.v[k, i]
+        out[nv + i] = rows[0, i]
+        bad += rows[0, i] - rows[0, i]
+    for r in range(nr):
+        out[2 * nv + r] = rows[0, nv + nr + r]
+        out[2 * nv + nr + r] = rows[0, nv + r] if P.valued[r] == 1 else K.mu[k, r]
+        bad += rows[0, nv + r] - rows[0, nv + r]
+        if P.valued[r] == 1 and K.mu[k, r] != 0.0:
+            for e in range(S.row_p[r], S.row_p[r + 1]):
+                i = S.col_i[e]
+                out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
+    turned(P, K.d[k], out)
+    for i in range(nv):
+        out[i] = K.dd[k, i] - out[i]
+    powers(A, K, k)
+    return 0 if bad == 0.0 else 1
+
+
+@formula
+def turned(P, d, w):
+    """Velocities w into rates of increments, in place: of turns by d' = w + d x w / 2 + d (d . w) / 4."""
+    for n in range(P.turns.shape[0]):
+        i = P.turns[n]
+        x, y, z = d[i], d[i + 1], d[i + 2]
+        p, q, r = w[i], w[i + 1], w[i + 2]
+        s = 0.25 * (x * p + y * q + z * r)
+        w[i] += 0.5 * (y * r - z * q) + s * x
+        w[i + 1] += 0.5 * (z * p - x * r) + s * y
+        w[i + 2] += 0.5 * (x * q - y * p) + s * z
+
+
+@formula
+def powers(A, K, k):
+    """Rates of the integrals at the stage last evaluated."""
+    if K.z.shape[1] == 0:
+        return
+    S, W = A[S_], A[W_]
+    rate = K.rate[k]
+    for f in range(S.force_i.shape[0]):
+        i = S.force_i[f, FORCE_WORK]
+        if i >= 0:
+            rate[i] = W.y[1, i]
+    for r in range(S.row_i.shape[0]):
+        if S.row_i[r, ROW_WORK] >= 0:
+            rate[S.row_i[r, ROW_WORK]] = K.lam[k, r] * W.row[NU, r]
+    progress(S, W, K.z[k], rate)
+
+
+@formula
+def linearise(t, k, A, K, c):
+    """The numbers of the Jacobian at stage k, or at the state at which the step begins. Returns a status."""
+    S, W, P, own = A[S_], A[W_], A[PLAN], A[OWN]
+    own.real[T] = t
+    compose(c.y[NOW], K.d[k], K.v[k], K.z[k], own.y[0], A)
+    lay(own.y[0], k, A, A[MOVED], K)
+    through(A, POSITION)
+    rows_of(S, W, K, P, k)
+    status = differentiate(A, K, A[MOVED], k, 0)
+    first, last = P.first[PICKED_MASS], P.first[ROWS]
+    if P.fixed[0] == 0 or K.count[JACOBIANS] == 0:
+        lay(own.y[0], k, A, A[PUSHED], K)
+        status += differentiate(A, K, A[PUSHED], k, first - P.first[PICKED])
+    elif k != START:
+        for e in range(first, last):
+            K.J[k, e] = K.J[START, e]
+    for n in range(P.turns.shape[0]):  # - d(T(d) w)/dd at d = 0, column by column
+        i = P.turns[n]
+        p, q, r = 0.5 * K.v[k, i], 0.5 * K.v[k, i + 1], 0.5 * K.v[k, i + 2]
+        J = K.J[k, P.first[TURNS] + 9 * n : P.first[TURNS] + 9 * n + 9]
+        J[0], J[1], J[2] = 0.0, r, -q
+        J[3], J[4], J[5] = -r, 0.0, p
+        J[6], J[7], J[8] = q, -p, 0.0
+    for n in range(P.pressing.shape[0]):
+        status += press(A, K, k, n)
+    return status
+
+
+@formula
+def rows_of(S, W, K, P, k):
+    """Entries of the rows, those along the metric of the stabilisation, and natural sizes of rows."""
+    J = K.J[k]
+    for r in range(S.row_i.shape[0]):
+        size = 0.0
+        for e in range(S.row_p[r], S.row_p[r + 1]):
+            g = W.G[e]
+            J[P.first[ROWS] + e] = g
+            J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g
+            size += g * g * P.metric[S.col_i[e]]
+        J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
+    for n in range(P.negative.shape[0]):
+        J[P.first[END] + 1 + n] = -J[P.negative[n]]
+
+
+@formula
+def lay(y, k, A, B, K):
+    """Put stage k on a bench of the residuals, its state being y."""
+    B.t[0] = complex(A[OWN].real[T], 0.0)
+    for i in range(B.state.shape[0]):
+        B.state[i] = complex(y[i], 0.0)
+    for i in range(K.v.shape[1]):
+        B.vdot[i] = complex(K.a[k, i], 0.0)
+    for r in range(K.lam.shape[1]):
+        B.lam[r] = complex(K.lam[k, r], 0.0)
+    for n in range(B.out.shape[0]):
+        B.out[n, 0] = complex(np.nan, np.nan)  # what is not found is no number
+
+
+@formula
+def differentiate(A, K, B, k, begin):
+    """Numbers from pick ``begin`` on, by the steps on that bench. Returns a status."""
+    P = A[PLAN]
+    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, STEPS)
+    end = P.first[PICKED_MASS] - P.first[PICKED] if begin == 0 else P.pick.shape[0]
+    bad = 0.0
+    for e in range(begin, end):
+        x = B.out[P.pick[e, 0], P.pick[e, 1]].imag / STEP
+        K.J[k, P.first[PICKED] + e] = x
+        bad += x - x
+    return 0 if bad == 0.0 else 1
+
+
+@formula
+def press(A, K, k, n):
+    """How the equations of motion change with a multiplier that some friction depends on. Returns a status."""
+    P, B, nv = A[PLAN], A[PRESSED], K.v.shape[1]
+    r = P.pressing[n]
+    lay(A[OWN].y[0], k, A, B, K)
+    B.lam[r] = complex(K.lam[k, r], STEP)
+    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, STEPS)
+    bad = 0.0
+    for i in range(nv):
+        x = B.out[0, i].imag / STEP
+        K.J[k, P.first[PRESSES] + n * nv + i] = x
+        bad += x - x
+    return 0 if bad == 0.0 else 1
+
+
+@formula
+def arrive(t, y, dy, A, K):
+    """Put y on the constraints, in place, and evaluate there; how far it moved. Multipliers go to ``K.found``."""
+    own, W = A[OWN], A[W_]
+    own.real[T] = t
+    for i in range(y.shape[0]):
+        own.y[0, i] = y[i]
+    status = through(A, ARRIVE)
+    if status == 0:
+        for i in range(dy.shape[0]):
+            y[i] = own.y[0, i]
+            dy[i] = own.K[0, i]
+        for r in range(K.found.shape[0]):
+            K.found[r] = W.row[LAM, r]
+    return status, A[SHEET].rows[0, 0]
+
+
+@formula
+def inspect(t, h, span, first, seen, A):
+    """What laws do within a step; see ``within.inspect``."""
+    if seen.shape[1] == 0:
+        return 0, 0.0, 0.0
+    own = A[OWN]
+    own.real[T], own.real[H], own.real[SPAN] = t, h, span
+    own.count[NEXT] = first
+    through(A, INSPECT)
+    return own.count[NEXT], own.real[H], own.real[GROW]
+
+
+@formula
+def report(t, y, out, A):
+    """Write a row of output."""
+    own = A[OWN]
+    own.real[T] = t
+    for i in range(y.shape[0]):
+        own.y[0, i] = y[i]
+    status = through(A, REPORT)
+    for i in range(out.shape[0]):
+        out[i] = A[SHEET].rows[0, i]
+    return status
+
+
+@kernel
+def implicit_kernel(doors, S, W, R, own, sheet, SC, WC, benches, plan, desk, clock, out):
+    """Go on with an implicit integration; see ``radau.advance``.
+
+    Parameters
+    ----------
+    doors : tuple of int
+        Addresses of the engine and of the residuals.
+    S, W : System, Work
+    R, own, sheet : Tableau, Clock, Sheet
+        The engine's.
+    SC, WC : System, Work
+        In complex numbers.
+    benches : tuple of Bench
+        With steps of positions and velocities, of accelerations, and without.
+    plan : Plan
+    desk : Desk
+    clock : Clock
+    out : (n, width)
+        Rows of output.
+
+    Returns
+    -------
+    int
+        The number of rows written.
+    """
+    moved, pushed, pressed = held(benches[0]), held(benches[1]), held(benches[2])
+    A = (
+        doors[0], doors[1], held(S), held(W), held(R), held(own), held(sheet), held(SC), held(WC), moved, pushed,
+        pressed, held(plan),
+    )  # fmt: skip
+    callbacks = (residual, linearise, compose, arrive, inspect, report)
+    return advance(callbacks, A, held(desk), held(clock), out)

@@ -1,0 +1,71 @@
+"""What an implicit integrator works with, and the names of its entries.
+
+The equations are those of the second order on a manifold, with constraints (Gear, Gupta and Leimkuhler 1985):
+
+    d' = T(d) (v + D G^T mu),  r(t, q0 (+) d, v, v', lam) = 0,  G v = nu,  g = 0
+
+d is the increment from the state at which a step begins. Unknowns are ordered d, v, lam, mu, equations as written.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...ldl import Pattern
+
+# entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
+# whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
+# iterations of all stages together
+ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, COUNTS = range(9)
+# entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
+# width that is factored for; width and error of the step before; fixed width or 0; regularisation; size of corrections
+# that are taken for rounding where they do not fall any more
+RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, STEP, SOFT, ROUGH, REALS = range(12)
+START = 3  # row of the state at which a step begins, and of the error estimate
+
+
+class Desk(NamedTuple):
+    """Scratch and tables of one run."""
+
+    count: np.ndarray  # type: ignore[assignment]  # (COUNTS,)
+    real: np.ndarray  # (REALS,)
+    d: np.ndarray  # (4, nv): increments at the stages; last: of the estimate
+    v: np.ndarray  # (4, nv)
+    dd: np.ndarray  # (4, nv): rates of both
+    a: np.ndarray  # (4, nv)
+    lam: np.ndarray  # (4, nr): multipliers; last: at the begin of the step
+    found: np.ndarray  # (nr,): multipliers at the state last arrived at
+    mu: np.ndarray  # (4, nr): of the stabilisation
+    z: np.ndarray  # (4, nz): integrals of the motion at the stages; last: at the begin of the step
+    rate: np.ndarray  # (4, nz): their rates
+    out: np.ndarray  # (4, 2 nv + 2 nr): what the equations miss
+    before_v: np.ndarray  # (4, nv): of the step before: stages, and where it began
+    before_lam: np.ndarray  # (3, nr)
+    tol: np.ndarray  # (2, nv): tolerances of d and v in this step
+    place: np.ndarray  # (nv,): component of the state that a velocity is the rate of, or -1: a turn
+    x: np.ndarray  # (3, n): solution, right-hand side, product
+    w: np.ndarray  # (3, n), complex
+    J: np.ndarray  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
+    put: np.ndarray  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
+    part: np.ndarray  # (2,): ends of the first two groups of these
+    real_A: np.ndarray  # the real matrix and its factors
+    real_L: np.ndarray
+    real_U: np.ndarray
+    real_D: np.ndarray
+    real_Y: np.ndarray
+    pair_A: np.ndarray  # the complex one
+    pair_L: np.ndarray
+    pair_U: np.ndarray
+    pair_D: np.ndarray
+    pair_Y: np.ndarray
+    P: Pattern
+    whole_put: np.ndarray  # (entries, 4): place in the matrix of all stages, row of J, number, what it is multiplied by
+    whole_x: np.ndarray  # (3, 3 n)
+    whole_A: np.ndarray
+    whole_L: np.ndarray
+    whole_U: np.ndarray
+    whole_D: np.ndarray
+    whole_Y: np.ndarray
+    whole_P: Pattern

@@ -1,0 +1,268 @@
+"""One step of Radau IIA: its start values, the iteration, its error, values between (Hairer and Wanner 1996, IV.8).
+
+Given ``residual(t, h, k, S, K, c)``, which fills row k of what the equations miss and of the rates of integrals.
+"""
+
+from __future__ import annotations
+
+from ....compiler.jit import formula
+from ....math.scalar import sqrt
+from ..clock import LEDGER, LOOSER, NOW, SCALE, T
+from ..clock import RTOL as CLOCK_RTOL
+from .coefficients import ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, UNSURE, A, C
+from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, START, THETA
+from .newton import correct, solve_real
+
+MOST = 7  # iterations
+STAGES = 3
+SURE = 0.99  # what corrections fall by at least
+WILD = 1e3  # what the second one may be larger by than the first
+DIVERGED, SLOW = 1, 2
+
+
+@formula
+def begin(c, K):
+    """Tolerances of the step from the state at which it begins, and that state's velocities."""
+    y = c.y[NOW]
+    nv = K.v.shape[1]
+    nq = y.shape[0] - nv - K.z.shape[1]
+    size = max(1.0, c.real[SCALE])
+    for i in range(nv):
+        x = 1.0
+        if K.place[i] >= 0:
+            x = abs(y[K.place[i]])
+            x = max(min(x, size), 1e-3 * x)
+        K.tol[0, i] = K.real[ATOL] + K.real[RTOL] * x
+        K.v[START, i] = y[nq + i]
+        K.tol[1, i] = K.real[ATOL] + K.real[RTOL] * abs(y[nq + i])
+    for i in range(K.z.shape[1]):
+        K.z[START, i] = y[nq + nv + i]
+        K.rate[START, i] = c.K[0, nq + nv + i]
+
+
+@formula
+def predict(K, h):
+    """Start values of the stages: velocities and multipliers go on as in the step before."""
+    nv = K.v.shape[1]
+    for i in range(nv):
+        for k in range(STAGES):
+            K.v[k, i] = K.v[START, i]
+        if K.count[BEFORE] == 1:
+            b1, b2, b3 = coefficients(K.before_v, i, K.before_v[START, i])
+            for k in range(STAGES):
+                x = 1.0 + C[k] * h / K.real[LAST_H]
+                K.v[k, i] = K.before_v[START, i] + x * (b1 + x * (b2 + x * b3))
+    for i in range(nv):
+        for k in range(STAGES):
+            K.d[k, i] = h * (A[k][0] * K.v[0, i] + A[k][1] * K.v[1, i] + A[k][2] * K.v[2, i])
+    for i in range(K.lam.shape[1]):
+        for k in range(STAGES):
+            K.mu[k, i] = 0.0
+            K.lam[k, i] = K.lam[START, i]
+        if K.count[BEFORE] == 1:
+            for k in range(STAGES):
+                K.lam[k, i] = at_stages(K.before_lam, i, 1.0 + C[k] * h / K.real[LAST_H])
+    for i in range(K.z.shape[1]):
+        for k in range(STAGES):
+            K.rate[k, i] = K.rate[START, i]
+
+
+@formula
+def coefficients(stages, i, start):
+    """Of x, x^2, x^3 of the polynomial through a start value and values at the stages, less the start."""
+    a, b, c = stages[0, i] - start, stages[1, i] - start, stages[2, i] - start
+    p, q, r = THROUGH_START
+    return p[0] * a + p[1] * b + p[2] * c, q[0] * a + q[1] * b + q[2] * c, r[0] * a + r[1] * b + r[2] * c
+
+
+@formula
+def at_stages(stages, i, x):
+    """The polynomial through values at the stages, at x."""
+    a, b, c = stages[0, i], stages[1, i], stages[2, i]
+    p, q, r = THROUGH_STAGES
+    return (
+        p[0] * a + p[1] * b + p[2] * c
+        + x * (q[0] * a + q[1] * b + q[2] * c + x * (r[0] * a + r[1] * b + r[2] * c))
+    )  # fmt: skip
+
+
+@formula
+def rates(K, h):
+    """Rates of increments and velocities at the stages, and integrals there, by the stage values."""
+    for k in range(STAGES):
+        a, b, c = INVERSE[k]
+        for i in range(K.v.shape[1]):
+            v0 = K.v[START, i]
+            K.dd[k, i] = (a * K.d[0, i] + b * K.d[1, i] + c * K.d[2, i]) / h
+            K.a[k, i] = (a * (K.v[0, i] - v0) + b * (K.v[1, i] - v0) + c * (K.v[2, i] - v0)) / h
+    integrals(K, h)
+
+
+@formula
+def integrals(K, h):
+    """Integrals of the motion at the stages by their rates there."""
+    for k in range(STAGES):
+        p, q, r = A[k]
+        for i in range(K.z.shape[1]):
+            K.z[k, i] = K.z[START, i] + h * (p * K.rate[0, i] + q * K.rate[1, i] + r * K.rate[2, i])
+
+
+@formula
+def iterate(residual, S, K, c, h):
+    """Find the stage values. Returns (status, factor by which the next width should change)."""
+    found = 0
+    rate = max(K.real[RATE], 1e-16) ** 0.8
+    theta = abs(K.real[THETA])
+    before = last = 0.0
+    for n in range(MOST):
+        rates(K, h)
+        for k in range(STAGES):
+            if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+                return DIVERGED, 0.5
+        size = correct(K, h)
+        K.count[ITERATIONS] += 1
+        if not size < 1e300:
+            return DIVERGED, 0.5
+        if n > 0:
+            ratio = size / last
+            theta = ratio if n == 1 or before >= SURE else sqrt(ratio * before)
+            before = ratio
+            if n == 1 and SURE <= theta < WILD:  # the first one corrected multipliers, that are not looked at
+                last = size
+                continue
+            if not theta < SURE:
+                if size <= K.real[NEWTON]:  # rounding
+                    found = n + 1
+                    break
+                return DIVERGED, 0.5
+            rate = theta / (1.0 - theta)
+            left = rate * size * theta ** (MOST - 2 - n) / K.real[NEWTON]
+            if left >= 1.0:
+                q = max(1e-4, min(20.0, left))
+                return SLOW, 0.8 * q ** (-1.0 / (4.0 + MOST - 2 - n))
+        last = max(size, 1e-16)
+        if rate * size <= K.real[NEWTON] and n + 1 >= K.count[LEAST]:
+            found = n + 1
+            break
+    if found == 0:
+        return SLOW, 0.5
+    K.real[RATE], K.real[THETA] = rate, theta
+    return account(residual, S, K, c, h), float(found)
+
+
+@formula
+def account(residual, S, K, c, h):
+    """Integrals of the motion by their rates at the stage values found. Returns a status."""
+    if K.z.shape[1] == 0:
+        return 0
+    rates(K, h)
+    for k in range(STAGES):
+        if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
+            return DIVERGED
+    integrals(K, h)
+    return 0
+
+
+@formula
+def estimate(residual, S, K, c, h, again):
+    """Error of the step in units of the tolerance. Returns (status, error)."""
+    nv = K.v.shape[1]
+    accounts = unsure(K, c, h)  # rates at the begin are other ones below
+    e, f, g = ERROR
+    for i in range(nv):
+        v0 = K.v[START, i]
+        K.d[START, i] = 0.0
+        K.dd[START, i] = -(e * K.d[0, i] + f * K.d[1, i] + g * K.d[2, i]) / h
+        K.a[START, i] = -(e * (K.v[0, i] - v0) + f * (K.v[1, i] - v0) + g * (K.v[2, i] - v0)) / h
+    for i in range(K.mu.shape[1]):
+        K.mu[START, i] = 0.0
+    status, size = filtered(residual, S, K, c, c.real[T], h)
+    if status == 0 and again and size >= 1.0:
+        perm = K.P.perm
+        for i in range(nv):
+            K.d[START, i] = K.x[0, perm[i]]
+            K.v[START, i] += K.x[0, perm[nv + i]]
+        status, size = filtered(residual, S, K, c, c.real[T], h)
+        for i in range(nv):
+            K.v[START, i] = c.y[NOW, c.y.shape[1] - K.z.shape[1] - nv + i]
+    return status, max(size, accounts)
+
+
+@formula
+def filtered(residual, S, K, c, t, h):
+    """What the equations miss in row START, solved with the real matrix, in units of the tolerance."""
+    if residual(t, START, S, K, c) != 0:
+        return 1, 0.0
+    perm = K.P.perm
+    nv = K.v.shape[1]
+    for i in range(perm.shape[0]):
+        K.x[0, perm[i]] = -K.out[START, i]
+    solve_real(K, h)
+    s = 0.0
+    for i in range(nv):
+        x, y = K.x[0, perm[i]] / K.tol[0, i], K.x[0, perm[nv + i]] / K.tol[1, i]
+        s += x * x + y * y
+    return 0, sqrt(s / max(2 * nv, 1))
+
+
+@formula
+def unsure(K, c, h):
+    """Error of the integrals in units of the tolerance: relative to all that stands in them and to c.real[LEDGER].
+
+    A fast beginning that the state forgets within the step is not forgotten by its integrals.
+    """
+    size = c.real[LEDGER]
+    for n in range(c.accounts.shape[0]):
+        size += abs(c.y[NOW, c.accounts[n]])
+    at = c.y.shape[1] - K.z.shape[1]
+    s = 0.0
+    for n in range(c.accounts.shape[0]):
+        i = c.accounts[n] - at
+        e = (
+            UNSURE[0] * K.rate[START, i]
+            + UNSURE[1] * K.rate[0, i]
+            + UNSURE[2] * K.rate[1, i]
+            + UNSURE[3] * K.rate[2, i]
+        )
+        s += e * e
+    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (LOOSER * c.real[CLOCK_RTOL] * size + 1e-300)
+
+
+@formula
+def defect(residual, S, K, c, h, x):
+    """Error that what the polynomial misses of the equations at t + x h would make if it lasted for the step.
+
+    In units of the tolerance; huge if they cannot be evaluated there.
+    """
+    nv = K.v.shape[1]
+    for i in range(nv):
+        v0 = K.v[START, i]
+        b1, b2, b3 = coefficients(K.d, i, 0.0)
+        K.d[START, i] = x * (b1 + x * (b2 + x * b3))
+        K.dd[START, i] = (b1 + x * (2.0 * b2 + x * 3.0 * b3)) / h
+        b1, b2, b3 = coefficients(K.v, i, v0)
+        K.v[START, i] = v0 + x * (b1 + x * (b2 + x * b3))
+        K.a[START, i] = (b1 + x * (2.0 * b2 + x * 3.0 * b3)) / h
+    for r in range(K.mu.shape[1]):
+        K.lam[START, r] = at_stages(K.lam, r, x)
+    status, size = filtered(residual, S, K, c, c.real[T] + x * h, h)
+    for i in range(nv):
+        K.v[START, i] = c.y[NOW, c.y.shape[1] - K.z.shape[1] - nv + i]
+    return size if status == 0 else 1e300
+
+
+@formula
+def between(K, x, h, d, v, z):
+    """Increments, velocities and integrals at t + x h, by the polynomial through the stages."""
+    for i in range(d.shape[0]):
+        b1, b2, b3 = coefficients(K.d, i, 0.0)
+        d[i] = x * (b1 + x * (b2 + x * b3))
+        v0 = K.v[START, i]
+        b1, b2, b3 = coefficients(K.v, i, v0)
+        v[i] = v0 + x * (b1 + x * (b2 + x * b3))
+    p, q, r = THROUGH_STAGES
+    for i in range(z.shape[0]):
+        a, b, c = K.rate[0, i], K.rate[1, i], K.rate[2, i]
+        s = p[0] * a + p[1] * b + p[2] * c
+        s += x / 2.0 * (q[0] * a + q[1] * b + q[2] * c) + x * x / 3.0 * (r[0] * a + r[1] * b + r[2] * c)
+        z[i] = K.z[START, i] + x * h * s
