@@ -81,6 +81,19 @@ def test_play_of_one_coordinate_is_a_pair_of_stops(coordinates):
     assert times(r, "key") == pytest.approx([0.05 + 0.1 * k for k in range(10)], abs=1e-9)
 
 
+@pytest.mark.parametrize("elastic", [{}, {"stiffness": 1e5}])
+def test_play_and_a_stop_of_one_coordinate_count_it_each_their_own_way(elastic):
+    """Play counts from where it is drawn, at 1 m; the stop at 1.005 m lies within it and is reached first."""
+    m = fb.Mechanism("slide", planar=True, gravity=None)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(1, 0), displacement=1.0))
+    m.add(fb.Initial("P.displacement", rate=0.1), fb.Backlash("play", ["P.displacement"], gap=0.02, **elastic))
+    m.add(fb.Limit("stop", "P.displacement", upper=1.005))
+    r = m.simulate(0.3, outputs=4)
+    assert [e.t for e in r.events] == pytest.approx([0.05], rel=1e-9)
+    assert r["play"].value[-1] == pytest.approx(0.005, rel=1e-9)
+    assert r["stop"].value[-1] == pytest.approx(1.005, rel=1e-9)
+
+
 def test_a_gear_pair_says_where_its_play_is():
     with pytest.raises(fb.ModelError, match=r"unknown field 'backlash'.*gears with play are a Backlash in its place"):
         fb.GearPair("mesh", "A", "B", teeth=(20, 60), backlash="0.2 deg")

@@ -64,7 +64,7 @@ GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance tha
 NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
 KEPT = (G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CONE)  # guards above zero as long as modes are right
 RESTING = 1e-9  # of the same a second: not coming nearer
-CREEP = 1e-13  # of the same a second: a rate that is none, as of what nothing moves
+CREEP = 1e-13  # of the same a second: a rate that is none
 
 
 @formula
@@ -98,15 +98,21 @@ def watched(S, W, t, kind, s):
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return NOT_WATCHED
-            return way * rate + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
+            return way * moving(S, rate) + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
         if kind == G_BACK:
-            return 0.0 if magnitude(rate) <= CREEP * max(1.0, S.glob[LENGTH]) else rate
+            return moving(S, rate)
         return NOT_WATCHED
     if kind == G_PULL:
         return way * W.row[LAM, k]
     if kind == G_HOLDS:
         return most(S, W, t, S.switch_i[s, SWITCH_FORCE]) - magnitude(W.row[LAM, k])
     return NOT_WATCHED
+
+
+@formula
+def moving(S, rate):
+    """A rate; none where that is rounding, as of what nothing moves, or what something else holds."""
+    return 0.0 if magnitude(rate) <= CREEP * max(1.0, S.glob[LENGTH]) else rate
 
 
 @formula

@@ -114,9 +114,9 @@ class Backlash(Unilateral):
         return sides(n, -0.5 * n.gap, 0.5 * n.gap)
 
     def switches(self) -> tuple[Switch, ...]:
-        """One along the sum."""
+        """One along the sum, counted from the middle, so its own where it has one coordinate too."""
         kind = ELASTIC if self.acts() else STOP
-        return (Switch(kind, along=self.coordinates, slides=self.acts()),)
+        return (Switch(kind, along=self.coordinates, slides=self.acts(), weighted=True),)
 
     def switched(self, n: SimpleNamespace, label: str, separation: float) -> tuple[float, ...]:
         """Half the gap to either side."""

@@ -20,7 +20,7 @@ from ...laws.functions import forget
 from ...model.model import Model
 from ...model.touching import nothing_touches
 from ...numerics.integrators import clock as ex
-from ...numerics.integrators.tableaux import tableau
+from ...numerics.integrators.tableaux import TABLEAUX, tableau
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Result
@@ -32,7 +32,6 @@ from ..motion.choice import SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.engines import LONGEST, Engine
 from ..motion.events.legs import laws_of_time
-from ..motion.impulse.settings import Stepping
 from ..motion.known import sampled_laws
 from ..motion.later import open_until_asked, solved
 from ..motion.reasons import remarks
@@ -78,7 +77,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
     if any(r.how == FUNCTION for r in question.asked):
         return None
     o = chosen(model, question.at(point)).options
-    if isinstance(o.method, Stepping) or o.stabilization != "projection":
+    if o.method not in TABLEAUX or o.stabilization != "projection":
         return None
     begun = begin(model, start_time(o.t_start, None), o.parameters, None, o.coordinates, switches=True)
     c = begun.assembly.compiled
