@@ -7,10 +7,11 @@ from typing import Any
 
 from ....errors import ModelError
 from ..start import Start, begin_at
+from .layout import sparsity
 
 IMPLICIT = ("radau",)
 """Implicit integrators by name."""
-SMALL = 30  # unknown velocities and rows in joint coordinates up to which full matrices are no loss
+FEW = 40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
 
 
 def explicit(method: str) -> str:
@@ -40,8 +41,8 @@ def refuse_idle(o: Any) -> None:
 def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> Start:
     """The start in coordinates that implicit integrators are good at.
 
-    In joint coordinates matrices are full, and drivers prescribe coordinates; so large mechanisms, and those with
-    drivers, go to absolute ones.
+    Joint coordinates of long chains have full matrices, and drivers prescribe some; such mechanisms go to absolute
+    ones.
 
     Raises
     ------
@@ -65,10 +66,17 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
                 f"are in joint coordinates: leave coordinates out"
             )
         why = "drivers' coordinates are rows in an implicit method"
-    elif wish == "auto" and s.nv + len(s.rows) > SMALL:
-        why = f"{s.nv} joint coordinates have full matrices"
+    elif wish == "auto" and (groups := _groups(begun)) > FEW:
+        why = f"matrices of {groups} joint coordinates, which follow each other, are full"
     else:
         return begun
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
     out.since, out.coordinates = begun.since, f"absolute: {why}"
     return out
+
+
+def _groups(begun: Start) -> int:
+    """How many evaluations a Jacobian takes in joint coordinates."""
+    c = begun.assembly.compiled
+    nr, nm = len(c.structure.rows), len(c.structure.measured)
+    return int(sparsity(c.structure, c.structure.nv + 3 * nr + 3 * nm, c.system)[1].max(initial=-1)) + 1
