@@ -256,6 +256,18 @@ def test_what_it_does_not_know_is_refused_by_name():
     m.simulate(0.1, method="radau")
 
 
+def test_friction_under_reactions_that_are_open_is_refused():
+    """Redundant rows may carry any self-stress in Newton's method, and friction would follow it."""
+    m = fb.Mechanism("door", gravity=(0, 0, -G))
+    m.add(fb.Body("leaf", mass=10.0, inertia=(1, 1, 1), position=(0.5, 0, 1)))
+    for name, z in (("upper", 2.0), ("lower", 0.0)):
+        m.add(fb.Revolute(name, "ground", "leaf", at=(0, 0, z), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("f", "upper", radius=0.1, kinetic=0.3, static=0.3, thrust_factor=1.0, stick_speed=0.05))
+    m.add(fb.Initial("upper.angle", rate=1.0))
+    with pytest.raises(fb.ModelError, match=r"JointFriction 'f'.* leave open"):
+        m.simulate(1.0, method="radau")
+
+
 def test_a_step_that_is_too_long_says_so():
     m = example("n_four_bar.py", windows=1)
     with pytest.raises(fb.SimulationError, match="give a shorter step"):

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from ....errors import ModelError
+from ....results.doubts import open_loads
+from ...mobility import mobility
 from ..start import Start, begin_at
 from .layout import sparsity
 
@@ -57,6 +59,7 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
             f"method='radau' does not know events, nor what holds at times and lets go at others: {what}; leave method "
             f"out, or give method='dop853'"
         )
+    _refuse_open_loads(begun)
     if not s.tree or wish == "absolute":
         return begun
     if s.prescribed:
@@ -73,6 +76,18 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
     out.since, out.coordinates = begun.since, f"absolute: {why}"
     return out
+
+
+def _refuse_open_loads(begun: Start) -> None:
+    """Friction under reactions that redundancy leaves open takes them from Newton's method, where they are any."""
+    s = begun.base.compiled.structure
+    found = open_loads(s.loads, mobility(s.model, begun.base).undetermined) if s.loads else []
+    if found:
+        names = ", ".join(f.title for f, _ in found)
+        raise ModelError(
+            f"method='radau' cannot have {names}: it follows reactions that redundant constraints leave open "
+            f"(m.mobility() names them); leave method out, or take the redundancy out"
+        )
 
 
 def _groups(begun: Start) -> int:
