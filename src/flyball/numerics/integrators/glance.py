@@ -12,7 +12,7 @@ from .step import extend, interpolate
 from .watching import END, EXTENDED, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, THERE, TRUE, TRULY
 
 ODD = 1e-2  # part of its change over a step by which a guard may differ from what is expected
-FAR = 0.1  # part of its least distance from zero by which it may
+FAR = 0.05  # part of its least distance from zero by which it may
 BLURRED = 1e-9  # part of its size that is nothing
 SHORT = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
 NOISE = 4.0  # times what is rounding of a guard
