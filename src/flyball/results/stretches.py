@@ -85,13 +85,6 @@ class Stretches:
             first = last
         return out
 
-    def changed(self) -> dict[str, float]:
-        """Parameters that events have set, as they were at the end."""
-        first, last = self.all[0].values, self.all[-1].values
-        if first is last:
-            return {}
-        return {k: x for k, x in last.given.env.items() if first.given.env.get(k) != x}
-
     def cut(self, rows: int) -> Stretches:
         """Those of the first so many output times."""
         out, left = list[Stretch](), rows

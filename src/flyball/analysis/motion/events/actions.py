@@ -156,7 +156,12 @@ def expressions(here: Here) -> dict[int, float]:
 
 
 def true_already(here: Here) -> list[str]:
-    """Titles of events whose comparisons are true now: they become true only after they were false."""
+    """Names of events whose comparisons are true now: they become true only after they were false.
+
+    None where a motion goes on: what is true there may have become true in what went before.
+    """
+    if here.start.before is not None:
+        return []
     every = here.structure.events
     texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
     values = expressions(here) if texts else {}
@@ -261,9 +266,11 @@ def _struck(here: Here, found: Found) -> Done:
     out = []
     for e, a, x in found:
         n = len(listed(a.impulse))
-        kick = generalised(here, e, a, x[:n], x[n:])
+        kick, blow = generalised(here, e, a, x[:n], x[n:])
         here.kick = kick if here.kick is None else here.kick + kick
-        told = [f"{_vector(x[:n])} N s" if n > 1 else f"{x[0]:g}"] if n else []
+        here.blows.append(blow)
+        along = (_unit(here, e, a, "impulse") or "N*s").replace("*", " ")
+        told = [f"{_vector(x[:n])} {along}"] if n else []
         told += [f"{_vector(x[n:])} N m s"] if x[n:] else []
         out.append((e, f"struck {a.on}: {', '.join(told)}"))
     return out

@@ -36,7 +36,7 @@ class Segments:
     def told(self, result: Result) -> None:
         """Give a result what held, and what events did to its energy, if anything can switch."""
         s = result.values.structure
-        if not s.switches and not s.guards:
+        if not s.switches and not s.guards and not s.model.events:
             return
         result.stretches = stretched(self.all)
         result.exchanged |= booked(result)
