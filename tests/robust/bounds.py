@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flyball.constraints.modes import ONE_WAY, RATCHET, STOP
+from flyball.model.touch import Touch
 from flyball.results.result import Result
 from flyball.tables.system import SWITCH_LOWER, SWITCH_PITCH, SWITCH_UPPER
 
@@ -15,7 +16,11 @@ def against(r: Result) -> str:
     """What was passed or pulled, in words; empty if nothing was."""
     for x, row in zip(r.values.structure.switches, r.values.system.switch_x, strict=True):
         e = x.element
-        if e.category not in ("forces", "limits") or x.switch.kind not in (STOP, ONE_WAY, RATCHET):
+        if (
+            isinstance(e, Touch)
+            or e.category not in ("forces", "limits")
+            or x.switch.kind not in (STOP, ONE_WAY, RATCHET)
+        ):
             continue
         told = r[e.name]
         rope = e.category == "forces"
