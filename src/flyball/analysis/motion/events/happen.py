@@ -154,7 +154,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         turned(n, hits)
         come_to_rest(n, found)
         n.arrive()
-        if jumped is not None and (jumped.given or not jumped.closing.keys() <= here.crept):
+        if jumped is not None and (jumped.blows or jumped.given or not jumped.closing.keys() <= here.crept):
             tell_jump(n, jumped, before)
         guards = n.guards()
         if again < AGAIN and misled(n, guards):
