@@ -22,12 +22,13 @@ STRUCK = 1e3  # times the impulse that forces make in it: a blow
 
 
 def doubt(n: Instant, found: Decided) -> None:
-    """Say what is left open at this instant, once."""
+    """Say what is left open at this instant, of the same elements once in a motion."""
     if not found.gain.any():
         return
-    for said in (_several(n, found), _undetermined(n, found)):
-        if said and said not in n.here.doubts:
-            n.here.doubts.append(said)
+    if (said := _several(n, found)) and not any(x.endswith(said) for x in n.here.doubts):
+        n.here.doubts.append(f"at t = {n.here.t:.6g} s {said}")
+    if (said := _undetermined(n, found)) and said not in n.here.doubts:
+        n.here.doubts.append(said)
 
 
 def _several(n: Instant, found: Decided) -> str:
@@ -39,7 +40,7 @@ def _several(n: Instant, found: Decided) -> str:
         if n.again(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
             who = " and ".join(elements(n, found.parts))
             return (
-                f"at t = {n.here.t:.6g} s rigid bodies with friction can go on in several ways (Painleve's paradox) at "
+                f"rigid bodies with friction can go on in several ways (Painleve's paradox) at "
                 f"{who}; taken: the one that goes on from the modes before"
             )
     return ""
