@@ -150,3 +150,26 @@ def test_a_stop_that_starts_violated_is_refused():
     m = slider(fb.Limit("floor", "guide.displacement", lower=0.1), height=0.05)
     with pytest.raises(fb.FlyballError, match=r"Limit 'floor'.*0\.05.*0\.1"):
         m.simulate(0.1)
+
+
+@pytest.mark.parametrize("stop", ["rope", "lower", "upper"])
+def test_an_elastic_stop_that_is_just_reached_at_rest_never_pulls(stop):
+    """Pressed by F for T, then pulled: (F / k) (1 - cos w t), then -F / k + ..., and free from where it is zero again."""
+    F, k, T = 1.0, 100.0, 0.5
+    way = -1.0 if stop == "lower" else 1.0
+    m = fb.Mechanism("slide", planar=True)
+    m.add(fb.Body("b", mass=1.0, inertia=1.0, position=(1, 0)))
+    m.add(fb.Prismatic("S", "ground", "b", at=(1, 0), axis=(1, 0)))
+    m.add(fb.Actuator("pull", "S.displacement", force=f"{way * F}*where(t < 0.5, 0, where(t < 1, 1, -1))"))
+    if stop == "rope":
+        m.add(fb.Rope("stop", ("ground", "b"), at=((0, 0), (1, 0)), stiffness=k))
+    else:
+        m.add(fb.Limit("stop", "S.displacement", **{stop: 0.0}, stiffness=k))
+    w = np.sqrt(k)
+    x, v = F / k * (1 - np.cos(w * T)), F / k * w * np.sin(w * T)
+    size, phase = np.hypot(x + F / k, v / w), np.arctan2(v / w, x + F / k)
+    free = (np.arccos(F / k / size) + phase) / w
+    speed = -size * w * np.sin(w * free - phase)
+    left = 1.0 - free
+    run = m.simulate(2.0, outputs=[0.0, 1.0, 2.0], rtol=1e-11, atol=1e-13)
+    assert way * run["S.displacement"] == pytest.approx([0.0, x, speed * left - 0.5 * F * left**2], abs=1e-8)

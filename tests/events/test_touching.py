@@ -71,13 +71,21 @@ def test_a_ball_with_backspin_slides_then_rolls():
     assert np.abs(run.energy.balance).max() < 1e-9 * run.energy.kinetic[0]
 
 
+def braked_wheel():
+    """A wheel that a driver holds, and a brake on it: friction on what nothing free moves."""
+    wheel = fb.Body("wheel", mass=1.0, inertia=1.0, position=(5, 5))
+    turn = fb.Revolute("W", "ground", "wheel", at=(5, 5))
+    return wheel, turn, fb.Driver("held", "W.angle", "0*t"), fb.Brake("brake", "W.angle", capacity=2.0)
+
+
+@pytest.mark.parametrize("beside", [(), braked_wheel()], ids=["alone", "beside a braked wheel"])
 @pytest.mark.parametrize("steep", [0.4, 0.8])
-def test_a_block_thrown_up_a_slope(steep):
+def test_a_block_thrown_up_a_slope(steep, beside):
     """It stops after v / (g (sin + mu cos)), stays if mu > tan, else slides back at g (sin - mu cos)."""
     mu, v = 0.5, 2.0
     g = G * np.array([-np.sin(steep), -np.cos(steep)])
     block = fb.Body("block", shape=fb.Box(edges=(0.4, 0.1, 0.1)), density=500, position=(0, 0.05), velocity=(v, 0))
-    m = scene(floor(True), block, planar=True, gravity=g, friction=mu)
+    m = scene(floor(True), block, *beside, planar=True, gravity=g, friction=mu)
     up = G * (np.sin(steep) + mu * np.cos(steep))
     down = max(0.0, G * (np.sin(steep) - mu * np.cos(steep))) if mu < np.tan(steep) else 0.0
     stops = v / up

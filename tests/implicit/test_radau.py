@@ -6,6 +6,9 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
+from flyball.analysis.linear.derivatives import Equations, State
+from flyball.analysis.motion.implicit.layout import sparsity
+from flyball.analysis.motion.start import begin
 from tests.layers import both_layers
 from tests.mechanisms import example, free_body, spatial_four_bar
 
@@ -253,7 +256,58 @@ def test_what_it_does_not_know_is_refused_by_name():
     m.simulate(0.1, method="radau")
 
 
+def test_friction_under_reactions_that_are_open_is_refused():
+    """Redundant rows may carry any self-stress in Newton's method, and friction would follow it."""
+    m = fb.Mechanism("door", gravity=(0, 0, -G))
+    m.add(fb.Body("leaf", mass=10.0, inertia=(1, 1, 1), position=(0.5, 0, 1)))
+    for name, z in (("upper", 2.0), ("lower", 0.0)):
+        m.add(fb.Revolute(name, "ground", "leaf", at=(0, 0, z), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("f", "upper", radius=0.1, kinetic=0.3, static=0.3, thrust_factor=1.0, stick_speed=0.05))
+    m.add(fb.Initial("upper.angle", rate=1.0))
+    with pytest.raises(fb.ModelError, match=r"JointFriction 'f'.* leave open"):
+        m.simulate(1.0, method="radau")
+
+
 def test_a_step_that_is_too_long_says_so():
     m = example("n_four_bar.py", windows=1)
     with pytest.raises(fb.SimulationError, match="give a shorter step"):
         m.simulate(10.0, method="radau", step=2.0)
+
+
+def test_a_driver_that_jumps_is_named_and_not_passed():
+    """A rate that jumps would take an infinite force, which an implicit step does not notice by itself."""
+    m = pendulum()
+    m.add(fb.Body("cart", mass=1.0, inertia=1.0, position=(2, 0)))
+    m.add(fb.Prismatic("rail", "ground", "cart", at=(2, 0), axis=(1, 0)))
+    m.add(fb.Driver("d", "rail." + next(iter(m["rail"].coordinates)), "where(t < 0.2, 0, 0.5*(t - 0.2))"))
+    with pytest.raises(fb.SimulationError, match=r"Driver 'd' cannot be followed beyond t = 0\.2"):
+        m.simulate(1.0, method="radau")
+
+
+def test_many_windows_go_through_singular_positions():
+    """Ten windows, in coordinates whose Jacobians are sparse by branches: the motion of one freedom."""
+    m = example("n_four_bar.py", windows=10)
+    r = m.simulate(10.0, outputs=2, method="radau")
+    e = m.simulate(10.0, outputs=2, rtol=1e-9)
+    assert r.health.coordinates.startswith("joint")
+    assert np.abs(r["post 0"].position - e["post 0"].position).max() < 1e-4
+    assert r.health.energy_drift < 1e-3
+
+
+BRANCHES = ("andrews.toml", "bricard.toml", "car_axis.toml", "governor.toml", "peaucellier.toml", "rolling_race.toml")
+
+
+@pytest.mark.parametrize("name", [*BRANCHES, "n_four_bar.py"])
+def test_patterns_of_branches_leave_nothing_out(name):
+    """Sparse Jacobians in joint coordinates against full ones, at random velocities, accelerations, multipliers."""
+    start = begin(example(name).snapshot(), 0.0, None, None, "joint")
+    c = start.assembly.compiled
+    s, rng = c.structure, np.random.default_rng(0)
+    x = State.moving(c, 0.1, start.y[: s.nq], start.y[s.nq : s.nq + s.nv] + rng.normal(size=s.nv))
+    x.vdot, x.lam = rng.normal(size=s.nv), rng.normal(size=len(s.rows))
+    full = Equations(x)
+    touched = sparsity(s, full.width, c.system)[0].toarray()
+    rows = np.r_[np.arange(s.nv), np.arange(full.at["n"].start, full.at["n"].stop)]
+    for J in (full.by_position, full.by_velocity, full.by_acceleration):
+        size = np.abs(J.toarray())
+        assert not ((size > 1e-11 * size.max()) & ~touched)[rows].any()

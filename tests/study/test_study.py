@@ -117,6 +117,14 @@ def test_options_are_those_of_simulate():
     assert {k: ours[k].default for k in shared} == {k: its[k].default for k in shared}
 
 
+@pytest.mark.parametrize("more", [{"method": "radau"}, {"method": "radau", "step": "5 ms"}, {"method": "rk45"}])
+def test_every_method(more):
+    s = oscillator().study({"k": [50.0, 100.0, 150.0, 200.0, 250.0]}, ["end(b.x)"], t_end=0.5, **more)
+    omega = np.sqrt(s.points[:, 0])
+    np.testing.assert_allclose(s["end(b.x)"], 0.1 * np.cos(0.5 * omega), atol=1e-6)
+    assert oscillator().simulate(**s.question(3))["b.x"][-1] == s["end(b.x)"][3]
+
+
 def test_going_on_from_a_result():
     m = oscillator()
     first = m.simulate(0.5)

@@ -22,6 +22,7 @@ from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
 from .motion.choice import IMPULSE, SimulateOptions
 from .motion.engines import AUTO, worth_making
+from .motion.implicit.suited import IMPLICIT
 from .motion.impulse.settings import Stepping
 from .motion.options import output_times
 from .motion.start import start_time
@@ -133,10 +134,11 @@ def _options(o: SimulateOptions) -> dict[str, Any]:
 def _decided(question: Question, found: Study) -> Question:
     """With the engine that all runs have: one choice, so that none depends on what was computed before it.
 
-    Contact and partitioning are for the tables in any case; to ask for these would be to ask for an integrator.
+    Contact and implicit methods are for the tables in any case; to ask for these may be to ask for an integrator.
     """
     model, o = question.model, question.options
-    if o.specialize != AUTO or model.contacts or model.bulk or o.method == IMPULSE or isinstance(o.method, Stepping):
+    others = o.method in (IMPULSE, *IMPLICIT) or isinstance(o.method, Stepping)
+    if o.specialize != AUTO or others or model.contacts or model.bulk:
         return question
     if found.options["specialize"] == AUTO:
         found.options["specialize"] = o.stabilization != "partitioning" and _made_code_pays(question, found)

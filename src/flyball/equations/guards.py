@@ -151,9 +151,10 @@ def pressing(S, W, s, kind, way):
     bound = W.switch[LOWER, s] if kind == G_PRESS_LOWER else W.switch[UPPER, s]
     depth = side * (bound - W.sensed[VALUE, m])
     push = S.switch_x[s, SWITCH_STIFFNESS] * depth - S.switch_x[s, SWITCH_DAMPING] * side * W.sensed[RATE, m]
-    if way * side > 0.5:  # an interpolated one is not exact
+    told = way > -1.5  # an interpolated one is not exact; one that looks where it is by itself is far below
+    if told and way * side > 0.5:
         return push
-    if way * side < -0.5 and way > -1.5:
+    if told and way * side < -0.5:
         return NOT_WATCHED
     return -push if depth > 0.0 else -depth
 

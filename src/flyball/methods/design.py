@@ -185,6 +185,7 @@ class Design(Model):
         rtol: float = 1e-7,
         atol: float | None = None,
         max_step: float | str = math.inf,
+        step: float | str | None = None,
         max_steps: int = 10_000_000,
         stabilization: str = "projection",
         alpha: float | None = None,
@@ -230,13 +231,15 @@ class Design(Model):
             Every run goes on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             As for `simulate`.
-        method : {"auto", "dop853", "rk45", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "impulse"} or Stepping
             As for `simulate`.
         rtol : float [1]
             As for `simulate`.
         atol : float [m, rad, m/s, rad/s], optional
             As for `simulate`.
         max_step : float or str [s]
+            As for `simulate`.
+        step : float or str [s], optional
             As for `simulate`.
         max_steps : int
             As for `simulate`.

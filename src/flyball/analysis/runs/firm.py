@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -33,6 +34,8 @@ def rests_as_drawn(begun: Start) -> bool:
 @dataclass(frozen=True)
 class Weighing:
     """What fills tables of masses, gravity and forces in; as `soft.Filling`, where nothing else changes."""
+
+    tables: ClassVar[tuple[str, ...]] = ("force_x", "const", "body_x", "glob")  # that it writes
 
     names: tuple[str, ...]
     parameters: Mapping[str, float]

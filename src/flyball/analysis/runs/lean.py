@@ -8,6 +8,7 @@ scratch and clock as new, one call. Whatever is unusual is left to `compute.alon
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,7 +21,7 @@ from ...laws.functions import forget
 from ...model.model import Model
 from ...model.touching import nothing_touches
 from ...numerics.integrators import clock as ex
-from ...numerics.integrators.tableaux import tableau
+from ...numerics.integrators.tableaux import TABLEAUX, tableau
 from ...results.departure import changed_velocities, not_allowed
 from ...results.health import Health
 from ...results.result import Result
@@ -32,7 +33,6 @@ from ..motion.choice import SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.engines import LONGEST, Engine
 from ..motion.events.legs import laws_of_time
-from ..motion.impulse.settings import Stepping
 from ..motion.known import sampled_laws
 from ..motion.later import open_until_asked, solved
 from ..motion.reasons import remarks
@@ -78,7 +78,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
     if any(r.how == FUNCTION for r in question.asked):
         return None
     o = chosen(model, question.at(point)).options
-    if isinstance(o.method, Stepping) or o.stabilization != "projection":
+    if o.method not in TABLEAUX or o.stabilization != "projection":
         return None
     begun = begin(model, start_time(o.t_start, None), o.parameters, None, o.coordinates, switches=True)
     c = begun.assembly.compiled
@@ -97,7 +97,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
         fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in VARIED)
     if (filling := _filling(question, o, begun)) is None:
         return None
-    return Shared(question, o, begun, filling, made, _plain(S), fixed)
+    return Shared(question, o, begun, filling, made, _plain(S, filling.tables), fixed)
 
 
 def _filling(question: Question, o: SimulateOptions, begun: Start) -> Filling | Weighing | None:
@@ -110,8 +110,8 @@ def _filling(question: Question, o: SimulateOptions, begun: Start) -> Filling | 
     return Weighing(question.names, question.options.parameters or {}, begun, float(o.t_end - begun.base.t))
 
 
-VARIED = ("force_x", "const", "body_x", "glob")
-"""Tables that change from run to run."""
+VARIED = Weighing.tables
+"""Tables that may change from run to run."""
 
 
 def _watched(model: Model) -> bool:
@@ -119,8 +119,8 @@ def _watched(model: Model) -> bool:
     return bool(model.events or model.contacts or model.bulk or any(t.beyond == "refuse" for t in model.tables))
 
 
-def _plain(S: System) -> tuple[np.ndarray, ...]:
-    return tuple(getattr(S, name) == x for name in VARIED for x in PLAIN)
+def _plain(S: System, names: Sequence[str]) -> tuple[np.ndarray, ...]:
+    return tuple(getattr(S, name) == x for name in names for x in PLAIN)
 
 
 class Desk:
@@ -161,7 +161,7 @@ class Desk:
             return False
         S = c.values.system
         if of.made is not None:
-            if not all(np.array_equal(a, b) for a, b in zip(of.plain, _plain(S), strict=True)):
+            if not all(np.array_equal(a, b) for a, b in zip(of.plain, _plain(S, of.filling.tables), strict=True)):
                 return False
             if any(getattr(S, name).ravel()[k] != x for name, k, x in of.fixed):
                 return False

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -57,6 +57,8 @@ def _only_acts(e: Element, reached: set[str]) -> bool:
 @dataclass(frozen=True)
 class Filling:
     """What fills the numbers of the forces that change into tables, as `tables.values` does."""
+
+    tables: ClassVar[tuple[str, ...]] = ("force_x", "const")  # that it writes
 
     names: tuple[str, ...]
     derived: tuple[tuple[str, Expression], ...]

@@ -261,8 +261,9 @@ def _struck(here: Here, found: Found) -> Done:
     out = []
     for e, a, x in found:
         n = len(listed(a.impulse))
-        kick = generalised(here, e, a, x[:n], x[n:])
+        kick, blow = generalised(here, e, a, x[:n], x[n:])
         here.kick = kick if here.kick is None else here.kick + kick
+        here.blows.append(blow)
         told = [f"{_vector(x[:n])} N s" if n > 1 else f"{x[0]:g}"] if n else []
         told += [f"{_vector(x[n:])} N m s"] if x[n:] else []
         out.append((e, f"struck {a.on}: {', '.join(told)}"))

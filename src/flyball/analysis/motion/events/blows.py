@@ -13,14 +13,17 @@ from ....model.element import si_numbers
 from ....model.event import Event
 from ....model.event_check import coordinate_of
 from ....model.geometry import vector
+from ....results.struck import Blow
 from ....tables.system import NV, PARENT, V0
 from .here import Here
 
 Three = np.ndarray
 
 
-def generalised(here: Here, e: Event, a: Impulse, force: Sequence[float], torque: Sequence[float]) -> np.ndarray:
-    """Its power at each unit velocity, (nv,); kinematics of the state are in the scratch.
+def generalised(
+    here: Here, e: Event, a: Impulse, force: Sequence[float], torque: Sequence[float]
+) -> tuple[np.ndarray, Blow]:
+    """Its power at each unit velocity, (nv,), and what it is made of; kinematics of the state are in the scratch.
 
     Parameters
     ----------
@@ -31,14 +34,16 @@ def generalised(here: Here, e: Event, a: Impulse, force: Sequence[float], torque
     """
     model = here.structure.model
     if not isinstance(model.find(a.on), (Body, Frame)):
-        return force[0] * _gradient(here, coordinate_of(model, e, a))
+        text = coordinate_of(model, e, a)
+        return force[0] * _gradient(here, text), ("along", here.structure.measured[text], force[0])
     plane = model.planar
     F = np.array([*force, 0.0, 0.0, 0.0])[:3] if len(force) < 3 else np.array(force)
     T = np.array([0.0, 0.0, *torque]) if plane and len(torque) == 1 else np.array(list(torque) or [0.0] * 3)
     body, point, axes = _frame(here, a)
     if a.axes == "body":
         F, T = axes @ F, axes @ T
-    return _along(here, body, point, F, T)
+    about = T + np.cross(point - here.c.work.BK[body, :3], F)
+    return _along(here, body, point, F, T), ("body", body, tuple(F.tolist()), tuple(about.tolist()))
 
 
 def _gradient(here: Here, text: str) -> np.ndarray:

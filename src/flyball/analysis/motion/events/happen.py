@@ -25,7 +25,7 @@ from .actions import act, act_at_start
 from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shock
-from .failed import beyond, guard_names, no_end, no_forces, no_impulses
+from .failed import beyond, guard_names, no_end, no_forces, no_impulses, undetermined
 from .here import Here
 from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
@@ -161,8 +161,11 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             n.look_again()
             again += 1
             continue
-        new = [g for g in broken(n, found, guards) if g not in gone]
+        against = broken(n, found, guards)
+        new = [g for g in against if g not in gone]
         if not new:
+            if against:  # it was let go, and is held again: what the forces of the whole do not share as the few did
+                raise undetermined(n, against)
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return

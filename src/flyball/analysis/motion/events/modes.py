@@ -48,8 +48,8 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     What a guard says has reached the end of what it holds lets go where that is against no rule: not for the sake of
     rounding, and not where redundancy leaves open who carries what, should it be held on to.
     """
-    parts = of_accelerations(n, at, still)
-    found = solved(n, parts)
+    found = solved(n, of_accelerations(n, at, still))
+    parts = found.parts
     let_go = _loose(n, found, fired) if found.ended == FOUND else {}
     while let_go:
         other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
@@ -94,9 +94,9 @@ def _let_go(p: Part, x: float) -> Part:
 def solved(n: Instant, parts: list[Part]) -> Decided:
     """The problem solved; what begins to slide slides with what it carries then."""
     B, P, _ = n.problem(parts)
-    free = [p for i, p in enumerate(parts) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
+    free = [i for i in range(len(parts)) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
     if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
-        parts = free
+        parts = [parts[i]._replace(of=free.index(parts[i].of) if parts[i].of >= 0 else -1) for i in free]
         B, P, _ = n.problem(parts)
     ended = FOUND
     for _ in range(CASCADE):

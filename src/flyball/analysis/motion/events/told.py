@@ -46,7 +46,7 @@ def words(n: Instant, s: int, held: bool) -> tuple[str, str]:
 
 def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
     """Record a jump of velocities."""
-    if not jumped.closing and not jumped.given and not jumped.jammed:
+    if not (jumped.closing or jumped.blows or jumped.given or jumped.jammed):
         return
     done: list[str] = []
     impulses: dict[str, float] = {}

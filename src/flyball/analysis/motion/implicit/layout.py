@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ....equations.engine import MOTION
@@ -12,9 +14,9 @@ from ....numerics.integrators.implicit.whole import SOFT as SOFTENED
 from ....numerics.ldl import Pattern, analyse
 from ....numerics.lu import constrained_order
 from ....tables.specs import Structure
-from ....tables.system import NV, SCHUR, SOLVER, System
+from ....tables.system import NV, PARENT, SCHUR, SOLVER, System
 from ...compiled import Compiled
-from ...linear.derivatives import grouped_sparsity
+from ...linear.derivatives import grouped, grouped_sparsity, pattern
 from ...linear.loads import pressing
 
 THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
@@ -32,7 +34,7 @@ class Layout:
     def __init__(self, s: Structure, S: System) -> None:
         self.s, self.nv, self.nr = s, s.nv, len(s.rows)
         self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
-        self.touched, self.group = grouped_sparsity(s, self.width, S)
+        self.touched, self.group = sparsity(s, self.width, S)
         self.groups = int(self.group.max(initial=-1)) + 1
         self.pressing = pressing(s).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
@@ -125,6 +127,27 @@ class Layout:
         P, place = analyse(n, i, j, constrained_order(groups, np.arange(bodies + self.nr) >= bodies, i, j))
         lower = P.perm[i] > P.perm[j]
         return P, np.ascontiguousarray(np.column_stack([place[: len(i)] + lower * len(P.Ai), number]))
+
+
+def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
+    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
+
+    In joint coordinates what acts on a body acts along the coordinates of all that it hangs on, and follows them.
+    """
+    if not s.tree:
+        return grouped_sparsity(s, width, S)
+    from scipy.sparse import csc_matrix
+
+    parents = S.body_i[:, PARENT].tolist()
+    above: list[list[int]] = []
+    for b, parent in enumerate(parents):
+        above.append([b, *(above[parent] if parent >= 0 else ())])
+
+    def found() -> tuple[Any, np.ndarray]:
+        touched = csc_matrix(pattern(s, S, above))
+        return touched, grouped(touched)
+
+    return s.kept.get("sparsity by branches", None, 1, found)
 
 
 def layout(s: Structure, S: System) -> Layout:

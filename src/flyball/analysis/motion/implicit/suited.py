@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from typing import Any
 
 from ....errors import ModelError
+from ....results.doubts import open_loads
+from ...mobility import mobility
 from ..start import Start, begin_at
+from .layout import sparsity
 
 IMPLICIT = ("radau",)
 """Implicit integrators by name."""
-SMALL = 30  # unknown velocities and rows in joint coordinates up to which full matrices are no loss
+FEW = 40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
 
 
 def explicit(method: str) -> str:
@@ -40,8 +43,8 @@ def refuse_idle(o: Any) -> None:
 def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> Start:
     """The start in coordinates that implicit integrators are good at.
 
-    In joint coordinates matrices are full, and drivers prescribe coordinates; so large mechanisms, and those with
-    drivers, go to absolute ones.
+    Joint coordinates of long chains have full matrices, and drivers prescribe some; such mechanisms go to absolute
+    ones.
 
     Raises
     ------
@@ -56,6 +59,7 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
             f"method='radau' does not know events, nor what holds at times and lets go at others: {what}; leave method "
             f"out, or give method='dop853'"
         )
+    _refuse_open_loads(begun)
     if not s.tree or wish == "absolute":
         return begun
     if s.prescribed:
@@ -65,10 +69,29 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
                 f"are in joint coordinates: leave coordinates out"
             )
         why = "drivers' coordinates are rows in an implicit method"
-    elif wish == "auto" and s.nv + len(s.rows) > SMALL:
-        why = f"{s.nv} joint coordinates have full matrices"
+    elif wish == "auto" and (groups := _groups(begun)) > FEW:
+        why = f"matrices of {groups} joint coordinates, which follow each other, are full"
     else:
         return begun
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
     out.since, out.coordinates = begun.since, f"absolute: {why}"
     return out
+
+
+def _refuse_open_loads(begun: Start) -> None:
+    """Friction under reactions that redundancy leaves open takes them from Newton's method, where they are any."""
+    s = begun.base.compiled.structure
+    found = open_loads(s.loads, mobility(s.model, begun.base).undetermined) if s.loads else []
+    if found:
+        names = ", ".join(f.title for f, _ in found)
+        raise ModelError(
+            f"method='radau' cannot have {names}: it follows reactions that redundant constraints leave open "
+            f"(m.mobility() names them); leave method out, or take the redundancy out"
+        )
+
+
+def _groups(begun: Start) -> int:
+    """How many evaluations a Jacobian takes in joint coordinates."""
+    c = begun.assembly.compiled
+    nr, nm = len(c.structure.rows), len(c.structure.measured)
+    return int(sparsity(c.structure, c.structure.nv + 3 * nr + 3 * nm, c.system)[1].max(initial=-1)) + 1

@@ -15,8 +15,13 @@ from ..clock import (
     ASIDE,
     AT_END,
     AT_START,
+    BEST,
+    BEST_H,
     BETWEEN,
+    BLURRED_AT,
     DONE,
+    EXCESS,
+    EXCESS_AT,
     FROM,
     FROM_RATE,
     GROW,
@@ -25,6 +30,7 @@ from ..clock import (
     NEXT,
     NOT_FINITE,
     NOW,
+    PARDON,
     QUOTA,
     REJECTED,
     RUNNING,
@@ -42,7 +48,8 @@ from ..clock import (
     T,
 )
 from ..explicit import width
-from .desk import BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RATE, START, STEP, THETA, WIDTH
+from ..refusal import afresh
+from .desk import BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RATE, RTOL, START, STEP, THETA, WIDTH
 from .newton import factor
 from .step import MOST, begin, between, defect, estimate, iterate, predict
 from .whole import iterate_whole
@@ -52,8 +59,10 @@ WIDEST, NARROWEST = 8.0, 0.2  # what the width changes by at most
 KEPT = 1.2  # a step that could be wider by this is not: the factors serve on
 SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 FIRST = 1e-4  # part of the time span that is tried first
+WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
+ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
+JUMPED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
 SINGULAR = 3
-REFUSED = 4
 
 
 @formula
@@ -63,8 +72,8 @@ def start(callbacks, S, K, c, out, used):
     y = c.y[NEW]
     for i in range(y.shape[0]):
         y[i] = c.y[NOW, i]
-    status, _ = arrive(c.real[T], y, c.K[0], S, K)
-    if status != 0:
+    status, moved = arrive(c.real[T], y, c.K[0], S, K)
+    if status != 0 or moved > JUMPED:
         return STUCK, used
     for i in range(y.shape[0]):
         c.y[NOW, i] = y[i]
@@ -85,6 +94,9 @@ def start(callbacks, S, K, c, out, used):
     K.real[RATE], K.real[THETA] = 1.0, SURE
     K.real[LAST_ERROR] = 0.0
     c.real[GROW] = WIDEST
+    c.real[EXCESS] = 1.0
+    c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
+    afresh(c)
     c.count[STARTED] = 1
     return 0, used
 
@@ -155,7 +167,7 @@ def attempt(callbacks, S, K, c, h):
         status, error = estimate(residual, S, K, c, h, c.count[ACCEPTED] == 0 or c.real[GROW] <= 1.0)
         if status != 0 or not error < 1e300:
             return SINGULAR, 0.0, 0.5
-        if error > 1.0:
+        if error > max(1.0, c.real[PARDON]):
             return 0, error, asked
     status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
     return status, error, asked if status == 0 else 0.5
@@ -194,6 +206,21 @@ def refuse(K, c, h, factor):
 
 
 @formula
+def pardon(K, c, h, error):
+    """Where ever narrower steps miss the tolerance, take the best of them: near a singular position rounding decides.
+
+    What is accepted so is told (c.real[EXCESS]).
+    """
+    if error < c.real[BEST]:
+        c.real[BEST] = error
+        c.real[BEST_H] = h
+    if c.real[H] < WALKED * c.real[WIDE] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
+        c.real[PARDON] = 2.0 * c.real[BEST]
+        c.real[H] = c.real[BEST_H]
+        c.real[BLURRED_AT] = c.real[T]
+
+
+@formula
 def enter(K, c, t, h, error, iterations):
     """Make the end of the step the present state, and choose the width of the next one."""
     for i in range(c.y.shape[1]):
@@ -206,7 +233,13 @@ def enter(K, c, t, h, error, iterations):
         for k in range(3):
             K.before_lam[k, i] = K.lam[k, i]
         K.lam[START, i] = K.lam[2, i]
+    if error > c.real[EXCESS]:
+        c.real[EXCESS] = error
+        c.real[EXCESS_AT] = c.real[T]
     wide, safe = wider(h, error, iterations)
+    if c.real[PARDON] > 0.0:
+        wide = h
+    afresh(c)
     if K.real[LAST_ERROR] > 0.0 and error > 0.0:
         f = (h / K.real[LAST_H]) * (K.real[LAST_ERROR] / (error * error)) ** 0.25 * safe
         wide = min(wide, h * max(NARROWEST, min(WIDEST, f)))
@@ -258,8 +291,9 @@ def advance(callbacks, S, K, c, out):
         if status != 0:
             refuse(K, c, h, asked)
             continue
-        if error > 1.0:
+        if error > max(1.0, c.real[PARDON]):
             refuse(K, c, h, wider(h, error, asked)[0] / h if c.count[ACCEPTED] > 0 else 0.1)
+            pardon(K, c, h, error)
             continue
         if overlooked(callbacks, S, K, c, h):
             refuse(K, c, h, 0.5)
