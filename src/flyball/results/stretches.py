@@ -26,7 +26,7 @@ class Stretch:
     rows : int
         How many output times; none is possible.
     switch : ndarray (5, ns)
-        Mode, what is held, lower and upper bounds of every switch (`Work.switch`).
+        Mode, what is held, lower and upper bounds of every switch, whether it was released (`Work.switch`).
     sigma : ndarray (ns,) or (ns, rows)
         The direction in which each acts.
     values : Values

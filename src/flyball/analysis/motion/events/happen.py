@@ -24,8 +24,8 @@ from ....tables.system import (
 from .actions import act, act_at_start
 from .apart import put_apart
 from .branches import Corners
-from .doubtful import doubt, shock
-from .failed import beyond, guard_names, no_end, no_forces, no_impulses, undetermined
+from .doubtful import doubt, shared, shock
+from .failed import beyond, guard_names, no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
@@ -164,8 +164,8 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         against = broken(n, found, guards)
         new = [g for g in against if g not in gone]
         if not new:
-            if against:  # it was let go, and is held again: what the forces of the whole do not share as the few did
-                raise undetermined(n, against)
+            if against:  # it was let go, and is held again: by other shares than the least
+                shared(n, against)
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return

@@ -11,7 +11,7 @@ from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
 from ....results.stretches import Stretch, stretched
-from ....tables.system import HELD, MODE, OFF, SWITCH_ROW, VALUE
+from ....tables.system import HELD, MODE, OFF, SPARE, SWITCH_ROW, VALUE
 from .here import Here
 
 
@@ -30,7 +30,15 @@ class Segments:
             ways = _ways(here, rows)
         _quiet(here, rows)
         self.all.append(
-            Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
+            Stretch(
+                len(rows),
+                W.switch[: 1 + SPARE].copy(),
+                ways,
+                c.values,
+                here.lost,
+                getattr(here, "given", 0.0),
+                here.y.copy(),
+            )
         )
 
     def told(self, result: Result) -> None:
