@@ -106,7 +106,7 @@ def test_lock_and_release(layer):
     assert (hold.done, hold.lost) == (("locked A",), pytest.approx(9.0, abs=1e-9))
     assert hold.impulses["A.displacement"] == pytest.approx(-6.0, abs=1e-9)
     assert (hold.before["b.vx"], hold.after["b.vx"]) == pytest.approx((3.0, 0.0), abs=1e-9)
-    assert free.done == ("released A", "struck A: 4")
+    assert free.done == ("released A", "struck A: 4 N s")
     assert free.after["A.rate"] == pytest.approx(2.0, abs=1e-9)
     assert r.energy.drift < 1e-8
 

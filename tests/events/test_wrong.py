@@ -72,6 +72,13 @@ def test_what_is_true_all_along_does_not_become_true():
     assert r.events["again"].t == pytest.approx([5 / 12], abs=1e-9)
 
 
+def test_what_became_true_before_a_motion_goes_on_is_not_told_as_never():
+    m = arm(fb.Event("late", "t > 0.1"))
+    first = m.simulate(0.2, outputs=3)
+    assert first.events["late"].t == pytest.approx([0.1], abs=1e-12)
+    assert not [w for w in m.simulate(0.3, start=first, outputs=3).health.warnings if "never happened" in w]
+
+
 def test_a_file_tells_its_line(tmp_path: Path):
     path = tmp_path / "v.toml"
     arm().save(path)

@@ -33,7 +33,7 @@ def test_few_events_are_listed():
     found = by_name(m.simulate(0.9, outputs=10))
     assert found["events"].rows == (
         ("0.25", "half", "event", "on the way", ""),
-        ("0.5", "floor", "impact", "floor closes at 5, leaves at 2.5", "18.75"),
+        ("0.5", "floor", "impact", "floor closes at 5 m/s, leaves at 2.5 m/s", "18.75"),
     )
     assert "all-events" not in found
     (row,) = found["holding"].rows

@@ -26,7 +26,7 @@ class Stretch:
     rows : int
         How many output times; none is possible.
     switch : ndarray (5, ns)
-        Mode, what is held, lower and upper bounds of every switch (`Work.switch`).
+        Mode, what is held, lower and upper bounds of every switch, whether it was released (`Work.switch`).
     sigma : ndarray (ns,) or (ns, rows)
         The direction in which each acts.
     values : Values
@@ -84,13 +84,6 @@ class Stretches:
             out.append((slice(first, last), found))
             first = last
         return out
-
-    def changed(self) -> dict[str, float]:
-        """Parameters that events have set, as they were at the end."""
-        first, last = self.all[0].values, self.all[-1].values
-        if first is last:
-            return {}
-        return {k: x for k, x in last.given.env.items() if first.given.env.get(k) != x}
 
     def cut(self, rows: int) -> Stretches:
         """Those of the first so many output times."""

@@ -111,7 +111,10 @@ class ImpulseReactions(Reactions):
         """The same with rows and what was given."""
         result, s = self._result, self._result.values.structure
         W = self._inertial()
-        given = {slot: impulse for kind, slot, impulse, *_ in self._blows if kind == "along"}
+        given: dict[int, float] = {}
+        for kind, slot, impulse, *_ in self._blows:
+            if kind == "along":
+                given[slot] = given.get(slot, 0.0) + impulse
         for k, t in enumerate(s.terms):
             c = coefficient(result, k)
             effort = result.multipliers[:, t.row] if not t.measured else result.records.zeros()

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...equations.velocities import turned_angles
 from ...errors import ModelError
+from ...model.actions import Set
 from ...model.model import Model
 from ...results.records import wound
 from ...results.result import Result
@@ -79,11 +80,21 @@ def begin(
         If a body can move without inertia, or the earlier result is of another mechanism.
     """
     if before is not None and before.stretches is not None:
-        parameters = {**before.stretches.changed(), **(parameters or {})}
+        parameters = {**_set_by_events(model, before), **(parameters or {})}
     base = _base(model, t, parameters, before)
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base, inertia=True)
     return begin_at(base, parameters, coordinates, before, switches=switches)
+
+
+def _set_by_events(model: Model, before: Result) -> dict[str, float]:
+    """Parameters that events set in an earlier motion, or in one that it went on from, as they were at its end."""
+    assert before.stretches is not None
+    names = {a.parameter for e in model.events for a in e.do if isinstance(a, Set)}
+    if not names:
+        return {}
+    env, last = compiled(model).values.env, before.stretches.all[-1].values.env
+    return {k: float(last[k]) for k in sorted(names) if last.get(k, env[k]) != env[k]}
 
 
 def begin_at(

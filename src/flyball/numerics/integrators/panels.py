@@ -213,7 +213,7 @@ def passing(W, i):
                 W.g[SIDE, i] = s
                 return x, y
             s = side_of(f1)
-        elif s == 0.0:
+        elif s == 0.0 and (W.kept[i] == 0 or f1 > W.g[MARK, i]):
             s = side_of(f1)
         d = d1
     W.g[SIDE, i] = s
@@ -233,7 +233,7 @@ def jumping(W, i):
                 W.g[SIDE, i] = s
                 return W.nodes[j - 1], W.nodes[j]
             s = side_of(f)
-        elif s == 0.0:
+        elif s == 0.0 and (W.kept[i] == 0 or f > W.g[MARK, i]):
             s = side_of(f)
     W.g[SIDE, i] = s
     return 0.0, -1.0
@@ -316,7 +316,7 @@ def begins_near(callbacks, S, W, R, c, h):
         below = W.kept[i] == 1 and W.g[START, i] < 0.0
         if finite(low, high) and (below or now <= (NEAR if just else ROUNDING) * size):
             W.g[SIDE, i] = 0.0
-            W.g[MARK, i] = NOISE * now if just or below else ROUNDING * size
+            W.g[MARK, i] = max(NOISE * now if just or below else ROUNDING * size, W.kept[i] * NOISE * W.grain[i])
             near = True
     return near
 

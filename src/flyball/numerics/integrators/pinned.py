@@ -30,6 +30,7 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
     place where it has not fired yet, which the start need not be.
     """
     W.real[BEYOND] = 0.0
+    first, last = a, b
     status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     wide = b - a
     while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
@@ -39,6 +40,11 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
+    if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
+        b = last
+        status, a, fa = lowest(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
+        if status != 0 or not s * fa > 0.0:
+            return status, -1.0
     status, fb = true_guard(callbacks, S, W, R, c, h, b, i)
     if status != 0:
         return status, -1.0

@@ -156,7 +156,12 @@ def expressions(here: Here) -> dict[int, float]:
 
 
 def true_already(here: Here) -> list[str]:
-    """Titles of events whose comparisons are true now: they become true only after they were false."""
+    """Names of events whose comparisons are true now: they become true only after they were false.
+
+    None where a motion goes on: what is true there may have become true in what went before.
+    """
+    if here.start.before is not None:
+        return []
     every = here.structure.events
     texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
     values = expressions(here) if texts else {}
@@ -264,7 +269,8 @@ def _struck(here: Here, found: Found) -> Done:
         kick, blow = generalised(here, e, a, x[:n], x[n:])
         here.kick = kick if here.kick is None else here.kick + kick
         here.blows.append(blow)
-        told = [f"{_vector(x[:n])} N s" if n > 1 else f"{x[0]:g}"] if n else []
+        along = (_unit(here, e, a, "impulse") or "N*s").replace("*", " ")
+        told = [f"{_vector(x[:n])} {along}"] if n else []
         told += [f"{_vector(x[n:])} N m s"] if x[n:] else []
         out.append((e, f"struck {a.on}: {', '.join(told)}"))
     return out

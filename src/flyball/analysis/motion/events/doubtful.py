@@ -7,10 +7,15 @@ the impulses are the limit of a step of time that goes to zero (Stewart 2000, SI
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ....equations.instant import BLOWS, OF_A_STEP
+from ....model.touch import Touch
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
+from ....tables.system import GUARD_OF
+from ..jams import bodies
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing
 from .modes import Decided, elements
@@ -22,12 +27,26 @@ STRUCK = 1e3  # times the impulse that forces make in it: a blow
 
 
 def doubt(n: Instant, found: Decided) -> None:
-    """Say what is left open at this instant, once."""
+    """Say what is left open at this instant, of the same elements once in a motion."""
     if not found.gain.any():
         return
-    for said in (_several(n, found), _undetermined(n, found)):
-        if said and said not in n.here.doubts:
-            n.here.doubts.append(said)
+    if (said := _several(n, found)) and not any(x.endswith(said) for x in n.here.doubts):
+        n.here.doubts.append(f"at t = {n.here.t:.6g} s {said}")
+    if (said := _undetermined(n, found)) and said not in n.here.doubts:
+        n.here.doubts.append(said)
+
+
+def shared(n: Instant, guards: Sequence[int]) -> None:
+    """Say whose shares of what holds a body no guard watches: it holds by others than those that are computed."""
+    which = [n.here.structure.switches[s].element for s in dict.fromkeys(n.S.guard_i[list(guards), GUARD_OF].tolist())]
+    who = " and ".join(f"{e.title} of {bodies(e)}" if isinstance(e, Touch) else e.title for e in which)
+    said = (
+        f"{who} would carry more than can be held there by the least forces, by others it holds: how rigid bodies at "
+        f"rest share what holds them is not determined, and when this gives way can be wrong. Steps by impulses "
+        f"(method='impulse') share anew in each step"
+    )
+    if said not in n.here.doubts:
+        n.here.doubts.append(said)
 
 
 def _several(n: Instant, found: Decided) -> str:
@@ -39,7 +58,7 @@ def _several(n: Instant, found: Decided) -> str:
         if n.again(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
             who = " and ".join(elements(n, found.parts))
             return (
-                f"at t = {n.here.t:.6g} s rigid bodies with friction can go on in several ways (Painleve's paradox) at "
+                f"rigid bodies with friction can go on in several ways (Painleve's paradox) at "
                 f"{who}; taken: the one that goes on from the modes before"
             )
     return ""

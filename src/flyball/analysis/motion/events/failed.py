@@ -122,19 +122,6 @@ def no_forces(n: Instant, found: Decided) -> Unresolved:
     )
 
 
-def undetermined(n: Instant, guards: Sequence[int]) -> Unresolved:
-    """What must hold carries more than it can, by how redundant rows share; other shares might hold, or nothing."""
-    which = [n.here.structure.switches[s].element for s in dict.fromkeys(n.S.guard_i[list(guards), GUARD_OF].tolist())]
-    pairs = dict.fromkeys(f"{e.title} of {bodies(e)}" if isinstance(e, Touch) else e.title for e in which)
-    return Unresolved(
-        f"at t = {n.here.t:.9g} s {' and '.join(pairs)} would carry more than can be held there: how rigid "
-        f"bodies at rest share this among all that holds them is not determined, and no shares were found that all "
-        f"can hold. Fewer places that hold one body, or friction that gives way (stick_speed=, law=), have an answer; "
-        f"steps by impulses find one",
-        t=n.here.t,
-    )
-
-
 def no_end(t: float, names: list[str], rounds: int) -> Unresolved:
     """What happens at an instant has no end."""
     return Unresolved(

@@ -24,8 +24,8 @@ from ....tables.system import (
 from .actions import act, act_at_start
 from .apart import put_apart
 from .branches import Corners
-from .doubtful import doubt, shock
-from .failed import beyond, guard_names, no_end, no_forces, no_impulses, undetermined
+from .doubtful import doubt, shared, shock
+from .failed import beyond, guard_names, no_end, no_forces, no_impulses
 from .here import Here
 from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
@@ -154,7 +154,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         turned(n, hits)
         come_to_rest(n, found)
         n.arrive()
-        if jumped is not None and not jumped.closing.keys() <= here.crept:
+        if jumped is not None and (jumped.blows or jumped.given or not jumped.closing.keys() <= here.crept):
             tell_jump(n, jumped, before)
         guards = n.guards()
         if again < AGAIN and misled(n, guards):
@@ -164,8 +164,8 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         against = broken(n, found, guards)
         new = [g for g in against if g not in gone]
         if not new:
-            if against:  # it was let go, and is held again: what the forces of the whole do not share as the few did
-                raise undetermined(n, against)
+            if against:  # it was let go, and is held again: by other shares than the least
+                shared(n, against)
             if told:
                 tell_modes(n, (modes, ways), before, hits)
             return

@@ -97,7 +97,8 @@ class Instant:
         self.tables = Written(S), Written(self.W)
         self.engine = Bound(engine, *self.tables, Written(R), Written(self.desk), Written(self.sheet))
         self.asked = Written(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
-        self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in units(s)]
+        self.units = units(s)
+        self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in self.units]
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin
         self.inertia = np.array([mass if m else turning for m in metric])

@@ -64,7 +64,7 @@ class Run:
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
-        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i)
+        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
 

@@ -11,7 +11,7 @@ from ....equations.engine import MOTION
 from ....results.booked import booked
 from ....results.result import Result
 from ....results.stretches import Stretch, stretched
-from ....tables.system import HELD, MODE, OFF, SWITCH_ROW, VALUE
+from ....tables.system import HELD, MODE, OFF, SPARE, SWITCH_ROW, VALUE
 from .here import Here
 
 
@@ -30,13 +30,21 @@ class Segments:
             ways = _ways(here, rows)
         _quiet(here, rows)
         self.all.append(
-            Stretch(len(rows), W.switch.copy(), ways, c.values, here.lost, getattr(here, "given", 0.0), here.y.copy())
+            Stretch(
+                len(rows),
+                W.switch[: 1 + SPARE].copy(),
+                ways,
+                c.values,
+                here.lost,
+                getattr(here, "given", 0.0),
+                here.y.copy(),
+            )
         )
 
     def told(self, result: Result) -> None:
         """Give a result what held, and what events did to its energy, if anything can switch."""
         s = result.values.structure
-        if not s.switches and not s.guards:
+        if not s.switches and not s.guards and not s.model.events:
             return
         result.stretches = stretched(self.all)
         result.exchanged |= booked(result)

@@ -51,8 +51,11 @@ def tell_jump(n: Instant, jumped: Jump, before: np.ndarray) -> None:
     done: list[str] = []
     impulses: dict[str, float] = {}
     for s, (u, after) in jumped.closing.items():
-        goes = "stays" if s in jumped.even else f"leaves at {abs(after):.6g}"
-        done.append(f"{n.name(s)} closes at {abs(u):.6g}, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks")
+        unit = n.units[s]
+        goes = "stays" if s in jumped.even else f"leaves at {abs(after):.6g} {unit}/s"
+        done.append(
+            f"{n.name(s)} closes at {abs(u):.6g} {unit}/s, {goes}" if n.kind[s] != LOCK else f"{n.name(s)} locks"
+        )
     for s, x in jumped.impulse.items():
         if x != 0.0:
             impulses[n.name(s)] = impulses.get(n.name(s), 0.0) + x
