@@ -15,7 +15,9 @@ def ball(name, radius, position, velocity):
 
 
 @pytest.mark.parametrize("method", ["dop853", "rk45"])
-@pytest.mark.parametrize(("thick", "radius", "v", "end"), [(0.001, 0.01, 10, 1), (0.05, 0.05, 10, 2), (0.2, 0.1, 20, 2)])
+@pytest.mark.parametrize(
+    ("thick", "radius", "v", "end"), [(0.001, 0.01, 10, 1), (0.05, 0.05, 10, 2), (0.2, 0.1, 20, 2)]
+)
 def test_a_ball_does_not_fly_through_a_plate(method, thick, radius, v, end):
     for x in (-2, *np.random.default_rng(0).uniform(-4, 4, 12)):
         m = fb.Mechanism("plate", planar=True)

@@ -130,9 +130,9 @@ def hidden(W, i):
         steepest = max(steepest, abs(W.g[NODE + j, i] - W.g[NODE + j - 1, i]) / (W.nodes[j] - W.nodes[j - 1]))
     for j in range(1, NODES):
         f, g = W.g[NODE + j - 1, i], W.g[NODE + j, i]
-        if f * g > 0.0 and fires(W.way[i], side_of(f)):
-            if abs(f) + abs(g) <= REACH * steepest * (W.nodes[j] - W.nodes[j - 1]):
-                return True
+        near = abs(f) + abs(g) <= REACH * steepest * (W.nodes[j] - W.nodes[j - 1])
+        if near and f * g > 0.0 and fires(W.way[i], side_of(f)):
+            return True
     return False
 
 
