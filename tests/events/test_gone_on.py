@@ -111,3 +111,16 @@ def test_a_file_keeps_places_of_contact(case, tmp_path):
         assert np.array_equal(again[name], x, equal_nan=True), name
     assert len(again.report()) > 10_000
     assert again.plot(*CASES[case][3].split()) is not None
+
+
+@pytest.mark.parametrize("cut", [1.0, 1.9999999999999933, 2.0, 2.0000009999999935, 2.2, 2.5, 2.75, 2.75 + 1e-9])
+def test_a_ball_cut_anywhere_bounces_on(cut):
+    """Of 5 m height, g = 10 and e = 0.5 the bounces are at 1, 2, 2.5, 2.75, ... s: a step ends on one to rounding."""
+    m = fb.Mechanism("drop", planar=True, gravity=(0, -10))
+    m.add(fb.Body("b", mass=1, inertia=1, position=(0, 5)), fb.Limit("L", "b.y", lower=0, restitution=0.5))
+    first = m.simulate(cut, rtol=1e-9)
+    second = m.simulate(3.2, start=first, rtol=1e-9)
+    hits = [e.t for run in (first, second) for e in run.events if e.kind == "impact"]
+    assert hits[:8] == pytest.approx(3 - 2.0 ** (1 - np.arange(8.0)), abs=1e-9)
+    assert second["b.y"].min() > -1e-9
+    assert second["b.y"][-1] == pytest.approx(0.0, abs=1e-12)

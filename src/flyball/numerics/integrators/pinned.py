@@ -58,7 +58,8 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
             a, fa = m, fm
     if a > 0.0 and W.g[START, i] * fa < 0.0:
         W.real[BEYOND] = a
-    return bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
+    status, x = bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
+    return status, max(x, CLOSE)  # one within rounding of the step's start is an event too
 
 
 @formula

@@ -54,10 +54,12 @@ class Legs:
         self.aim()
 
     def passed(self) -> None:
-        """Go on with the next one where nothing is left of this one."""
+        """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
         real = self.clock.real
-        while self.at < len(self.times) and real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
-            self.next()
+        while real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+            if not self.next():
+                real[ex.T] = real[ex.T_END]
+                break
 
     def aim(self) -> None:
         """Have the clock run to the end of the stretch."""

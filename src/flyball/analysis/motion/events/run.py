@@ -19,7 +19,18 @@ from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
 from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
-from ....tables.system import G_BACK, G_CONE, G_CORNER, G_HOLDS, G_LOWER, G_PULL, G_UPPER, GUARD_KIND, GUARD_OF
+from ....tables.system import (
+    G_BACK,
+    G_CONE,
+    G_CORNER,
+    G_HOLDS,
+    G_LOWER,
+    G_PULL,
+    G_UPPER,
+    GUARD_KIND,
+    GUARD_OF,
+    SWITCH_MEASURED,
+)
 from ...progress import Tell
 from ..engines import Engine
 from .actions import expressions, say_never, stepped_over, true_already
@@ -35,6 +46,7 @@ ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
 DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
+HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
 HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
@@ -162,11 +174,21 @@ class Run:
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
-        guards = here.c.system.guard_i
         if self.loop is not None and self.loop.desk.count[AWAY]:
-            here.crept = frozenset(int(guards[g, GUARD_OF]) for g in fired if guards[g, GUARD_KIND] in DISTANCES)
+            here.crept = self.crept(self.loop)
         self.happens(fired)
         here.crept = frozenset()
+
+    def crept(self, loop: Watched) -> frozenset[int]:
+        """Stops that what stood at them has crept past: at the step's begin it hardly moved; what did hits them."""
+        S, out = self.here.c.system, set()
+        for g in loop.fired:
+            kind, s = S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
+            if kind in DISTANCES:
+                before, now = np.abs(loop.desk.moving[:, 1, S.switch_i[s, SWITCH_MEASURED]])
+                if before <= HARDLY * now:
+                    out.add(s)
+        return frozenset(out)
 
     def happens(self, fired: Sequence[int]) -> None:
         """What happens where these guards fired."""
