@@ -17,7 +17,7 @@ SHORT = 0.1  # [s]: small differences grow
 
 def ran(m: fb.Mechanism, t_end: float, wish: bool, **options):
     try:
-        return m.simulate(t_end, outputs=5, specialize=wish, progress=False, **options), ""
+        return m.simulate(t_end, specialize=wish, progress=False, **{**options, "outputs": 5}), ""
     except fb.SimulationError as error:
         return error.result, re.sub(r"[\d.e+-]+", "", str(error))[:40]
 

@@ -59,7 +59,7 @@ def test_the_bar_of_the_page_tells_and_goes_there(run, browser, tmp_path):
     run.events = few()
     assert [m.t for m in record(run).marks] == [0.2, 0.6]
     run.to_html(tmp_path / "page.html")
-    page = Opened(browser, (tmp_path / "page.html").as_uri())
+    page = Opened(browser, (tmp_path / "page.html").as_uri() + "#t=0")
     ticks = page.tab.locator(".bar .event")
     assert ticks.count() == 2
     assert ticks.nth(0).get_attribute("title") == "open, hit, 0.2 s"
