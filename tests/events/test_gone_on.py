@@ -119,7 +119,7 @@ def test_a_ball_cut_anywhere_bounces_on(cut):
     m = fb.Mechanism("drop", planar=True, gravity=(0, -10))
     m.add(fb.Body("b", mass=1, inertia=1, position=(0, 5)), fb.Limit("L", "b.y", lower=0, restitution=0.5))
     first = m.simulate(cut, rtol=1e-9)
-    second = m.simulate(3.2, start=first, rtol=1e-9)
+    second = m.simulate(3.0, start=first, rtol=1e-9)  # what is left is halved: steps end on bounces
     hits = [e.t for run in (first, second) for e in run.events if e.kind == "impact"]
     assert hits[:8] == pytest.approx(3 - 2.0 ** (1 - np.arange(8.0)), abs=1e-9)
     assert second["b.y"].min() > -1e-9

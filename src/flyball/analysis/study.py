@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import AnalysisError, FlyballError, ModelError, StartWarning
 from ..model.model import Model
 from ..model.words import listing, suggest
-from ..results.study import Study
+from ..results.study import WAITING, Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
 from .motion.choice import IMPULSE, SimulateOptions
@@ -28,7 +28,7 @@ from .motion.options import output_times
 from .motion.start import start_time
 from .options import count
 from .progress import shown
-from .runs.compute import TODO, Question
+from .runs.compute import Question
 from .runs.designs import DESIGNS, SAMPLED, points
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
@@ -147,7 +147,7 @@ def _decided(question: Question, found: Study) -> Question:
 
 def _made_code_pays(question: Question, found: Study) -> bool:
     """Whether code for this mechanism pays, by what the first run that does not fail computes."""
-    todo = np.flatnonzero(found.status == TODO)
+    todo = np.flatnonzero(found.status == WAITING)
     for k in todo[:TRIED]:
         try:
             run = simulate(question.model, replace(question.at(found.points[k]), specialize=False))
@@ -165,7 +165,7 @@ def _run(question: Question, found: Study, o: StudyOptions, tell: Any) -> None:
     AnalysisError
         If the executor fails; the file holds what was done by then.
     """
-    todo = np.flatnonzero(found.status == TODO)
+    todo = np.flatnonzero(found.status == WAITING)
     if not len(todo):
         return
     answers = question.empty(0)
@@ -177,7 +177,8 @@ def _run(question: Question, found: Study, o: StudyOptions, tell: Any) -> None:
             for at, part in parts:
                 answers.take(at, part)
                 tell(
-                    float((found.status != TODO).sum()) / total, f"{int((found.status != TODO).sum())} of {total} runs"
+                    float((found.status != WAITING).sum()) / total,
+                    f"{int((found.status != WAITING).sum())} of {total} runs",
                 )
                 if o.file is not None and time.monotonic() - saved > EVERY:
                     save_study(found, o.file)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
     from .result import Result
 
-TODO, DONE, FAILED = 0, 1, 2
+WAITING, DONE, FAILED = 0, 1, 2
 TOLD = 6  # reasons in a text
 NO_CROSS = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
 
@@ -95,7 +95,7 @@ class Study:
     @property
     def complete(self) -> bool:
         """Whether no run is still to be done."""
-        return bool((self.status != TODO).all())
+        return bool((self.status != WAITING).all())
 
     @property
     def shape(self) -> tuple[int, ...]:

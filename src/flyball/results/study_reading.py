@@ -16,7 +16,7 @@ from ..model.io import dumps
 from ..model.model import Model
 from .files import GROUP, sealed
 from .result import Result
-from .study import TODO, Study
+from .study import WAITING, Study
 from .study_file import FORMAT, TIME, safe
 
 REMEDY = "give a file that a study with file= or Study.save wrote"
@@ -97,6 +97,6 @@ def _read(path: Path) -> Study:
         told[name] = tuple(told[name])
     for name in ("reasons", "remarks"):
         told[name] = {int(k): x for k, x in told[name].items()}
-    if (status == TODO).any() and not told["message"]:
+    if (status == WAITING).any() and not told["message"]:
         told["message"] = "it ended before all runs were done"
     return Study(points=np.column_stack(columns), axes=tuple(axes), t=t, values=values, status=status, **told)

@@ -10,11 +10,10 @@ import numpy as np
 
 from ...errors import FlyballError, SimulationError
 from ...model.model import Model
+from ...results.study import DONE, FAILED
 from ..motion.choice import SimulateOptions
 from ..simulate import simulate
 from .reading import CURVE, Reading, read
-
-TODO, DONE, FAILED = 0, 1, 2
 
 
 @dataclass(frozen=True)
