@@ -101,3 +101,13 @@ def test_sensors_name_curves_that_results_have():
     r = m.simulate(0.1, outputs=3)
     for e in m.elements():
         assert list(r[e.name].channels()) == [k for k, x in quantities(m, e.name).items() if x.curve], e.name
+
+
+@pytest.mark.parametrize(
+    ("table", "kind", "right"), [("forces", "Ratchet", "limits"), ("joints", "GearPair", "couplings")]
+)
+def test_a_type_in_the_wrong_table_is_told_the_right_one(tmp_path, table, kind, right):
+    path = tmp_path / "wrong.toml"
+    path.write_text(f'name = "wrong"\n[[{table}]]\ntype = "{kind}"\nname = "x"\n', encoding="utf-8")
+    with pytest.raises(fb.ModelError, match=rf"'x' .*a {kind} stands in a table \[\[{right}\]\]"):
+        fb.load(path)

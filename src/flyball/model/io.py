@@ -303,8 +303,16 @@ def _kind(category: str, fields: dict[str, Any], where: str) -> type[Element]:
         return Touch
     if name not in known:
         problem = "it has no type" if name is None else f"unknown type {name!r}{suggest(str(name), known)}"
-        raise ModelError(f"{where}: {problem}; {category} are {', '.join(known)}")
+        raise ModelError(f"{where}: {_elsewhere(name) or problem}; {category} are {', '.join(known)}")
     return Element.registry[name]
+
+
+def _elsewhere(name: Any) -> str:
+    """In which table a type stands, if there is one for it."""
+    for _, room in MANY_KINDS.values():
+        importlib.import_module(f"..{room}", __package__)
+    kind = Element.registry.get(str(name))
+    return f"a {name} stands in a table [[{kind.category}]]" if kind and kind.category in MANY_KINDS else ""
 
 
 def _refuse(error: Exception, where: str) -> NoReturn:
