@@ -139,7 +139,7 @@ def moved(
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
-        loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
+        loop = Implicit(c, clock, _width(begun.assembly), o.step or 0.0)
         rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
         here.failed = loop.failed
     elif watched(begun) or len(known.times):
@@ -196,7 +196,8 @@ def clock_for(
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
     real[ex.SPAN] = (t_end - t) or 1.0
-    real[ex.H_MAX] = min(o.max_step, t_end - t)
+    real[ex.H] = real[ex.STEP] = o.step or 0.0
+    real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
