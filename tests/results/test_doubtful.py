@@ -23,12 +23,12 @@ def coupled() -> fb.Mechanism:
 
 @pytest.mark.parametrize("method", ["dop853", "rk45"])
 def test_a_stiff_motion_at_a_rough_tolerance(method):
-    """It comes out off by five times its tolerance and more, soon by as much as it is long, and nothing is raised."""
+    """It comes out off by as much as it moves, and nothing is raised."""
     m = coupled()
-    exact = m.simulate(0.3, outputs=11, method="radau", rtol=1e-8)
+    exact = m.simulate(2.0, outputs=11, method="radau", rtol=1e-8)
     assert not exact.health.doubtful
-    rough = m.simulate(0.3, outputs=11, method=method, rtol=1e-2)
-    assert np.abs(rough["crank"].angular_velocity - exact["crank"].angular_velocity).max() > 0.05
+    rough = m.simulate(2.0, outputs=11, method=method, rtol=1e-2)
+    assert np.abs(rough["crank"].angular_velocity - exact["crank"].angular_velocity).max() > 1.0
     (text,) = rough.health.doubtful
     assert text.startswith("the energy balance is off by ")
     assert rough.health.status == "done, but doubtful"
