@@ -103,6 +103,7 @@ class CompareOptions(Options):
             alpha=rates[0],
             beta=rates[1],
             step=None,
+            rho_inf=None,
         )
 
 

@@ -30,7 +30,8 @@ from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.loop import Implicit, run_implicit
+from .motion.implicit.loop import run_implicit
+from .motion.implicit.made import implicit
 from .motion.implicit.suited import IMPLICIT, explicit, suited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
@@ -82,7 +83,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     """The motion by a method that is chosen: start, end, output times."""
     started = time.perf_counter()
     t_start, _, times = span
-    announce_motion(model, not isinstance(o.method, Stepping), o.method in IMPLICIT)
+    announce_motion(model, not isinstance(o.method, Stepping), o.method)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
@@ -93,7 +94,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
-        begun = suited(begun, o.coordinates, o.parameters)
+        begun = suited(begun, str(o.method), o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
@@ -101,7 +102,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     made = False if o.method in IMPLICIT else o.specialize
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
-        begun.engine.told = f"{TABLES}: {IMPLICIT[0]} goes through the tables"
+        begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -139,7 +140,7 @@ def moved(
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
-        loop = Implicit(c, clock, _width(begun.assembly), o.step or 0.0)
+        loop = implicit(c, clock, _width(begun.assembly), o)
         rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
         here.failed = loop.failed
     elif watched(begun) or len(known.times):
