@@ -140,11 +140,11 @@ def moved(
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
-        loop = implicit(c, clock, _width(begun.assembly), o)
-        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
+        loop = implicit(c, clock, width(begun.assembly), o)
+        rows, interrupted = run_implicit(loop, width(begun.assembly), known, tell)
         here.failed = loop.failed
     elif watched(begun) or len(known.times):
-        rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
+        rows, interrupted = run_events(here, tableau(explicit(o.method)), width(begun.assembly), tell, engine, known)
     else:
         rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
     if task == INTEGRATE:
@@ -192,7 +192,7 @@ def clock_for(
     ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
     """
     a, y = start.assembly, start.y
-    refuse_unheld(len(times), _width(a))
+    refuse_unheld(len(times), width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
@@ -234,7 +234,7 @@ def energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + fast * fast) + moving)
 
 
-def _width(a: Assembly) -> int:
+def width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
     return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
@@ -248,8 +248,8 @@ def run_clock(
     ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
     """
     c, engine = a.compiled, engine or Engine(a.compiled, False)
-    s, width = c.structure, _width(a)
-    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
+    s, wide = c.structure, width(a)
+    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
     rows = []
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
@@ -274,6 +274,6 @@ def run_clock(
                 forget(c.work.stack)
             clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:
-        return np.concatenate(rows) if rows else np.zeros((0, width)), True
+        return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:
         engine.end()

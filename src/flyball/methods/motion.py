@@ -98,8 +98,8 @@ class Motions(Model):
             Steps of this width, whose errors are then not looked at; one ends early at an event, the next begins there.
             ``rtol`` is then how exactly the equations of a step are solved.
         rho_inf : float [1], optional
-            Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if not
-            given. 1 damps nothing.
+            Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if
+            not given. 1 damps nothing.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.
@@ -160,6 +160,7 @@ class Motions(Model):
         parameters: Mapping[str, float | str] | None = None,
         start: Result | None = None,
         method: str = "dop853",
+        step: float | str | None = None,
         rtol: float = 1e-7,
         atol: float | None = None,
         max_step: float | str = math.inf,
@@ -184,7 +185,9 @@ class Motions(Model):
             Number of times at which drift and energy are looked at, or the times themselves.
         formulations : sequence of str, optional
             Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
-            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default.
+            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Besides methods that
+            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3`` and
+            ``generalised-alpha index 3``.
         repeats : int
             Times that each is run for its cost, fewer where that takes long; 0 for none.
         parameters : mapping, optional
@@ -193,6 +196,8 @@ class Motions(Model):
             Go on from where this result ended.
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
+        step : float or str [s], optional
+            Width of steps of ``radau``, which chooses it by itself if none is given, and ``generalised-alpha``.
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
         atol : float [m, rad, m/s, rad/s], optional

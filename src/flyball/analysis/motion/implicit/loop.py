@@ -48,9 +48,7 @@ class Implicit:
         Whether velocities are not held to the constraints.
     """
 
-    def __init__(
-        self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0, index_3: bool = False
-    ) -> None:
+    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0, index_3: bool = False) -> None:
         refuse_functions(c.structure)
         s, S = c.structure, c.system
         self.c, self.clock = c, clock

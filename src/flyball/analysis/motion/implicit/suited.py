@@ -37,7 +37,8 @@ def refuse_idle(o: Any) -> None:
     if o.stabilization not in ("projection", "none"):
         raise ModelError(
             f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
-            f"velocities on the constraints itself; leave it out, or give 'none', and it keeps positions alone (index 3)"
+            f"velocities on the constraints itself; leave it out, or give 'none', and it keeps positions alone "
+            f"(index 3)"
         )
     if o.specialize is True:
         raise ModelError(
@@ -61,8 +62,8 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
         names = [x.title for x in s.model.events] + [x.element.title for x in s.switches]
         what = ", ".join(dict.fromkeys(names)) or "what switches"
         raise ModelError(
-            f"method={method!r} does not know events, nor what holds at times and lets go at others: {what}; leave method "
-            f"out, or give method='dop853'"
+            f"method={method!r} does not know events, nor what holds at times and lets go at others: {what}; leave "
+            f"method out, or give method='dop853'"
         )
     _refuse_open_loads(begun, method)
     if not s.tree or wish == "absolute":
@@ -70,8 +71,8 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
     if s.prescribed:
         if wish == "joint":
             raise ModelError(
-                f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as they "
-                f"are in joint coordinates: leave coordinates out"
+                f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as "
+                f"they are in joint coordinates: leave coordinates out"
             )
         why = "drivers' coordinates are rows in an implicit method"
     elif wish == "auto" and (groups := _groups(begun)) > FEW:

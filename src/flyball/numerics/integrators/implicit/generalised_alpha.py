@@ -17,14 +17,30 @@ from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ...lu import lu_factor
 from ..clock import ASIDE, ASIDE_RATE, NEW, NOW, STEP, T
-from .desk import BEFORE, FACTORS, FRESH, ITERATIONS, JACOBIANS, LAST_H, LEAST, NEWTON, ROUGH, START, THETA, WHOLE, WIDTH
-from .even import account, refuse
+from .desk import (
+    BEFORE,
+    FACTORS,
+    FRESH,
+    ITERATIONS,
+    JACOBIANS,
+    LAST_H,
+    LEAST,
+    NEWTON,
+    ROUGH,
+    START,
+    THETA,
+    WHOLE,
+    WIDTH,
+)
+from .even import account
 from .even import enter as enter_step
-from .hermite import D_RATE, END, V_RATE, V_RATE_END, between
+from .hermite import D_RATE, END, V_RATE, V_RATE_END
 from .newton import solve
 from .step import begin as tolerances
 
-ALGORITHMIC, TRUE, NEXT_ONE, RATE = range(4)  # rows of past: a and v' where the step begins; a at its end; v'' at a start
+ALGORITHMIC, TRUE, NEXT_ONE, RATE = range(
+    4
+)  # rows of past: a and v' where the step begins; a at its end; v'' at a start
 AHEAD = 1e-3  # part of a step over which the rate of accelerations is found at a start
 MOST, MOST_WHOLE = 10, 25  # iterations: with one Jacobian, and with that of each
 FALLS = 0.5  # what corrections fall by at least, or each iteration has its own Jacobian
@@ -245,4 +261,3 @@ def enter(K, c, t, h, error, asked):
     K.count[BEFORE], K.real[LAST_H] = 1, h
     K.count[FRESH] = 0 if K.real[THETA] <= SERVES else -1
     enter_step(c, t)
-
