@@ -6,7 +6,9 @@ from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..math.scalar import atan, sqrt
 from ..numerics.integrators.implicit import fixed
-from ..numerics.integrators.implicit.generalised_alpha import attempt, between, enter, refuse
+from ..numerics.integrators.implicit.even import refuse
+from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
+from ..numerics.integrators.implicit.hermite import between
 from .implicit import PLAN, TURNS, arrive, compose, inspect, linearise, missed, powers, report, turned
 
 SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
@@ -38,7 +40,8 @@ def residual(t, k, A, K, c):
     status = missed(t, k, A, K, c)
     for i in range(K.v.shape[1]):
         K.out[k, i] = K.dd[k, i] - K.out[k, i]
-    powers(A, K, k)
+    if status == 0:
+        powers(A, K, k)
     return status
 
 

@@ -38,9 +38,8 @@ from .hermite import D_RATE, END, V_RATE, V_RATE_END
 from .newton import solve
 from .step import begin as tolerances
 
-ALGORITHMIC, TRUE, NEXT_ONE, RATE = range(
-    4
-)  # rows of past: a and v' where the step begins; a at its end; v'' at a start
+# rows of past: a and v' where the step begins; a at its end; v'' at a start
+ALGORITHMIC, TRUE, NEXT_ONE, RATE = range(4)
 AHEAD = 1e-3  # part of a step over which the rate of accelerations is found at a start
 MOST, MOST_WHOLE = 10, 25  # iterations: with one Jacobian, and with that of each
 FALLS = 0.5  # what corrections fall by at least, or each iteration has its own Jacobian
