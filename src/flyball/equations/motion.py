@@ -48,6 +48,7 @@ from ..tables.system import (
     WORST_V,
     X_SOLVED,
 )
+from .control import control
 from .dispatch import progress, remember
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .loads import efforts, forces, gather, inertial
@@ -167,6 +168,7 @@ def loaded(S, W, t, p, work):
     if W.info[MADE + LOADS] != 0:
         run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
         return
+    control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
     inertial(S, W)
     forces(S, W, t, work)
     gather(S, W, W.vel[F_APPLIED])
