@@ -35,7 +35,7 @@ def test_fields_of_a_pid(fields, said):
 
 def test_names():
     lag = fb.Lag("lag", of="1", time=1)
-    with pytest.raises(fb.ModelError, match="Lag 'lag' has no signal 'out'.*; it has output, input, value"):
+    with pytest.raises(fb.ModelError, match=r"Lag 'lag' has no signal 'out'.*; it has output, input, value"):
         slide(lag, force="lag.out")
     two = fb.StateSpace("K", inputs=["1"], D=[[1], [2]])
     with pytest.raises(fb.ModelError, match=r"has several outputs; name one: K\.output1, K\.output2"):
