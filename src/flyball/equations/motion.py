@@ -139,6 +139,7 @@ def balance(S, W, t, p, work, factored):
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
+        control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
         loaded(S, W, t, p, work)
         if (
             factored == OLD
@@ -168,7 +169,6 @@ def loaded(S, W, t, p, work):
     if W.info[MADE + LOADS] != 0:
         run(W.info[MADE + LOADS], S, W, t, p, work, p, work)
         return
-    control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
     inertial(S, W)
     forces(S, W, t, work)
     gather(S, W, W.vel[F_APPLIED])
