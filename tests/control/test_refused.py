@@ -68,7 +68,7 @@ def test_names():
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
         lambda m: m.symbolic(),
-        lambda m: m.sensitivity(["A.displacement"], ["k"], times=[0, 1]),
+        lambda m: m.sensitivity(["A.displacement"], ["k"]),
         lambda m: m.simulate(1, method="radau"),
         lambda m: m.simulate(1, method="impulse"),
     ],
