@@ -204,7 +204,7 @@ def clock_for(
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]

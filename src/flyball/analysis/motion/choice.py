@@ -117,6 +117,10 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
     if o.method == AUTO:
         return _suitable(model, o)
     touch = bool(model.contacts or model.bulk)
+    if o.method in IMPLICIT and model.controllers:
+        raise ModelError(
+            f"method={o.method!r} does not know {model.controllers[0].title}; the explicit methods do: leave method out"
+        )
     if not isinstance(o.method, Stepping) and o.method != IMPULSE:
         if model.bulk:
             raise ModelError(
@@ -166,7 +170,7 @@ def _suitable(model: Model, o: SimulateOptions) -> Way:
 
 def _smooth(model: Model) -> list[str]:
     """What steps by impulses do not know."""
-    return [e.title for e in (*model.events, *smooth_only(model))]
+    return [e.title for e in (*model.events, *model.controllers, *smooth_only(model))]
 
 
 def _given(o: SimulateOptions) -> list[str]:
