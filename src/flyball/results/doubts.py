@@ -18,7 +18,7 @@ FEW, EACH = (
     10.0,
     0.1,
 )  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
-FINE = 1e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
+FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
