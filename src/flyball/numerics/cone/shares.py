@@ -32,7 +32,7 @@ class Shares(NamedTuple):
     ``D[c, i, 0]`` is what q, a, b (i = 0, 1, 2) of cell c are at y = 0, ``D[c, i, 1:]`` how they follow y.
     """
 
-    count: np.ndarray  # (2,)
+    count: np.ndarray  # type: ignore[assignment]  # (2,)
     D: np.ndarray  # (cells, 3, 1 + n): each divided by the w of its cell
     y: np.ndarray  # (n + 1,): the y found, and s
     now: np.ndarray  # (cells, 3): q, a, b there, less s
