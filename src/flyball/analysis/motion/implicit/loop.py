@@ -8,7 +8,7 @@ import numpy as np
 
 from ....equations import residual
 from ....equations.engine import Sheet, engine
-from ....equations.implicit import Plan, implicit_kernel
+from ....equations.implicit import SIZES, Plan, implicit_kernel
 from ....equations.residual import Bench
 from ....errors import SimulationError
 from ....laws.breaks import Breaks
@@ -25,9 +25,11 @@ from ...progress import Tell
 from ..events.legs import Legs
 from .layout import layout, metric
 
-SOFT = 1e-10  # regularisation of rows, as part of their natural size
+SOFT, SOFTER = 1e-10, 1e-8  # regularisation of rows, as part of their natural size; where forces depend on multipliers
 SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if they do not fall: where errors of steps
 # are looked at, and where they are not
+CHEAP, DEAR, FEW = 1e-3, 0.1, 12  # rates of the iteration up to which a Jacobian serves on, where it takes few
+# evaluations and where it takes more
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 LONGEST = 100_000  # steps in one call of the compiled loop
 
@@ -103,8 +105,10 @@ class Implicit:
         near = min(0.03, real[ds.RTOL] ** 0.5) if step == 0.0 else 0.01
         real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / real[ds.RTOL], near)
         real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / real[ds.RTOL])
-        real[ds.STEP], real[ds.SOFT] = step, SOFT
+        real[ds.STEP], real[ds.SOFT] = step, SOFTER if len(x.pressing) else SOFT
+        real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
         count = np.zeros(ds.COUNTS, np.int64)
+        count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
         count[ds.LEAST] = 2 if len(self.c.system.angle_i) else 1
         count[ds.INDEX_3] = int(x.index_3)
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))

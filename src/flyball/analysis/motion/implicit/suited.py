@@ -65,7 +65,8 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
             f"method={method!r} does not know events, nor what holds at times and lets go at others: {what}; leave "
             f"method out, or give method='dop853'"
         )
-    _refuse_open_loads(begun, method)
+    if method != RADAU:
+        _refuse_open_loads(begun, method)
     if not s.tree or wish == "absolute":
         return begun
     if s.prescribed:

@@ -49,7 +49,7 @@ from ..clock import (
 )
 from ..explicit import width
 from ..refusal import afresh
-from .desk import BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RATE, RTOL, START, STEP, THETA, WIDTH
+from .desk import BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RATE, RTOL, SERVES, START, STEP, THETA, WIDTH
 from .newton import factor
 from .step import MOST, begin, between, defect, estimate, iterate, predict
 from .whole import iterate_whole
@@ -57,7 +57,6 @@ from .whole import iterate_whole
 SAFETY = 0.9
 WIDEST, NARROWEST = 8.0, 0.2  # what the width changes by at most
 KEPT = 1.2  # a step that could be wider by this is not: the factors serve on
-SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 FIRST = 1e-4  # part of the time span that is tried first
 WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
 FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is so much narrower, if it is no rounding
@@ -93,7 +92,7 @@ def start(callbacks, S, K, c, out, used):
         c.count[NEXT] += 1
     K.count[FRESH] = K.count[BEFORE] = 0
     K.real[WIDTH] = 0.0
-    K.real[RATE], K.real[THETA] = 1.0, SURE
+    K.real[RATE], K.real[THETA] = 1.0, K.real[SERVES]
     K.real[LAST_ERROR] = 0.0
     c.real[GROW] = WIDEST
     c.real[EXCESS] = 1.0
@@ -266,7 +265,7 @@ def enter(K, c, t, h, error, iterations):
     K.real[LAST_H] = h
     K.real[LAST_ERROR] = max(1e-2, error)
     K.count[BEFORE] = 1
-    K.count[FRESH] = 0 if K.real[THETA] <= SURE else -1
+    K.count[FRESH] = 0 if K.real[THETA] <= K.real[SERVES] else -1
     if K.count[FRESH] == 0 and h <= wide <= KEPT * h:
         wide = h
     c.real[WIDE] = max(h, 0.8 * c.real[WIDE])
