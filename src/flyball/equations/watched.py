@@ -15,7 +15,7 @@ from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
-from ..numerics.integrators.watching import STAGE, START, watching
+from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, STAGE, START, watching
 from ..tables.system import BIAS, GUARD_KIND, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
 from .engine import Sheet, engine
 from .guards import KEPT, grains
@@ -132,7 +132,10 @@ def note(A, K, row):
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     guards(S, W, A[OWN].real[T], K.g[row])
-    grains(S, W, K.grain)
+    grain = GRAIN_START if row == START else GRAIN_END
+    grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.g[grain])
+    for i in range(K.grain.shape[0]):
+        K.grain[i] = K.g[grain, i] if K.kept[i] == 1 else min(K.g[GRAIN_START, i], K.g[grain, i])
 
 
 @formula

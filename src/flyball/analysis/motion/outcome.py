@@ -74,6 +74,7 @@ def outcome(
         "warnings": partial(doubts.warnings, result),
     }
     result.events = here.records
+    result.counted = dict(here.counts)
     if here.seen is not None:
         here.seen.told(result)
         result.contacts = contacts(result)
