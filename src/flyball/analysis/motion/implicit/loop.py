@@ -44,13 +44,15 @@ class Implicit:
         Of a row of output.
     step : float
         Fixed width of steps [s]; 0: adaptive.
+    index_3 : bool
+        Whether velocities are not held to the constraints.
     """
 
-    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0) -> None:
+    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0, index_3: bool = False) -> None:
         refuse_functions(c.structure)
         s, S = c.structure, c.system
         self.c, self.clock = c, clock
-        self.layout = layout(s, S)
+        self.layout = layout(s, S, index_3)
         ny = clock.y.shape[1]
         y = clock.y[ex.NOW].copy()
         x = self.layout
@@ -104,6 +106,7 @@ class Implicit:
         real[ds.STEP], real[ds.SOFT] = step, SOFT
         count = np.zeros(ds.COUNTS, np.int64)
         count[ds.LEAST] = 2 if len(self.c.system.angle_i) else 1
+        count[ds.INDEX_3] = int(x.index_3)
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P
