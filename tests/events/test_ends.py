@@ -120,7 +120,9 @@ def test_what_comes_often_and_ends_is_not_refused():
 )
 def test_events_that_accumulate_are_named_soon(when, at):
     """The n-th is at 0.3 - 1 / (2 pi n): none before the 8192nd is left out, and where they accumulate is told."""
-    with pytest.raises(fb.SimulationError, match=r"Event 'e' has happened 8192 times.*without end before t = 0.3 s") as e:
+    with pytest.raises(
+        fb.SimulationError, match=r"Event 'e' has happened 8192 times.*without end before t = 0.3 s"
+    ) as e:
         chirp(when, **at).simulate(0.5, outputs=2)
     found = e.value.result.events.t
     assert found == pytest.approx(0.3 - 1 / (2 * np.pi * np.arange(1, len(found) + 1)), abs=1e-11)

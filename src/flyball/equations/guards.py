@@ -124,7 +124,7 @@ def distance(S, x, rate):
 
 @formula
 def grains(S, W, t, trial, out):
-    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,): of distances, rates, forces, laws.
+    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
 
     ``trial`` is scratch of the shape of ``W.sensed``.
     """
