@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from itertools import pairwise
 
 MANY = 8192  # times that one has happened, at least
 RATIOS = 4  # of these that are the same
@@ -44,10 +45,10 @@ class Counts:
 
 def limit(past: list[float]) -> float:
     """The limit of times whose distances shrink by a steady ratio, infinite where they do not."""
-    between = [b - a for a, b in zip(past[-RATIOS - 2 : -1], past[-RATIOS - 1 :], strict=True)]
+    between = [b - a for a, b in pairwise(past[-RATIOS - 2 :])]
     if len(between) <= RATIOS or min(between) <= 0.0:
         return math.inf
-    ratios = [b / a for a, b in zip(between[:-1], between[1:], strict=True)]
+    ratios = [b / a for a, b in pairwise(between)]
     if max(ratios) > LESS or max(ratios) > STEADY * min(ratios):
         return math.inf
     return past[-1] + between[-1] * ratios[-1] / (1.0 - ratios[-1])
