@@ -72,6 +72,7 @@ def outcome(
         "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
+        "doubtful": partial(doubts.doubtful, result),
     }
     result.events = here.records
     result.counted = dict(here.counts)
