@@ -73,7 +73,7 @@ def heading(S, W, sensed, s):
 
 @formula
 def begins(S, way, velocity, square):
-    """The same of what has just begun to slide: d ~ velocity + c exp(-(speed / c)^2) way, c = FIRST lengths a second."""
+    """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths a second."""
     first = FIRST * S.glob[LENGTH]
     c = first * exp(-square / (first * first)) / FRESH
     a, b = velocity[0] + c * way[0], velocity[1] + c * way[1]
