@@ -30,7 +30,6 @@ from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.loop import Implicit, run_implicit
 from .motion.implicit.suited import IMPLICIT, explicit, suited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
@@ -138,12 +137,8 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if task == INTEGRATE and o.method in IMPLICIT:
-        loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
-        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
-        here.failed = loop.failed
-    elif watched(begun) or len(known.times):
-        rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times)):
+        rows, interrupted = run_events(here, o.method, _width(begun.assembly), tell, engine, known)
     else:
         rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
     if task == INTEGRATE:
@@ -200,6 +195,7 @@ def clock_for(
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
+    real[ex.STEP] = getattr(o, "step", None) or 0.0
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
     count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq

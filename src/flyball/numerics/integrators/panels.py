@@ -268,7 +268,7 @@ def begin_sides(callbacks, S, W, R, c, h):
     on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
     soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
     """
-    look, t, ng = callbacks[5], c.real[T], W.way.shape[0]
+    look, t, ng = callbacks[7], c.real[T], W.way.shape[0]
     W.count[AWAY] = 0
     if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):

@@ -28,7 +28,6 @@ from .clock import (
     OLD,
     OLD_RATE,
     PARDON,
-    REJECTED,
     RTOL,
     TO,
     TO_RATE,
@@ -36,6 +35,7 @@ from .clock import (
     H,
     T,
 )
+from .loop import shorten
 from .step import attempt
 
 SAFETY = 0.85
@@ -77,14 +77,6 @@ def enter(R, c, t, h, error):
     c.real[GROW] = 6.0
     c.count[ACCEPTED] += 1
     afresh(c)
-
-
-@formula
-def shorten(c, h):
-    """Try a step of that width next, as the last was refused."""
-    c.count[REJECTED] += 1
-    c.real[GROW] = 1.0
-    c.real[H] = h
 
 
 @formula

@@ -18,12 +18,11 @@ CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same 
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant;
 # the part of the step that was looked through; where a guard that comes back is beyond zero
 PANEL, WIDTH, SAME, DONE_TO, BEYOND, REAL = range(6)
-# entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
-# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events; whether what
-# is expected within the step is borne out; places looked at with the equations since it was taken, and in all; whether
-# they could not be evaluated at one; times that a step was cut since it could not be looked through; whether a guard
-# leaves the side that it has to keep
-STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(14)
+# entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
+# be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
+# out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
+# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(13)
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
 

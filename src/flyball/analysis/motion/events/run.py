@@ -12,12 +12,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
-from ....equations.watched import Watched
+from ....equations.explicit import Explicit
+from ....equations.watched import Loop
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
-from ....numerics.integrators.tableaux import Tableau
+from ....numerics.integrators.tableaux import tableau
 from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import (
     G_BACK,
@@ -33,6 +34,8 @@ from ....tables.system import (
 )
 from ...progress import Tell
 from ..engines import Engine
+from ..implicit.loop import Implicit
+from ..implicit.suited import IMPLICIT, explicit
 from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
 from .happen import begin, happen
@@ -58,7 +61,8 @@ class Run:
     Parameters
     ----------
     here : Here
-    method : Tableau
+    method : str
+        Name of the integrator.
     width : int
         Of a row of output.
     tell : callable
@@ -67,22 +71,27 @@ class Run:
         Which loops compute it where nothing is watched.
     """
 
-    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell, engine: Engine) -> None:
-        self.engine = engine
-        self.here, self.method, self.width, self.tell = here, method, width, tell
+    def __init__(self, here: Here, method: str, width: int, tell: Tell, engine: Engine) -> None:
+        self.engine, self.name = engine, method
+        self.here, self.method, self.width, self.tell = here, tableau(explicit(method)), width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
-        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
+        self.guarded = len(here.c.system.guard_i) > 0
+        watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
-        self.loop = self._loop() if len(here.c.system.guard_i) else None
+        self.loop = self._loop()
 
-    def _loop(self) -> Watched:
-        c = self.here.c
-        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
+    def _loop(self) -> Loop | None:
+        """By steps behind a door; nothing where the engine's own loop does."""
+        c, clock, width = self.here.c, self.here.clock, self.width
+        if self.name in IMPLICIT:
+            steps = Implicit(self.name, c, clock)
+            return Loop(steps, clock, c.system, c.work, max(width, steps.width))
+        return Loop(Explicit(self.method), clock, c.system, c.work, width) if self.guarded else None
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
@@ -108,8 +117,10 @@ class Run:
             here.failed = error
         finally:
             engine.end()
-            if self.loop is not None:
+            if self.loop is not None and self.guarded:
                 here.watched = told(self.loop)
+            if self.loop is not None and here.failed is None:
+                here.failed = self.loop.steps.failed
         return np.concatenate(self.rows), False
 
     def over(self) -> bool:
@@ -119,7 +130,7 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            sharp = self.legs.ends_sharply() and self.loop is not None
+            sharp = self.legs.ends_sharply() and self.guarded
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
                 return True
@@ -179,7 +190,7 @@ class Run:
         self.happens(fired)
         here.crept = frozenset()
 
-    def crept(self, loop: Watched) -> frozenset[int]:
+    def crept(self, loop: Loop) -> frozenset[int]:
         """Stops that what stood at them has crept past: at the step's begin it hardly moved; what did hits them."""
         S, out = self.here.c.system, set()
         for g in loop.fired:
@@ -232,7 +243,7 @@ class Run:
         clock.count[ex.STATUS] = ex.DONE
 
 
-def told(loop: Watched) -> str:
+def told(loop: Loop) -> str:
     """How closely a motion was looked for events: what may have come and gone in between was not seen."""
     count = loop.desk.count
     guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
@@ -244,7 +255,7 @@ def told(loop: Watched) -> str:
 
 
 def run_events(
-    here: Here, method: Tableau, width: int, tell: Tell, engine: Engine, known: Breaks
+    here: Here, method: str, width: int, tell: Tell, engine: Engine, known: Breaks
 ) -> tuple[np.ndarray, bool]:
     """Integrate from event to event. Returns (output rows, whether the user interrupted).
 
@@ -252,7 +263,8 @@ def run_events(
     ----------
     here : Here
         Where the motion begins; gets what happens, and in ``failed`` why it could not go on.
-    method : Tableau
+    method : str
+        Name of the integrator.
     width : int
         Of a row of output.
     tell : callable

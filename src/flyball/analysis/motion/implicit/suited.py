@@ -52,13 +52,6 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
         For what implicit integrators do not know.
     """
     s = begun.assembly.compiled.structure
-    if s.guards or s.switches or s.model.events:
-        names = [x.title for x in s.model.events] + [x.element.title for x in s.switches]
-        what = ", ".join(dict.fromkeys(names)) or "what switches"
-        raise ModelError(
-            f"method='radau' does not know events, nor what holds at times and lets go at others: {what}; leave method "
-            f"out, or give method='dop853'"
-        )
     _refuse_open_loads(begun)
     if not s.tree or wish == "absolute":
         return begun
