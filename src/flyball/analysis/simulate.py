@@ -191,11 +191,11 @@ def clock_for(
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
     real[ex.SPAN] = (t_end - t) or 1.0
-    real[ex.H_MAX] = min(o.max_step, t_end - t)
+    real[ex.H] = real[ex.STEP] = o.step or 0.0
+    real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
     real[ex.LARGEST] = max(abs(t), abs(t_end))
-    real[ex.STEP] = getattr(o, "step", None) or 0.0
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
     count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq

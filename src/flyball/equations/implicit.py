@@ -14,7 +14,7 @@ from ..compiler.bound import Bound, Written
 from ..compiler.door import door, enter
 from ..compiler.jit import formula
 from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
-from ..numerics.integrators.implicit.asked import answer
+from ..numerics.integrators.implicit.asked import answer, rates_at_begin
 from ..numerics.integrators.implicit.desk import JACOBIANS, SOFT, START, Desk
 from ..numerics.integrators.implicit.radau import attempt, refuse
 from ..numerics.integrators.implicit.radau import enter as enter_radau
@@ -255,6 +255,7 @@ def land(t, y, dy, A, K):
     """`arrive`; at the end of a step guards are kept within it first."""
     own, c, watch = A[OWN], A[GOING].clock, A[GOING].watch
     h, begin = c.real[TRIED], c.real[T]
+    rates_at_begin(K, c)
     for j in range(watch.met.shape[0] if watch.way.shape[0] > 0 and c.count[STARTED] == 1 else 0):
         x = watch.met_at[j]
         z = c.y[ASIDE, : K.z.shape[1]]

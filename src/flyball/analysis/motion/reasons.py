@@ -294,6 +294,11 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
         where += f" (whose law there has the rate {W.row[NU, k]:.4g} and the second derivative {W.row[NU_DOT, k]:.4g})"
     t = f"t = {clock.real[ex.T]:.6g} s"
     begun = clock.count[ex.STARTED] != 0
+    if clock.real[ex.STEP] > 0.0 and begun:
+        return (
+            f"at {t} a step of {clock.real[ex.STEP]:g} s has no solution{where}: give a shorter step, or leave step "
+            f"out, and its width is chosen"
+        )
     what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
     if rounding := _rounded(clock):
         return f"the integration cannot go on at {what}{rounding}"
@@ -305,6 +310,11 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
 
 
 def _too_many(a: Assembly, clock: ex.Clock) -> str:
+    if clock.real[ex.STEP] > 0.0:
+        return (
+            f"max_steps = {clock.count[ex.LIMIT]} steps of {clock.real[ex.STEP]:g} s were taken by "
+            f"t = {clock.real[ex.T]:.6g} s; give more (max_steps=)"
+        )
     slowest = _component(a, _pacemaker(clock))
     return (
         f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "

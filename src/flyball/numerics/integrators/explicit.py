@@ -95,8 +95,6 @@ def answer(own, S, W, R, c, task):
     if task == TRY:
         c.count[EXTENDED] = 0
         status, c.real[ERROR] = attempt(derivative, arrive, tangent, S, W, R, c, c.real[TRIED])
-        if c.real[STEP] > 0.0:
-            c.real[ERROR] = 0.0
         return status
     if task == WITHIN:
         return within(derivative, S, W, R, c)
@@ -104,8 +102,6 @@ def answer(own, S, W, R, c, task):
         enter(R, c, ending(c), c.real[TRIED], c.real[ERROR])
         return 0
     if task == REFUSE:
-        if c.real[STEP] > 0.0:
-            return 1
         refuse(derivative, arrive, tangent, S, W, R, c, c.real[TRIED], c.count[TROUBLE], c.real[ERROR])
         return 0
     if task == OVERLOOKED:

@@ -99,17 +99,16 @@ def write(callbacks, S, W, R, c, out, used):
 
 @formula
 def width(c):
-    """Width of the next step: none is left over at the end that is very short; 0 if it would be too short."""
+    """Width of the next step: none is left over at the end that is very short; 0 if it would be too short.
+
+    Fixed steps are never wider, and narrower only where they end: at events, and at the end of the time.
+    """
     left = c.real[T_END] - c.real[T]
-    if c.real[STEP] > 0.0:  # fixed: shorter where one was cut, and at the end
-        h = min(c.real[H], c.real[STEP]) if c.real[GROW] <= 1.0 else c.real[STEP]
-        h = left if left < 1.000001 * h else h
-    else:
-        h = min(c.real[H], c.real[H_MAX])
-        if 1.000001 * h >= left:
-            h = left
-        elif 2.0 * h > left:
-            h = 0.5 * left
+    h = min(c.real[H], c.real[H_MAX])
+    if 1.000001 * h >= left:
+        h = left
+    elif 2.0 * h > left and c.real[STEP] == 0.0:
+        h = 0.5 * left
     return 0.0 if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]) else h
 
 

@@ -92,9 +92,18 @@ def overlooked(residual, inspect, S, K, c):
 
 
 @formula
+def rates_at_begin(K, c):
+    """Rates of integrals where the step begins: what else is looked at may have overwritten them."""
+    at = c.y.shape[1] - K.z.shape[1]
+    for i in range(K.z.shape[1]):
+        K.rate[START, i] = c.K[0, at + i]
+
+
+@formula
 def within(between, compose, S, K, c):
     """The state at a part of the step."""
     z = c.y[ASIDE, : K.z.shape[1]]
+    rates_at_begin(K, c)
     between(K, c.real[PART], c.real[TRIED], K.d[START], K.a[START], z)
     compose(c.y[NOW], K.d[START], K.a[START], z, c.y[BETWEEN], S)
     c.count[EXTENDED] = 1

@@ -167,7 +167,7 @@ def enter(K, c, t, h, error, iterations):
     if K.count[FRESH] == 0 and h <= wide <= KEPT * h:
         wide = h
     c.real[WIDE] = max(h, 0.8 * c.real[WIDE])
-    c.real[H] = wide
+    c.real[H] = wide if c.real[STEP] == 0.0 else c.real[STEP]
     c.real[T] = t
     c.real[GROW] = WIDEST
     c.count[ACCEPTED] += 1
