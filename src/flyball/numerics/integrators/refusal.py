@@ -37,7 +37,7 @@ from .clock import (
     T,
 )
 from .loop import shorten
-from .step import attempt
+from .step import LARGE, attempt
 
 SAFETY = 0.85
 DIGITS = 1e-14  # part of a state that its last digits are, once rounding has built up
