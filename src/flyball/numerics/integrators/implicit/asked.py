@@ -29,7 +29,6 @@ from ..clock import (
     SPAN,
     STEP,
     STUCK,
-    T_END,
     TRIED,
     H,
     T,
@@ -71,7 +70,7 @@ def begin(arrive, inspect, S, K, c):
     c.real[BEFORE] = c.real[T]
     c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
     if c.real[H] <= 0.0:
-        c.real[H] = FIRST * (c.real[T_END] - c.real[T])
+        c.real[H] = FIRST * c.real[SPAN]
     afresh(c)
     return 0
 
