@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
-from ..equations.within import ROWS, kept
+from ..equations.within import ROWS, breaking, kept
 from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
@@ -209,7 +209,7 @@ def clock_for(
     W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
-    nothing = sampled is not None and not sampled
+    nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(explicit(o.method)).c) + 1, len(y)))

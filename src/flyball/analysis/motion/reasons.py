@@ -78,7 +78,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
     text = of_drivers(a, clock) or _not_finite(a, clock)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
-    text = text or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
+    text = text or _broken(a, clock) or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}{after}", None
 
 
@@ -144,6 +144,13 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
         if problem:
             return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
     return ""
+
+
+def _broken(a: Assembly, clock: ex.Clock) -> str:
+    """A force whose formula ends where the motion stopped; else nothing."""
+    t = float(clock.real[ex.T])
+    force = broken_force(a.compiled, t)
+    return f"at t = {t:.6g} s, {force}" if force else ""
 
 
 def _driving(a: Assembly) -> list[tuple[Any, int, bool]]:

@@ -70,19 +70,20 @@ def overlooked(derivative, inspect, S, W, R, c):
     """Whether laws do something within the step that its stages have not seen, and that matters.
 
     ``inspect`` names places where a law is not as its values elsewhere in the step let expect; what this comes to is
-    what the dense output misses of the equations there, over the part of the step for which it lasts.
+    what the dense output misses of the equations there, over the part of the step for which it lasts. What lasts for
+    more than a step is another branch of a formula: no width is right. Steps of fixed width look for that only.
     """
     h = c.real[TRIED]
     inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, W)
-    if c.real[STEP] > 0.0:
-        return 0
     k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, W)
     if k > 0 and c.count[EXTENDED] == 0:
         if extend(derivative, S, W, R, c, h) != 0:
             return 1
         c.count[EXTENDED] = 1
     while k > 0:
-        if not defect(derivative, S, W, R, c, h, x) * share <= 1.0:
+        if share > 1.0:
+            return 1
+        if c.real[STEP] == 0.0 and not defect(derivative, S, W, R, c, h, x) * share <= 1.0:
             return 1
         k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S, W)
     return 0

@@ -121,6 +121,12 @@ def shorten(c, h):
 
 
 @formula
+def narrow(c, h):
+    """The same after a step within which something cannot be: for steps of fixed width there is nothing to try."""
+    shorten(c, h if c.real[STEP] == 0.0 else 0.0)
+
+
+@formula
 def ending(c):
     """Time at which the step in the making ends."""
     h = c.real[TRIED]
@@ -139,11 +145,11 @@ def whole(callbacks, S, W, R, c, out, used):
     ask, own = callbacks[:2]
     h = c.real[TRIED]
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, OVERLOOKED) != 0:
-        shorten(c, 0.5 * h)
+        narrow(c, 0.5 * h)
         return used, False
     status, used = write(callbacks, S, W, R, c, out, used)
     if status != 0:  # what lies inside the step cannot be reported: take a shorter one
-        shorten(c, 0.25 * h)
+        narrow(c, 0.25 * h)
         return used, False
     if full(c):
         return used, True

@@ -12,7 +12,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import NEXT, NOW, STATUS, TRIED, H, T
 from .glance import NOISE
-from .loop import ENDED, ENTER, OVERLOOKED, ending, full, shorten, write
+from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, write
 from .sought import CUT, first_event
 from .watching import CUTS, END, EVENT, EVENTS, FRESH, SIDE, START, STEPS
 
@@ -38,7 +38,7 @@ def onward(callbacks, S, W, R, c, out, used):
     most = c.real[TRIED]
     note(S, W, END)
     if c.seen.shape[1] > 0 and ask(own, S, W, R, c, OVERLOOKED) != 0:
-        shorten(c, 0.5 * most)
+        narrow(c, 0.5 * most)
         return used, False
     status, h, hit = first_event(callbacks, S, W, R, c)
     if status == 0:
@@ -50,7 +50,7 @@ def onward(callbacks, S, W, R, c, out, used):
         shorten(c, h)
         return used, False
     if status != 0:  # what lies inside the step cannot be told: take a shorter one
-        shorten(c, 0.25 * most)
+        narrow(c, 0.25 * most)
         return used, False
     if hit and used > 0 and out[used - 1, 0] == ending(c):  # written when it is known how the motion goes on
         used -= 1

@@ -80,11 +80,11 @@ def overlooked(residual, inspect, S, K, c):
     """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
     h = c.real[TRIED]
     inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, K)
-    if c.real[STEP] > 0.0:
-        return 0
     k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, K)
     while k > 0:
-        if not defect(residual, S, K, c, h, x) * share <= 1.0:
+        if share > 1.0:
+            return 1
+        if c.real[STEP] == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0:
             return 1
         k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S, K)
     return 0
