@@ -33,9 +33,10 @@ from ....tables.system import (
     SWITCH_MEASURED,
 )
 from ...progress import Tell
-from ..engines import Engine
+from ..engines import FAILED, Engine
 from ..implicit.loop import Implicit
 from ..implicit.suited import IMPLICIT, explicit
+from ..stiff import EXPLICIT, Pace, on_corner
 from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
 from .happen import begin, happen
@@ -72,7 +73,8 @@ class Run:
     """
 
     def __init__(self, here: Here, method: str, width: int, tell: Tell, engine: Engine) -> None:
-        self.engine, self.name = engine, method
+        self.engine, self.now = engine, method
+        self.pace = here.start.pace or Pace(float(here.clock.real[ex.T_END]), method, str)
         self.here, self.method, self.width, self.tell = here, tableau(explicit(method)), width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
@@ -84,12 +86,13 @@ class Run:
         watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop()
+        self.quota = int(clock.count[ex.QUOTA])
 
     def _loop(self) -> Loop | None:
         """By steps behind a door; nothing where the engine's own loop does."""
         c, clock, width = self.here.c, self.here.clock, self.width
-        if self.name in IMPLICIT:
-            steps = Implicit(self.name, c, clock)
+        if self.now in IMPLICIT:
+            steps = Implicit(self.now, c, clock)
             return Loop(steps, clock, c.system, c.work, max(width, steps.width))
         return Loop(Explicit(self.method), clock, c.system, c.work, width) if self.guarded else None
 
@@ -121,7 +124,40 @@ class Run:
                 here.watched = told(self.loop)
             if self.loop is not None and here.failed is None:
                 here.failed = self.loop.steps.failed
+            here.method = "; ".join(self.pace.told)
         return np.concatenate(self.rows), False
+
+    def turn(self, to: str, why: str) -> None:
+        """Go on by another method from here on."""
+        clock, before = self.here.clock, self.loop
+        self.pace.turned(clock, to, why)
+        self.now = to
+        self.engine.stop()
+        self.loop = self._loop()
+        if before is not None and self.loop is not None:
+            self.loop.desk.side[:] = before.desk.side
+        clock.count[ex.STARTED], clock.count[ex.STATUS] = 0, ex.RUNNING
+        if to not in IMPLICIT and not clock.real[ex.STEP]:
+            clock.real[ex.H] = 0.0  # as at a start
+
+    def turned(self) -> bool:
+        """Go on by another method where that pays, or where this one does not know what is; whether it does."""
+        pace, c, clock = self.pace, self.here.c, self.here.clock
+        implicit, corner = self.now in IMPLICIT, on_corner(c)
+        if implicit and corner:
+            pace.back = self.now
+            self.turn(EXPLICIT, "where a law is held on its corner")
+        elif pace.back and not corner:
+            to, pace.back = pace.back, ""
+            self.turn(to, "where none is any more")
+        elif implicit and pace.mixed and clock.count[ex.STATUS] in FAILED:
+            self.turn(EXPLICIT, f"where {self.now} could not go on")
+            pace.stays()
+        elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.asked or pace.turns(c, clock, self.now)):
+            self.turn(to, "where it is stiff" if to in IMPLICIT else "where it is not stiff any more")
+        else:
+            return False
+        return True
 
     def over(self) -> bool:
         """Do what the compiled loop has returned for: whether the motion is over."""
@@ -137,8 +173,9 @@ class Run:
             if sharp:
                 self.jumped(before)
             return False
-        elif status != ex.RUNNING and not engine.hands_over(clock):
+        elif status != ex.RUNNING and not engine.hands_over(clock) and not self.turned():
             return True
+        self.turned()
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
@@ -153,11 +190,13 @@ class Run:
         begin(self.here)
         self.true = true_already(self.here)
         self.here.fresh = False
+        self.turned()
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
         c, clock = self.here.c, self.here.clock
         before = time.perf_counter()
+        clock.count[ex.QUOTA] = self.pace.limited(clock, self.quota)
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
             if self.loop is None:
@@ -169,7 +208,7 @@ class Run:
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
             done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            clock.count[ex.QUOTA] = self.engine.limited(clock, done * SLICE / took)
+            self.quota = self.engine.limited(clock, done * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""

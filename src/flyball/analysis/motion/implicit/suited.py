@@ -7,8 +7,10 @@ from typing import Any
 
 from ....errors import ModelError
 from ....results.doubts import open_loads
+from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at
+from ..stiff import EXPLICIT
 from .layout import sparsity
 
 IMPLICIT = ("radau",)
@@ -17,8 +19,8 @@ FEW = 40  # groups of joint coordinates that no equation sees together, up to wh
 
 
 def explicit(method: str) -> str:
-    """The explicit integrator whose tableau the engine is handed: of implicit ones any, which is not looked at."""
-    return "rk45" if method in IMPLICIT else method
+    """The explicit integrator that computes what an implicit one does not know."""
+    return EXPLICIT if method in IMPLICIT else method
 
 
 def refuse_idle(o: Any) -> None:
@@ -69,6 +71,21 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
     out.since, out.coordinates = begun.since, f"absolute: {why}"
     return out
+
+
+def unsuited(begun: Start) -> str:
+    """Why a motion in those coordinates cannot go on by an implicit method, in words; empty: it can."""
+    s = begun.assembly.compiled.structure
+    try:
+        refuse_functions(s)
+        _refuse_open_loads(begun)
+    except ModelError as error:
+        return str(error).removesuffix("; leave method out, or take the redundancy out")
+    if not s.tree:
+        return ""
+    if s.prescribed:
+        return f"drivers prescribe coordinates ({', '.join(s.prescribed)}); method='radau' takes absolute ones"
+    return "" if _groups(begun) <= FEW else "its chains are long; method='radau' takes absolute coordinates"
 
 
 def _refuse_open_loads(begun: Start) -> None:
