@@ -86,7 +86,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     """The motion by a method that is chosen: start, end, output times."""
     started = time.perf_counter()
     t_start, _, times = span
-    announce_motion(model, not isinstance(o.method, Stepping), o.method in IMPLICIT)
+    announce_motion(model, not isinstance(o.method, Stepping), o.method)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
@@ -97,7 +97,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
-        begun = suited(begun, o.coordinates, o.parameters)
+        begun = suited(begun, str(o.method), o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
@@ -105,7 +105,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     made = False if o.method in IMPLICIT else o.specialize
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
-        begun.engine.told = f"{TABLES}: {IMPLICIT[0]} goes through the tables"
+        begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
     mixed = auto and o.stabilization == "projection" and o.step is None
     begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun))
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
@@ -144,13 +144,13 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times)):
-        rows, interrupted = run_events(here, o.method, _width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
+        rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
     else:
         method = tableau(explicit(o.method))
         rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace)
         if begun.pace is not None and begun.pace.asked:
-            more, interrupted = run_events(here, o.method, _width(begun.assembly), tell, engine, known)
+            more, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
             rows = np.concatenate([rows, more])
         elif begun.pace is not None:
             here.method = "; ".join(begun.pace.told)
@@ -199,7 +199,7 @@ def clock_for(
     ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
     """
     a, y = start.assembly, start.y
-    refuse_unheld(len(times), _width(a))
+    refuse_unheld(len(times), width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
@@ -211,7 +211,7 @@ def clock_for(
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
@@ -241,7 +241,7 @@ def energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + fast * fast) + moving)
 
 
-def _width(a: Assembly) -> int:
+def width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
     return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
@@ -262,8 +262,8 @@ def run_clock(
     ``pace`` may ask for another method, and then this one goes no further.
     """
     c, engine = a.compiled, engine or Engine(a.compiled, False)
-    s, width = c.structure, _width(a)
-    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
+    s, wide = c.structure, width(a)
+    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
     rows = []
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
@@ -296,6 +296,6 @@ def run_clock(
                 quota = pace.limited(clock, quota)
             clock.count[ex.QUOTA] = quota
     except KeyboardInterrupt:
-        return np.concatenate(rows) if rows else np.zeros((0, width)), True
+        return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:
         engine.end()

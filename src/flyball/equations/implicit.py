@@ -10,12 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.bound import Bound, Written
 from ..compiler.door import door, enter
 from ..compiler.jit import formula
 from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
 from ..numerics.integrators.implicit.asked import answer, rates_at_begin
-from ..numerics.integrators.implicit.desk import JACOBIANS, SOFT, START, Desk
+from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START, Desk
 from ..numerics.integrators.implicit.radau import attempt, refuse
 from ..numerics.integrators.implicit.radau import enter as enter_radau
 from ..numerics.integrators.implicit.step import between as between_radau
@@ -34,7 +33,7 @@ from ..tables.system import (
     System,
     Work,
 )
-from .callbacks import OWN, S_, SHEET, W_, Going, Own, inspect, meet, through
+from .callbacks import OWN, S_, SHEET, W_, inspect, meet, through
 from .callbacks import arrive as arrive_there
 from .dispatch import progress
 from .residual import Bench
@@ -72,7 +71,7 @@ class Means(NamedTuple):
     pushed: Bench  # of accelerations
     pressed: Bench  # without
     plan: Plan
-    desk: Desk
+    desk: Desk  # of the method
 
 
 @formula
@@ -92,6 +91,22 @@ def compose(y, d, v, z, out, A):
 @formula
 def residual(t, k, A, K, c):
     """What the equations miss at stage k, into its row; rates of integrals there. Returns a status."""
+    status = missed(t, k, A, K, c)
+    out = K.out[k]
+    turned(A[PLAN], K.d[k], out)
+    for i in range(K.v.shape[1]):
+        out[i] = K.dd[k, i] - out[i]
+    if status == 0:
+        powers(A, K, k)
+    return status
+
+
+@formula
+def missed(t, k, A, K, c):
+    """The same, but that the first rows are v + D G^T mu, which increments follow. Returns a status.
+
+    Of index 3 only positions are held to the constraints, and mu is none.
+    """
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[SHEET].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
     own.real[T] = t
@@ -111,17 +126,13 @@ def residual(t, k, A, K, c):
         out[2 * nv + r] = rows[0, nv + nr + r]
         out[2 * nv + nr + r] = rows[0, nv + r] if P.valued[r] == 1 else K.mu[k, r]
         bad += rows[0, nv + r] - rows[0, nv + r]
-        if P.valued[r] == 1 and K.mu[k, r] != 0.0:
+        if P.valued[r] == 1 and K.count[INDEX_3] == 1:
+            out[2 * nv + r], out[2 * nv + nr + r] = rows[0, nv + r], K.mu[k, r]
+        elif P.valued[r] == 1 and K.mu[k, r] != 0.0:
             for e in range(S.row_p[r], S.row_p[r + 1]):
                 i = S.col_i[e]
                 out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
-    turned(P, K.d[k], out)
-    for i in range(nv):
-        out[i] = K.dd[k, i] - out[i]
-    if far(P, K.d[k]):
-        return 1
-    powers(A, K, k)
-    return 0 if bad == 0.0 else 1
+    return 0 if bad == 0.0 and not far(P, K.d[k]) else 1
 
 
 @formula
@@ -302,7 +313,7 @@ def as_modes_are(A):
 
 
 @formula
-def perform(method, S, W, M, own, going, task):
+def perform(method, callbacks, S, W, M, own, going, task):
     """What a loop asks of an implicit method."""
     A = (
         own.doors[0], S, W, own.R, own.clock, own.sheet, own.doors[1], M.SC, M.WC, M.moved, M.pushed, M.pressed,
@@ -310,25 +321,17 @@ def perform(method, S, W, M, own, going, task):
     )  # fmt: skip
     if task == BEGIN:
         as_modes_are(A)
-    return answer(method, (residual, linearise, compose, land, inspect), A, M.desk, going.clock, task)
+    return answer(method, callbacks, A, M.desk, going.clock, task)
 
 
 @formula
 def by_radau(S, W, M, own, going, task):
     """Radau IIA of order 5."""
-    return perform((attempt, between_radau, enter_radau, refuse), S, W, M, own, going, task)
+    method = (attempt, between_radau, enter_radau, refuse)
+    return perform(method, (residual, linearise, compose, land, inspect), S, W, M, own, going, task)
 
 
 @door
 def radau_steps(S, W, M, own, going, task):
     """`by_radau` behind an address."""
     return by_radau(S, W, M, own, going, task)
-
-
-METHODS = {"radau": radau_steps}
-"""Doors of implicit methods by name."""
-
-
-def bind(name: str, S: System, W: Work, M: Means, own: Own, going: Going) -> Bound:
-    """The door of a method with these tuples bound to it."""
-    return Bound(METHODS[name], *map(Written, (S, W, M, own, going)))

@@ -81,7 +81,7 @@ def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
     if not any(look) and not breaking(S):
         return np.zeros((ROWS, 0))
     loads = int((S.force_i[:, FORCE_LOAD] >= 0).sum())
-    sensed = 2 * measured(S) + loads + len(S.switch_i)
+    sensed = 2 * measured(S) + loads + len(S.control_i) + len(S.switch_i)
     seen = np.zeros((ROWS, max(sensed, noted(S), NODES, len(laws))))
     seen[LOOK, : len(laws)] = look
     return seen

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
 from ....constraints.modes import BRANCH
 from ....laws.breaks import Breaks, Timed, found_beforehand, margin, timed
 from ....numerics.integrators import clock as ex
-from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
+from ....tables.system import (
+    BODY_LAW,
+    CONTROL_RATE,
+    FORCE_LAW,
+    G_LAW,
+    GUARD_KIND,
+    GUARD_OF,
+    ROW_LAW,
+    SWITCH_KIND,
+    SWITCH_LAW,
+)
 from ...compiled import Compiled
 
 LAWS = 3  # of a force
@@ -30,7 +43,9 @@ def _timed(c: Compiled) -> Timed:
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
     corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
-    starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
+    starts = np.concatenate(
+        [forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners, S.control_i[:, CONTROL_RATE]]
+    )
     return timed(S.code.tolist(), starts.tolist())
 
 
@@ -45,10 +60,12 @@ class Legs:
     clock : Clock
         As the motion begins.
     found : Breaks
+    until : callable
+        A time up to which the clock is to run at most, for reasons of its own.
     """
 
-    def __init__(self, clock: ex.Clock, found: Breaks) -> None:
-        self.clock, self.end = clock, float(clock.real[ex.T_END])
+    def __init__(self, clock: ex.Clock, found: Breaks, until: Callable[[], float] = lambda: math.inf) -> None:
+        self.clock, self.end, self.until = clock, float(clock.real[ex.T_END]), until
         self.times, self.sharp = found.times, found.sharp
         self.at = 0
         self.aim()
@@ -68,7 +85,7 @@ class Legs:
             end = float(self.times[self.at])
             if self.sharp[self.at]:
                 end -= margin(end)
-        self.clock.real[ex.T_END] = end
+        self.clock.real[ex.T_END] = min(end, self.until())
 
     def whole(self) -> None:
         """Have it run to the end of the motion."""

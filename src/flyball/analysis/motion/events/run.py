@@ -5,6 +5,7 @@ Where nothing is watched, steps only end on these times: the engine's own loop r
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
 from ....equations.explicit import Explicit
+from ....equations.sampled import Sampling
 from ....equations.watched import Loop
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
@@ -34,8 +36,9 @@ from ....tables.system import (
 )
 from ...progress import Tell
 from ..engines import FAILED, Engine
-from ..implicit.loop import Implicit
+from ..implicit.made import implicit
 from ..implicit.suited import IMPLICIT, explicit
+from ..options import Integration
 from ..stiff import EXPLICIT, Pace, on_corner
 from .actions import expressions, say_never, stepped_over, true_already
 from .failed import endless
@@ -43,6 +46,7 @@ from .happen import begin, happen
 from .here import Here
 from .instant import instant_of
 from .legs import Legs, breaks
+from .sampling import sampling
 from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
@@ -62,8 +66,8 @@ class Run:
     Parameters
     ----------
     here : Here
-    method : str
-        Name of the integrator.
+    o : Integration
+        Which integrator, and its choices.
     width : int
         Of a row of output.
     tell : callable
@@ -72,10 +76,10 @@ class Run:
         Which loops compute it where nothing is watched.
     """
 
-    def __init__(self, here: Here, method: str, width: int, tell: Tell, engine: Engine) -> None:
-        self.engine, self.now = engine, method
-        self.pace = here.start.pace or Pace(float(here.clock.real[ex.T_END]), method, str)
-        self.here, self.method, self.width, self.tell = here, tableau(explicit(method)), width, tell
+    def __init__(self, here: Here, o: Integration, width: int, tell: Tell, engine: Engine) -> None:
+        self.engine, self.now, self.options = engine, o.method, o
+        self.pace = here.start.pace or Pace(float(here.clock.real[ex.T_END]), o.method, str)
+        self.here, self.method, self.width, self.tell = here, tableau(explicit(o.method)), width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
@@ -87,12 +91,33 @@ class Run:
         here.seen = Segments() if watched else None
         self.loop = self._loop()
         self.quota = int(clock.count[ex.QUOTA])
+        self.sampling = self._sampling(here.t)
+
+    def _sampling(self, t: float) -> Sampling | None:
+        span, rows = (t, float(self.here.clock.real[ex.T_END])), (self.width, len(self.buffer))
+        return sampling(self.here.c, self.method, span, rows)
+
+    def _instant(self) -> float:
+        """Until when the watched loop may run: the next instant of a sampled controller."""
+        return math.inf if self.sampling is None or self.loop is None else self.sampling.next()
+
+    def sampled(self) -> bool:
+        """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
+        here = self.here
+        if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
+            return False
+        before = expressions(here)
+        if self.sampling.sample(here.c.system, here.c.work, here.clock) == 0:
+            self.jumped(before)
+        if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+            self.rows[-1][-1] = self.row()
+        return True
 
     def _loop(self) -> Loop | None:
         """By steps behind a door; nothing where the engine's own loop does."""
         c, clock, width = self.here.c, self.here.clock, self.width
         if self.now in IMPLICIT:
-            steps = Implicit(self.now, c, clock)
+            steps = implicit(self.now, c, clock, self.options)
             return Loop(steps, clock, c.system, c.work, max(width, steps.width))
         return Loop(Explicit(self.method), clock, c.system, c.work, width) if self.guarded else None
 
@@ -103,7 +128,7 @@ class Run:
         try:
             self.begin()
             engine.begin(here.clock)
-            self.legs = Legs(here.clock, known)
+            self.legs = Legs(here.clock, known, self._instant)
             while not here.stopped:
                 self.integrate()
                 if self.over():
@@ -166,6 +191,9 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
+            if self.sampled():
+                self.legs.aim()
+                return False
             sharp = self.legs.ends_sharply() and self.guarded
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
@@ -187,7 +215,10 @@ class Run:
 
     def begin(self) -> None:
         """What happens as the motion begins."""
-        begin(self.here)
+        here = self.here
+        if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
+            self.sampling.sample(here.c.system, here.c.work, here.clock)
+        begin(here)
         self.true = true_already(self.here)
         self.here.fresh = False
         self.turned()
@@ -199,7 +230,9 @@ class Run:
         clock.count[ex.QUOTA] = self.pace.limited(clock, self.quota)
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
-            if self.loop is None:
+            if self.loop is None and self.sampling is not None:
+                used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
+            elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
                 used = self.loop.go_on(c.system, c.work, self.buffer)
@@ -248,7 +281,10 @@ class Run:
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
-            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._instant)
+            other = self._sampling(here.t)
+            if other is not None and self.sampling is not None and other.differs(self.sampling):
+                self.sampling = other
         self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
@@ -273,13 +309,16 @@ class Run:
 
     def stop(self) -> None:
         """The motion ends here: the last row is written."""
-        here, clock = self.here, self.here.clock
-        c = here.c
+        self.take(self.row()[None, :])
+        self.here.clock.count[ex.STATUS] = ex.DONE
+
+    def row(self) -> np.ndarray:
+        """The row of output of here and now."""
+        here, c = self.here, self.here.c
         row, y = np.zeros((1, self.width)), here.y.copy()
-        motion_kernel(c.system, c.work, self.method, clock, row, REPORT)
+        motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
         here.y[:] = y
-        self.take(row)
-        clock.count[ex.STATUS] = ex.DONE
+        return row[0]
 
 
 def told(loop: Loop) -> str:
@@ -294,7 +333,7 @@ def told(loop: Loop) -> str:
 
 
 def run_events(
-    here: Here, method: str, width: int, tell: Tell, engine: Engine, known: Breaks
+    here: Here, o: Integration, width: int, tell: Tell, engine: Engine, known: Breaks
 ) -> tuple[np.ndarray, bool]:
     """Integrate from event to event. Returns (output rows, whether the user interrupted).
 
@@ -302,8 +341,8 @@ def run_events(
     ----------
     here : Here
         Where the motion begins; gets what happens, and in ``failed`` why it could not go on.
-    method : str
-        Name of the integrator.
+    o : Integration
+        Which integrator, and its choices.
     width : int
         Of a row of output.
     tell : callable
@@ -313,4 +352,4 @@ def run_events(
     known : Breaks
         Times at which steps end.
     """
-    return Run(here, method, width, tell, engine).go(known)
+    return Run(here, o, width, tell, engine).go(known)

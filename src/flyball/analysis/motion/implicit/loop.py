@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....compiler.bound import Bound
+from ....compiler.bound import Bound, Written
 from ....equations import residual
 from ....equations.callbacks import Going, Own
-from ....equations.implicit import Means, Plan, bind
+from ....equations.implicit import Means, Plan, radau_steps
 from ....equations.residual import Bench
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
@@ -30,19 +30,21 @@ class Implicit:
 
     Parameters
     ----------
-    name : str
-        Of the method.
     c : Compiled
         In the coordinates of the motion, with the scratch that it is run on.
     clock : Clock
+    index_3 : bool
+        Whether velocities are not held to the constraints.
     """
 
-    def __init__(self, name: str, c: Compiled, clock: ex.Clock) -> None:
+    door = radau_steps
+
+    def __init__(self, c: Compiled, clock: ex.Clock, index_3: bool = False) -> None:
         refuse_functions(c.structure)
         s, S = c.structure, c.system
-        self.name, self.clock = name, clock
+        self.clock = clock
         self.c, self.stages = SEEN, len(SEEN)
-        self.layout = x = layout(s, S)
+        self.layout = x = layout(s, S, index_3)
         self.width, self.system = x.width, S
         y = clock.y[ex.NOW].copy()
         SC, WC = complex_tables(c)
@@ -60,7 +62,7 @@ class Implicit:
             self.means.desk.count[ds.JACOBIANS] = 0
         M = self.means
         own.doors[1] = residual.address(M.SC, M.WC, M.moved)
-        return bind(self.name, S, W, M, own, going)
+        return Bound(self.door, *map(Written, (S, W, M, own, going)))
 
     @property
     def failed(self) -> SimulationError | None:
@@ -99,7 +101,7 @@ class Implicit:
         real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / real[ds.RTOL])
         real[ds.SOFT] = SOFT
         count = np.zeros(ds.COUNTS, np.int64)
-        count[ds.LEAST] = 2 if turns else 1
+        count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P

@@ -113,7 +113,7 @@ def within(between, compose, S, K, c):
 def answer(method, callbacks, S, K, c, task):
     """What the `loop` asks of a method."""
     attempt, between, enter, refuse = method
-    residual, _, compose, arrive, inspect = callbacks
+    residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
     if task == TRY:
         c.count[EXTENDED] = 0
         status, c.real[ERROR], K.real[ASKED] = attempt(callbacks, S, K, c, c.real[TRIED])

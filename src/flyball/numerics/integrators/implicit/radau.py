@@ -59,7 +59,7 @@ def rest(K, c):
 @formula
 def attempt(callbacks, S, K, c, h):
     """One step of width h into c.y[NEW]. Returns (status, error, factor that a failed iteration asks for)."""
-    residual, linearise, compose, arrive, _ = callbacks
+    residual, linearise, compose, arrive = callbacks[:4]
     begin(c, K)
     if c.real[GROW] <= 1.0 and K.count[FRESH] == 0:
         K.count[FRESH] = -1
