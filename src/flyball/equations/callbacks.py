@@ -1,6 +1,6 @@
 """What loops of integrators ask of the equations, through the engine's door: written once for all of them.
 
-``A`` begins with the engine's address, tables, scratch, its tableau, its desk and its sheet.
+``A`` begins with the engine's address, tables, scratch, its tableau, its desk, its sheet, and what holds together.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from ..compiler.jit import formula
 from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import Watch
-from ..tables.system import LAM
+from ..tables.system import G_SHARED, GUARD_KIND, LAM
 from .engine import Sheet
+from .sharing import Sharing, margin
 from .tasks import ARRIVE, INSPECT, REPORT, TANGENT
 
-ENGINE, S_, W_, R_, OWN, SHEET = range(6)
+ENGINE, S_, W_, R_, OWN, SHEET, GROUP = range(7)
 
 
 class Own(NamedTuple):
@@ -36,6 +37,7 @@ class Going(NamedTuple):
 
     clock: Clock
     watch: Watch
+    group: Sharing  # what holds together
 
 
 @formula
@@ -122,8 +124,11 @@ def levels(A, K, at):
 @formula
 def meet(A, K, j):
     """Keep guards and levels at place j of those that are met within a step; the engine has just done WATCH there."""
-    for i in range(K.met_g.shape[1]):
+    S, last = A[S_], K.met_g.shape[1] - 1
+    for i in range(last + 1):
         K.met_g[j, i] = A[SHEET].rows[0, i]
+    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+        K.met_g[j, last] = margin(S, A[W_], A[OWN].real[T], A[GROUP])
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.met[j]:
             levels(A, K, 1 + k)

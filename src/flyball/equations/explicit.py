@@ -38,7 +38,7 @@ def perform(S, W, R, own, going, task):
     """`explicit.answer`, asked of the engine."""
     if task == TRY:
         going.watch.count[STAGE] = 0
-    A = (own.doors[0], S, W, R, own.clock, own.sheet)
+    A = (own.doors[0], S, W, R, own.clock, own.sheet, going.group)
     return answer((derivative, arrive, tangent, inspect), A, going.watch, R, going.clock, task)
 
 

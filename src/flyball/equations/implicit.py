@@ -43,7 +43,7 @@ from .tree import retract
 
 STEP = 1e-40
 FAR = 12.0  # square of an increment 2 tan(angle / 2): a third of a turn in a step is the most
-RESIDUALS, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN, GOING, BETWEEN = range(6, 15)
+RESIDUALS, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN, GOING, BETWEEN = range(7, 16)
 # entries of Plan.first: numbers of the Jacobian that begin there
 PICKED, PICKED_MASS, ROWS, ROWS_METRIC, ROWS_HELD, SIZES, TURNS, PRESSES, END = range(9)
 
@@ -316,8 +316,8 @@ def as_modes_are(A):
 def perform(method, callbacks, S, W, M, own, going, task):
     """What a loop asks of an implicit method."""
     A = (
-        own.doors[0], S, W, own.R, own.clock, own.sheet, own.doors[1], M.SC, M.WC, M.moved, M.pushed, M.pressed,
-        M.plan, going, method[1],
+        own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, own.doors[1], M.SC, M.WC, M.moved, M.pushed,
+        M.pressed, M.plan, going, method[1],
     )  # fmt: skip
     if task == BEGIN:
         as_modes_are(A)

@@ -20,15 +20,45 @@ from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
 from ..numerics.integrators.watching import START, watching
-from ..tables.system import BIAS, GUARD_KIND, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
-from .callbacks import OWN, S_, W_, Going, Own, levels, put, report, steps, through
+from ..tables.system import (
+    BIAS,
+    G_SHARED,
+    GUARD_KIND,
+    GUARD_WAY,
+    LAM,
+    RATE,
+    RETURNED,
+    SWITCH_ROW,
+    VALUE,
+    X_SOLVED,
+    System,
+    Work,
+)
+from .callbacks import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, Going, Own, levels, put, report, steps, through
 from .engine import Sheet, engine
 from .guards import KEPT, grains
 from .guards import watch as guards
 from .rows import measured
+from .sharing import GRAIN, Sharing, margin, renewed
 from .tasks import MOTION
 
-EXPECTED = 6
+EXPECTED = 7
+
+
+@formula
+def all_guards(A, W, t, out):
+    """Guards by what stands in W, that of the group last."""
+    S = A[S_]
+    guards(S, W, t, out)
+    last = out.shape[0] - 1
+    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+        out[last] = margin(S, W, t, A[GROUP])
+
+
+@formula
+def balanced(A):
+    """Bring what is in balance by itself up to the state last evaluated."""
+    renewed(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], A[GROUP])
 
 
 @formula
@@ -37,7 +67,9 @@ def watch(t, y, A, K, row):
     own = A[OWN]
     put(own, t, y)
     status = through(A, MOTION)
-    guards(A[S_], A[W_], t, K.g[row])
+    if status == 0:
+        balanced(A)
+    all_guards(A, A[W_], t, K.g[row])
     return status
 
 
@@ -53,21 +85,25 @@ def note(A, K, row):
             a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
-    guards(S, W, A[OWN].real[T], K.g[row])
+    balanced(A)
+    all_guards(A, W, A[OWN].real[T], K.g[row])
     grains(S, W, K.grain)
+    last = K.grain.shape[0] - 1
+    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+        K.grain[last] = GRAIN * A[GROUP].size[0]
 
 
 @formula
 def look(t, h, x, A, K, row):
     """Guards expected at a part x of the step that begins at t."""
     expect(K, x, h)
-    guards(A[S_], A[EXPECTED], t + x * h, K.g[row])
+    all_guards(A, A[EXPECTED], t + x * h, K.g[row])
 
 
 @kernel
-def watched_kernel(doors, S, W, R, own, sheet, expected, desk, clock, out):
+def watched_kernel(doors, S, W, R, own, sheet, group, expected, desk, clock, out):
     """Go on with a watched integration; ``doors``: what the method is asked by (`door.ask`); the engine's address."""
-    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet), held(expected))
+    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet), held(group), held(expected))
     callbacks = (steps, doors[0], report, begun, onward, watch, note, look)
     return advance(callbacks, A, held(desk), held(R), held(clock), out)
 
@@ -103,9 +139,11 @@ class Loop:
     S, W : System, Work
     width : int
         Of a row of output, and of what the method has the engine write.
+    group : Sharing
+        What holds together.
     """
 
-    def __init__(self, steps: Any, clock: Clock, S: System, W: Work, width: int) -> None:
+    def __init__(self, steps: Any, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
         nm = len(S.row_p) - 1 - len(S.row_i)
         self.steps, self.clock, self.S, self.W = steps, clock, S, W
         rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
@@ -121,7 +159,8 @@ class Loop:
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,
             clock.seen,
         )  # fmt: skip
-        sheet = Sheet(np.zeros((3, max(width, len(S.guard_i), 1))))
+        self.group, nv = group, W.vel.shape[1]
+        sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
         self.own = Own(own, sheet, tableau("rk45"), np.zeros(2, np.int64))
         self._bound: Bound | None = None
 
@@ -130,12 +169,12 @@ class Loop:
         x = self.own
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
-            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk))
+            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group))
         doors = self._bound.asked, x.doors
         tables = S, W, x.R, x.clock, x.sheet
         if not len(S.guard_i):
             return int(unwatched_kernel(doors, *tables, self.desk, self.clock, out))
-        return int(watched_kernel(doors, *tables, self.expected, self.desk, self.clock, out))
+        return int(watched_kernel(doors, *tables, self.group, self.expected, self.desk, self.clock, out))
 
     @property
     def fired(self) -> tuple[int, ...]:
