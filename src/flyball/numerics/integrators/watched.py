@@ -10,11 +10,30 @@ W is a `Watch`. It returns besides when a step ends on events; whoever calls cha
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import NEXT, NOW, STATUS, TRIED, H, T
+from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
 from .glance import NOISE
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, write
+from .panels import rounding, side_of
 from .sought import CUT, first_event
-from .watching import CUTS, END, EVENT, EVENTS, FRESH, SIDE, START, STEPS
+from .watching import (
+    CUTS,
+    END,
+    EVENT,
+    EVENTS,
+    FIRED,
+    FRESH,
+    GRAIN_END,
+    GRAIN_START,
+    LATEST,
+    LEAST,
+    MOST,
+    SIDE,
+    START,
+    STEPS,
+    UNKNOWN,
+)
+
+OFTEN = 64.0  # times as long as from event to event that the step after one is at most
 
 
 @formula
@@ -24,7 +43,7 @@ def begun(callbacks, S, W, c, back):
     W.count[FRESH] = 1
     if back:
         for i in range(W.side.shape[0]):
-            W.side[i] = 1.0
+            W.side[i] = UNKNOWN
     return see(watch, note, S, W, c)
 
 
@@ -61,11 +80,13 @@ def onward(callbacks, S, W, R, c, out, used):
     W.count[STEPS] += 1
     W.count[CUTS] = 0
     if hit:
-        c.real[H] = max(c.real[H], most)
+        c.real[H], c.real[WIDE] = max(c.real[H], most), max(c.real[WIDE], most)
+        if c.real[T] > W.real[LATEST]:  # as wide as it can be looked through for more that come as soon
+            c.real[H] = min(c.real[H], OFTEN * (c.real[T] - W.real[LATEST]))
+            W.real[LATEST] = c.real[T]
         c.count[STATUS] = EVENT
         W.count[EVENTS] += 1
-        for i in range(W.side.shape[0]):
-            W.side[i] = 0.0 if W.fired[i] == 1 else 1.0
+        known_sides(W, c, c.real[TRIED])
     else:
         settled(W)
     return used, hit
@@ -77,7 +98,25 @@ def see(watch, note, S, W, c):
     status = watch(c.real[T], c.y[NOW], S, W, START)
     if status == 0:
         note(S, W, START)
+    for i in range(W.side.shape[0]):  # what jumped since is on no known side
+        if abs(W.side[i]) == 1.0 and not W.side[i] * W.g[START, i] >= 0.5 * abs(W.g[END, i]):
+            W.side[i] = UNKNOWN
     return status
+
+
+@formula
+def known_sides(W, c, h):
+    """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
+
+    So what is to fire next, however soon, is not taken for what has just fired.
+    """
+    for i in range(W.side.shape[0]):
+        f, slope = W.g[END, i], (W.g[MOST, i] - W.g[LEAST, i]) / h
+        W.side[i] = UNKNOWN
+        if W.fired[i] == 1:
+            W.side[i], W.g[FIRED, i] = 0.0, abs(f)
+        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > rounding(W, c, i, slope, GRAIN_END):
+            W.side[i] = side_of(f)
 
 
 @formula
@@ -86,7 +125,7 @@ def settled(W):
     W.count[FRESH] = 0
     for i in range(W.way.shape[0]):
         W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END, i]) <= NOISE * W.grain[i] else W.g[SIDE, i]
-        W.g[START, i] = W.g[END, i]
+        W.g[START, i], W.g[GRAIN_START, i] = W.g[END, i], W.g[GRAIN_END, i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):
             W.moving[0, k, m] = W.moving[1, k, m]

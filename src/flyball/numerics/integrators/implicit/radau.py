@@ -42,6 +42,8 @@ SAFETY = 0.9
 NARROWEST = 0.2  # what the width becomes at least
 KEPT = 1.2  # a step that could be wider by this is not: the factors serve on
 WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
+FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is so much narrower, if it is no rounding
+SLIGHT = 10.0  # an error from rounding that is accepted where no step of another width is found
 ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
 SINGULAR = 3
 
@@ -111,6 +113,7 @@ def refuse(K, c):
             shorten(c, h)
             return 1 if K.count[FRESH] == 1 else 0
         shorten(c, asked * h)
+        stranded(c)
         return 0
     shorten(c, wider(h, error, asked)[0] if K.count[BEFORE] == 1 else 0.1 * h)
     pardon(K, c, h, error)
@@ -119,16 +122,26 @@ def refuse(K, c):
 
 @formula
 def pardon(K, c, h, error):
-    """Where ever narrower steps miss the tolerance, take the best of them: near a singular position rounding decides.
+    """Where ever narrower steps miss the tolerance by as much, rounding decides: the widest of them is taken.
 
-    What is accepted so is told (c.real[EXCESS]).
+    So it is near a singular position, where it grows as steps get narrower. What is accepted so is told
+    (c.real[EXCESS]).
     """
-    if error < c.real[BEST]:
+    if error < FALLS * c.real[BEST]:
         c.real[BEST] = error
         c.real[BEST_H] = h
-    if c.real[H] < WALKED * c.real[WIDE] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
+    elif h < NARROWER * c.real[BEST_H] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
         c.real[PARDON] = 2.0 * c.real[BEST]
         c.real[H] = c.real[BEST_H]
+        c.real[BLURRED_AT] = c.real[T]
+
+
+@formula
+def stranded(c):
+    """Where the iteration fails in ever narrower steps, a wide one is tried, which ends beyond the place."""
+    if c.real[H] < WALKED * c.real[WIDE] and c.real[PARDON] == 0.0:
+        c.real[PARDON] = SLIGHT
+        c.real[H] = c.real[WIDE]
         c.real[BLURRED_AT] = c.real[T]
 
 
@@ -149,14 +162,14 @@ def enter(K, c, t, h, error, iterations):
         c.real[EXCESS] = error
         c.real[EXCESS_AT] = c.real[T]
     wide, safe = wider(h, error, iterations)
-    if c.real[PARDON] > 0.0:
-        wide = h
-    afresh(c)
     if K.real[LAST_ERROR] > 0.0 and error > 0.0:
         f = (h / K.real[LAST_H]) * (K.real[LAST_ERROR] / (error * error)) ** 0.25 * safe
         wide = min(wide, h * max(NARROWEST, min(WIDEST, f)))
     if c.real[GROW] <= 1.0:
         wide = min(wide, h)
+    if c.real[PARDON] > 0.0:
+        wide = max(h, c.real[WIDE])
+    afresh(c)
     for i in range(c.seen.shape[1]):
         c.seen[FROM, i] = c.seen[TO, i]
         c.seen[FROM_RATE, i] = c.seen[TO_RATE, i]
