@@ -62,8 +62,6 @@ def test_names():
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda m: m.equilibrium(),
-        lambda m: m.linearize(),
         lambda m: m.modes(),
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
