@@ -28,6 +28,7 @@ from ....tables.system import (
     G_HOLDS,
     G_LOWER,
     G_PULL,
+    G_SHARED,
     G_UPPER,
     GUARD_KIND,
     GUARD_OF,
@@ -51,7 +52,7 @@ LATEST = 20  # events of which it is told who they were
 DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
 HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
-HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
+HOLDING = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -106,7 +107,7 @@ class Run:
 
     def _loop(self) -> Watched:
         c = self.here.c
-        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
+        return Watched(self.method, self.here.clock, c.system, c.work, self.width, self.here.group)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
