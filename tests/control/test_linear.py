@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import flyball as fb
 from tests.control.slide import slide
@@ -117,3 +118,33 @@ def test_equilibrium_has_what_the_integral_must_carry():
     )  # ki/kp beyond the damping: third-order flutter
     rest = m.simulate(1, start=e.result, rtol=1e-9)
     assert np.abs(rest["A.angle"] - 0.7).max() < 1e-9
+
+
+def test_sensitivity_of_a_motion_is_that_of_the_exponential():
+    """Of a PID's gain, of what its integral begins with, and of a lag's time: by complex steps of the exact solution."""
+    m = slide(
+        fb.PID("pid", setpoint="1", measured="A.displacement", kp="kp", ki=60, kd=12, filter="tf", initial="i0 + 1"),
+        kp=80.0,
+        tf=0.02,
+        i0=0.5,
+    )
+    of, to = ["A.displacement", "pid.output", "pid.integral"], ["kp", "tf", "i0"]
+    s = m.sensitivity(of, to, analysis="motion", t_end=0.4, outputs=5)
+
+    def exact(kp, tf, i0):
+        # (x, v, I, slow, 1)
+        u = np.array([-kp - 12 / tf, 0, 1, -12 / tf, kp], complex)
+        A = np.array(
+            [[0, 1, 0, 0, 0], [-10, -2, 0, 0, 0], [-60, 0, 0, 0, 60], [-1 / tf, 0, 0, -1 / tf, 0], [0] * 5], complex
+        )
+        A[1] += u
+        y = np.array([expm(A * t) @ np.array([0, 0, i0 + 1, 0, 1], complex) for t in s.t])
+        return np.stack([y[:, 0], y @ u, y[:, 2]], axis=1)
+
+    at = np.array([80.0, 0.02, 0.5])
+    for k, name in enumerate(to):
+        step = 1e-20 * at[k]
+        d = exact(*(at + 1j * step * (np.arange(3) == k))).imag / step
+        for i, what in enumerate(of):
+            assert s[what, name] == pytest.approx(d[:, i], rel=1e-6, abs=1e-6 * np.abs(d[:, i]).max())
+    assert s.values[:, 1] == pytest.approx(exact(*at)[:, 1].real, rel=1e-7, abs=1e-7)

@@ -96,7 +96,7 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
     begin, c = _begun(a, o.start), a.compiled
     names = [x.name for x in c.structure.controls]
     old = dict(zip(names, (begin if o.start is None else o.start.assembly).compiled.z.tolist(), strict=False))
-    other = slid(model, old, places=True)
+    other = slid(model, {name: repr(z) for name, z in old.items()}, places=True)
     if holds_at_times(other.model):
         raise ModelError(
             f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "

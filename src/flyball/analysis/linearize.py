@@ -114,7 +114,7 @@ def _controlled(model: Model, o: LinearizeOptions) -> LinearModel:
     refuse_sampled(model, "linearize")
     here = o.state(model)
     c = here.c.structure
-    other = slid(model, dict(zip([x.name for x in c.controls], here.z.tolist(), strict=False)), o.outputs)
+    other = slid(model, {x.name: repr(z) for x, z in zip(c.controls, here.z.tolist(), strict=False)}, o.outputs)
     if holds_at_times(other.model):
         raise ModelError(
             f"{model.name!r} has controllers and parts that hold at times, and linearize knows only one of the two; "

@@ -11,6 +11,7 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from ...forces import Actuator
 from ...joints import Prismatic
 from ...model.body import Body
 from ...model.controller import Controller
-from ...model.element import LawOf, fields_with
+from ...model.element import LawOf, fields_with, resolve
 from ...model.expressions import Expression, is_number_text
 from ...model.model import Model
 from ...model.sensor import Sensor
@@ -74,14 +75,26 @@ def refuse_sampled(model: Model, analysis: str) -> None:
 STRIDE = 1e4  # of a state, for a metre of its body: positions are looked for with steps of limited length
 
 
-def slid(model: Model, at: Mapping[str, float], outputs: Sequence[str] = (), *, places: bool = False) -> Slid:
+def beginnings(model: Model) -> dict[str, str]:
+    """What the states begin with, as formulas of the parameters."""
+    out = {}
+    for e in model.controllers:
+        n = resolve(e, model.environment())
+        raw = SimpleNamespace(**{f.name: getattr(e, f.name) for f in dataclasses.fields(e)})
+        for told, known in zip(e.states(raw), e.states(n), strict=True):
+            formula = isinstance(told.initial, str) and not is_number_text(told.initial)
+            out[f"{e.name}.{told.name}"] = told.initial if formula else repr(float(known.initial))
+    return out
+
+
+def slid(model: Model, at: Mapping[str, float | str], outputs: Sequence[str] = (), *, places: bool = False) -> Slid:
     """The copy.
 
     Parameters
     ----------
     model : Model
     at : mapping
-        State of a controller -> its value where small motions are asked about.
+        State of a controller -> its value where small motions are asked about, a number or a formula of parameters.
     outputs : sequence of str
         Signals and states of controllers that are asked for, besides curves of other parts.
     places : bool
@@ -93,7 +106,7 @@ def slid(model: Model, at: Mapping[str, float], outputs: Sequence[str] = (), *, 
 class _Sliding:
     """A copy in the making."""
 
-    def __init__(self, model: Model, at: Mapping[str, float], places: bool) -> None:
+    def __init__(self, model: Model, at: Mapping[str, float | str], places: bool) -> None:
         self.old, self.what = model, "displacement" if places else "displacement_rate"
         self.new = model.copy()
         self.new.controllers, self.new.events = [], []
@@ -101,7 +114,7 @@ class _Sliding:
         self.states = wired(model)
         self.body = {x.name: self._free(x.name.replace(".", "_")) for x in self.states}
         stride = f"{STRIDE!r}*" if places else ""
-        self.known = {name: f"({at[name]!r} + {stride}{b}_now)" for name, b in self.body.items()}
+        self.known = {name: f"(({at[name]}) + {stride}{b}_now)" for name, b in self.body.items()}
 
     def _free(self, name: str) -> str:
         """A name that nothing has."""
