@@ -15,7 +15,7 @@ from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
-from ..numerics.integrators.watching import STAGE, START, watching
+from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, STAGE, START, watching
 from ..tables.system import (
     BIAS,
     G_SHARED,
@@ -165,10 +165,13 @@ def note(A, K, row):
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     balanced(A)
     all_guards(A, W, A[OWN].real[T], K.g[row])
-    grains(S, W, K.grain)
+    grain = GRAIN_START if row == START else GRAIN_END
+    grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.g[grain])
     last = K.grain.shape[0] - 1
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
-        K.grain[last] = GRAIN * A[GROUP].size[0]
+        K.g[grain, last] = GRAIN * A[GROUP].size[0]
+    for i in range(K.grain.shape[0]):
+        K.grain[i] = K.g[grain, i] if K.kept[i] == 1 else min(K.g[GRAIN_START, i], K.g[grain, i])
 
 
 @formula

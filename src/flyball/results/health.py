@@ -9,7 +9,10 @@ from typing import Any
 from .contact_health import ContactHealth
 from .departure import Departure, summary
 
-LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
+LATE = (
+    *("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings"),
+    "doubtful",
+)
 """Figures that are found when first asked for."""
 
 
@@ -56,7 +59,8 @@ class Health:
     @property
     def status(self) -> str:
         """How it ended: ``"done"``, or where and by which event of the model, or why it could not go on."""
-        return "done" if self.success and self._simulated and not self.ended_early else self.message
+        end = "done" if self.success and self._simulated and not self.ended_early else self.message
+        return f"{end}, but doubtful" if self.success and self.doubtful else end
 
     @property
     def ended_early(self) -> bool:
@@ -92,6 +96,11 @@ class Health:
     def creep(self) -> dict[str, tuple[float, float]]:
         """Joint friction -> largest creep speed [m/s] and distance [m] while it should stick; see `doubts.creep`."""
         return self._found("creep") if "creep" in self.late else {}
+
+    @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Reasons to think that the motion is not what its tolerance asks for: its energy balance, its constraints."""
+        return tuple(self._found("doubtful")) if "doubtful" in self.late else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -140,7 +149,9 @@ class Health:
             out.append(("events", self.events))
         if self.contact:
             out += self.contact.lines()
-        return out + [(f"warning {k}", text) for k, text in enumerate(self.warnings, 1)]
+        out += [("doubtful", text) for text in self.doubtful]
+        others = [text for text in self.warnings if text not in self.doubtful]
+        return out + [(f"warning {k}", text) for k, text in enumerate(others, 1)]
 
     def __str__(self) -> str:
         width = max(len(k) for k, _ in self.lines())

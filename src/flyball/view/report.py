@@ -95,6 +95,8 @@ def _verdict(result: Result) -> str:
     kind, text = ("good", "The run reached its end.") if h.success else ("bad", f"The run stopped: {h.message}")
     if h.ended_early:
         kind, text = "early", f"The run {h.message}."
+    if h.success and h.doubtful:
+        kind, text = "bad", f"{text.removesuffix('.')}, but is doubtful."
     warnings = h.warnings
     if warnings:
         count = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"

@@ -72,8 +72,10 @@ def outcome(
         "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
+        "doubtful": partial(doubts.doubtful, result),
     }
     result.events = here.records
+    result.counted = dict(here.counts)
     if here.seen is not None:
         here.seen.told(result)
         result.contacts = contacts(result)

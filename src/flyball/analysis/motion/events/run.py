@@ -20,7 +20,7 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
-from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....numerics.integrators.watching import AWAY, CHECKS, END, EVENT, FIRED, LOOKS, NODES, STEPS, UNKNOWN
 from ....tables.system import (
     G_BACK,
     G_CONE,
@@ -36,8 +36,9 @@ from ....tables.system import (
 )
 from ...progress import Tell
 from ..engines import Engine
-from .actions import expressions, say_never, stepped_over, true_already
-from .failed import endless
+from .accumulating import Counts
+from .actions import at_the_seam, expressions, say_never, stepped_over, true_already
+from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
 from .instant import instant_of
@@ -80,6 +81,7 @@ class Run:
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
+        self.counts = Counts()
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
@@ -171,8 +173,22 @@ class Run:
         if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
             self.sampling.sample(here.c.system, here.c.work, here.clock)
         begin(here)
+        if self.loop is not None and here.start.before is not None:
+            self.resume(self.loop)
         self.true = true_already(self.here)
         self.here.fresh = False
+
+    def resume(self, loop: Watched) -> None:
+        """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
+
+        What did not is ahead, however near.
+        """
+        here, desk = self.here, loop.desk
+        told = at_the_seam(here)
+        values = instant_of(here).guards()
+        for g, e in here.structure.events.items():
+            desk.side[g] = 0.0 if e.name in told else np.sign(values[g]) or UNKNOWN
+            desk.g[END, g], desk.g[FIRED, g] = values[g], abs(values[g])
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
@@ -207,6 +223,9 @@ class Run:
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+        self.counts.add(fired, here.t)
+        if found := self.counts.accumulate(fired, self.legs.end):
+            raise accumulating(instant_of(here), *found)
         if self.loop is not None and self.loop.desk.count[AWAY]:
             here.crept = self.crept(self.loop)
         self.happens(fired)
