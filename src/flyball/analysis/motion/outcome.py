@@ -17,6 +17,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ..compile_time import compiled_since
 from ..mobility import mobility
 from .events.here import Here
 from .options import Integration
@@ -97,6 +98,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
+        compiling=compiled_since(start.since),
         options=o.choices(),
         remarks=(
             *map(not_allowed, changed_velocities(start.base.departures)),
