@@ -24,6 +24,8 @@ def test_rings_are_named():
         ({"kp": 1, "ki": 1, "lower": 0, "anti_windup": "clamping", "tracking": 1}, "tracking does nothing without"),
         ({"kp": 1, "lower": 2, "upper": 1}, "lower must be less"),
         ({"kp": 1, "initial": 1}, "initial does nothing without ki"),
+        ({"kp": 1, "initial_measured": 1}, "initial_measured does nothing without kd"),
+        ({"ki": 1, "lower": 0}, "give tracking"),
         ({}, "it has no gains"),
         ({"kd": 1, "filter": 0}, "it must be greater than 0"),
     ],

@@ -18,8 +18,8 @@ import numpy as np
 
 from ...equations.velocities import velocities
 from ...errors import ModelError
-from ...forces import Actuator
-from ...joints import Prismatic
+from ...forces.coordinate_spring import pushing
+from ...joints.prismatic import slide
 from ...model.body import Body
 from ...model.controller import Controller
 from ...model.element import LawOf, fields_with, resolve
@@ -129,12 +129,12 @@ class _Sliding:
             still = {"inertia": 1.0} if planar else {"inertia": (1.0, 1.0, 1.0)}
             self.new.add(
                 Body(body, mass=1.0, position=self._place(), **still),
-                Prismatic(f"{body}_slide", "ground", body, at=self._place(), axis=(1, 0) if planar else (1, 0, 0)),
+                slide(f"{body}_slide", body, self._place(), planar),
                 Sensor(f"{body}_now", f"{body}_slide.{self.what}"),
             )
         for x, body in zip(self.states, self.body.values(), strict=True):
             force = f"{self.text(x.law)}{self._held()}"
-            self.new.add(Actuator(f"{body}_push", coordinate=f"{body}_slide.displacement", force=force))
+            self.new.add(pushing(f"{body}_push", f"{body}_slide.displacement", force))
         self._laws()
         found = {name: self._output(name, k) for k, name in enumerate(outputs) if self._own(name)}
         self.new.sensors = [e for e in self.new.sensors if not self._own(getattr(e, "of", ""))]
@@ -200,9 +200,7 @@ class _Sliding:
             raise ModelError(f"{owner!r} has no signal {what!r}; it has {', '.join(wiring_of(self.old, e))}")
         text = self.text(signal(self.old, e, what))
         told, along = self._free(f"output_{k}_"), f"{self.old.bodies[0].name}.x"
-        self.new.add(
-            Actuator(told, coordinate=along, force=text), Actuator(f"{told}back", coordinate=along, force=f"-{text}")
-        )
+        self.new.add(pushing(told, along, text), pushing(f"{told}back", along, f"-{text}"))
         return f"{told}.force"
 
 
