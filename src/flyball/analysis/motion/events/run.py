@@ -110,8 +110,10 @@ class Run:
         if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
             return False
         before = expressions(here)
-        if self.sampling.sample(here.c.system, here.c.work, here.clock) == 0:
-            self.jumped(before)
+        if self.sampling.sample(here.c.system, here.c.work, here.clock) != 0:
+            here.clock.count[ex.STATUS] = ex.STUCK
+            return True
+        self.jumped(before)
         if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             self.rows[-1][-1] = self.row()
         return True
@@ -201,7 +203,7 @@ class Run:
         elif status == ex.DONE:
             if self.sampled():
                 self.legs.aim()
-                return False
+                return bool(clock.count[ex.STATUS] == ex.STUCK)
             sharp = self.legs.ends_sharply() and self.guarded
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
