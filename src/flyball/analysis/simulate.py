@@ -38,6 +38,7 @@ from .motion.known import sampled_laws, told_of
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
+from .motion.part import Part, whole
 from .motion.start import Start, begin, start_time
 from .motion.touches import with_places
 from .progress import Tell, shown
@@ -56,20 +57,24 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
     way = chosen(model, o)
     try:
-        return _told(model, way.options, span, way.why)
+        return told(model, way.options, span, way.why)
     except (ModelError, SimulationError) as error:
         if way.instead is None or not unresolved(error):
             raise
         try:
-            return _told(model, way.instead, span, instead_of(error))
+            return told(model, way.instead, span, instead_of(error))
         except FlyballError:
             raise error from None
 
 
-def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], why: str) -> Result:
-    """The motion, which says by what it was computed, and why."""
+Span = tuple[float, float, np.ndarray]
+"""Start and end of a motion [s], and its output times."""
+
+
+def told(model: Model, o: SimulateOptions, span: Span, why: str, part: Part | None = None) -> Result:
+    """The motion, or a part of it, which says by what it was computed, and why."""
     try:
-        result = _computed(model, o, span)
+        result = _computed(model, o, span, part or whole())
     except SimulationError as error:
         if isinstance(error.result, Result):
             error.result.health.method = why
@@ -78,19 +83,19 @@ def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray
     return result
 
 
-def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray]) -> Result:
-    """The motion by a method that is chosen: start, end, output times."""
+def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Result:
+    """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
     announce_motion(model, not isinstance(o.method, Stepping), o.method in IMPLICIT)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
-            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
+            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
     model = with_places(model, o.parameters)
-    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
+    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)
     slides = _no_stops(begun) and leaves_no_freedom(begun)  # what drivers prescribe follows no force
     if slides:
-        begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
+        begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
         begun = suited(begun, o.coordinates, o.parameters)
@@ -132,6 +137,7 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    begun.part.begin(c.structure)
     known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
@@ -140,12 +146,12 @@ def moved(
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
         loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
-        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell)
+        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell, begun.part)
         here.failed = loop.failed
     elif watched(begun) or len(known.times):
         rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
+        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine, begun.part)
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
@@ -195,10 +201,11 @@ def clock_for(
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
-    real[ex.SPAN] = (t_end - t) or 1.0
+    first = t if start.part.first is None else start.part.first
+    real[ex.SPAN] = (t_end - first) or 1.0
     real[ex.H_MAX] = min(o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
+    real[ex.LEDGER] = energy_size(start.base, float(real[ex.SPAN]))
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
@@ -239,13 +246,20 @@ def _width(a: Assembly) -> int:
 
 
 def run_clock(
-    a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int, engine: Engine | None = None
+    a: Assembly,
+    clock: ex.Clock,
+    method: Tableau,
+    tell: Tell,
+    task: int,
+    engine: Engine | None = None,
+    part: Part | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven. It ends
+    early where ``part`` does.
     """
-    c, engine = a.compiled, engine or Engine(a.compiled, False)
+    c, engine, part = a.compiled, engine or Engine(a.compiled, False), part or whole()
     s, width = c.structure, _width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = []
@@ -253,10 +267,10 @@ def run_clock(
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
     engine.begin(clock)
-    clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
+    quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
     try:
         while True:
-            begin = time.perf_counter()
+            begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
                 used = motion_kernel(c.system, c.work, method, clock, buffer, task)
@@ -267,10 +281,14 @@ def run_clock(
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
+            part.took(done)
             if engine.begins_anew(clock):
                 rows.clear()
+                part.anew()
                 forget(c.work.stack)
-            clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
+            if part.over(clock):
+                return np.concatenate(rows), False
+            quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, width)), True
     finally:

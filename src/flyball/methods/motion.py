@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from ..analysis.motion.impulse.settings import Stepping
     from ..analysis.prepared import Prepared
     from ..model.model import Model
@@ -39,6 +41,7 @@ class Motions(Model):
         beta: float | None = None,
         specialize: bool | str = "auto",
         step: float | str | None = None,
+        checkpoint: str | PathLike[str] | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
         """Integrate the equations of motion.
@@ -94,6 +97,10 @@ class Motions(Model):
             the tolerance, and not to the last digit, with those of the other; ``health.engine`` says which it was.
         step : float or str [s], optional
             A fixed step, of ``radau`` alone: errors are then not looked at.
+        checkpoint : path, optional
+            Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
+            minute of computing at most, the same call goes on from there, to the same digits. Where the motion is
+            there to its end, it is what is returned.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.
@@ -111,10 +118,9 @@ class Motions(Model):
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
         """
-        from ..analysis.motion.choice import SimulateOptions
-        from ..analysis.simulate import simulate
+        from ..analysis.checkpointed import CheckpointOptions, checkpointed
 
-        return simulate(self, SimulateOptions.asked(locals()))
+        return checkpointed(self, CheckpointOptions.asked(locals()))
 
     def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.

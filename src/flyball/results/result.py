@@ -64,6 +64,8 @@ class Result:
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
         surfaces that move, given by kicks and changes of parameters.
+    carried : dict
+        What a motion that goes on from it knows besides its end: how often events happened, for instance.
     stretches : Stretches
         What held between events: modes of what switches, parameters; None where nothing can switch.
     """
@@ -92,6 +94,7 @@ class Result:
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self.carried: dict[str, Any] = {}
         self.stretches: Stretches | None = None
         self._events = Events(())
         self.energy = Energy(self)

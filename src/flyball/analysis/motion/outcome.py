@@ -18,8 +18,10 @@ from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..mobility import mobility
+from .events.carried import carried
 from .events.here import Here
 from .options import Integration
+from .part import KEPT
 from .reasons import reason, remarks
 from .residual import acceleration_violation
 from .start import Start
@@ -49,12 +51,14 @@ def outcome(
     message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+    elif here.start.part.paused:
+        message = KEPT.format(t)
     elif here.failed is not None:
         message = f"{model.name!r}: {here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
     elif status != ex.DONE:
         message, cause = reason(a, start.base, clock)
     health = _health(start, clock, o)
-    ended = here.failed is None and not interrupted
+    ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE
     health.watched = here.watched
     health.remarks = (*health.remarks, *here.doubts)
@@ -66,6 +70,7 @@ def outcome(
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved
     result.wound = start.wound
+    result.carried = carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
     health.late = {
         "mobility": partial(mobility, model, start.base),
         "energy_drift": partial(_energy_drift, result),

@@ -21,6 +21,7 @@ from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
 from ....tables.values import Values
 from .blows import generalised
+from .carried import take_up
 from .here import Here
 from .holding import gone_on, hold, let_go
 from .setting import set_parameters
@@ -118,6 +119,7 @@ def act_at_start(here: Here) -> Acts:
             here.c.work.switch[MODE, k] = HELD
     if here.start.before is not None:
         gone_on(here, here.start.before)
+        take_up(here, here.start.before.carried)
         return Acts(here, (), before=here.y.copy(), tables=here.c.values)
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
@@ -158,20 +160,20 @@ def expressions(here: Here) -> dict[int, float]:
 def true_already(here: Here) -> list[str]:
     """Names of events whose comparisons are true now: they become true only after they were false.
 
-    None where a motion goes on: what is true there may have become true in what went before.
+    Where a motion goes on, those of its begin: what is true now may have become true in what went before.
     """
     if here.start.before is not None:
-        return []
+        return here.true
     every = here.structure.events
     texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
     values = expressions(here) if texts else {}
     return [every[g].name for g, text in texts.items() if values[g] > 0.0 and compared(text, every[g]) is not None]
 
 
-def say_never(here: Here, true: Sequence[str]) -> None:
+def say_never(here: Here) -> None:
     """Say which events, true as the motion began, did not happen in it."""
     for e in here.structure.model.events:
-        if e.name in true and not here.counts.get(e.name):
+        if e.name in here.true and not here.counts.get(e.name):
             here.doubts.append(
                 f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
             )

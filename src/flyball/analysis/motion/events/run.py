@@ -74,6 +74,7 @@ class Run:
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
+        self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
@@ -96,9 +97,10 @@ class Run:
                 self.integrate()
                 if self.over():
                     break
-            if here.stopped:
+            if here.stopped or self.part.paused:
                 self.stop()
-            say_never(here, self.true)
+            if not self.part.paused:
+                say_never(here)
         except KeyboardInterrupt:
             here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
@@ -131,16 +133,19 @@ class Run:
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
+            self.part.anew()
             self.here.seen = self.here.seen and Segments()
             forget(self.here.c.work.stack)
             self.legs.anew()
+        if clock.count[ex.ACCEPTED] > self.settled and self.part.over(clock):
+            return True
         self.legs.aim()
         return False
 
     def begin(self) -> None:
         """What happens as the motion begins."""
         begin(self.here)
-        self.true = true_already(self.here)
+        self.here.true = true_already(self.here)
         self.here.fresh = False
 
     def integrate(self) -> None:
@@ -148,6 +153,7 @@ class Run:
         c, clock = self.here.c, self.here.clock
         before = time.perf_counter()
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
+        clock.count[ex.QUOTA] = self.part.most(self.quota)
         with interrupts_kept(c.structure.functions):
             if self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
@@ -155,10 +161,11 @@ class Run:
                 used = self.loop.go_on(c.system, c.work, self.buffer)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
+        done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps)
+        self.part.took(done)
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
-            done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            clock.count[ex.QUOTA] = self.engine.limited(clock, done * SLICE / took)
+            self.quota = self.engine.limited(clock, max(done, 1) * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
@@ -195,6 +202,8 @@ class Run:
         here, clock = self.here, self.here.clock
         system = here.c.system
         happen(here, fired)
+        self.part.decided()
+        self.settled = int(clock.count[ex.ACCEPTED])
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
@@ -222,14 +231,16 @@ class Run:
             self.happens(fired)
 
     def stop(self) -> None:
-        """The motion ends here: the last row is written."""
+        """The motion, or a part of it, ends here: the last row is written, but where it is already."""
         here, clock = self.here, self.here.clock
-        c = here.c
+        c, status = here.c, clock.count[ex.STATUS]
+        if self.part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+            return
         row, y = np.zeros((1, self.width)), here.y.copy()
         motion_kernel(c.system, c.work, self.method, clock, row, REPORT)
         here.y[:] = y
         self.take(row)
-        clock.count[ex.STATUS] = ex.DONE
+        clock.count[ex.STATUS] = status if self.part.paused else ex.DONE
 
 
 def told(loop: Watched) -> str:

@@ -23,6 +23,7 @@ from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, complex_tables
 from ...progress import Tell
 from ..events.legs import Legs
+from ..part import Part
 from .layout import layout, metric
 
 SOFT = 1e-10  # regularisation of rows, as part of their natural size
@@ -144,29 +145,30 @@ class Implicit:
         )  # fmt: skip
 
 
-def run_implicit(loop: Implicit, width: int, known: Breaks, tell: Tell) -> tuple[np.ndarray, bool]:
-    """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted)."""
+def run_implicit(loop: Implicit, width: int, known: Breaks, tell: Tell, part: Part) -> tuple[np.ndarray, bool]:
+    """Call the compiled loop until it is through, or the part is. Returns (rows, whether the user interrupted)."""
     c, clock = loop.c, loop.clock
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
     rows = [np.zeros((0, width))]
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
-    legs = Legs(clock, known)
+    legs, quota = Legs(clock, known), int(clock.count[ex.QUOTA])
     try:
         while True:
-            begin = time.perf_counter()
+            begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             rows.append(buffer[: loop.go_on(buffer)].copy())
             reached = max(reached, (clock.real[ex.T] - first) / span)
             tell(min(1.0, reached))
+            done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
+            part.took(done)
             if clock.count[ex.STATUS] == ex.DONE and legs.next():
                 continue
-            if clock.count[ex.STATUS] != ex.RUNNING:
+            if part.over(clock) or clock.count[ex.STATUS] != ex.RUNNING:
                 legs.whole()
                 return np.concatenate(rows), False
-            done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
             took = time.perf_counter() - begin
-            clock.count[ex.QUOTA] = int(min(max(done * SLICE / max(took, 1e-6), 1.0), LONGEST))
+            quota = int(min(max(done * SLICE / max(took, 1e-6), 1.0), LONGEST))
     except KeyboardInterrupt:
         return np.concatenate(rows), True

@@ -74,7 +74,7 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
     else:
         return begun
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
-    out.since, out.coordinates = begun.since, f"absolute: {why}"
+    out.since, out.part, out.coordinates = begun.since, begun.part, f"absolute: {why}"
     return out
 
 
