@@ -21,6 +21,7 @@ from typing import Any
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
 
+from flyball.numerics.integrators.tableaux import TABLEAUX
 from mechanisms import Kernel, simulate
 
 TOLERANCES = tuple(10.0 ** (-e / 2) for e in range(4, 25))
@@ -207,12 +208,11 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
 
 
 def clocks(model: Any, t_end: float, outputs: int, options: Mapping[str, Any]) -> dict[str, Callable[[], float]]:
-    """What is timed of flyball: the compiled loop, and the whole call."""
-    kernel = Kernel(model, t_end, 2, **options)
-    return {
-        "kernel": kernel.seconds,
-        "call": lambda: timing.cpu(lambda: simulate(model, t_end, outputs=outputs, **options)),
-    }
+    """What is timed of flyball: the compiled loop, if it is an explicit one, and the whole call."""
+    out = {"call": lambda: timing.cpu(lambda: simulate(model, t_end, outputs=outputs, **options))}
+    if options["method"] in TABLEAUX:
+        out["kernel"] = Kernel(model, t_end, 2, **options).seconds
+    return out
 
 
 def run(contest: Contest, ours: Sequence[Flyball], peers: Sequence[Peer]) -> list[dict[str, Any]]:
@@ -242,9 +242,9 @@ def time_in_turn(contest: Contest, rows: Sequence[dict[str, Any]]) -> None:
     for i, row in enumerate(rows):
         row |= {NAMED[key]: 1e3 * seconds[i, key] / contest.per for key in row["clocks"]}
     for key, ratio in RATIOS.items():
-        ours = min((row[key] for row in rows if row["engine"] == "flyball"), default=None)
+        ours = min((row[key] for row in rows if row["engine"] == "flyball" and key in row), default=None)
         for row in rows:
-            row[ratio] = row[key] / ours if ours else None
+            row[ratio] = row[key] / ours if ours and key in row else None
 
 
 def ratios(rows: Sequence[Mapping[str, Any]]) -> str:
@@ -255,7 +255,9 @@ def ratios(rows: Sequence[Mapping[str, Any]]) -> str:
         return f"{rows[0]['case']}: no ratio, the target was not met by both sides"
     texts = []
     for key, label in (("cpu_ms", "kernel"), ("call_ms", "whole call")):
-        peer, best = min(peers, key=lambda r: r[key]), min(r[key] for r in ours)
+        if not any(key in r for r in ours):
+            continue
+        peer, best = min(peers, key=lambda r: r[key]), min(r[key] for r in ours if key in r)
         told = f"{peer['engine']} ({peer['setting']}) {peer[key]:.3g} ms"
         texts.append(f"{label}: flyball {best:.3g} ms, best peer {told}, ratio {peer[key] / best:.2f}")
     return f"{rows[0]['case']}: " + "; ".join(texts)

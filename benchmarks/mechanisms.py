@@ -146,6 +146,10 @@ def flyball_planar(p: Planar) -> fb.Mechanism:
         m.add(fb.Revolute(f"hinge{k}", "ground" if i == GROUND else f"rod{i}", f"rod{j}", at=where))
     for k, (hinge, *law) in enumerate(p.motors):
         m.add(fb.Motor(f"motor{k}", f"hinge{hinge}", torque=following(*law)))
+    for k, (i, at_i, j, at_j, stiffness, length) in enumerate(p.springs):
+        ends = tuple(tuple(point(p.start[None], b, at)[0].tolist()) for b, at in ((i, at_i), (j, at_j)))
+        names = ["ground" if b == GROUND else f"rod{b}" for b in (i, j)]
+        m.add(fb.SpringDamper(f"spring{k}", *names, at=ends, stiffness=stiffness, length=length))
     return m
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from exudyn_run import DENSE, IMPLICIT, driven, exu, integrate, item, stored
-from trees import Link, Motion, Motor, Tree, start_twists
+from trees import Link, Motion, Motor, Tree, mounted, springs_of, start_twists
 
 from mechanisms import GROUND
 
@@ -82,6 +82,9 @@ class Built:
         if kinds == ["hinge"]:
             ends = self.ends(link.parent, k, first.point, turned(first.direction))
             add(item.ObjectJointRevoluteZ(markerNumbers=ends))
+            if first.stiffness or first.damping:
+                connector = item.ObjectConnectorTorsionalSpringDamper
+                add(connector(markerNumbers=ends, stiffness=first.stiffness, damping=first.damping))
         elif kinds == ["hinge", "hinge"]:  # one axis in each body, at right angles for good
             ends = self.ends(link.parent, k, first.point, turned(link.axes[1].direction, first.direction))
             add(item.ObjectJointGeneric(markerNumbers=ends, constrainedAxes=[1, 1, 1, 0, 1, 0]))
@@ -90,6 +93,11 @@ class Built:
             ends = self.ends(link.parent, k, first.point, z[:, [2, 0, 1]])
             add(item.ObjectJointPrismaticX(markerNumbers=ends))
             self.slide_spring(k, link)
+        elif mounted(link):
+            stiffness, damping = map(np.diag, springs_of(link))
+            ends = self.ends(link.parent, k, first.point, np.eye(3))
+            connector = item.ObjectConnectorRigidBodySpringDamper
+            add(connector(markerNumbers=ends, stiffness=stiffness, damping=damping))
         elif len(kinds) != 6:
             raise ValueError(f"no joint of this engine is a chain of {kinds}")
 

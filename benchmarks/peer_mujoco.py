@@ -13,13 +13,15 @@ import time
 import mujoco
 import native_motor
 import numpy as np
-from trees import Link, Motion, Tree
+from trees import Link, Motion, Tree, mounted
 
 from mechanisms import GROUND
 
 SETTINGS = {
     "RK4, stiff": 2.0,
     "RK4, softer (4 steps)": 4.0,
+    "implicitfast, stiff": 2.0,
+    "implicit, stiff": 2.0,
 }  # time constant of the constraints in steps
 JOINT = mujoco.mjtObj.mjOBJ_JOINT
 FREE = 6  # joints of a link that are one free joint
@@ -32,7 +34,7 @@ def build(tree: Tree, h: float, setting: str):
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = tree.gravity
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    spec.option.integrator = getattr(mujoco.mjtIntegrator, "mjINT_" + setting.partition(",")[0].upper())
     spec.option.timestep = h
     spec.option.tolerance, spec.option.iterations = 1e-14, 50
     spec.option.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT
@@ -78,13 +80,13 @@ def add_body(above, link: Link, below: np.ndarray, first: int):
         body.fullinertia = (J[0, 0], J[1, 1], J[2, 2], J[0, 1], J[0, 2], J[1, 2])
     else:
         body.inertia = np.diag(J)
-    if len(link.axes) == FREE:
+    if len(link.axes) == FREE and not mounted(link):
         body.add_freejoint(name=f"joint{first}")
         return body
     for k, a in enumerate(link.axes):
         kind = mujoco.mjtJoint.mjJNT_HINGE if a.kind == "hinge" else mujoco.mjtJoint.mjJNT_SLIDE
         joint = body.add_joint(name=f"joint{first + k}", type=kind, pos=a.point - at, axis=a.direction)
-        if a.stiffness:
+        if a.stiffness or a.damping:
             joint.stiffness, joint.springref, joint.damping = [a.stiffness, 0, 0], a.rest, [a.damping, 0, 0]
     return body
 
@@ -99,7 +101,7 @@ def start_rates(tree: Tree) -> np.ndarray:
     """
     out, n = np.array(tree.rates), 0
     for link in tree.links:
-        if len(link.axes) == FREE:
+        if len(link.axes) == FREE and not mounted(link):
             if not np.array_equal([a.direction for a in link.axes], np.eye(3)[[0, 1, 2, 2, 1, 0]]):
                 raise ValueError(f"{link.name}: six freedoms that are no free joint")
             out[n + 3 : n + 6] = out[n + 3 : n + 6][::-1].copy()

@@ -120,6 +120,16 @@ class Tree:
         return [a for link in self.links for a in link.axes]
 
 
+def mounted(link: Link) -> bool:
+    """Whether a link hangs in a rubber mount: three slides along x, y, z and three hinges, with springs."""
+    return len(link.axes) == 6 and link.axes[0].stiffness > 0.0
+
+
+def springs_of(link: Link) -> tuple[list[float], list[float]]:
+    """Stiffness and damping of all its axes."""
+    return [a.stiffness for a in link.axes], [a.damping for a in link.axes]
+
+
 class Motion(NamedTuple):
     """Centres of mass, rotations, their velocities and angular velocities; world components, (times, links, ...)."""
 
@@ -276,12 +286,12 @@ def flyball_tree(tree: Tree) -> fb.Mechanism:
 
 
 def add_joint(m: fb.Mechanism, name: str, parent: str, link: Link) -> None:
-    """A chain of hinges and slides as one of flyball's joints; six freedoms are no joint."""
+    """A chain of hinges and slides as one of flyball's joints, or a mount; six freedoms are no joint."""
     kinds = [a.kind for a in link.axes]
     first = link.axes[0]
     if kinds == ["hinge"]:
         m.add(fb.Revolute(name, parent, link.name, at=first.point, axis=first.direction))
-        if first.stiffness:
+        if first.stiffness or first.damping:
             held = {"stiffness": first.stiffness, "damping": first.damping, "angle": first.rest}
             m.add(fb.TorsionalSpringDamper(f"spring of {name}", name, **held))
     elif kinds == ["hinge", "hinge"]:
@@ -292,6 +302,10 @@ def add_joint(m: fb.Mechanism, name: str, parent: str, link: Link) -> None:
         if first.stiffness:
             spring = {"stiffness": first.stiffness, "rest": first.rest}
             m.add(fb.CoordinateSpring(f"spring of {name}", f"{name}.displacement", **spring))
+    elif mounted(link):
+        k, c = springs_of(link)
+        m.add(fb.Bushing(name, parent, link.name, at=first.point, stiffness=k[:3], damping=c[:3],
+                         torsional_stiffness=k[3:], torsional_damping=c[3:]))  # fmt: skip
     elif len(kinds) != 6:
         raise ValueError(f"{name}: no joint of flyball is a chain of {kinds}")
 

@@ -19,6 +19,7 @@ Describe a mechanism
     couplings     GearPair, RackAndPinion, Coupler
     forces        SpringDamper, TorsionalSpringDamper, CoordinateSpring, Bushing, Rope, Detent, Actuator, Motor,
                   JointFriction, Clutch, Brake, PointForce, PointTorque
+    controllers   PID, StateSpace, Transfer, Lag, Integrator, State: with states of their own; laws name them
     Driver        a coordinate follows a law of time; Initial says where it starts, Table is a curve for laws
     Sensor, IMU   measured quantities with names of their own
     load          read a mechanism from a TOML or Python file; ``m.save(path)`` writes one
@@ -87,6 +88,12 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .analysis.motion.impulse.settings import Stepping as Stepping
     from .analysis.prepared import Prepared as Prepared
     from .analysis.study import load_study as load_study
+    from .control.integrator import Integrator as Integrator
+    from .control.lag import Lag as Lag
+    from .control.pid import PID as PID
+    from .control.state import State as State
+    from .control.state_space import StateSpace as StateSpace
+    from .control.transfer import Transfer as Transfer
     from .errors import AnalysisError as AnalysisError
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
@@ -221,7 +228,7 @@ _HOME = {
     "StateEquations": "symbolic.explicit.states",
     "TransferFunction": "symbolic.linear.transfer",
 }
-_ROOMS = ("model.shapes", "joints", "forces")
+_ROOMS = ("model.shapes", "joints", "forces", "control")
 _MODULES = ("rotations",)
 
 

@@ -22,7 +22,7 @@ from tests.program.copied import PACKAGE
 FILES = sorted(PACKAGE.rglob("*.py"))
 TREES = {p: ast.parse(p.read_text(encoding="utf-8")) for p in FILES}
 LIBRARY = {"compiler", "math"}
-ELEMENTS = {"constraints", "model", "joints", "forces"}
+ELEMENTS = {"constraints", "model", "joints", "forces", "control"}
 LEAF = {"errors", "__version__"}  # may be used anywhere
 ALLOWED = {  # room -> rooms that it may import when it is imported
     "compiler": set(),
@@ -34,6 +34,7 @@ ALLOWED = {  # room -> rooms that it may import when it is imported
     "model": {"math", "constraints", "rotations"},
     "joints": {*LIBRARY, "constraints", "model"},
     "forces": {*LIBRARY, "constraints", "model"},
+    "control": {*LIBRARY, "model"},
     "contact": LIBRARY,
     "laws": {*LIBRARY, "model"},
     "tables": {*LIBRARY, *ELEMENTS, "numerics", "laws", "contact"},

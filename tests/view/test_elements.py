@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
@@ -187,18 +189,20 @@ def test_a_rope_runs_over_its_points_and_knows_its_length() -> None:
     (line,) = r.lines
     assert line.kind == "rope"
     assert len(line.points) == 3
-    assert np.allclose(line.points[1][:, :2], result["load"].position)
-    length = sum(np.sqrt(((b - a) ** 2).sum(axis=1)) for a, b in zip(line.points, line.points[1:]))
+    out = np.isin(r.t, result.t)  # besides, there are times at which it goes slack and taut
+    points = [p[out] for p in line.points]
+    assert np.allclose(points[1][:, :2], result["load"].position)
+    length = sum(np.sqrt(((b - a) ** 2).sum(axis=1)) for a, b in pairwise(points))
     assert np.allclose(length, result["rope"].length)
     assert (line.rest == 2.3).all()
-    (pull,) = (a for a in r.arrows if a.name == "rope")
-    slack = length < line.rest
+    (pull,) = (a.vector[out] for a in r.arrows if a.name == "rope")
+    slack = length < 2.3
     assert slack.any()
     assert not slack.all()
-    assert np.allclose(pull.vector[slack], 0)
+    assert np.allclose(pull[slack], 0)
     # the two halves pull towards their eyes: upwards, with twice the tension times the cosine
-    wanted = 2 * result["rope"].tension * (1 - line.points[1][:, 1]) / (length / 2)
-    assert np.allclose(pull.vector[:, 1], wanted)
+    wanted = 2 * result["rope"].tension * (1 - points[1][:, 1]) / (length / 2)
+    assert np.allclose(pull[:, 1], wanted)
 
 
 @pytest.mark.parametrize("ball", [False, True])

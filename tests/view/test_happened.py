@@ -9,6 +9,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis.motion.events.told import FREE_WORDS, HELD_WORDS, PLACE_WORDS, ROPE_WORDS
+from flyball.results.kinds import HAPPENED
+from flyball.view.animate import record
 from flyball.view.edged import edged
 from flyball.view.report import report
 from flyball.view.tables import tables
@@ -160,6 +163,82 @@ def test_jumps_of_parameters_and_of_files(tmp_path: Path):
 def test_names_of_marks_are_written_once():
     r = ball(0.8).simulate(3, outputs=61)
     (ax,) = r.plot("b.y").axes
-    texts = [t.get_text() for t in ax.texts]
-    assert sum(t.startswith("floor (1 of") for t in texts) == 1
-    assert len(texts) <= 2
+    texts = [t.get_text() for t in ax.texts if t.get_text()]
+    assert texts == [f"floor ×{len(r.events)}"]
+
+
+def test_jumps_on_the_page_are_upright():
+    """The recording of a page has both sides of each impact: -5 and 2.5 m/s at 0.5 s, and its poses and times fit."""
+    r = ball().simulate(2.4, outputs=25)
+    shown = record(r)
+    at = np.flatnonzero(shown.t == r.events["floor"].t[0])
+    (vy,) = (c.values for c in shown.channels if c.name == "b.vy")
+    assert vy[at] == pytest.approx([-5, 2.5], abs=1e-9)
+    assert shown.bodies[0].p[at, 1] == pytest.approx([0, 0], abs=1e-12)
+    assert len(shown.t) == len(r.t) + 2 * len(r.events["impact"])
+    assert all(np.isfinite(a.vector).all() for a in shown.arrows)
+    page = report(r)
+    assert len(page) > 100_000
+
+
+def test_jumps_beside_an_output_time():
+    """A motor that an event switches off within rounding of an output time: its torque falls upright."""
+    m = fb.Mechanism("m", planar=True, parameters={"lift": 8})
+    m.add(fb.Body("b", mass=1, inertia=2), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Motor("motor", "A", torque="lift*step(t, 0, 1, 2, 1)"), fb.Event("off", "t > 2 s", do=fb.Set("lift", 0)))
+    whole = edged(m.simulate(4, outputs=101))
+    falls = np.flatnonzero(np.diff(whole["motor.torque"]) < -1.0)
+    assert len(falls) == 1
+    assert whole.t[falls + 1] - whole.t[falls] == pytest.approx([0.0], abs=1e-12)
+
+
+def test_what_jumps_not_is_not_broken():
+    """A note of an event changes nothing: curves have no more times there."""
+    m = ball()
+    m.add(fb.Event("half", "t - 0.25", do=[fb.Note("on the way")]))
+    r = m.simulate(0.45, outputs=10)
+    assert len(r.events) == 1
+    assert len(edged(r).t) == 10
+
+
+def test_parameters_that_events_set():
+    """The report has the value at the start, and the others with their times; masses are those at the start too."""
+    m = fb.Mechanism("set", planar=True, parameters={"k": "8 N/m", "mass": 1, "c": 3})
+    m.add(fb.Body("b", mass="mass", inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("s", "A.displacement", stiffness="k"))
+    m.add(
+        fb.Event("hard", "t - 0.25", do=[fb.Set("k", 16), fb.Set("mass", 2)]),
+        fb.Event("soft", "t - 0.5", do=fb.Set("k", 4)),
+    )
+    found = by_name(m.simulate(1, outputs=5))
+    assert found["parameters"].columns == ("name", "as written", "at the start [SI]", "set by events to")
+    assert found["parameters"].rows == (
+        ("k", "8 N/m", "8", "16 at 0.25 s, 4 at 0.5 s"),
+        ("mass", "1", "1", "2 at 0.25 s"),
+        ("c", "3", "3", ""),
+    )
+    assert found["bodies"].rows[0][1] == "1"
+
+
+def test_what_is_there_and_never_happened_is_an_empty_list():
+    m = ball()
+    m.add(fb.Event("overload", "b.vy - 100", do=fb.Stop()))
+    r = m.simulate(0.4)
+    for name in ("overload", "floor", "b", "impact"):
+        assert len(r.events[name]) == 0
+        assert not r.events[:0][name]
+    with pytest.raises(fb.ModelError, match=r"nothing named 'overlaod' happened \(did you mean 'overload'\?\)"):
+        r.events["overlaod"]
+
+
+def test_kinds_of_what_happens():
+    spoken = [*HELD_WORDS.values(), *FREE_WORDS.values(), *ROPE_WORDS.values(), *PLACE_WORDS.values()]
+    assert {kind for kind, _ in spoken if kind} <= HAPPENED
+
+
+def test_warnings_are_at_the_top():
+    m = ball()
+    m.add(fb.Event("down", "b.y < 3", do=fb.Stop()))
+    page = report(m.simulate(0.3))
+    assert '<p class="verdict early" role="status">The run reached its end; 1 warning.</p>' in page
+    assert page.index("never happened") < page.index("<dl class='cards'>")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 
 import flyball as fb
 from flyball.results.events import Happening
 from flyball.view.animate import record
+from flyball.view.mark_names import LETTER, placed
 from flyball.view.marks import LINES, marks
 
 
@@ -25,7 +28,8 @@ def few():
 
 def test_what_is_close_together_is_one_mark(run):
     run.events = [*few(), Happening(0.601, "hit", "impact")]
-    assert [(m.t, m.text, m.line) for m in marks(run)] == [(0.2, "open, hit", True), (0.6, "hit (2 times)", True)]
+    assert [(m.t, m.text, m.line) for m in marks(run)] == [(0.2, "open, hit", True), (0.6, "hit ×2", True)]
+    assert [m.label for m in marks(run)] == ["open, hit ×3", ""]  # each name once, with how often in all
     run.events = ()
     assert marks(run) == ()
 
@@ -44,13 +48,74 @@ def test_plots_have_lines_and_names(run):
         lines = [c.get_segments() for c in ax.collections]
         assert [s[0][0] for s in lines[0]] == [0.2, 0.6]
         assert ax.get_xlim() == (0.0, 1.0)
-    assert [t.get_text() for t in first.texts] == ["open, hit", "hit"]
+    written = [t for t in first.texts if t.get_text()]
+    assert [t.get_text() for t in written] == ["open, hit ×2"]
+    first.figure.draw_without_rendering()
+    assert written[0].get_window_extent().y0 > first.get_window_extent().y1  # above the curves
     assert not second.texts
     run.events = [Happening(t, "tick", "event") for t in np.linspace(0, 1, LINES + 10)]
     ax = run.plot("A.rate").axes[0]
     assert not ax.texts
     heights = [s[0][1] for c in ax.collections for s in c.get_segments()]
     assert min(heights) > 0.9  # ticks at the upper edge
+
+
+def clock():
+    """Names of two events that alternate, one that happens once between them, and stops that happen most often."""
+    ticks = [Happening(t, "tick" if k % 2 else "tock", "event") for k, t in enumerate(np.linspace(0.05, 0.95, 10))]
+    stops = [Happening(t, "stop", "impact") for t in np.linspace(0.02, 0.98, 17)]
+    return sorted([*ticks, *stops, Happening(0.31, "too fast", "event")], key=lambda h: h.t)
+
+
+def test_every_name_is_written_where_there_is_room(run):
+    run.events = clock()
+    found = [m for m in marks(run) if m.label]
+    assert {m.label for m in found} == {"tick ×5", "tock ×5", "too fast", "stop ×17"}
+    assert min(found, key=lambda m: m.rank).label == "too fast"  # the most seldom first
+    width = 400.0
+    names = placed(found, [width * m.t for m in found], width)
+    assert len(names) == 4
+    for a, b in itertools.permutations(names, 2):  # no line goes up through a name, no two names overlap
+        ends = sorted((width * a.mark.t, width * a.mark.t + (1 if a.right else -1) * LETTER * len(a.mark.label)))
+        if b.lane >= a.lane:
+            assert not ends[0] < width * b.mark.t < ends[1]
+    narrow = placed(found, [10.0 * m.t + 60.0 for m in found], 130.0)
+    assert "too fast" in {n.mark.label for n in narrow}
+
+
+def test_marks_on_the_page_s_plots(run, browser, tmp_path):
+    """A mark on a gridline is seen, in a colour that is neither the grid's nor the cursor's, and named when pointed at."""
+    from tests.view.conftest import Opened
+
+    run.events = [Happening(0.5, "half way", "event")]
+    run.to_html(tmp_path / "page.html")
+    page = Opened(browser, (tmp_path / "page.html").as_uri() + "#t=0&theme=light")
+    area = page.tab.locator(".plot .u-over").first
+    box = area.bounding_box()
+    column = page.evaluate(
+        """() => {
+          const { chart } = { chart: document.querySelector(".plot canvas") };
+          const over = document.querySelector(".plot .u-over");
+          const scale = chart.width / chart.clientWidth;
+          const x = Math.round((over.offsetLeft + 0.5 * over.clientWidth) * scale);
+          const data = chart.getContext("2d").getImageData(x - 2, over.offsetTop * scale, 5, over.clientHeight * scale).data;
+          const violet = [];
+          for (let k = 0; k < data.length; k += 4) {
+            const [r, g, b, a] = data.slice(k, k + 4);
+            if (a > 100 && r - g > 60 && b - g > 40) violet.push(k);
+          }
+          return violet.length / over.clientHeight;
+        }"""
+    )
+    assert column > 0.4  # dashed
+    page.tab.mouse.move(box["x"] + 0.5 * box["width"] + 2, box["y"] + 20)
+    tip = page.tab.locator(".plot .mark-tip").first
+    assert tip.is_visible()
+    assert tip.inner_text() == "half way, 0.5 s"
+    page.tab.mouse.move(box["x"] + 0.8 * box["width"], box["y"] + 20)
+    assert not tip.is_visible()
+    assert page.errors == []
+    page.tab.close()
 
 
 def test_the_bar_of_the_page_tells_and_goes_there(run, browser, tmp_path):

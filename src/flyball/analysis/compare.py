@@ -102,6 +102,7 @@ class CompareOptions(Options):
             stabilization=way.stabilization,
             alpha=rates[0],
             beta=rates[1],
+            step=None,
         )
 
 

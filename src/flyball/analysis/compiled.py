@@ -16,6 +16,7 @@ from ..equations.scratch import work
 from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
+from ..tables.controllers import initial
 from ..tables.coordinates import BodyState, positions
 from ..tables.forest import steps
 from ..tables.names import velocity_names
@@ -281,6 +282,7 @@ def _places(x: Values) -> np.ndarray:
     """
     s = x.structure
     z = np.zeros(len(s.states), x.q.dtype)
+    z[: len(s.controls)] = initial(s.model, x.env)
     for t in s.terms:
         if t.hint >= 0 and isinstance(t.owner, (Body, Frame)):
             z[t.hint] = x.poses.turned(t.owner)

@@ -24,6 +24,7 @@ from .linearize import without_inputs
 from .options import Options
 from .resting.rest import rest
 from .steps import tangent_step
+from .untouched import refuse_controllers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,6 +65,7 @@ def resting(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
+    refuse_controllers(model, "equilibrium")
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin = _begun(a, o.start)
     if holds_at_times(model):

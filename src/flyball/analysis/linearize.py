@@ -38,6 +38,7 @@ from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
 from .resting.instant import closed_instant
+from .untouched import refuse_controllers
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
@@ -79,6 +80,7 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
+    refuse_controllers(model, "linearize")
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "linearize")
         out = _linear(joined, there)

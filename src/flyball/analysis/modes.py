@@ -18,6 +18,7 @@ from .linear.spectrum import EQUAL, spectrum
 from .linearize import InstantOptions, without_inputs
 from .options import count as at_least
 from .resting.instant import closed_instant
+from .untouched import refuse_controllers
 
 FEW = 10
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
@@ -38,6 +39,7 @@ class ModesOptions(InstantOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
+    refuse_controllers(model, "modes")
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "modes")
         return replace(_modes(joined, there), notes=notes)

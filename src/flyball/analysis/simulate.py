@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
-from ..equations.within import ROWS, kept
+from ..equations.within import ROWS, breaking, kept
 from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
@@ -145,7 +145,7 @@ def moved(
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
-        loop = Implicit(c, clock, _width(begun.assembly), getattr(o, "step", None) or 0.0)
+        loop = Implicit(c, clock, _width(begun.assembly), o.step or 0.0)
         rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell, begun.part)
         here.failed = loop.failed
     elif watched(begun) or len(known.times):
@@ -203,13 +203,14 @@ def clock_for(
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
     first = t if start.part.first is None else start.part.first
     real[ex.SPAN] = (t_end - first) or 1.0
-    real[ex.H_MAX] = min(o.max_step, t_end - t)
+    real[ex.H] = real[ex.STEP] = o.step or 0.0
+    real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = energy_size(start.base, float(real[ex.SPAN]))
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv, s.nq
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
@@ -220,7 +221,7 @@ def clock_for(
     W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
     W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
-    nothing = sampled is not None and not sampled
+    nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(explicit(o.method)).c) + 1, len(y)))

@@ -50,7 +50,7 @@ class SingularitiesOptions(Options):
 
 def singularities(model: Model, o: SingularitiesOptions) -> Singularities:
     """Follow a driven motion through its singular positions: see `Mechanism.singularities`."""
-    refuse_contact(model, "singularities")
+    refuse_contact(model, "singularities", controlled=True)
     f = freed(model, o.driver, o.t, o.parameters)
     return _followed(f, Tracer(f.closure, o.step), _range(f, o.range, o.parameters), o.branch, o.steps)
 

@@ -32,15 +32,17 @@ def holding_parts(model: Model, knows: Collection[int] = ()) -> Iterator[Element
             yield e
 
 
-def refuse_contact(model: Model, analysis: str, knows: Collection[int] = ()) -> None:
+def refuse_contact(model: Model, analysis: str, knows: Collection[int] = (), *, controlled: bool = False) -> None:
     """Refuse to answer as if parts were not there.
 
     Raises
     ------
     ModelError
         If the mechanism has a contact, many bodies, an event, or another part that holds at times, of no kind that the
-        analysis ``knows``.
+        analysis ``knows``; or a controller, unless it knows those or they do not matter to it (``controlled``).
     """
+    if not controlled:
+        refuse_controllers(model, analysis)
     parts = list(holding_parts(model, knows))
     if not parts:
         return
@@ -49,6 +51,22 @@ def refuse_contact(model: Model, analysis: str, knows: Collection[int] = ()) -> 
         f"{model.name!r} has {', '.join(e.title for e in parts)}, and {analysis} knows {_unknown(parts)}; simulate "
         f"does. Without them: m.changed({{{without}}}).{analysis}(...){_instead(parts)}"
     )
+
+
+def refuse_controllers(model: Model, analysis: str) -> None:
+    """Refuse to answer as if controllers had no states.
+
+    Raises
+    ------
+    ModelError
+        If the mechanism has a controller.
+    """
+    if model.controllers:
+        titles = ", ".join(e.title for e in model.controllers)
+        raise ModelError(
+            f"{model.name!r} has {titles}, and {analysis} knows no controllers; simulate does. Ask it of a copy whose "
+            f"laws have formulas in their place"
+        )
 
 
 def _unknown(parts: list[Element]) -> str:

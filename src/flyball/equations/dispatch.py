@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ..compiler.written import ladder, written
 from ..constraints.registry import KINDS, RARE
-from ..forces import EFFORTS, INPUTS, WRENCHES
+from ..forces import BRANCHES, EFFORTS, INPUTS, WRENCHES
 from ..tables.system import TERM_KINDS
 from . import rows, turns
 
@@ -29,6 +29,18 @@ inputs = ladder(__name__, "inputs", "par, F, M", INPUTS, f"({NAN}, {NAN})")
 
 wrench = ladder(__name__, "wrench", "par, F, M, laws, values", WRENCHES, f"({NONE}, {NONE})")
 """Wrench of a force between frames on M."""
+
+branch = ladder(__name__, "branch", "par, F, M", BRANCHES, f"({NAN}, {NAN}, {NAN}, {NAN}, {NAN})")
+"""On which branch of its formula a force between frames is, for kinds whose formula breaks; see `forces.BRANCHES`."""
+
+breaks = written(
+    __name__,
+    "breaks",
+    "kind",
+    [*(f"if kind == {k}:\n        return True" for k in sorted(BRANCHES)), "return False"],
+    {},
+)
+"""Whether the formula of a kind of force breaks somewhere."""
 
 effort = ladder(__name__, "effort", "par, x, rate, laws, load", EFFORTS, NAN)
 """Force along a measured quantity."""

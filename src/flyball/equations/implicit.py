@@ -16,12 +16,13 @@ from ..compiler.jit import formula, kernel
 from ..numerics.integrators.clock import GROW, NEXT, NOW, SPAN, H, T
 from ..numerics.integrators.implicit.desk import JACOBIANS, SOFT, START
 from ..numerics.integrators.implicit.radau import advance
-from ..tables.system import COORDINATES, FORCE_WORK, LAM, NU, ROW_WORK
+from ..tables.system import COORDINATES, FORCE_WORK, LAM, LENGTH, NU, ROW_WORK
 from .dispatch import progress
 from .tasks import ARRIVE, INSPECT, POSITION, REPORT, RESIDUAL, STEPS
 from .tree import retract
 
 STEP = 1e-40
+FAR = 12.0  # square of an increment 2 tan(angle / 2): a third of a turn in a step is the most
 ENGINE, RESIDUALS, S_, W_, R_, OWN, SHEET, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN = range(13)
 # entries of Plan.first: numbers of the Jacobian that begin there
 PICKED, PICKED_MASS, ROWS, ROWS_METRIC, SIZES, TURNS, PRESSES, END = range(8)
@@ -89,8 +90,20 @@ def residual(t, k, A, K, c):
     turned(P, K.d[k], out)
     for i in range(nv):
         out[i] = K.dd[k, i] - out[i]
+    if far(P, K.d[k]):
+        return 1
     powers(A, K, k)
     return 0 if bad == 0.0 else 1
+
+
+@formula
+def far(P, d):
+    """Whether a quaternion is turned by more than a step may: near half a turn its increment has no bounds."""
+    for n in range(P.turns.shape[0]):
+        i = P.turns[n]
+        if d[i] * d[i] + d[i + 1] * d[i + 1] + d[i + 2] * d[i + 2] > FAR:
+            return True
+    return False
 
 
 @formula
@@ -154,15 +167,20 @@ def linearise(t, k, A, K, c):
 
 @formula
 def rows_of(S, W, K, P, k):
-    """Entries of the rows, those along the metric of the stabilisation, and natural sizes of rows."""
+    """Entries of the rows, those along the metric of the stabilisation, and natural sizes of rows.
+
+    In joint coordinates a lever is added, as in `solve.factor_coupled`: what a row weighs must not vanish with entries
+    that are nothing but rounding, or it would hold what it does not.
+    """
     J = K.J[k]
+    lever = 0.0 if P.fixed[0] == 1 else min(1.0, S.glob[LENGTH]) ** 2
     for r in range(S.row_i.shape[0]):
         size = 0.0
         for e in range(S.row_p[r], S.row_p[r + 1]):
             g = W.G[e]
             J[P.first[ROWS] + e] = g
             J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g
-            size += g * g * P.metric[S.col_i[e]]
+            size += (g * g + lever) * P.metric[S.col_i[e]]
         J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
     for n in range(P.negative.shape[0]):
         J[P.first[END] + 1 + n] = -J[P.negative[n]]

@@ -48,6 +48,7 @@ from ..tables.system import (
     WORST_V,
     X_SOLVED,
 )
+from .control import control
 from .dispatch import progress, remember
 from .friction import BLURRED, CONVERGED, SUBSTITUTIONS, improve, learnt, returned
 from .loads import efforts, forces, gather, inertial
@@ -138,6 +139,7 @@ def balance(S, W, t, p, work, factored):
     change = 1e300
     # joints with friction need the solution to know their loads: again until these return themselves
     for attempt in range(SUBSTITUTIONS):
+        control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], work)
         loaded(S, W, t, p, work)
         if (
             factored == OLD

@@ -38,6 +38,7 @@ from ..tables.system import (
     V2,
     VALUE,
 )
+from .control import control
 from .dispatch import row_biases, row_values, whole_rows
 from .friction import loads_end, reaction_loads
 from .kinematics import frame_motions, frames, poses
@@ -145,6 +146,7 @@ def missed(S, W, t, p, lam, out):
     for n in range(2 * nm, loads_end(S, W)):
         W.sensed[LOAD, n] = W.sensed[RETURNED, n]
     f = W.vel[F_APPLIED]
+    control(S, W, t, p[S.kinds[COORDINATES] + nv :], W.y[1])
     inertial(S, W)
     forces(S, W, t, W.y[1])
     gather(S, W, f)

@@ -16,6 +16,7 @@ from ..constraints.modes import BRANCH
 from ..laws.evaluation import evaluate_jet
 from ..tables.system import (
     BIAS,
+    CONTROL_RATE,
     DRIFT_BEFORE,
     DRIFT_OFF,
     INVERSE_SLOPES,
@@ -31,6 +32,7 @@ from ..tables.system import (
     VALUE,
     X_SOLVED,
 )
+from .control import column_of
 from .rows import measured, way_of
 
 WHOLE = -1  # derivative along the motion
@@ -66,6 +68,10 @@ def drifts(S, W, t):
         W.sensed[RATE, nm + m] = a
         W.sensed[BIAS, nm + m] = W.sensed[BIAS, m]
         W.sensed[BIAS, m] = a
+    for c in range(S.control_i.shape[0]):
+        law = S.control_i[c, CONTROL_RATE]
+        at = column_of(S, W, c)
+        W.sensed[BIAS, at] = evaluate_jet(S.code, S.const, law, W.stack, t, W.sensed, WHOLE)[1] if law >= 0 else 0.0
     for s in range(S.switch_i.shape[0]):
         if S.switch_i[s, SWITCH_KIND] == BRANCH:
             law = S.switch_i[s, SWITCH_LAW]

@@ -3,7 +3,8 @@
 Each law that can act briefly is sampled along the step, its inputs along the cubics through their values and rates at
 the ends. Where it is not what eight of its values let expect, the place is named; the integrator looks whether that
 matters. Samples are dense relative to the whole time span, so that their number is bounded: what is shorter than a
-`SAMPLES`-th of the span may fall between them.
+`SAMPLES`-th of the span may fall between them. A force whose formula breaks somewhere (a rotation vector at half a
+turn) has to be on one branch of it at both ends of the step.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from collections.abc import Collection
 import numpy as np
 
 from ..compiler.jit import formula
+from ..forces import BRANCHES
 from ..laws.evaluation import evaluate, evaluate_jet
 from ..laws.manner import brief
 from ..math.scalar import cos
 from ..numerics.integrators.clock import AT_END, AT_START, FROM, FROM_RATE, TO, TO_RATE
 from ..tables.system import (
     ALONG,
+    BETWEEN,
     BODY_LAW,
     FORCE_ALONG,
     FORCE_F,
@@ -33,7 +36,7 @@ from ..tables.system import (
     SLIDING,
     VALUE,
 )
-from .dispatch import inputs
+from .dispatch import branch, breaks, inputs
 from .loads import wide
 from .made import run
 from .records import load
@@ -43,6 +46,9 @@ SAMPLES = 20000  # of a law over the whole time span, in steps that are wide
 LEAST = 8  # in any step
 NODES = 8  # values of a law that tell what to expect of it: at Chebyshev's points, ends included
 LAWS = 3  # of a force
+PARTS = 5  # numbers that say on which branch of its formula a force is, and how fast it turns
+WIDEST = 2.0  # turning within a step [rad] up to which the ends tell that
+BREAKS = np.inf  # how long a place of no formula lasts: no width of step is right
 ODD = 1e-3  # part of a law's change over the step by which it may differ from what is expected
 BLURRED = 1e-9  # part of its size that is nothing
 # rows of Clock.seen: sensors within the step; (sensors and inputs of forces, and rates, at its start and end;) nodes
@@ -55,6 +61,16 @@ def law_starts(S) -> np.ndarray:
     return np.r_[S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel(), S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW]]
 
 
+def noted(S) -> int:
+    """How many numbers `take_note` keeps of each end."""
+    return measured(S) + (1 + PARTS) * len(S.force_i)
+
+
+def breaking(S) -> bool:
+    """Whether the formula of some force breaks somewhere."""
+    return any(kind in BRANCHES for kind in S.force_i[:, FORCE_KIND].tolist())
+
+
 def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
     """What `inspect` writes on: no columns, and nothing is inspected, where no law can act briefly.
 
@@ -62,11 +78,11 @@ def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
     """
     laws = law_starts(S)
     look = [at >= 0 and brief(S.code, at) and (sampled is None or at in sampled) for at in laws]
-    if not any(look):
+    if not any(look) and not breaking(S):
         return np.zeros((ROWS, 0))
     loads = int((S.force_i[:, FORCE_LOAD] >= 0).sum())
-    sensed = 2 * measured(S) + loads + len(S.switch_i)
-    seen = np.zeros((ROWS, max(sensed, measured(S) + len(S.force_i), NODES, len(laws))))
+    sensed = 2 * measured(S) + loads + len(S.control_i) + len(S.switch_i)
+    seen = np.zeros((ROWS, max(sensed, noted(S), NODES, len(laws))))
     seen[LOOK, : len(laws)] = look
     return seen
 
@@ -75,9 +91,10 @@ def kept(S, sampled: Collection[int] | None = None) -> np.ndarray:
 def inspect(t, h, span, first, seen, S, W):
     """The next place within a step at which a law does something unexpected: (where to go on from, place, how long).
 
-    Place and how long are parts of the step; the first is 0 where there is none. Each such law has two places: where
-    it departs most from its polynomial, and where most from its mean, as a node may have met the pulse itself. With
-    AT_START and AT_END the inputs of the laws, at the state in W, are kept.
+    Place and how long are parts of the step; the first is 0 where there is none. Where a formula breaks it lasts
+    without end (`BREAKS`): every step is too wide. Each such law has two places: where it departs most from its
+    polynomial, and where most from its mean, as a node may have met the pulse itself. With AT_START and AT_END the
+    inputs of the laws, at the state in W, are kept.
     """
     if seen.shape[1] == 0:
         return 0, 0.0, 0.0
@@ -87,6 +104,8 @@ def inspect(t, h, span, first, seen, S, W):
     if first == AT_END:
         take_note(S, W, seen, TO)
         return 0, 0.0, 0.0
+    if first == 0 and parted(S, seen, h):
+        return 1, 0.5, BREAKS
     again = first % 2 == 1  # the law that was named last has another place to look at
     for k in range(first // 2, LAWS * S.force_i.shape[0] + S.row_i.shape[0] + S.body_i.shape[0]):
         law = law_at(S, k)
@@ -131,8 +150,28 @@ def take_note(S, W, seen, row):
             F = load(W.FK, S.force_i[f, FORCE_F])
             M = load(W.FK, S.force_i[f, FORCE_M])
             a, b = inputs(S.force_i[f, FORCE_KIND], wide(S.force_x, f), F, M)
+            if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(S.force_i[f, FORCE_KIND]):
+                side = branch(S.force_i[f, FORCE_KIND], wide(S.force_x, f), F, M)
+                for i in range(PARTS):
+                    seen[row, nm + S.force_i.shape[0] + PARTS * f + i] = side[i]
         seen[row, nm + f] = a
         seen[row + 1, nm + f] = b
+
+
+@formula
+def parted(S, seen, h):
+    """Whether some force is on another branch of its formula at the end of the step than at its begin, or may be."""
+    nf = S.force_i.shape[0]
+    for f in range(nf):
+        if S.force_i[f, FORCE_ALONG] == BETWEEN and breaks(S.force_i[f, FORCE_KIND]):
+            at = measured(S) + nf + PARTS * f
+            s = 0.0
+            for i in range(PARTS - 1):
+                s += seen[FROM, at + i] * seen[TO, at + i]
+            speed = max(seen[FROM, at + PARTS - 1], seen[TO, at + PARTS - 1])
+            if not (s > 0.0 and speed * h <= WIDEST):
+                return True
+    return False
 
 
 @formula

@@ -35,6 +35,9 @@ def formulas(elements: list[type[Force]], name: str) -> dict[int, Callable]:
 
 
 INPUTS, WRENCHES, EFFORTS = (formulas(_HERE, name) for name in ("inputs", "wrench", "effort"))
+BRANCHES = formulas(_HERE, "branch")
+"""Kind -> four numbers, of which two states within half a turn that are on one branch of a force's formula have a
+positive product; and the speed [rad/s] at which it turns."""
 if set(WRENCHES) & set(EFFORTS):
     raise RuntimeError(f"kinds of forces are taken twice: {sorted(set(WRENCHES) & set(EFFORTS))}")
 if TYPE_CHECKING:  # for editors and type checkers; nothing is imported here

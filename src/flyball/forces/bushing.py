@@ -10,7 +10,8 @@ import numpy as np
 from ..compiler.jit import formula
 from ..errors import ModelError
 from ..math.rotation import log_gradient, rotation_vector
-from ..math.vec import add, cross, mm, mtv, mv, neg, sub, transpose
+from ..math.scalar import choose
+from ..math.vec import add, cross, mm, mtv, mv, neg, norm, sub, transpose
 from ..model.body import Orientation
 from ..model.element import Number, Numbers, Unit, element
 from ..model.force import TwoFrameForce
@@ -27,9 +28,34 @@ def times(par, k, a):
 
 
 @formula
+def turned(par, F, M):
+    """Rotation from F to M; none where nothing is asked to turn back."""
+    R = mm(transpose(F[1]), M[1])
+    k = par[6] + par[7] + par[8]
+    l = 0.0 * R[0] + 1.0
+    o = 0.0 * l
+    return (
+        choose(k, R[0], l), choose(k, R[1], o), choose(k, R[2], o), choose(k, R[3], o), choose(k, R[4], l),
+        choose(k, R[5], o), choose(k, R[6], o), choose(k, R[7], o), choose(k, R[8], l),
+    )  # fmt: skip
+
+
+@formula
 def deflection(par, F, M):
     """Displacement and rotation vector of M seen from F, along F's axes."""
-    return mtv(F[1], sub(M[0], F[0])), rotation_vector(mm(transpose(F[1]), M[1]))
+    return mtv(F[1], sub(M[0], F[0])), rotation_vector(turned(par, F, M))
+
+
+@formula
+def branch(par, F, M):
+    """The rotation's quaternion times four times its first component, which passes zero at half a turn; and its speed.
+
+    Two of these within half a turn of each other have a positive product, unless half a turn lies between them.
+    """
+    R = turned(par, F, M)
+    k = par[6] + par[7] + par[8]
+    speed = choose(k, norm(sub(M[2], F[2])), 0.0 * k)
+    return 1.0 + R[0] + R[4] + R[8], R[7] - R[5], R[2] - R[6], R[3] - R[1], speed
 
 
 @formula
@@ -70,7 +96,8 @@ class Bushing(TwoFrameForce):
     """A rubber mount: ``body_j`` is held to ``body_i`` at a point by springs and dampers, in six components.
 
     It carries nothing as drawn. Components are along axes fixed in ``body_i``. Rotations are measured by the rotation
-    vector, so they have no singular position short of half a turn; there the run stops.
+    vector, so they have no singular position short of half a turn; there the run stops, unless no torsional stiffness
+    is given.
 
     Parameters
     ----------
@@ -97,6 +124,7 @@ class Bushing(TwoFrameForce):
     kind: ClassVar[int] = KIND
     inputs: ClassVar = staticmethod(inputs)
     wrench: ClassVar = staticmethod(wrench)
+    branch: ClassVar = staticmethod(branch)
     energy: ClassVar = staticmethod(energy)
     drawn: ClassVar[str] = "bushing"
     fails: ClassVar[str] = (

@@ -19,6 +19,7 @@ from .opcodes import ABS, CALL, CONSTANT, INPUT
 
 NONE = np.zeros(0)
 NEAR = 256.0  # units in the last place that breaks are apart
+INSIDE = 0.381966011250105  # part of a span where its sign is read: in the middle, by symmetry, a law may touch zero
 
 
 class Breaks(NamedTuple):
@@ -117,10 +118,15 @@ def reached(
     with np.errstate(all="ignore"):
         zeros, all_found = crossings(law, Corner(-1, len(steps) - 1, np.zeros(1)), spans)
         edges = np.unique(np.r_[spans.edges, zeros])
-        middle = 0.5 * (edges[:-1] + edges[1:])
-        positive = np.broadcast_to(law.points(range(len(steps)), middle)[0][len(steps) - 1], middle.shape) > 0.0
+        t = within(edges)
+        positive = np.broadcast_to(law.points(range(len(steps)), t)[0][len(steps) - 1], t.shape) > 0.0
     change = np.flatnonzero(positive[1:] != positive[:-1])
     return edges[1:-1][change], positive[1:][change], complete and all_found
+
+
+def within(edges: np.ndarray) -> np.ndarray:
+    """A time [s] within each span between edges where the sign of the span is read."""
+    return edges[:-1] + INSIDE * (edges[1:] - edges[:-1])
 
 
 def depends(code: Sequence[int], at: int) -> int:
@@ -162,9 +168,9 @@ def _cut(steps: list[Step], const: np.ndarray, t0: float, t1: float) -> tuple[La
             complete = complete and found and len(spans.edges) + len(times) <= MOST
             known.append(c)
             edges = np.unique(np.r_[spans.edges, times])
-            middle = 0.5 * (edges[:-1] + edges[1:])
-            at = law.points(needed(steps, [c.of for c in known]), middle)[0]
-            spans = Spans(edges, {c.at: np.sign(np.broadcast_to(at[c.of], middle.shape)) for c in known})
+            t = within(edges)
+            at = law.points(needed(steps, [c.of for c in known]), t)[0]
+            spans = Spans(edges, {c.at: np.sign(np.broadcast_to(at[c.of], t.shape)) for c in known})
             if not complete:
                 break
     return law, spans, complete

@@ -96,7 +96,8 @@ class Motions(Model):
             every mechanism. auto: whichever takes less time; what code is there already is used. Results agree within
             the tolerance, and not to the last digit, with those of the other; ``health.engine`` says which it was.
         step : float or str [s], optional
-            A fixed step, of ``radau`` alone: errors are then not looked at.
+            Steps of this width, whose errors are then not looked at; one ends early at an event, the next begins there.
+            ``rtol`` is then how exactly the equations of a step are solved.
         checkpoint : path, optional
             Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
             minute of computing at most, the same call goes on from there, to the same digits. Where the motion is

@@ -29,6 +29,7 @@ CATEGORIES = (
     "couplings",
     "tables",
     "sensors",
+    "controllers",
     "forces",
     "drivers",
     "initial",

@@ -102,7 +102,7 @@ def check_units(model: Model, e: Element, env: Mapping[str, float]) -> None:
                 tables = {x.name: x for x in model.tables}
                 names = model.names_in_laws(fields_with(e.__class__, LawOf)[name])
                 where = f"{name} of {e.title}"
-                law = law_expression(value, pair[turning], where, tables, names)
+                law = law_expression(value, pair[turning], where, tables, names, any("." in k for k in names))
                 if name in e.not_negative and law.names <= set(env) and not law.tables and law.function is None:
                     given = law.evaluate(env)
                     if not given.real >= 0.0:

@@ -17,6 +17,7 @@ from ..errors import ModelError
 from .body import Body, Driver, Frame, Initial
 from .bulk import Bodies
 from .contact import Contact
+from .controller import Controller
 from .copies import CATEGORIES
 from .coupling import Coupling
 from .element import Element, written
@@ -49,10 +50,12 @@ ONE_KIND = {
     "contacts": Contact,
     "events": Event,
 }
+LATER = ("sensors", "controllers", "forces", "drivers")  # which alone may name one another
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {
     "joints": (Joint, "joints"),
     "couplings": (Coupling, "joints"),
+    "controllers": (Controller, "control"),
     "forces": (Force, "forces"),
     "limits": (Unilateral, "forces"),
 }
@@ -222,11 +225,11 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
                 errors.append(error)
         if len(failed) == len(waiting):
             raise errors[0]
-        if failed and all(category not in ("sensors", "forces", "drivers") for category, _, _ in failed):
+        if failed and all(category not in LATER for category, _, _ in failed):
             raise errors[0]  # only these can name one another
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
-    for category in ("sensors", "forces", "drivers"):
+    for category in LATER:
         getattr(model, category).sort(key=lambda e: place[e.name])
 
 

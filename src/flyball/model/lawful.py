@@ -6,6 +6,7 @@ import dataclasses
 from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
+from . import wiring
 from .element import LawOf, limited
 from .examine import Curve, measured
 from .expressions import Expression, folded, law_expression
@@ -17,8 +18,13 @@ if TYPE_CHECKING:
     from .model import Model
 
 
-def law_of(model: Model, value: Any, of: LawOf, where: str, driver: bool = False) -> Expression | None:
-    """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
+def law_of(
+    model: Model, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True
+) -> Expression | None:
+    """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names.
+
+    Formulas of controllers' signals stand in the places of their names, if ``whole``.
+    """
     if value is None:
         return None
     if driver and callable(value):
@@ -29,15 +35,21 @@ def law_of(model: Model, value: Any, of: LawOf, where: str, driver: bool = False
     tables = {x.name: x for x in model.tables}
     names = model.names_in_laws(of)
     try:
-        expression = law_expression(value, of.dimension, where, tables, names, of.curves)
+        signals = wiring.names(model)
+        expression = law_expression(value, of.dimension, where, tables, names, of.curves or bool(signals))
+        if not of.curves and any("." in k and k not in signals for k in expression.names - set(names)):
+            wiring.refuse_unknown(model, expression)
+            law_expression(value, of.dimension, where, tables, names)  # which refuses curves of other parts
         expression = dataclasses.replace(expression, where=where)
         if expression.tree.kind == "number":
             limited(expression.tree.value, of.dimension, where)
         sensors = {k: x for k in expression.names if isinstance(x := model.find(k), Sensor)}
-        curves = {k for k in expression.names if "." in k} if of.curves else set()
+        if signals:
+            wiring.refuse_unknown(model, expression)
+        curves = {k for k in expression.names if "." in k and k not in signals} if of.curves else set()
         expression.require({*names, *curves})
         folded(expression.tree, expression.text)
-        refuse_twins(expression.names, of.inputs, sensors, model.parameters)
+        refuse_twins(expression.names, of.inputs, {*sensors, *(k for k in signals if "." not in k)}, model.parameters)
     except ExpressionError as error:
         text = str(error)
         raise ExpressionError(text if text.startswith(where) else f"{where}: {text}") from None
@@ -45,7 +57,14 @@ def law_of(model: Model, value: Any, of: LawOf, where: str, driver: bool = False
         _check_sensed(model, sensors[name], where, driver)
     for name in sorted(curves):
         _check_curve(model, name, where)
-    return expression
+    if not signals:
+        return expression
+    if driver:
+        wiring.refuse_in_driver(model, expression, where)
+    try:
+        return wiring.inlined(model, expression) if whole else expression
+    except ExpressionError as error:
+        raise ExpressionError(f"{where}: {error}") from None
 
 
 def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:

@@ -9,9 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ..errors import ModelError
+from . import wiring
 from .body import GROUND, Body, Driver, Frame, Initial
 from .bulk import Bodies
 from .contact import Contact
+from .controller import Controller
 from .copies import CATEGORIES, changed, copied, refuse_changes, same_values, snapshot, thawed
 from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, plain, resolve
@@ -86,6 +88,7 @@ class Model:
         self.couplings: list[Coupling] = []
         self.tables: list[Table] = []
         self.sensors: list[Sensor | IMU] = []
+        self.controllers: list[Controller] = []
         self.forces: list[Force] = []
         self.drivers: list[Driver] = []
         self.initial: list[Initial] = []
@@ -198,12 +201,19 @@ class Model:
             If a name is taken, a body or joint it refers to is unknown, or a number makes no sense.
         """
         refuse_changes(self, "nothing can be added")
+        vars(self)["_adding"] = tuple(e for e in elements if isinstance(e, Controller))
+        try:
+            return self._add(*elements)
+        finally:
+            vars(self).pop("_adding")
+
+    def _add(self, *elements: Element) -> Any:
         last = None
         for e in elements:
             if not isinstance(e, Element) or e.category not in CATEGORIES:
                 raise ModelError(
                     f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table, initial "
-                    f"condition, part of ground, material, contact, limit or event"
+                    f"condition, part of ground, material, contact, limit, controller or event"
                 )
             self._check_name(e)
             check_references(self, e)
@@ -242,7 +252,7 @@ class Model:
             raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
         if e.name in RESERVED:
             raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
-        if isinstance(e, (Sensor, Table)) and e.name in self.parameters:
+        if isinstance(e, (Sensor, Table, Controller)) and e.name in self.parameters:
             raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
         if e.name in self.by_name:
             raise ModelError(f"{e.title}: the name is taken by {self.by_name[e.name].title}; names must be unique")
@@ -326,6 +336,8 @@ class Model:
         e.check(n)
         check_vectors(e, n, self.planar)
         self._check_laws(e)
+        if isinstance(e, Controller):
+            wiring.check(self, e)
         check_units(self, e, env)
         check_kind(self, e, n, env)
 
@@ -350,10 +362,14 @@ class Model:
             return owner.coordinates[what].unit
         return "rad" if what == "angle" else "m"
 
-    def law(self, value: Any, of: LawOf, where: str, driver: bool = False) -> Any:
-        """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names."""
-        return law_of(self, value, of, where, driver)
+    def law(self, value: Any, of: LawOf, where: str, driver: bool = False, whole: bool = True) -> Any:
+        """A law as an expression of t, its inputs, sensors, tables and parameters; refused if it uses other names.
+
+        Formulas of controllers' signals stand in the places of their names, if ``whole``.
+        """
+        return law_of(self, value, of, where, driver, whole)
 
     def names_in_laws(self, of: LawOf) -> set[str]:
         """All names that such a law may use; curves besides, where it may."""
-        return {"t", *of.inputs, *self.parameters, *(x.name for x in self.sensors if isinstance(x, Sensor))}
+        sensors = (x.name for x in self.sensors if isinstance(x, Sensor))
+        return {"t", *of.inputs, *self.parameters, *sensors, *wiring.names(self)}

@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from ..errors import ModelError
 from .body import Body, Driver, Frame
+from .controller import Controller
 from .coupling import Coupling
 from .force import BodyForce, CoordinateForce, Force, TwoFrameForce
 from .joint import Joint
 from .sensor import IMU, Sensor
+from .wiring import wiring_of
 from .words import suggest
 
 if TYPE_CHECKING:
@@ -82,6 +84,8 @@ def quantities(model: Model, name: str) -> Table:
         return {"effort": effort, "work": Quantity("J", curve=True, array=True)}
     if isinstance(e, IMU):
         return _of_imu(axes)
+    if isinstance(e, Controller):
+        return {k: Quantity("", curve=True, array=True) for k in wiring_of(model, e)}
     return {"value": Quantity(_unit_of(model, e.of), curve=True, array=True)} if isinstance(e, Sensor) else {}
 
 

@@ -22,7 +22,7 @@ def lines(model: Model) -> list[tuple[str, str]]:
     out += _line("bodies", (e.name for e in model.bodies))
     out += _line("bulk", (f"{e.count} {e.name}" for e in model.bulk))
     out += _line("frames", (e.name for e in model.frames))
-    for category in ("joints", "couplings", "forces"):
+    for category in ("joints", "couplings", "controllers", "forces"):
         kinds: dict[str, list[str]] = {}
         for e in getattr(model, category):
             kinds.setdefault(type(e).__name__, []).append(e.name)

@@ -23,7 +23,7 @@ def listing(names: list[str]) -> str:
 
 
 def shortened(names: Iterable[str], most: int = 60) -> str:
-    """Names with commas between them, in about so many letters: the last one too where some are left out."""
+    """Names with commas between them, in about so many letters: the last one too where three or more are left out."""
     every = list(names)
     if len(", ".join(every)) <= most or len(every) < 4:
         return ", ".join(every)
@@ -32,4 +32,6 @@ def shortened(names: Iterable[str], most: int = 60) -> str:
         if kept and len(", ".join([*kept, name, every[-1]])) > most - 5:
             break
         kept.append(name)
+    if len(every) - len(kept) <= 3:
+        return ", ".join(every)
     return f"{', '.join(kept)}, ... {every[-1]}"

@@ -129,18 +129,15 @@ class Contacts:
         slack = 1e-9 * max(high - low, abs(high))
         if not isinstance(t, (int, float, np.number)) or not low - slack <= float(t) <= high + slack:
             raise ModelError(f"contacts: t is {t!r}; it must be a time [s] from {low:g} to {high:g}")
-        i = int(np.abs(self.t - float(t)).argmin())
-        return self._rows(slice(int(self.begin[i]), int(self.begin[i + 1])), np.array([i]))
+        return self.taken([int(np.abs(self.t - float(t)).argmin())])
 
-    def _rows(self, rows: Any, times: np.ndarray) -> Contacts:
-        """Some rows of some output times."""
+    def taken(self, times: Sequence[int] | np.ndarray) -> Contacts:
+        """The same at some of the output times, by their indices; one may be taken twice."""
+        times = np.asarray(times, int)
+        begin = np.r_[0, np.cumsum(self.count[times])]
+        rows = np.arange(begin[-1]) + np.repeat(np.asarray(self.begin)[times] - begin[:-1], self.count[times])
         own = {name: getattr(self, name)[rows] for name in ARRAYS}
-        count = np.bincount(self.when[rows], minlength=len(self.t))[times]
-        return replace(self, t=self.t[times], begin=np.r_[0, np.cumsum(count)], history=None, **own)
-
-    def taken(self, times: np.ndarray) -> Contacts:
-        """The same at some of the output times, by their ascending indices."""
-        return self._rows(np.isin(self.when, times), np.asarray(times))
+        return replace(self, t=self.t[times], begin=begin, history=None, **own)
 
     def between(self, a: str, b: str) -> PairForce:
         """What ``a`` does to ``b`` over time: the sum over all their contacts.

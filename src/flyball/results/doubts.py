@@ -48,9 +48,10 @@ def _balance(result: Result) -> str:
     moved, drift = energy_moved(result), result.health.energy_drift
     if drift <= UNBALANCED * moved + _rest(result):
         return ""
+    finer = "shorter step" if result.health.options.get("step") else "smaller rtol"
     return (
-        f"the energy balance is off by {drift:.3g} J where {moved:.3g} J were moved; a smaller rtol may tell whether "
-        f"the motion can be trusted"
+        f"the energy balance is off by {drift:.3g} J where {moved:.3g} J were moved; a {finer} may tell whether the "
+        f"motion can be trusted"
     )
 
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.words import listing, shortened, suggest
+from .kinds import HAPPENED
 from .moment import Moment
 from .struck import Struck
 
@@ -73,10 +74,13 @@ class Happening:
 
 
 class Events(Sequence):
-    """All that happened at instants of a motion, in the order of time; ``run.events["hit"]`` are those of a name."""
+    """All that happened at instants of a motion, in the order of time; ``run.events["hit"]`` are those of a name.
 
-    def __init__(self, happened: Iterable[Happening], result: Result | None = None) -> None:
-        self._all = tuple(happened if result is None else _bound(list(happened), result))
+    ``of`` is the result that they are of.
+    """
+
+    def __init__(self, happened: Iterable[Happening], of: Result | None = None) -> None:
+        self._all, self._of = tuple(happened), of
 
     def __len__(self) -> int:
         return len(self._all)
@@ -92,23 +96,29 @@ class Events(Sequence):
         """One by its number, several by a slice, or those of a name or kind."""
         if isinstance(which, str):
             return self.of(which)
-        return Events(self._all[which]) if isinstance(which, slice) else self._all[which]
+        return Events(self._all[which], self._of) if isinstance(which, slice) else self._all[which]
 
     def of(self, name: str) -> Events:
-        """Those of an event, element or kind of this name; none if it never happened.
+        """Those of an event, element or kind of this name; none if there is one, and it never happened.
 
         Raises
         ------
         ModelError
-            If nothing of that name is among them; the message lists what is.
+            If there is nothing of that name; the message lists what happened.
         """
         found = [h for h in self._all if h.kind == name or name in h.name.split(", ")]
-        if not found:
-            known = self.names()
-            raise ModelError(
-                f"nothing named {name!r} happened{suggest(name, known)}; {listing(known) if known else 'nothing did'}"
-            )
-        return Events(found)
+        if not found and name not in HAPPENED and name not in (able := self._able()):
+            names = self.names()
+            meant, known = suggest(name, [*names, *sorted(able)]), listing(names) if names else "nothing did"
+            raise ModelError(f"nothing named {name!r} happened{meant}; {known}")
+        return Events(found, self._of)
+
+    def _able(self) -> set[str]:
+        """Names of all that might have happened."""
+        if self._of is None:
+            return set()
+        held = self._of.stretches.all[0].values.structure.switches if self._of.stretches is not None else ()
+        return {e.name for e in self._of.model.elements()} | {x.switch.label or x.element.name for x in held}
 
     def names(self) -> list[str]:
         """Names of what happened, each once, in the order of time."""
@@ -179,7 +189,7 @@ class Events(Sequence):
         return f"<table><tr>{head}</tr>" + "".join(f"<tr>{row}</tr>" for row in body) + "</table>"
 
 
-def _bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
+def bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
     """With states that can be read by name, by the parameters of their time."""
     now = next((h.tables[0] for h in happened if h.tables is not None), result.values)
     for h in happened:

@@ -48,10 +48,15 @@ class Measured:
 
     @cached_property
     def slots(self) -> np.ndarray:
-        """What laws read: (3, slots, n): values, rates as values of their own, loads (not these), ways of switches."""
+        """What laws read: (3, slots, n): values, rates as values of their own, loads (not these), states of
+        controllers, ways of switches.
+        """
         s = self._result.values.structure
         n, switches = len(s.measured), len(s.switches)
-        out = self._result.records.zeros(3, 2 * n + len(s.loads) + switches)
+        first = 2 * n + len(s.loads)
+        out = self._result.records.zeros(3, first + len(s.controls) + switches)
+        if s.controls:
+            out[0, first : first + len(s.controls)] = self._result.states[:, : len(s.controls)].T
         if s.slots or switches:
             for m in range(n):
                 out[0, m], out[1, m] = self.quantity(m)

@@ -16,7 +16,7 @@ from ..tables.values import Values
 from .bulk import Bulk
 from .contacts import Contacts
 from .energy import Energy
-from .events import Events, Happening
+from .events import Events, Happening, bound
 from .health import Health
 from .measured import Measured
 from .numbers import span
@@ -96,7 +96,7 @@ class Result:
         self.exchanged: dict[str, np.ndarray] = {}
         self.carried: dict[str, Any] = {}
         self.stretches: Stretches | None = None
-        self._events = Events(())
+        self._events = Events((), self)
         self.energy = Energy(self)
 
     @property
@@ -125,7 +125,7 @@ class Result:
     @events.setter
     def events(self, happened: Iterable[Happening]) -> None:
         """Say what happened; states before and after are read by name from then on."""
-        self._events = Events(happened, self)
+        self._events = Events(bound(list(happened), self), self)
         self.health.events = self._events.summary()
 
     @property

@@ -7,7 +7,7 @@ from ..tables.system import System, Work
 
 WIDE = {"body_i", "body_x", "frame_x", "term_i", "term_x", "seg_i", "row_i", "mix_i", "force_i", "force_x", "angle_i"}
 WIDE |= {"load_i", "mass_i", "pair_i", "block_i", "BK", "FK", "X", "O", "FB", "IC", "T", "row", "vel", "sensed"}
-WIDE |= {"D", "stack", "y", "switch_i", "switch_x", "guard_i", "switch"}
+WIDE |= {"D", "stack", "y", "switch_i", "switch_x", "guard_i", "control_i", "switch"}
 """Arrays of two dimensions; all others have one."""
 
 

@@ -59,6 +59,8 @@ def _planned(s: Structure, S: System) -> Plan:
     why = ""
     if np.iscomplexobj(S.body_x):
         why = "its numbers are complex"
+    elif s.controls:
+        why = "states of controllers are for the tables"
     elif size > MOST:
         why = f"it would be some {size} operations, and is made up to {MOST}"
     return Plan(digest.hexdigest()[:32], size, why)

@@ -17,7 +17,7 @@ from ..equations.motion import finish, loaded
 from ..equations.prescribed import prepare
 from ..equations.projection import move, place
 from ..equations.rows import BY_TIME
-from ..equations.within import LAWS, kept, law_at, take_note
+from ..equations.within import LAWS, kept, law_at, noted, take_note
 from ..graph.node import Node, Undecided
 from ..graph.printers.llvm_order import operations
 from ..laws.evaluation import evaluate, evaluate_jet
@@ -128,7 +128,7 @@ class Stages(Solves):
     def _noted(self, W: Work) -> list[Any]:
         if kept(self.S).shape[1] == 0:
             return []
-        seen = np.zeros((6, self.nm + len(self.S.force_i)), object)
+        seen = np.zeros((6, noted(self.S)), object)
         take_note(self.S, W, seen, 1)
         return list(seen.ravel())
 

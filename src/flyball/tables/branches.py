@@ -25,13 +25,17 @@ from ..model.force import CoordinateForce, TwoPointForce
 from ..model.grammar import Node
 from ..model.model import Model
 from ..model.switch import Switch
+from ..model.wiring import wired
+from .controllers import CONTROLS
 from .specs import Structure, frame
 from .switches import SwitchSpec
 from .terms import measured_term
 
 
 def laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
-    """The laws of forces and drivers: whose, and of which inputs besides time."""
+    """The laws of forces, controllers and drivers: whose, and of which inputs besides time."""
+    for x in wired(model):
+        yield x.controller, x.law, ()
     for e in model.forces:
         for name, of in fields_with(e.__class__, LawOf).items():
             value = getattr(e, name)
@@ -48,7 +52,8 @@ def bent_laws(model: Model) -> list[Element]:
     sensors = {x.name for x in model.sensors}
     out = []
     for e, law, inputs in laws(model):
-        if bends(law, ("t", *inputs), sensors & law.names) and _counts(model, law):
+        moving = {name for name in law.names if name in sensors or "." in name}
+        if bends(law, ("t", *inputs), moving) and _counts(model, law):
             out.append(e)
     return out
 
@@ -143,9 +148,16 @@ def _named(u: Node, slots: dict[str, int]) -> tuple[Any, ...]:
 
 
 def settle(s: Structure) -> None:
-    """Write the columns of the ways into the code, when all that is measured is numbered."""
+    """Write the columns of ways, and of controllers' states, into the code, when all that is measured is numbered."""
     first = 2 * len(s.measured) + len(s.loads)
+
+    def column(place: int) -> int:
+        if place >= 0:
+            return place
+        return first + CONTROLS - place if place <= CONTROLS else first + len(s.controls) - 1 - place
+
     for at in s.laws:
         for i in range(at + 2, at + 2 + 2 * s.code[at], 2):
-            if s.code[i] == SENSOR and s.code[i + 1] < 0:
-                s.code[i + 1] = first - 1 - s.code[i + 1]
+            if s.code[i] == SENSOR:
+                s.code[i + 1] = column(s.code[i + 1])
+    s.slots = {name: column(place) for name, place in s.slots.items()}

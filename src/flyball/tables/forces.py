@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..constraints.blocks import DISTANCE, turning
+from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
 from ..model.event import Event
 from ..model.examine import Curve, measured
@@ -18,16 +19,17 @@ from .system import SLIDING
 from .terms import coordinate_frames, coordinate_term, measured_term
 
 
-def measured_quantities(s: Structure, watched: Mapping[str, Event]) -> None:
+def measured_quantities(s: Structure, watched: Mapping[str, Event | Controller]) -> None:
     """Number every quantity that a force acts along or that a law names; the slots in which laws find them.
 
-    ``watched``: names in expressions of events, curves such as A.angle among them, and whose they are.
+    ``watched``: names in expressions of events and controllers, curves such as A.angle among them, and whose they are.
     """
     for e in (*s.model.forces, *s.model.limits):
         if isinstance(e, CoordinateForce):
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
-    curves = sorted(name for name in watched if "." in name)
+    own = {x.name for x in s.controls}
+    curves = sorted(name for name in watched if "." in name and name not in own)
     if not sensors and not curves:
         return
     named = _names(s) | set(watched)
@@ -72,7 +74,7 @@ def _along(s: Structure, e: CoordinateForce) -> int:
     return m
 
 
-def _sensed(s: Structure, e: Sensor | Event, kind: str, text: str) -> int:
+def _sensed(s: Structure, e: Sensor | Event | Controller, kind: str, text: str) -> int:
     """The quantity that a sensor measures, or that an event names."""
     force = s.model[text] if kind == "force" else None
     if isinstance(force, CoordinateForce):

@@ -15,6 +15,7 @@ from ..model.expressions import Expression
 from ..model.force import Force
 from ..model.kept import Kept
 from ..model.model import Model
+from ..model.wiring import Wired
 from ..numerics.ldl import Pattern
 from .forest import TreeJoint
 
@@ -87,6 +88,7 @@ class Structure:
     branches: Any = None  # what finds the sides of laws' corners (`branches.Branches`); None: laws decide themselves
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
     events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
+    controls: list[Wired] = field(default_factory=list)  # states of controllers, the first of all states
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, np.ndarray] = field(default_factory=dict)

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
-from . import events, forces, patterns, switches, terms
+from . import controllers, events, forces, patterns, switches, terms
 from .branches import Branches, settle
 from .forest import body_table
 from .points import single
@@ -82,6 +82,7 @@ def _decided(model: Model, choices: Choices) -> Structure:
     for table in model.tables:
         s.table_at[table.name] = len(s.const)
         s.const += table.data()
+    controllers.states(s)
     body_table(s)
     s.frames.append(FrameSpec(-1, None, "world"))
     if c.switches:
@@ -89,11 +90,13 @@ def _decided(model: Model, choices: Choices) -> Structure:
         s.branches.quantities()
         switches.quantities(s)
         events.quantities(s)
-    forces.measured_quantities(s, events.names(model) if c.switches else {})
+    forces.measured_quantities(s, {**controllers.names(model), **(events.names(model) if c.switches else {})})
+    controllers.slots(s)
     terms.rows(s, c.holds)
     if c.switches:
         switches.rows(s)
     forces.forces(s)
+    controllers.table(s)
     if c.switches:
         events.guards(s)
     switches.table(s)

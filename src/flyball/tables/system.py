@@ -50,6 +50,8 @@ GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_ASTRAY = 10, 11, 12
 FALLING, EITHER, RISING = -1, 0, 1
+# columns of System.control_i: the law of a state's rate (-1: it is held), which clock samples it (-1: none)
+CONTROL_RATE, CONTROL_CLOCK = range(2)
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
@@ -58,7 +60,8 @@ F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
-# scratch; and the inverse Jacobian of the gaps. Then, in row VALUE, the way of each switch (`rows.way_of`)
+# scratch; and the inverse Jacobian of the gaps. Then value, rate and its rate of each controller's state
+# (`control.column_of`). Then, in row VALUE, the way of each switch (`rows.way_of`)
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED, LATER, PLACED = range(11)
@@ -101,6 +104,7 @@ class System(NamedTuple):
     switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
     switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
     guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
+    control_i: np.ndarray  # (nc, 2): states of controllers, the first of all states: law of the rate, clock
     kinds: (
         np.ndarray
     )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
@@ -129,7 +133,7 @@ class Work(NamedTuple):
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (8, nv)
-    sensed: np.ndarray  # (6 + nl, 2 nm + nl + nw): what is measured: value, rate, bias; loads; ways of the switches
+    sensed: np.ndarray  # (6 + nl, 2 nm + nl + nc + nw): what is measured: value, rate, bias; loads; controls; ways
     switch: np.ndarray  # (11 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor

@@ -119,7 +119,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
         t["row_i"], t["row_p"], t["col_i"], t["mix_i"], t["force_i"], force_x, t["angle_i"], t["load_i"],
-        t["switch_i"], switch_x, t["guard_i"],
+        t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
     x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)

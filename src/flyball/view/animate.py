@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from ..model.body import GROUND, Body, Frame
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
 from .arrows import arrows, rope_ends
+from .edged import with_edges
 from .facts import facts
 from .gears import Wheel
 from .looks import Looks
@@ -83,8 +84,9 @@ def record(
     """
     if not len(result.t):
         raise ModelError(f"the result of {result.model.name!r} has no output time: there is nothing to draw")
+    motion = result
+    result, every, near, instead = shown_times(motion)
     members = sum(map(len, result.bulk.values()))
-    every = kept(len(result.t), members)
     places = Places(result)
     looks = Looks(result, places)
     drawn = list(_drawn(result, places, looks, every))
@@ -94,8 +96,8 @@ def record(
     )
     joints = tuple(d for d in drawn if isinstance(d, RecordedJoint))
     sets = crowds(result, every)
-    contacts, left_out = touches(result, every) if curves else (None, "")
-    notes = dict(result.health.lines()) if told else {}
+    contacts, left_out = touches(motion, near) if curves else (None, "")
+    notes = dict(motion.health.lines()) if told else {}
     if len(every) < len(result.t) and members:
         notes["pictures"] = f"{len(every)} of {len(result.t)} output times: {members} bodies in sets"
     if left_out:
@@ -112,7 +114,7 @@ def record(
         size=looks.size,
         notes=notes,
         curves=tuple(d for d in drawn if isinstance(d, RecordedCurve)),
-        arrows=arrows(result, places, every) if curves else (),
+        arrows=arrows(result, places, every, instead) if curves else (),
         frames=tuple(_frames(result, places)),
         paths=tuple(_path(result, p) for p in paths),
         show=_chosen(show),
@@ -120,8 +122,29 @@ def record(
         down=_down(result),
         sets=sets,
         contacts=contacts,
-        marks=marks(result) if told else (),
+        marks=marks(motion) if told else (),
     )
+
+
+class Shown(NamedTuple):
+    """A motion with the states around its events, and which of its times are shown.
+
+    ``every`` are their indices, ``near`` those of the nearest output times of the motion as it was given, ``instead``
+    these in the motion itself.
+    """
+
+    motion: Result
+    every: np.ndarray
+    near: np.ndarray
+    instead: np.ndarray
+
+
+def shown_times(result: Result) -> Shown:
+    """What is shown of a motion; all that is around events."""
+    chosen = kept(len(result.t), sum(map(len, result.bulk.values())))
+    whole, near, more = with_edges(result)
+    every = np.flatnonzero(more | np.isin(near, chosen))
+    return Shown(whole, every, near[every], np.flatnonzero(~more)[near[every]])
 
 
 def kept(n: int, members: int = 0) -> np.ndarray:

@@ -21,15 +21,15 @@ FAINT = 1e-5  # arrows that never reach this part of the largest of their kind c
 NUMBERS = 600_000  # in the arrows of a recording, at most
 
 
-def arrows(result: Result, places: Places, every: np.ndarray) -> tuple[RecordedArrow, ...]:
+def arrows(result: Result, places: Places, every: np.ndarray, instead: np.ndarray) -> tuple[RecordedArrow, ...]:
     """Every arrow that can be seen; of a mechanism with very many parts those of evenly chosen ones.
 
     Reactions are those on ``body_j`` at the joint's point there. What acts along a line, a spring for instance, acts
-    on both of its ends; ends on ground are left out.
+    on both of its ends; ends on ground are left out. ``instead`` are times to take where there is no value at a time.
     """
     most = max(1, NUMBERS // (3 * len(every)))
     out = [
-        RecordedArrow(name, group, what, end.body, three(end.p), vector[every])
+        RecordedArrow(name, group, what, end.body, three(end.p), _known(vector, every, instead))
         for name, group, what, end, vector in _all(result, places, most)
         if np.isfinite(vector).any()
     ]
@@ -38,6 +38,10 @@ def arrows(result: Result, places: Places, every: np.ndarray) -> tuple[RecordedA
     seen = [k for k, a in enumerate(out) if size[k] > FAINT * largest[a.what]]
     rank = sorted(seen, key=lambda k: -size[k] / largest[out[k].what])
     return tuple(out[k] for k in sorted(rank[:most]))
+
+
+def _known(vector: np.ndarray, every: np.ndarray, instead: np.ndarray) -> np.ndarray:
+    return np.where(np.isfinite(vector[every]).all(axis=1)[:, None], vector[every], vector[instead])
 
 
 Found = tuple[str, str, str, End, np.ndarray]

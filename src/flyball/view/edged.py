@@ -5,7 +5,7 @@ Accelerations and forces of constraints have no value there, so their curves are
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import groupby
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -15,10 +15,12 @@ import numpy as np
 from ..results.booked import booked
 from ..results.moment import Moment
 from ..results.stretches import Stretch, Stretches
+from ..results.touched import contacts
 
 if TYPE_CHECKING:
     from ..results.result import Result
 
+ROUNDING = 1e-12  # of a state, or of the time span
 MOST = 400  # instants; of more, jumps are too near to each other to be told apart
 
 
@@ -31,16 +33,38 @@ class _Edge(NamedTuple):
     after: np.ndarray
 
 
+class Edged(NamedTuple):
+    """A motion with two more times at each event.
+
+    ``near`` is for each of its times the output time of the motion that it was made of: itself, or the last before and
+    the first after an event. ``more`` says which times are more.
+    """
+
+    motion: Result
+    near: np.ndarray
+    more: np.ndarray
+
+
 def edged(result: Result) -> Result:
     """The motion with two more times at each event; itself where there are none."""
-    edges = _edges(result)
-    if not edges:
-        return result
-    stretches = result.stretches
-    if stretches is None:
-        return result
+    return with_edges(result).motion
+
+
+def with_edges(result: Result) -> Edged:
+    """The same, and where its times come from."""
+    edges, stretches = _edges(result), result.stretches
+    n = len(result.t)
+    if not edges or stretches is None:
+        return Edged(result, np.arange(n), np.zeros(n, bool))
     ends = np.cumsum([x.rows for x in stretches.all])
-    at = np.repeat([int(ends[e.stretch]) for e in edges], 2)
+    after = np.array([int(ends[e.stretch]) for e in edges])
+    at = np.repeat(after, 2)
+    near = np.insert(np.arange(n), at, np.clip(np.column_stack([after - 1, after]).ravel(), 0, n - 1))
+    return Edged(_longer_motion(result, stretches, edges, at), near, np.insert(np.zeros(n, bool), at, True))
+
+
+def _longer_motion(result: Result, stretches: Stretches, edges: list[_Edge], at: np.ndarray) -> Result:
+    """The motion with the states of edges before the rows ``at``."""
     y = np.array([x for e in edges for x in (e.before, e.after)])
     s = result.values.structure
     q, v, z = np.split(y, [s.nq, s.nq + s.nv], axis=1)
@@ -53,6 +77,8 @@ def edged(result: Result) -> Result:
     out.wound = result.wound
     out.stretches = _longer(stretches, edges)
     out.exchanged |= booked(out)
+    if result.contacts is not None:
+        out.contacts = contacts(out)
     return out
 
 
@@ -65,13 +91,38 @@ def _edges(result: Result) -> list[_Edge]:
     if len(moments) > MOST:
         return []
     every, k, out = result.stretches.all, 0, []
+    rows = np.cumsum([x.rows for x in every])
     for own in moments:
-        before, after = own[0].before.y, own[-1].after.y
-        found = next((j for j in range(k, len(every) - 1) if np.array_equal(every[j].end, before)), None)
-        if found is not None:
-            out.append(_Edge(found, own[0].t, before, after))
-            k = found + 1
+        t, before, after = own[0].t, own[0].before.y, own[-1].after.y
+        found = _ended(every[k:-1], before)
+        if found is None:
+            continue
+        j = k + found
+        i = int(rows[j])
+        at = float(np.clip(t, result.t[max(i - 1, 0)], result.t[min(i, len(result.t) - 1)]))
+        if abs(at - t) <= ROUNDING * (
+            result.t[-1] - result.t[0]
+        ):  # an output time within rounding may be on either side
+            k = j + 1
+            if not _same(every[j], every[k]) or not np.array_equal(before, after):
+                out.append(_Edge(j, at, before, after))
     return out
+
+
+def _ended(every: Sequence[Stretch], y: np.ndarray) -> int | None:
+    """The stretch that ended in a state; an instant may be the last place of a time after it."""
+    near = ROUNDING * np.abs(y).max(initial=0.0)
+    for most in (0.0, near):
+        found = next((j for j, x in enumerate(every) if np.abs(x.end - y).max(initial=0.0) <= most), None)
+        if found is not None:
+            return found
+    return None
+
+
+def _same(a: Stretch, b: Stretch) -> bool:
+    """Whether the same holds in both, so that nothing jumps between them but velocities."""
+    ways = np.array_equal(a.ways[:, -1:], b.ways[:, :1])
+    return a.values is b.values and ways and np.array_equal(a.switch, b.switch, equal_nan=True)
 
 
 def _told(h: Any) -> bool:

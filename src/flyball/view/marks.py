@@ -1,4 +1,4 @@
-"""Marks of events on time axes: which of them are drawn, and what is written beside them."""
+"""Marks of events on time axes: which of them are drawn, and what is written above them."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from .mark_names import draw_names
 from .recording import Mark
 
 if TYPE_CHECKING:
@@ -16,17 +17,17 @@ if TYPE_CHECKING:
 LINES = 30  # lines through a panel; of more events there are short ticks at its upper edge
 SELDOM = 5  # times that an event may happen to be a line among very many others
 NEAR = 0.004  # of the time span: what happens within it is one mark
-APART = 0.03  # of the time span between two names
-LONG = 30  # letters of a name beside a line
+LONG = 30  # letters of a name
 DASHED = (0, (3, 2))
-COLOR = "#8a8a8a"
+COLOR = "#96448a"
 MOST = 3  # names of one mark
 
 
 def marks(result: Result) -> tuple[Mark, ...]:
     """What happened at instants, as marks on a time axis: what is close together is one.
 
-    Where there are very many, only what happens seldom is a line.
+    Where there are very many, only what happens seldom is a line. Each name is told at the first of its lines, with how
+    often it happens in all.
     """
     if not len(result.t) or not len(result.events):
         return ()
@@ -40,22 +41,30 @@ def marks(result: Result) -> tuple[Mark, ...]:
     counts = Counter(h.name for h in result.events)
     seldom = [any(counts[name] <= SELDOM for name in names) for _, names in groups]
     few, some = len(groups) <= LINES, sum(seldom) <= LINES
-    return tuple(
-        Mark(t, told(sorted(names, key=counts.__getitem__)), few or (some and one))
-        for (t, names), one in zip(groups, seldom, strict=True)
-    )
+    lines = [few or (some and one) for one in seldom]
+    asked = {e.name for e in result.model.events}
+    rank = {name: (name not in asked, counts[name]) for name in counts}
+    order = {name: k for k, name in enumerate(sorted(rank, key=rank.__getitem__))}
+    said, out = set[str](), []
+    for (t, names), line in zip(groups, lines, strict=True):
+        new = sorted({*names} - said if line else (), key=order.__getitem__)
+        said |= set(new)
+        first = order[new[0]] if new else 0
+        text = told(sorted(names, key=counts.__getitem__))
+        out.append(Mark(t, text, line, told([x for x in new for _ in range(counts[x])]), first))
+    return tuple(out)
 
 
 def told(names: Sequence[str]) -> str:
-    """Names of what happened at one mark, each once, and how often."""
+    """Names of what happened, each once, and how often."""
     counts = {name: names.count(name) for name in dict.fromkeys(names)}
-    texts = [f"{name} ({n} times)" if n > 1 else name for name, n in counts.items()]
+    texts = [f"{name} ×{n}" if n > 1 else name for name, n in counts.items()]
     more = f", {len(texts) - MOST} more" if len(texts) > MOST else ""
     return ", ".join(texts[:MOST]) + more
 
 
 def draw_marks(axes: Sequence[Axes], every: Sequence[Mark]) -> None:
-    """Thin vertical lines through the panels, with names in the first one where there is room; the rest are ticks."""
+    """Thin vertical lines through the panels, names above the first one where there is room; the rest are ticks."""
     if not every:
         return
     low, high = axes[0].get_xlim()
@@ -65,24 +74,6 @@ def draw_marks(axes: Sequence[Axes], every: Sequence[Mark]) -> None:
         for line, ends, dashes in kinds:
             times = [m.t for m in inside if m.line == line]
             across = ax.get_xaxis_transform()
-            ax.vlines(times, *ends, transform=across, colors=COLOR, linewidth=0.6, zorder=0.9, linestyles=dashes)
+            ax.vlines(times, *ends, transform=across, colors=COLOR, linewidth=0.8, zorder=0.9, linestyles=dashes)
         ax.set_xlim(low, high)
-    _named(axes[0], [m for m in inside if m.line], high - low)
-
-
-def _named(ax: Axes, inside: Sequence[Mark], span: float) -> None:
-    """Names along the lines, from the upper edge down: each once, where the name before it is far enough."""
-    last, counts, said = -float("inf"), Counter(m.text for m in inside), set[str]()
-    for m in inside:
-        if m.text in said or m.t - last < APART * span:
-            continue
-        last = m.t
-        said.add(m.text)
-        text = m.text if len(m.text) <= LONG else f"{m.text[: LONG - 1]}…"
-        text += f" (1 of {counts[m.text]})" if counts[m.text] > 1 else ""
-        right = m.t > ax.get_xlim()[1] - 0.5 * APART * span
-        ax.annotate(
-            text, (m.t, 1.0), xycoords=ax.get_xaxis_transform(), xytext=(-2 if right else 2, -2),
-            textcoords="offset points", rotation=90, va="top", ha="right" if right else "left", fontsize=7, color=COLOR,
-            annotation_clip=False, bbox={"facecolor": "white", "alpha": 0.75, "edgecolor": "none", "pad": 0.4},
-        ).set_in_layout(False)  # fmt: skip
+    draw_names(axes[0], [m for m in inside if m.label], COLOR)

@@ -41,6 +41,7 @@ MODULES = (
     "crowd",
     "mechanism",
     "stage",
+    "marks",
     "plots",
     "report",
     "panels",

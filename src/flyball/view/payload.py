@@ -93,7 +93,7 @@ def payload(recording: Recording) -> bytes:
         "arrows": [_riding(a, "group", "what") | {"vector": block.add(a.vector)} for a in recording.arrows],
         "frames": [_riding(f, "of") for f in recording.frames],
         "paths": [_riding(p) for p in recording.paths],
-        "marks": [{"t": float(m.t), "text": m.text, "line": bool(m.line)} for m in recording.marks],
+        "marks": [asdict(m) | {"t": float(m.t)} for m in recording.marks],
         "modes": [asdict(mode) for mode in recording.modes],
         "channels": _curves(recording.channels, block),
         "figures": [

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..model.body import GROUND
 from .edged import edged
-from .figures import centre, contacts, few, figures, movers, some
+from .figures import centre, few, figures, movers, some
 from .marks import marks
 from .recording import Figure, Picture, PointPaths
 
@@ -25,13 +25,11 @@ def standard_pictures(result: Result) -> list[Picture]:
     in the plane or from three sides), ``contacts``, ``reactions``, ``actuation`` and ``sensors``.
     """
     whole = edged(result)
-    found: dict[str, tuple[Result, Figure | PointPaths]] = {f.name: (whole, f) for f in figures(whole)}
-    touching = contacts(result) if len(result.t) else None  # at output times only
-    found |= {f.name: (result, f) for f in (touching,) if f is not None}
+    found: dict[str, Figure | PointPaths] = {f.name: f for f in figures(whole)}
     if len(result.t):
-        found["paths"] = whole, _paths(whole)
+        found["paths"] = _paths(whole)
     when, name = marks(result), result.model.name
-    return [Picture(k, f"{name}: {k}", found[k][0].t, found[k][1], when) for k in ORDER if k in found]
+    return [Picture(k, f"{name}: {k}", whole.t, found[k], when) for k in ORDER if k in found]
 
 
 def _paths(result: Result) -> PointPaths:

@@ -39,7 +39,7 @@ def plot(result: Result, *names: str, path: str | os.PathLike | None = None) -> 
     ModelError
         If there is no such curve or part, the suffix is of no known kind, or the file cannot be written.
     """
-    whole = edged(result) if result.contacts is None else result
+    whole = edged(result)
     curves = {c.name: c for name in names or ("energy",) for c in _curves(whole, name)}
     with styled():
         drawing = stacked(whole.t, tuple(panels(list(curves.values()), len(curves))), marks=marks(result))

@@ -217,11 +217,16 @@ class Figure:
 
 @dataclass(frozen=True)
 class Mark:
-    """What happened at an instant ``t`` [s], as a mark on a time axis: its text, and whether it is a line or a tick."""
+    """What happened at an instant ``t`` [s], as a mark on a time axis: its text, and whether it is a line or a tick.
+
+    ``label`` is what is written above a line if there is room, lower ``rank`` first.
+    """
 
     t: float
     text: str
     line: bool = True
+    label: str = ""
+    rank: int = 0
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.io import dumps
-from .animate import kept, record
+from .animate import record, shown_times
 from .figures import figures
 from .page import document
 from .recording import Channel, Figure
@@ -19,6 +19,9 @@ from .tables import tables
 
 if TYPE_CHECKING:
     from ..results.result import Result
+
+
+WARNINGS = 6  # that are told at the top
 
 
 def report(result: Result, **options: Any) -> str:
@@ -41,8 +44,8 @@ def report(result: Result, **options: Any) -> str:
         If there is no output time, so nothing to draw.
     """
     recording = record(result, **options)
-    every = kept(len(result.t))
-    chosen = tuple(_thinned(f, every) for f in figures(result))
+    whole, every, _, _ = shown_times(result)
+    chosen = tuple(_thinned(f, every) for f in figures(whole))
     parts = tables(result)
     names = {"animation": "Animation", **{f"plot-{f.name}": f.title for f in chosen}}
     names |= {f"table-{t.name}": t.title for t in parts if t.title} | {"file": "Model file"}
@@ -87,12 +90,20 @@ def _headline(result: Result) -> str:
 
 
 def _verdict(result: Result) -> str:
-    """One line that says whether the run came to its end."""
+    """One line that says whether the run came to its end, and what there is to look at twice."""
     h = result.health
     kind, text = ("good", "The run reached its end.") if h.success else ("bad", f"The run stopped: {h.message}")
     if h.ended_early:
         kind, text = "early", f"The run {h.message}."
-    return f'<p class="verdict {kind}" role="status">{escape(text)}</p>'
+    warnings = h.warnings
+    if warnings:
+        count = "1 warning" if len(warnings) == 1 else f"{len(warnings)} warnings"
+        kind, text = ("early" if kind == "good" else kind), f"{text.removesuffix('.')}; {count}."
+    listed = "".join(f"<li>{escape(w)}</li>" for w in warnings[:WARNINGS])
+    if len(warnings) > WARNINGS:
+        listed += f'<li><a href="#table-run">{len(warnings) - WARNINGS} more</a></li>'
+    told = f'\n<ul class="warnings">{listed}</ul>' if warnings else ""
+    return f'<p class="verdict {kind}" role="status">{escape(text)}</p>{told}'
 
 
 def number(value: float) -> str:

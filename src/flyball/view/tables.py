@@ -10,15 +10,19 @@ import numpy as np
 
 from ..model.element import written
 from ..model.joint import Joint
+from ..results.moment import Moment
 from ..results.numbers import tuple_of
 from .facts import between
 from .happened import events, holding
 from .tabled import Table
 
 if TYPE_CHECKING:
+    from ..model.model import Model
     from ..results.result import Result
+    from ..tables.values import Values
 
 MOST = 200  # rows of one table
+SETS = 4  # changes of a parameter that are told, and the last
 
 
 def tables(result: Result) -> list[Table]:
@@ -64,17 +68,47 @@ def health(result: Result) -> Table:
 
 
 def parameters(result: Result) -> Table:
-    """Named numbers as written, and what they are in SI units."""
-    values = dict(zip(result.model.parameters, result.values.system.const.tolist(), strict=False))
-    rows = tuple((k, str(v), fixed(values[k])) for k, v in result.model.parameters.items())
-    return Table("parameters", "Parameters", ("name", "as written", "value [SI]"), rows)
+    """Named numbers as written, and what they are in SI units: at the start, and what events set them to."""
+    values = _constants(result.model, begun(result).values)
+    changes = _set(result)
+    rows = []
+    for k, v in result.model.parameters.items():
+        told = [f"{fixed(x)} at {t:.6g} s" for t, x in changes.get(k, ())]
+        more = [f"{len(told) - SETS} more", told[-1]] if len(told) > SETS + 1 else told[SETS:]
+        rows.append((k, str(v), fixed(values[k]), ", ".join([*told[:SETS], *more])))
+    columns = ("name", "as written", "value [SI]", "set by events to")
+    if not changes:
+        return Table("parameters", "Parameters", columns[:-1], tuple(row[:-1] for row in rows))
+    return Table("parameters", "Parameters", (*columns[:2], "at the start [SI]", columns[3]), tuple(rows))
+
+
+def begun(result: Result) -> Result:
+    """The first part of a motion, with the parameters that it began with."""
+    return result.pieces[0] if result.pieces else result
+
+
+def _constants(model: Model, values: Values) -> dict[str, Any]:
+    """Parameters by name."""
+    return dict(zip(model.parameters, values.system.const.tolist(), strict=False))
+
+
+def _set(result: Result) -> dict[str, list[tuple[float, float]]]:
+    """Times at which events gave parameters other values, and these."""
+    out: dict[str, list[tuple[float, float]]] = {}
+    for h in result.events:
+        if not isinstance(h.before, Moment) or h.before.values is h.after.values:
+            continue
+        was, now = (_constants(result.model, m.values) for m in (h.before, h.after))
+        for name in (k for k in now if now[k] != was[k]):
+            out.setdefault(name, []).append((h.t, now[name]))
+    return out
 
 
 def bodies(result: Result) -> Table:
-    """Mass properties as used, positions at the start; the sum of masses and their centre."""
+    """Mass properties and positions at the start; the sum of masses and their centre."""
     p, rows, masses, centres = result.planar, [], [], []
     for e in result.model.bodies:
-        b = result.values.bodies[e.name]
+        b = begun(result).values.bodies[e.name]
         moments = [b.inertia[2, 2]] if p else np.linalg.eigvalsh(np.asarray(b.inertia).real)
         centre = np.array([c[0] for c in result.records.body(result.values.structure.place[e.name])[0]])
         masses.append(float(np.real(b.mass)))

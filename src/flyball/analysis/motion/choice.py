@@ -12,7 +12,6 @@ from ...model.touching import smooth_only
 from ...model.words import suggest
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.result import Result
-from ..options import positive, seconds
 from .engines import AUTO as EITHER
 from .engines import check_specialize
 from .implicit.suited import IMPLICIT, refuse_idle
@@ -34,7 +33,7 @@ CALLED = {
 """What methods are called in words."""
 IDLE = {
     "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
-    "max_steps": MOST,
+    "max_steps": MOST, "step": None,
 }  # fmt: skip
 """Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
 STEPS = "steps by impulses"
@@ -51,19 +50,11 @@ class SimulateOptions(Integration):
     parameters: Mapping[str, float] | None
     start: Result | None
     specialize: bool | str
-    step: float | None
     progress: bool | Callable[[float], None]
 
     def __post_init__(self) -> None:
         super().__post_init__()
         check_specialize(self.specialize)
-        if self.step is not None:
-            object.__setattr__(self, "step", seconds(self.step, "step"))
-            positive(self.step, "step")
-            if self.method not in IMPLICIT:
-                raise ModelError(
-                    f"step is a fixed step of method={IMPLICIT[0]!r}; with method={self.method!r} it does nothing"
-                )
         if self.method in IMPLICIT:
             refuse_idle(self)
 
@@ -110,6 +101,10 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
     if o.method == AUTO:
         return _suitable(model, o)
     touch = bool(model.contacts or model.bulk)
+    if o.method in IMPLICIT and model.controllers:
+        raise ModelError(
+            f"method={o.method!r} does not know {model.controllers[0].title}; the explicit methods do: leave method out"
+        )
     if not isinstance(o.method, Stepping) and o.method != IMPULSE:
         if model.bulk:
             raise ModelError(
@@ -124,7 +119,8 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
             f"method={USUAL!r}"
         )
     if given:
-        raise ModelError(f"{given[0]} does nothing with {STEPS}; leave it out")
+        instead = "; Stepping(step=...) is theirs" if o.step is not None else ""
+        raise ModelError(f"{given[0]} does nothing with {STEPS}; leave it out{instead}")
     if o.coordinates == "joint":
         raise ModelError(
             f"{STEPS} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
@@ -158,7 +154,7 @@ def _suitable(model: Model, o: SimulateOptions) -> Way:
 
 def _smooth(model: Model) -> list[str]:
     """What steps by impulses do not know."""
-    return [e.title for e in (*model.events, *smooth_only(model))]
+    return [e.title for e in (*model.events, *model.controllers, *smooth_only(model))]
 
 
 def _given(o: SimulateOptions) -> list[str]:

@@ -28,9 +28,12 @@ SHORT = 1e-12  # part of the span: a power that is still uneven over less has ju
 
 
 def leaves_no_freedom(start: Start) -> bool:
-    """Whether drivers prescribe every velocity, and rows on positions alone say where everything is."""
+    """Whether drivers prescribe every velocity, and rows on positions alone say where everything is.
+
+    Controllers have states of their own, which are integrated.
+    """
     s = start.base.compiled.structure
-    if not s.model.drivers or s.nv > len(s.rows) or not all(r.holonomic for r in s.rows):
+    if s.controls or not s.model.drivers or s.nv > len(s.rows) or not all(r.holonomic for r in s.rows):
         return False
     a = start.base
     x, key = a.compiled.values, (float(a.t).hex(), a.y.tobytes())

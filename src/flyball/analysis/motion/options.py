@@ -48,14 +48,18 @@ class Integration(Options):
     stabilization: str
     alpha: float | None
     beta: float | None
+    step: float | None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if isinstance(self.max_step, str):
-            object.__setattr__(self, "max_step", seconds(self.max_step, "max_step"))
-        for name in ("rtol", "atol", "max_step"):
-            if getattr(self, name) is not None or name != "atol":
+        for name in ("max_step", "step"):
+            if isinstance(getattr(self, name), str):
+                object.__setattr__(self, name, seconds(getattr(self, name), name))
+        for name in ("rtol", "atol", "max_step", "step"):
+            if getattr(self, name) is not None or name in ("rtol", "max_step"):
                 positive(getattr(self, name), name)
+        if self.step is not None and self.max_step != np.inf:
+            raise ModelError("max_step does nothing with steps of fixed width (step=); leave one of the two out")
         count(self.max_steps, "max_steps")
         if self.rtol < FINEST:
             raise ModelError(
@@ -119,6 +123,7 @@ def projected(coordinates: str, rtol: float, atol: float, max_steps: int = MOST)
         stabilization="projection",
         alpha=None,
         beta=None,
+        step=None,
     )
 
 

@@ -78,7 +78,7 @@ def reason(a: Assembly, base: Assembly, clock: ex.Clock, kept: bool = True) -> t
     text = of_drivers(a, clock) or _not_finite(a, clock)
     if not text and (text := _jammed(a, clock)):
         return f"{name!r}: {text}{after}", Unresolved(text, t=t)
-    text = text or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
+    text = text or _broken(a, clock) or _locked(a, base, clock) or _rivals(a, clock) or _stuck(a, clock)
     return f"{name!r}: {text}{after}", None
 
 
@@ -144,6 +144,13 @@ def of_drivers(a: Assembly, clock: ex.Clock) -> str:
         if problem:
             return f"{driver.title} cannot be followed beyond t = {t:.6g} s: its law {problem}"
     return ""
+
+
+def _broken(a: Assembly, clock: ex.Clock) -> str:
+    """A force whose formula ends where the motion stopped; else nothing."""
+    t = float(clock.real[ex.T])
+    force = broken_force(a.compiled, t)
+    return f"at t = {t:.6g} s, {force}" if force else ""
 
 
 def _driving(a: Assembly) -> list[tuple[Any, int, bool]]:
@@ -294,6 +301,11 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
         where += f" (whose law there has the rate {W.row[NU, k]:.4g} and the second derivative {W.row[NU_DOT, k]:.4g})"
     t = f"t = {clock.real[ex.T]:.6g} s"
     begun = clock.count[ex.STARTED] != 0
+    if clock.real[ex.STEP] > 0.0 and begun:
+        return (
+            f"at {t} a step of {clock.real[ex.STEP]:g} s has no solution{where}: give a shorter step, or leave step "
+            f"out, and its width is chosen"
+        )
     what = f"{t}: the step width fell to {clock.real[ex.H]:.3g} s{where}" if begun else f"its start, {t}{where}"
     if rounding := _rounded(clock):
         return f"the integration cannot go on at {what}{rounding}"
@@ -305,6 +317,11 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
 
 
 def _too_many(a: Assembly, clock: ex.Clock) -> str:
+    if clock.real[ex.STEP] > 0.0:
+        return (
+            f"max_steps = {clock.count[ex.LIMIT]} steps of {clock.real[ex.STEP]:g} s were taken by "
+            f"t = {clock.real[ex.T]:.6g} s; give more (max_steps=)"
+        )
     slowest = _component(a, _pacemaker(clock))
     return (
         f"max_steps = {clock.count[ex.LIMIT]} steps were taken by t = {clock.real[ex.T]:.6g} s; they are "

@@ -85,7 +85,7 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
     s, S = c.structure, c.values.system
     if s.switches or s.guards or s.functions or s.loads or S.glob[SEMIDEFINITE] or leaves_no_freedom(begun):
         return None
-    if laws_of_time(c):
+    if s.controls or laws_of_time(c):
         return None
     o = o.sized(begun.base.compiled.values.length)
     made, fixed = None, tuple[tuple[str, int, float], ...]()

@@ -109,12 +109,18 @@ def function(number: int, a: Range) -> tuple[Range, Range]:
     slope = among(a, lambda x: slopes(number, x, value(number, x))[0] + 0.0 * x, slope_turns)
     if number == TAN:
         near = SEAM * np.maximum(np.abs(a[0]), np.abs(a[1]))  # a range may end at a pole
-        lo, hi = np.minimum(a[0] + near, a[1]), np.maximum(a[1] - near, a[0])
-        f = among((lo, hi), lambda x: value(number, x), ())
-        pole = np.floor((lo - 0.5 * np.pi) / np.pi) != np.floor((hi - 0.5 * np.pi) / np.pi)
-        f = np.where(pole, -np.inf, f[0]), np.where(pole, np.inf, f[1])
+        pole = _branch(np.minimum(a[0] + near, a[1])) != _branch(np.maximum(a[1] - near, a[0]))
+        f = (
+            np.where(pole | (_branch(a[0] - near) != _branch(a[0] + near)), -np.inf, f[0]),
+            np.where(pole | (_branch(a[1] - near) != _branch(a[1] + near)), np.inf, f[1]),
+        )
         slope = among(f, lambda x: 1.0 + x * x, (0.0,))
     return f, slope
+
+
+def _branch(x: Array) -> Array:
+    """Which branch of the tangent an angle is on."""
+    return np.floor((x - 0.5 * np.pi) / np.pi)
 
 
 def whole_power(a: Range, n: int) -> Range:

@@ -11,8 +11,8 @@ T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER, SPAN = range(11)
 # (of the steps refused since the last accepted one: the last error, the least, its width; an error that is good enough)
 LAST, BEST, BEST_H, PARDON = range(11, 15)
 # (widest step of late; begin of the step before, and of the last that was taken back; largest error accepted, its time;
-# when an error was last found to be rounding)
-WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT, REALS = range(15, 22)
+# when an error was last found to be rounding; width of fixed steps, 0: adaptive)
+WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT, STEP, REALS = range(15, 23)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS, COUNTS = range(10)
 # rows of Clock.y: the state, the one in the making, the interpolated one; what a trial puts aside; the step before

@@ -35,6 +35,7 @@ from .clock import (
     SPAN,
     STARTED,
     STATUS,
+    STEP,
     STUCK,
     T_END,
     TOO_MANY,
@@ -105,7 +106,7 @@ def overlooked(derivative, inspect, S, W, R, c, h):
     ``inspect`` names places where a law is not as its values elsewhere in the step let expect; what this comes to is
     what the dense output misses of the equations there, over the part of the step for which it lasts.
     """
-    if c.seen.shape[1] == 0:
+    if c.seen.shape[1] == 0 or c.real[STEP] > 0.0:
         return False
     k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, W)
     if k > 0 and extend(derivative, S, W, R, c, h) != 0:
@@ -119,12 +120,15 @@ def overlooked(derivative, inspect, S, W, R, c, h):
 
 @formula
 def width(c):
-    """Width of the next step: none is left over at the end that is very short; 0 if it would be too short."""
+    """Width of the next step: none is left over at the end that is very short; 0 if it would be too short.
+
+    Fixed steps are never wider, and narrower only where they end: at events, and at the end of the time.
+    """
     left = c.real[T_END] - c.real[T]
     h = min(c.real[H], c.real[H_MAX])
     if 1.000001 * h >= left:
         h = left
-    elif 2.0 * h > left:
+    elif 2.0 * h > left and c.real[STEP] == 0.0:
         h = 0.5 * left
     return 0.0 if h < 1e-14 * max(abs(c.real[T]), c.real[LARGEST]) else h
 

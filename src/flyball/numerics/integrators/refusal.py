@@ -30,16 +30,16 @@ from .clock import (
     PARDON,
     REJECTED,
     RTOL,
+    STEP,
     TO,
     TO_RATE,
     WIDE,
     H,
     T,
 )
-from .step import attempt
+from .step import LARGE, attempt
 
 SAFETY = 0.85
-LARGE = 1e300  # the error of a step that was not tried
 DIGITS = 1e-14  # part of a state that its last digits are, once rounding has built up
 BLUR = 0.1  # an error that changes by more than this part of it with the state's last digits is rounding
 ROUGH = 1e-7  # a relative error of a step above which rounding is no excuse
@@ -73,6 +73,8 @@ def enter(R, c, t, h, error):
         c.real[WIDE] = max(h, SLOWLY * c.real[WIDE])
     grow = c.real[GROW]
     c.real[H] = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
+    if c.real[STEP] > 0.0:
+        c.real[H] = c.real[STEP]
     c.real[T] = t
     c.real[GROW] = 6.0
     c.count[ACCEPTED] += 1
@@ -89,7 +91,10 @@ def shorten(c, h):
 
 @formula
 def refuse(derivative, arrive, tangent, S, W, R, c, h, status, error):
-    """Choose what to try after a step with that status and error."""
+    """Choose what to try after a step with that status and error; fixed steps that fail are the end."""
+    if c.real[STEP] > 0.0:
+        shorten(c, 0.0)
+        return
     if status != 0 or not error < LARGE:
         shorten(c, 0.25 * h)
         return

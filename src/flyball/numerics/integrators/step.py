@@ -20,10 +20,12 @@ from .clock import (
     POSITIONS,
     RTOL,
     SCALE,
+    STEP,
     T,
 )
 
 BEYOND = 1e-3  # of a coordinate beyond the mechanism's size, what its tolerance still grows with
+LARGE = 1e300  # the error of a step that was not tried, or is no number
 FIRST = 1e-7  # part of the largest step: the least that is tried first
 
 
@@ -90,7 +92,7 @@ def first_step(derivative, S, W, R, c):
 
 @formula
 def attempt(derivative, arrive, tangent, S, W, R, c, h):
-    """One step of width h into c.y[NEW]. Returns (status, error in units of the tolerance)."""
+    """One step of width h into c.y[NEW]. Returns (status, error in units of the tolerance; 0 if it is fixed)."""
     y = c.y[NOW]
     new = c.y[NEW]
     stages = R.order_i[1]
@@ -109,7 +111,8 @@ def attempt(derivative, arrive, tangent, S, W, R, c, h):
     error = estimate(tangent, S, W, R, c, h, False)
     if error > 1.0 and c.real[PARDON] > 0.0:
         error = estimate(tangent, S, W, R, c, h, True)
-    return 0, moved if error <= moved else error  # an error that is no number stays one, and is refused
+    error = moved if error <= moved else error  # an error that is no number stays one, and is refused
+    return 0, 0.0 if c.real[STEP] > 0.0 and error < LARGE else error
 
 
 @formula

@@ -6,12 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 from ...errors import ModelError
 from ...model.body import Body, Driver, Frame
+from ...model.controller import Controller
 from ...model.coupling import Coupling
 from ...model.force import Force
 from ...model.joint import Joint
 from ...model.sensor import IMU, Sensor
 from ...model.touch import Touch
 from .base import View as View
+from .controllers import ControllerView
 from .drivers import CouplingView, DriverView
 from .forces import ForceView
 from .joints import JointView
@@ -29,6 +31,7 @@ VIEWS: tuple[tuple[type, type[View]], ...] = (
     (Coupling, CouplingView),
     (Touch, TouchView),
     (Force, ForceView),
+    (Controller, ControllerView),
     (Driver, DriverView),
     (Sensor, SensorView),
     (IMU, IMUView),

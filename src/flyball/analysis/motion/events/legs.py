@@ -7,7 +7,17 @@ import numpy as np
 from ....constraints.modes import BRANCH
 from ....laws.breaks import Breaks, Timed, found_beforehand, margin, timed
 from ....numerics.integrators import clock as ex
-from ....tables.system import BODY_LAW, FORCE_LAW, G_LAW, GUARD_KIND, GUARD_OF, ROW_LAW, SWITCH_KIND, SWITCH_LAW
+from ....tables.system import (
+    BODY_LAW,
+    CONTROL_RATE,
+    FORCE_LAW,
+    G_LAW,
+    GUARD_KIND,
+    GUARD_OF,
+    ROW_LAW,
+    SWITCH_KIND,
+    SWITCH_LAW,
+)
 from ...compiled import Compiled
 
 LAWS = 3  # of a force
@@ -30,7 +40,9 @@ def _timed(c: Compiled) -> Timed:
     guards = S.guard_i[S.guard_i[:, GUARD_KIND] == G_LAW, GUARD_OF]
     forces = S.force_i[:, FORCE_LAW : FORCE_LAW + LAWS].ravel()
     corners = S.switch_i[S.switch_i[:, SWITCH_KIND] == BRANCH, SWITCH_LAW]
-    starts = np.concatenate([forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners])
+    starts = np.concatenate(
+        [forces, S.row_i[:, ROW_LAW], S.body_i[:, BODY_LAW], guards, corners, S.control_i[:, CONTROL_RATE]]
+    )
     return timed(S.code.tolist(), starts.tolist())
 
 

@@ -175,14 +175,17 @@ def attempt(callbacks, S, K, c, h):
 
 @formula
 def overlooked(callbacks, S, K, c, h):
-    """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
+    """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`.
+
+    With steps of fixed width only what no width makes right: another branch of a formula.
+    """
     residual, _, _, _, inspect, _ = callbacks
     if c.seen.shape[1] == 0:
         return False
     inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S)
     k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S)
     while k > 0:
-        if K.real[STEP] == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0:
+        if share > 1.0 or (K.real[STEP] == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0):
             return True
         k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S)
     return False
@@ -296,6 +299,9 @@ def advance(callbacks, S, K, c, out):
             pardon(K, c, h, error)
             continue
         if overlooked(callbacks, S, K, c, h):
+            if K.real[STEP] > 0.0:
+                c.count[STATUS] = STUCK
+                return used
             refuse(K, c, h, 0.5)
             continue
         status, used = write(callbacks, S, K, c, h, out, used)

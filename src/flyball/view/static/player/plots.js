@@ -2,10 +2,12 @@
 import uPlot from "uplot";
 import { mixed } from "./data.js";
 import { element, pretty, shortNumber } from "./format.js";
+import { Marks } from "./marks.js";
 import { CURVES } from "./theme.js";
 
 const FONT = "11px system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif";
 const LOWEST = 72; // px
+const LANES = 2; // of names of events above the first plot, at most
 const HIGHEST = 320;
 const MOST = CURVES.length; // curves in one plot
 const DASHES = [undefined, [7, 7], [2, 5], [10, 4, 2, 4]]; // of a curve that lies on none, one, two, ... others
@@ -100,8 +102,8 @@ export function hidden(channels) {
 }
 
 export class Plot {
-  /** One plot with its own head line, cursor and markers; `title` says what its axis shows. */
-  constructor(parent, channels, times, onSeek, title = "", marks = []) {
+  /** One plot with its own head line, cursor and markers; `title` says what its axis shows, `marks` are drawn over it. */
+  constructor(parent, channels, times, onSeek, title, marks) {
     Object.assign(this, { channels, times, marks, dashes: hidden(channels).map((n) => DASHES[n % DASHES.length]) });
     this.values = channels.map(() => element("output", { className: "value" }));
     const names = channels.map((channel, k) => {
@@ -123,6 +125,7 @@ export class Plot {
     parent.append(this.root);
     this.chart = new uPlot(this.#options(), [times, ...channels.map((channel) => gapped(channel.values))], this.box);
     this.#addCursor(onSeek);
+    marks.listen(this.chart, this.box);
   }
 
   #options() {
@@ -137,10 +140,10 @@ export class Plot {
     return {
       width: 300,
       height: 150,
-      padding: [8, 12, 0, 0],
+      padding: [8 + this.marks.room, 12, 0, 0],
       cursor: { show: false },
       legend: { show: false },
-      hooks: { drawClear: [(chart) => this.#drawMarks(chart)] },
+      hooks: { drawAxes: [(chart) => this.marks.draw(chart, css("--event"))] },
       scales: {
         x: { time: false, range: (_, low, high) => (high > low ? [low, high] : [low - 0.5, low + 0.5]) },
         y: { range: valueRange },
@@ -160,25 +163,6 @@ export class Plot {
         })),
       ],
     };
-  }
-
-  /** Thin lines where something happened, or short ticks. */
-  #drawMarks(chart) {
-    const { ctx, bbox } = chart;
-    const inside = this.marks.filter(({ t }) => t >= chart.scales.x.min && t <= chart.scales.x.max);
-    if (!inside.length) return;
-    ctx.save();
-    ctx.strokeStyle = css("--muted");
-    ctx.globalAlpha = 0.5;
-    ctx.lineWidth = devicePixelRatio;
-    ctx.beginPath();
-    for (const { t, line } of inside) {
-      const x = Math.round(chart.valToPos(t, "x", true)) + 0.5;
-      ctx.moveTo(x, bbox.top);
-      ctx.lineTo(x, bbox.top + (line ? 1 : 0.05) * bbox.height);
-    }
-    ctx.stroke();
-    ctx.restore();
   }
 
   #addCursor(onSeek) {
@@ -237,7 +221,8 @@ export class Plots {
   show(channels, together) {
     const groups = grouped(channels, together);
     for (const plot of this.plots) plot.destroy();
-    this.plots = groups.map((group) => new Plot(this.box, group, this.times, this.onSeek, "", this.marks));
+    const marks = (k) => new Marks(this.marks, k === 0 ? LANES : 0);
+    this.plots = groups.map((group, k) => new Plot(this.box, group, this.times, this.onSeek, "", marks(k)));
     if (groups.length) this.empty.remove();
     else this.box.append(this.empty);
     this.resize();

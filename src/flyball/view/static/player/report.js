@@ -1,14 +1,16 @@
 // What a report has besides the player: figures, a copy button, and a picture that lets one scroll past it.
 import { element } from "./format.js";
+import { Marks } from "./marks.js";
 import { Plot } from "./plots.js";
 
 const HEIGHT = 190; // px
+const LANES = 5; // of names of events above the first plot of a figure, at most
 
 /** One figure of the report: its panels, each a plot, sized with the page. */
 class Chart {
   constructor(box, figure, times, onSeek, marks) {
-    this.plots = figure.panels.map(({ label, note, curves }) => {
-      const plot = new Plot(box, curves, times, onSeek, label, marks);
+    this.plots = figure.panels.map(({ label, note, curves }, k) => {
+      const plot = new Plot(box, curves, times, onSeek, label, new Marks(marks, k === 0 ? LANES : 0));
       if (note) plot.root.append(element("figcaption", { textContent: note }));
       return plot;
     });
@@ -18,7 +20,7 @@ class Chart {
   }
 
   resize() {
-    for (const plot of this.plots) plot.resize(Math.max(plot.box.clientWidth, 120), HEIGHT);
+    for (const plot of this.plots) plot.resize(Math.max(plot.box.clientWidth, 120), HEIGHT + plot.marks.room);
     if (this.last) this.seek(...this.last);
   }
 

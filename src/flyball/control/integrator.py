@@ -1,0 +1,40 @@
+"""Integrator: the integral of a signal over time."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from ..model.controller import Controller, ControlState
+from ..model.element import Law, Number, Unit, element
+
+
+@element
+class Integrator(Controller):
+    """The integral of a signal over time, y' = gain u.
+
+    Parameters
+    ----------
+    name : str
+    of : expression
+        The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+    gain : expression
+    initial : number
+        What the integral begins with.
+    """
+
+    of: Law
+    gain: Law = 1.0
+    initial: Annotated[Number, Unit(None)] = 0.0
+
+    def given(self) -> dict[str, Any]:
+        """Input and gain."""
+        return {"of": self.of, "gain": self.gain}
+
+    def signals(self) -> dict[str, str]:
+        """The integral, and what is integrated."""
+        return {"output": "value", "input": "of"}
+
+    def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
+        """The integral."""
+        return (ControlState("value", "gain*of", n.initial),)

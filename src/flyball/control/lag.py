@@ -1,0 +1,58 @@
+"""Lag: first order, with or without a lead."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from ..model.controller import Controller, ControlState
+from ..model.element import Law, Number, Unit, element, nonnegative, positive
+
+
+@element
+class Lag(Controller):
+    """A signal that follows another with a lag: y / u = gain (1 + lead s) / (1 + time s).
+
+    Without a lead a low-pass filter of first order; with a lead greater than the time it leads.
+
+    Parameters
+    ----------
+    name : str
+    of : expression
+        The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+    time : number [s]
+        Time constant of the lag.
+    lead : number [s]
+        Time constant of the lead; none if 0.
+    gain : expression
+    initial : number
+        What the output of the lag alone, without gain and lead, begins with.
+
+    Notes
+    -----
+    With x' = (u - x) / time the output is gain (x + lead/time (u - x)).
+    """
+
+    of: Law
+    time: Annotated[Number, Unit("s")]
+    lead: Annotated[Number, Unit("s")] = 0.0
+    gain: Law = 1.0
+    initial: Annotated[Number, Unit(None)] = 0.0
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Times have a sign."""
+        positive(self, n, "time", why="What follows at once needs no Lag")
+        nonnegative(self, n, "lead")
+
+    def given(self) -> dict[str, Any]:
+        """Input, times and gain."""
+        return {"of": self.of, "time": self.time, "lead": self.lead, "gain": self.gain}
+
+    def signals(self) -> dict[str, str]:
+        """What follows, and what it follows."""
+        leads = "" if self.lead == 0.0 else " + lead/time*(input - value)"
+        return {"output": f"gain*(value{leads})", "input": "of"}
+
+    def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
+        """What lags."""
+        return (ControlState("value", "(input - value)/time", n.initial),)

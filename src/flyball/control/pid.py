@@ -1,0 +1,150 @@
+"""PID: proportional, integral, derivative; with limits, anti-windup and a filtered derivative."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any, Literal
+
+from ..errors import ModelError
+from ..model.controller import Controller, ControlState
+from ..model.element import Law, Number, Unit, element, positive
+
+BACK, CLAMPING = "back-calculation", "clamping"
+
+
+@element
+class PID(Controller):
+    """A PID controller: u = kp (b r - y) + I + D, I' = ki (r - y), D = kd s / (1 + filter s) (c r - y).
+
+    r is the set point, y what is measured, e = r - y. The output is u within its limits. Gains are expressions, so that
+    they may follow time or what is measured (scheduled gains).
+
+    Parameters
+    ----------
+    name : str
+    setpoint, measured : expression
+        Of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+    kp, ki, kd : expression
+        Gains: of the error, of its integral over time, of its derivative.
+    filter : number [s]
+        Time constant of the derivative's filter; needed where there is a derivative.
+    lower, upper : expression, optional
+        Limits of the output.
+    anti_windup : {"back-calculation", "clamping", "none"}
+        What the integral does while the output is at a limit: it is led back, I' = ki e + (u_limited - u) / tracking;
+        or it stands still as long as the error would lead it further beyond; or it goes on.
+    tracking : number [s], optional
+        Time constant of the back-calculation; if not given sqrt(kd/ki), without a derivative kp/ki.
+    setpoint_weight, derivative_weight : number
+        b and c: how much of the set point goes into the proportional part, and into the derivative.
+    bias : expression
+        Added to the output before limits: what holds against gravity, for instance.
+    initial : number
+        What the integral part I begins with.
+
+    Notes
+    -----
+    Sources: K. J. Astrom and T. Hagglund, *Advanced PID Control*, ISA 2006: set-point weighting (section 3.4), filtered
+    derivative (3.3), back-calculation and tracking time (3.5: between Td and Ti, sqrt(Ti Td) proposed), conditional
+    integration, "clamping" (3.5).
+    """
+
+    setpoint: Law
+    measured: Law
+    kp: Law = 0.0
+    ki: Law = 0.0
+    kd: Law = 0.0
+    filter: Annotated[Number | None, Unit("s")] = None
+    lower: Law | None = None
+    upper: Law | None = None
+    anti_windup: Literal["back-calculation", "clamping", "none"] | None = None
+    tracking: Annotated[Number | None, Unit("s")] = None
+    setpoint_weight: Annotated[Number, Unit("1")] = 1.0
+    derivative_weight: Annotated[Number, Unit("1")] = 0.0
+    bias: Law = 0.0
+    initial: Annotated[Number, Unit(None)] = 0.0
+
+    @property
+    def windup(self) -> str:
+        """What is done against windup: back-calculation where there are limits and an integral, if nothing is said."""
+        return self.anti_windup or (BACK if self._limited and self.ki != 0.0 else "none")
+
+    @property
+    def _limited(self) -> bool:
+        return self.lower is not None or self.upper is not None
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Refuse what has no effect, and what is missing."""
+        if self.kp == 0.0 and self.ki == 0.0 and self.kd == 0.0:
+            raise ModelError(f"{self.title}: it has no gains; give at least one of kp, ki, kd")
+        if self.kd != 0.0 and self.filter is None:
+            raise ModelError(
+                f"{self.title}: a derivative needs a filter; give filter=..., a tenth of kd/kp for instance: the "
+                f"derivative of what jumps is infinite"
+            )
+        positive(self, n, "filter", "tracking")
+        for name, needs, there in (
+            ("filter", "kd", self.kd != 0.0),
+            ("derivative_weight", "kd", self.kd != 0.0 or self.derivative_weight == 0.0),
+            ("setpoint_weight", "kp", self.kp != 0.0 or self.setpoint_weight == 1.0),
+            ("anti_windup", "limits and ki", self._limited and self.ki != 0.0),
+            ("tracking", f"anti_windup={BACK!r}", self.windup == BACK),
+            ("initial", "ki", self.ki != 0.0 or self.initial == 0.0),
+        ):
+            if getattr(self, name) is not None and not there:
+                raise ModelError(f"{self.title}: {name} does nothing without {needs}; leave it out")
+        if isinstance(self.lower, float) and isinstance(self.upper, float) and not self.lower < self.upper:
+            raise ModelError(f"{self.title}: lower is {self.lower:g}, upper {self.upper:g}; lower must be less")
+
+    def given(self) -> dict[str, Any]:
+        """Inputs, gains, limits."""
+        numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias")
+        own = {k: getattr(self, k) for k in ("setpoint", "measured", *numbers)}
+        return {k: v for k, v in own.items() if v is not None} | {
+            "weight_p": self.setpoint_weight,
+            "weight_d": self.derivative_weight,
+        }
+
+    def signals(self) -> dict[str, str]:
+        """The output within limits, the output without them, the error and the parts."""
+        parts = {}
+        if self.kp != 0.0:
+            parts["proportional"] = "kp*error" if self.setpoint_weight == 1.0 else "kp*(weight_p*setpoint - measured)"
+        if self.kd != 0.0:
+            parts["derivative"] = "kd/filter*(damped - slow)"
+        total = " + ".join([*parts, *(["integral"] if self.ki != 0.0 else []), *(["bias"] if self.bias != 0.0 else [])])
+        out = "unlimited" if self.lower is None else "max(unlimited, lower)"
+        out = out if self.upper is None else f"min({out}, upper)"
+        inner = {"damped": "-measured" if self.derivative_weight == 0.0 else "weight_d*setpoint - measured"}
+        return {
+            "output": out,
+            "setpoint": "setpoint",
+            "measured": "measured",
+            "error": "setpoint - measured",
+            "unlimited": total,
+            **parts,
+            **(inner if self.kd != 0.0 else {}),
+        }
+
+    def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
+        """The integral part; what the derivative is filtered by."""
+        out = []
+        if self.ki != 0.0:
+            out.append(ControlState("integral", self._rate_of_integral(), n.initial))
+        if self.kd != 0.0:
+            out.append(ControlState("slow", "(damped - slow)/filter", 0.0))
+        return tuple(out)
+
+    def _rate_of_integral(self) -> str:
+        """What is integrated."""
+        if self.windup == BACK:
+            usual = "sqrt(kd/ki)" if self.kd != 0.0 else "kp/ki"
+            time = usual if self.tracking is None else "tracking"
+            return f"ki*error + (output - unlimited)/({time})"
+        if self.windup == CLAMPING:
+            beyond = []
+            beyond += ["unlimited > upper and ki*error > 0"] if self.upper is not None else []
+            beyond += ["unlimited < lower and ki*error < 0"] if self.lower is not None else []
+            condition = " or ".join(f"({x})" for x in beyond)
+            return f"where({condition}, 0, ki*error)"
+        return "ki*error"

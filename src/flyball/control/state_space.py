@@ -1,0 +1,155 @@
+"""State space: x' = A x + B u, y = C x + D u, of any number of inputs and outputs."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator
+
+from ..errors import ModelError
+from ..model.controller import OUTPUT, Controller, ControlState, numbered
+from ..model.element import Laws, Numbers, Unit, element, plain
+from .systems import matrices
+
+
+def _listed(value: Any) -> Any:
+    """One law is a list of one."""
+    return (value,) if isinstance(value, (str, int, float)) else plain(value)
+
+
+def _matrix(value: Any) -> Any:
+    """Rows of numbers; of one number, and of one row, the matrix that it is."""
+    value = plain(value)
+    if isinstance(value, (int, float, str)):
+        value = ((value,),)
+    if isinstance(value, tuple) and value and not isinstance(value[0], tuple):
+        value = (value,)
+    return value
+
+
+Matrix = Annotated[tuple[Numbers, ...], BeforeValidator(_matrix)]
+"""Rows of numbers or expressions of parameters."""
+
+
+@element
+class StateSpace(Controller):
+    """A linear system x' = A x + B u, y = C x + D u.
+
+    Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one by
+    the system's name. States are ``K.x1``, ``K.x2``, ...
+
+    Parameters
+    ----------
+    name : str
+    inputs : list of expressions
+        The signals u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
+    A, B, C, D : matrices
+        Rows of numbers, or of expressions of parameters. Without states only D is given: a matrix of gains.
+    outputs : list of str, optional
+        Names of the outputs.
+    initial : list of numbers, optional
+        What the states begin with; zero if not given.
+
+    See Also
+    --------
+    StateSpace.from_control : of a system of the python-control library.
+    """
+
+    inputs: Annotated[Laws, BeforeValidator(_listed)]
+    A: Matrix = ()
+    B: Matrix = ()
+    C: Matrix = ()
+    D: Matrix = ()
+    outputs: tuple[str, ...] = ()
+    initial: Annotated[Numbers, Unit(None)] = ()
+
+    @classmethod
+    def from_control(cls, name: str, system: Any, inputs: Any, **fields: Any) -> StateSpace:
+        """A system of the python-control library, `control.StateSpace` or `control.TransferFunction`.
+
+        Parameters
+        ----------
+        name : str
+        system : control.StateSpace or control.TransferFunction
+            Or anything that has A, B, C, D, or num and den, and dt.
+        inputs : list of expressions
+        fields
+            As of `StateSpace`: outputs, initial.
+
+        Raises
+        ------
+        ModelError
+            If it is no such system.
+        """
+        given = matrices(system, name)
+        return cls(name, inputs=inputs, **(given | fields))
+
+    @property
+    def sizes(self) -> tuple[int, int, int]:
+        """Numbers of states, inputs, outputs."""
+        return len(self.A), len(self.inputs), len(self.D) or len(self.C)
+
+    def check(self, n: SimpleNamespace) -> None:
+        """Refuse matrices whose sizes do not fit."""
+        states, inputs, outputs = self.sizes
+        if not outputs or not inputs:
+            raise ModelError(f"{self.title}: it has no {'outputs' if inputs else 'inputs'}; give C or D, and inputs")
+        for name, rows, columns in (
+            ("A", states, states),
+            ("B", states, inputs),
+            ("C", outputs if states else 0, states),
+            ("D", outputs, inputs),
+        ):
+            M = getattr(self, name)
+            if not M and (name == "D" or not rows):
+                continue
+            shape = {(len(M), len(row)) for row in M} or {(0, 0)}
+            if shape != {(rows, columns)}:
+                told = " or ".join(f"{a} x {b}" for a, b in sorted(shape))
+                raise ModelError(
+                    f"{self.title}: {name} is {told}; of {states} states, {inputs} inputs and {outputs} outputs it "
+                    f"must be {rows} x {columns}"
+                )
+        if self.outputs and len(self.outputs) != outputs:
+            raise ModelError(f"{self.title}: it has {outputs} outputs, and {len(self.outputs)} names for them")
+        if self.initial and len(self.initial) != states:
+            raise ModelError(f"{self.title}: it has {states} states, and {len(self.initial)} initial values")
+
+    def given(self) -> dict[str, Any]:
+        """Inputs, and entries of matrices that are expressions."""
+        out: dict[str, Any] = {f"u_{j}": law for j, law in enumerate(self.inputs)}
+        for name in "ABCD":
+            for i, row in enumerate(getattr(self, name)):
+                out |= {f"{name}_{i}_{j}": x for j, x in enumerate(row) if isinstance(x, str)}
+        return out
+
+    def _row(self, name: str, i: int, of: tuple[str, ...]) -> list[str]:
+        """Terms of one row of a matrix times a vector."""
+        M = getattr(self, name)
+        out = []
+        for j, x in enumerate(M[i] if M else ()):
+            if isinstance(x, str):
+                out.append(f"{name}_{i}_{j}*{of[j]}")
+            elif x != 0.0:
+                out.append(of[j] if x == 1.0 else f"({float(x)!r})*{of[j]}")
+        return out
+
+    @property
+    def _x(self) -> tuple[str, ...]:
+        return numbered("x", self.sizes[0])
+
+    def signals(self) -> dict[str, str]:
+        """The outputs, and the inputs."""
+        _, inputs, outputs = self.sizes
+        u = tuple(f"u_{j}" for j in range(inputs))
+        names = self.outputs or numbered(OUTPUT, outputs)
+        y = (" + ".join([*self._row("C", i, self._x), *self._row("D", i, u)]) or "0" for i in range(outputs))
+        return dict(zip(names, y, strict=True)) | dict(zip(numbered("input", inputs), u, strict=True))
+
+    def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
+        """The states x."""
+        u = tuple(f"u_{j}" for j in range(self.sizes[1]))
+        laws = (" + ".join([*self._row("A", i, self._x), *self._row("B", i, u)]) or "0" for i in range(self.sizes[0]))
+        initial = n.initial or (0.0,) * self.sizes[0]
+        return tuple(ControlState(*x) for x in zip(self._x, laws, initial, strict=True))

@@ -1,0 +1,79 @@
+"""What every controller declares: states of its own, signals that laws may name, and what it is given.
+
+A controller is described by formulas in the language of the laws, whose names are those of its own states, of its own
+signals and of what it is given. A state of a continuous controller has a rate.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from types import SimpleNamespace
+from typing import Any, ClassVar, NamedTuple
+
+from ..errors import ModelError
+from .element import Element
+
+OUTPUT = "output"
+"""The signal that the bare name of a controller stands for, if it has one of that name."""
+
+
+class ControlState(NamedTuple):
+    """One number that a controller keeps.
+
+    Attributes
+    ----------
+    name : str
+    law : str
+        Formula of its rate; of a sampled controller, of the value from the next sample on.
+    initial : float
+        What it begins with, a number in ``n`` of `Controller.states`.
+    """
+
+    name: str
+    law: str
+    initial: Any = 0.0
+
+
+@dataclass(frozen=True)
+class Controller(Element):
+    """A controller: what laws of forces and motors, and expressions of events, may name.
+
+    ``pid`` is the output of the controller of that name, ``pid.error`` another signal, ``pid.integral`` a state.
+    """
+
+    _: KW_ONLY
+
+    category: ClassVar[str] = "controllers"
+    held: ClassVar[tuple[str, ...]] = ()  # signals that a sampled controller holds between samples: its outputs
+
+    def ends(self) -> dict[str, str]:
+        """It has no frame."""
+        return {}
+
+    def given(self) -> dict[str, Any]:
+        """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""
+        raise NotImplementedError
+
+    def signals(self) -> dict[str, str]:
+        """Name of each signal -> its formula, outputs first."""
+        raise NotImplementedError
+
+    def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
+        """Its states; ``n`` holds the resolved fields."""
+        raise NotImplementedError
+
+
+def numbered(letter: str, count: int) -> tuple[str, ...]:
+    """Names of so many states or signals: x1, x2; of one only the letter."""
+    return (letter,) if count == 1 else tuple(f"{letter}{k + 1}" for k in range(count))
+
+
+def refuse_equal(e: Controller, names: Any) -> None:
+    """Refuse states and signals of one name, and names that are no plain words."""
+    seen: set[str] = set()
+    for name in names:
+        if not isinstance(name, str) or not name.isidentifier():
+            raise ModelError(f"{e.title}: {name!r} is no plain name for a signal; use letters, digits and _")
+        if name in seen:
+            raise ModelError(f"{e.title}: two of its signals or states are called {name!r}; name them differently")
+        seen.add(name)

@@ -1,0 +1,52 @@
+"""States of controllers: the first of all states, each with the law of its rate; laws read them as they read sensors.
+
+Their columns among what is measured are known only when all is numbered (`branches.settle`): until then their places
+stand in the code as negative numbers, from `CONTROLS` downwards.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..model.controller import Controller
+from ..model.element import resolve
+from ..model.model import Model
+from ..model.wiring import signal, wired
+from .specs import Structure, ints
+
+CONTROLS = -1_000_000_000
+"""Place of the first state until columns are known; below those of switches' ways."""
+
+
+def states(s: Structure) -> None:
+    """Give every state of a controller its number, before all other states."""
+    s.controls = wired(s.model)
+    for x in s.controls:
+        s.state(x.name)
+
+
+def names(model: Model) -> dict[str, Controller]:
+    """Every name in laws and signals of controllers, and a controller that uses it."""
+    out: dict[str, Controller] = {}
+    for e in model.controllers:
+        laws = [x.law for x in wired(model) if x.controller is e] + [signal(model, e, name) for name in e.signals()]
+        out |= dict.fromkeys((name for law in laws for name in law.names), e)
+    return out
+
+
+def slots(s: Structure) -> None:
+    """Have laws find the states."""
+    s.slots |= {x.name: CONTROLS - k for k, x in enumerate(s.controls)}
+
+
+def table(s: Structure) -> None:
+    """The laws of the rates."""
+    s.tables["control_i"] = ints([(s.law(x.law, (), x.controller), -1) for x in s.controls], 2)
+
+
+def initial(model: Model, env: Any) -> list[Any]:
+    """What the states begin with, at these values of the parameters."""
+    out = []
+    for e in model.controllers:
+        out += [x.initial for x in e.states(resolve(e, env))]
+    return out

@@ -1,0 +1,79 @@
+"""What controllers cannot be, and who does not know them: refused by name."""
+
+from __future__ import annotations
+
+import pytest
+
+import flyball as fb
+from tests.control.slide import slide
+
+
+def test_rings_are_named():
+    a = fb.Lag("a", of="b", time=1, lead=0.5)
+    b = fb.PID("b", setpoint="a", measured="A.displacement", kp=2)
+    with pytest.raises(fb.ModelError, match=r"b\.output -> .*a\.output -> a\.input -> b\.output"):
+        slide(a, b, force="b")
+
+
+@pytest.mark.parametrize(
+    ("fields", "said"),
+    [
+        ({"kp": 1, "filter": 0.1}, "filter does nothing without kd"),
+        ({"kd": 1}, "a derivative needs a filter"),
+        ({"kp": 1, "anti_windup": "clamping"}, "anti_windup does nothing without limits and ki"),
+        ({"kp": 1, "ki": 1, "lower": 0, "anti_windup": "clamping", "tracking": 1}, "tracking does nothing without"),
+        ({"kp": 1, "lower": 2, "upper": 1}, "lower must be less"),
+        ({"kp": 1, "initial": 1}, "initial does nothing without ki"),
+        ({}, "it has no gains"),
+        ({"kd": 1, "filter": 0}, "it must be greater than 0"),
+    ],
+)
+def test_fields_of_a_pid(fields, said):
+    with pytest.raises(fb.ModelError, match=said):
+        slide(fb.PID("pid", setpoint="1", measured="A.displacement", **fields))
+
+
+def test_names():
+    lag = fb.Lag("lag", of="1", time=1)
+    with pytest.raises(fb.ModelError, match=r"Lag 'lag' has no signal 'out'.*; it has output, input, value"):
+        slide(lag, force="lag.out")
+    two = fb.StateSpace("K", inputs=["1"], D=[[1], [2]])
+    with pytest.raises(fb.ModelError, match=r"has several outputs; name one: K\.output1, K\.output2"):
+        slide(two, force="K")
+    with pytest.raises(fb.ModelError, match="unknown name 'lagg'"):
+        slide(lag, force="lagg")
+    with pytest.raises(fb.ModelError, match="laws use curves by sensors"):
+        slide(lag, force="lag + A.displacement")
+    with pytest.raises(fb.ModelError, match=r"'A\.reach' is no curve"):
+        slide(fb.Lag("lag", of="A.reach", time=1))
+    with pytest.raises(fb.ModelError, match="known only after the accelerations are"):
+        slide(fb.Lag("lag", of="cart.ax", time=1))
+    m = slide(lag, force="lag", k=1.0)
+    with pytest.raises(fb.ModelError, match="a driver prescribes a motion"):
+        m.add(fb.Driver("move", "A.displacement", "lag"))
+    with pytest.raises(fb.ModelError, match="the name 'k' is a parameter's"):
+        m.add(fb.Lag("k", of="1", time=1))
+    with pytest.raises(fb.ModelError, match="D is 1 x 1; of 0 states, 2 inputs and 1 outputs it must be 1 x 2"):
+        m.add(fb.StateSpace("K", inputs=["1", "t"], D=3))
+    with pytest.raises(fb.ModelError, match="what differentiates has no states"):
+        m.add(fb.Transfer("D", of="1", num=[1, 0], den=[1]))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda m: m.equilibrium(),
+        lambda m: m.linearize(),
+        lambda m: m.modes(),
+        lambda m: m.inverse_dynamics([0, 1]),
+        lambda m: m.prepare(),
+        lambda m: m.symbolic(),
+        lambda m: m.sensitivity(["A.displacement"], ["k"]),
+        lambda m: m.simulate(1, method="radau"),
+        lambda m: m.simulate(1, method="impulse"),
+    ],
+)
+def test_who_does_not_know_them_says_so(ask):
+    m = slide(fb.Lag("lag", of="1", time=1), force="lag", k=1.0)
+    with pytest.raises(fb.ModelError, match="Lag 'lag'"):
+        ask(m)
