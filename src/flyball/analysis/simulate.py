@@ -151,7 +151,9 @@ def moved(
     elif watched(begun) or len(known.times):
         rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine, begun.part)
+        rows, interrupted = run_clock(
+            begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine, begun.part
+        )
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None

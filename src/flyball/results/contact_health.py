@@ -77,12 +77,14 @@ class ContactHealth:
         """Reasons to look at the motion twice."""
         out = list(self.notes)
         if self.halved:
-            out.append(f"{self.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps")
+            out.append(
+                f"{self.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps"
+            )
         if self.reduced:
             law = self.impacts.partition(",")[0]
             out.append(
-                f"{self.reduced} of {self.impacted} impacts gave back less than {law}'s law says, which would have made "
-                f"energy there"
+                f"{self.reduced} of {self.impacted} impacts gave back less than {law}'s law says, which would have "
+                f"made energy there"
             )
         if self.unconverged:
             when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""

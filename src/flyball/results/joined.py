@@ -34,12 +34,12 @@ def joined(parts: Sequence[Result], times: np.ndarray) -> Result:
     keep = [np.isin(p.t, times) for p in parts]
     if len(keep[-1]):
         keep[-1][-1] = True
-    rows = {
-        name: np.concatenate([getattr(p, name)[k] for p, k in zip(parts, keep, strict=True)])
+    t, *rows = (
+        np.concatenate([getattr(p, name)[k] for p, k in zip(parts, keep, strict=True)])
         for name in ("t", "q", "v", "states", "vdot", "multipliers")
-    }
-    health = _health([p.health for p in parts])
-    out = Result(last.model, last.values, *rows.values(), health)
+    )
+    q, v, states, vdot, multipliers = rows
+    out = Result(last.model, last.values, t, q, v, states, vdot, multipliers, _health([p.health for p in parts]))
     out.final, out.carried, out.wound = last.final, dict(last.carried), parts[0].wound
     known = Known(last.values)
     out.stretches = _stretches(parts, keep, known)
@@ -124,7 +124,9 @@ def _bulk(every: Sequence[Bulk], keep: Sequence[np.ndarray]) -> Bulk:
             q = q * np.where((q[:1] * turns[-1][-1:]).sum(axis=2, keepdims=True) < 0.0, -1.0, 1.0)
         turns.append(q)
     told = {name: [getattr(b, name) for b in every] for name in ARRAYS} | {"quaternion": turns}
-    rows = {name: np.concatenate([x[k] for x, k in zip(all_of, keep, strict=True)]) for name, all_of in told.items()}
+    rows: dict[str, Any] = {
+        name: np.concatenate([x[k] for x, k in zip(all_of, keep, strict=True)]) for name, all_of in told.items()
+    }
     return dataclasses.replace(every[0], **rows)
 
 

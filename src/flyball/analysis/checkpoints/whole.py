@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from ...results import doubts
 from ...results.result import Result
@@ -17,15 +16,14 @@ def finished(result: Result, parts: Sequence[Result]) -> Result:
     """The parts end to end, ``result``, with a health that knows what each of them does."""
     if len(parts) == 1:
         return result
-    health, late = result.health, parts[0].health.late
-    found: dict[str, Any] = {
-        "mobility": late["mobility"],
-        "energy_drift": lambda: result.energy.drift,
+    health = result.health
+    health.late = {"mobility": parts[0].health.late["mobility"], "energy_drift": lambda: result.energy.drift}
+    if isinstance(health.options.get("method"), Mapping):  # accelerations of steps by impulses are means
+        health.contact = health.contact and dataclasses.replace(health.contact, notes=made_energy(result))
+        return result
+    health.late |= {
         "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
     }
-    health.late = {name: find for name, find in found.items() if name in late}
-    if health.contact is not None:
-        health.contact = dataclasses.replace(health.contact, notes=made_energy(result))
     return result

@@ -83,16 +83,16 @@ def begin(
     ModelError
         If a body can move without inertia, or the earlier result is of another mechanism.
     """
-    later = part is not None and part.later
+    part = part or whole()
     if before is not None and before.stretches is not None:
         set_by_events = _set_by_events(model, before)
-        parameters = {**(parameters or {}), **set_by_events} if later else {**set_by_events, **(parameters or {})}
+        parameters = {**(parameters or {}), **set_by_events} if part.later else {**set_by_events, **(parameters or {})}
     base = _base(model, t, parameters, before)
-    if later and before is not None:
+    if part.later and before is not None:
         return replace(_as_it_came(base, parameters, before, switches), part=part)
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base, inertia=True)
-    return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part or whole())
+    return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part)
 
 
 def _as_it_came(base: Assembly, parameters: Mapping[str, float] | None, before: Result, switches: bool) -> Start:

@@ -59,7 +59,6 @@ def result_of(
     q, v, vdot = coordinates(base, scene, kept)
     t = np.array(kept.t)
     count = stepper.pace.count
-    real = stepper.pace.real
     contact = _contact_health(scene, stepper, o, smallest(scene, values))
     health = Health(
         success=message == REACHED,
