@@ -106,3 +106,12 @@ def pile() -> fb.Mechanism:
     m.add(fb.Body("arm", shape=fb.Capsule(length=0.4, radius=0.03), density=1000, position=(0.6, 0, 0.5)))
     m.add(fb.Revolute("A", "ground", "arm", at=(0.3, 0, 0.5), axis=(0, 1, 0)))
     return m
+
+
+def sampled() -> fb.Mechanism:
+    """A pendulum held up by a sampled controller."""
+    m = fb.Mechanism("sampled", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+    m.add(fb.PID("pid", measured="A.angle", setpoint="0.2", kp=60, ki=20, kd=8, filter="50 ms", period="10 ms"))
+    m.add(fb.Motor("M", "A", torque="pid"))
+    return m

@@ -124,6 +124,6 @@ class _Motion:
         if before is not None:
             made = o.specialize if o.specialize != AUTO else bool(before.carried.get("made"))
             changed = {**changed, "start": before, "t_start": None, "specialize": made}
-            times = times[times > t]
+            times = times[times >= t] if before.carried.get("open") else times[times > t]
         result = told(self.model, o.known(**changed), (t, last, times), why, part)
         return result, part.paused

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..equations.engine import INTEGRATE
 from ..errors import AnalysisError, ModelError, SimulationError
+from ..laws.breaks import NO_BREAKS
 from ..model.model import Model
 from ..model.words import listing, suggest
 from ..numerics.integrators import clock as ex
@@ -22,12 +23,15 @@ from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.events.here import Here
+from .motion.implicit.loop import run_implicit
+from .motion.implicit.made import implicit
+from .motion.implicit.suited import ALPHA, EVEN, IMPLICIT, RADAU, suited
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
-from .options import Options, count
+from .options import Options, count, seconds
 from .progress import Tell, shown, unwatched
-from .simulate import clock_for, run_clock
+from .simulate import clock_for, run_clock, width
 from .untouched import refuse_contact
 
 FINE = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
@@ -42,6 +46,7 @@ class Way(NamedTuple):
     stabilization: str = "projection"
     coordinates: str = "absolute"
     coupled: bool = False
+    method: str = ""  # an implicit one
 
 
 WAYS = {
@@ -58,6 +63,15 @@ WAYS = {
     "coupled matrix": Way("projection, by factors of [M G^T; G 0] in place of those of G M^-1 G^T", coupled=True),
     "joint coordinates": Way("projection, in joint coordinates of a spanning tree", coordinates="joint"),
 }
+"""Formulations for explicit methods, all of which are compared unless some are named."""
+OF_THEIR_OWN = {
+    RADAU: Way("Radau IIA of order 5, implicit, of the stabilised equations of index 2", method=RADAU),
+    f"{RADAU} index 3": Way("the same with positions alone held to the constraints", "none", method=RADAU),
+    ALPHA: Way("generalised-alpha, implicit, of order 2, of the stabilised equations of index 2", method=ALPHA),
+    f"{ALPHA} index 3": Way("the same with positions alone held to the constraints", "none", method=ALPHA),
+}
+"""Methods that hold motions to constraints themselves, by name."""
+ALL = WAYS | OF_THEIR_OWN
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,6 +86,7 @@ class CompareOptions(Options):
     parameters: Mapping[str, float] | None
     start: Result | None
     method: str
+    step: float | None
     rtol: float
     atol: float | None
     max_step: float
@@ -84,13 +99,21 @@ class CompareOptions(Options):
         super().__post_init__()
         object.__setattr__(self, "formulations", _known(self.formulations))
         count(self.repeats, "repeats", 0)
+        if self.step is not None:
+            object.__setattr__(self, "step", seconds(self.step, "step"))
+        ways = [ALL[name] for name in self.formulations or ()]
+        even = [name for name in self.formulations or () if ALL[name].method in EVEN]
+        if even and self.step is None:
+            raise ModelError(f"{even[0]!r} takes steps of fixed width: give one, for instance step='1 ms'")
+        if self.step is not None and not any(w.method for w in ways):
+            raise ModelError(f"step is the fixed step of {listing(list(OF_THEIR_OWN))}, of which none is compared")
         for name in ("alpha", "beta"):
             if "baumgarte" not in (self.formulations or ()) and getattr(self, name) is not None:
                 raise ModelError(f"{name} is a rate of the formulation 'baumgarte', which is not among those compared")
         self.integration(WAYS["baumgarte"])
 
     def integration(self, way: Way, max_steps: int = MOST) -> Integration:
-        """How a formulation is integrated."""
+        """How a formulation is integrated; those with methods of their own take ``step`` if it is given."""
         rates = (self.alpha, self.beta) if way.stabilization == "baumgarte" else (None, None)
         return Integration(
             coordinates=way.coordinates,
@@ -102,8 +125,9 @@ class CompareOptions(Options):
             stabilization=way.stabilization,
             alpha=rates[0],
             beta=rates[1],
-            step=None,
-        )
+            step=self.step,
+            rho_inf=None,
+        ).known(method=way.method or self.method, step=self.step if way.method else None)
 
 
 @dataclass
@@ -155,8 +179,8 @@ def _known(names: Sequence[str] | None) -> tuple[str, ...]:
         return tuple(WAYS)
     wanted = (names,) if isinstance(names, str) else tuple(names)
     for name in wanted:
-        if name not in WAYS:
-            raise ModelError(f"there is no formulation {name!r}{suggest(str(name), WAYS)}; {listing(list(WAYS))}")
+        if name not in ALL:
+            raise ModelError(f"there is no formulation {name!r}{suggest(str(name), ALL)}; {listing(list(ALL))}")
     return tuple(dict.fromkeys(wanted))
 
 
@@ -181,6 +205,11 @@ def _start(job: _Task, way: Way) -> Start:
         If there is no such formulation for this mechanism.
     """
     a, rows = job.base.assembly, len(job.base.assembly.compiled.structure.rows)
+    if way.method:
+        try:
+            return suited(job.base, way.method, "absolute", job.asked.parameters)
+        except ModelError as error:
+            raise AnalysisError(str(error)) from None
     if way.coordinates == "joint":
         made = begin(job.model, job.span[0], job.asked.parameters, job.asked.start, "joint")
         if not made.assembly.compiled.structure.tree:
@@ -202,15 +231,19 @@ def _start(job: _Task, way: Way) -> Start:
 
 def _motion(job: _Task, start: Start, o: Integration) -> tuple[Result | None, str]:
     """The motion, as far as it goes, and why it goes no further."""
-    clock, rows, _ = _run(job, start, o, job.times)
+    clock, rows, _, failed = _run(job, start, o, job.times)
+    here = Here(start, clock)
+    here.failed = failed
     try:
-        return outcome(Here(start, clock), rows, o), ""
+        return outcome(here, rows, o), ""
     except SimulationError as stopped:
         return stopped.result, str(stopped).partition(" The motion up to")[0]  # type: ignore[return-value]
 
 
-def _run(job: _Task, start: Start, o: Integration, times: np.ndarray) -> tuple[ex.Clock, np.ndarray, float]:
-    """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s])."""
+def _run(
+    job: _Task, start: Start, o: Integration, times: np.ndarray
+) -> tuple[ex.Clock, np.ndarray, float, Exception | None]:
+    """Run the compiled loop from the start. Returns (clock, rows, time of the processor [s], why it failed)."""
     W = start.assembly.compiled.work
     W.info[:] = 0
     W.option[[WORST_G, WORST_V]] = 0.0
@@ -218,17 +251,21 @@ def _run(job: _Task, start: Start, o: Integration, times: np.ndarray) -> tuple[e
         partition.choose(job.model, start)
     start.since = time.perf_counter()
     clock = clock_for(start, *job.span, times, o)
+    loop = implicit(start.assembly.compiled, clock, width(start.assembly), o) if o.method in IMPLICIT else None
     begun = time.thread_time()
-    rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), unwatched, INTEGRATE)
+    if loop is not None:
+        rows, interrupted = run_implicit(loop, width(start.assembly), NO_BREAKS, unwatched)
+    else:
+        rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), unwatched, INTEGRATE)
     taken = time.thread_time() - begun
     if interrupted:
         raise KeyboardInterrupt
-    return clock, rows, taken
+    return clock, rows, taken, loop.failed if loop is not None else None
 
 
 def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) -> Formulation:
     """The motion by one formulation, and what can be said about it."""
-    way, nothing = WAYS[name], np.zeros(0)
+    way, nothing = ALL[name], np.zeros(0)
     try:
         starts[name] = start = _start(job, way)
     except AnalysisError as error:
@@ -247,7 +284,7 @@ def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) 
 
 
 def _choice(job: _Task, name: str) -> Integration:
-    return job.asked.integration(WAYS[name], job.max_steps).sized(job.base.base.compiled.values.length)
+    return job.asked.integration(ALL[name], job.max_steps).sized(job.base.base.compiled.values.length)
 
 
 def _state(c: Compiled, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -297,7 +334,7 @@ def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tel
             if f.name not in spent or sum(spent[f.name]) > BUDGET:
                 continue
             start = starts[f.name]
-            clock, _, seconds = _run(job, start, _choice(job, f.name), end)
+            clock, _, seconds, _ = _run(job, start, _choice(job, f.name), end)
             spent[f.name].append(seconds)
             info: Any = start.assembly.compiled.work.info
             f.steps, f.rejected = int(clock.count[ex.ACCEPTED]), int(clock.count[ex.REJECTED])

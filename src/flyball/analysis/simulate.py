@@ -30,7 +30,8 @@ from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.loop import Implicit, run_implicit
+from .motion.implicit.loop import run_implicit
+from .motion.implicit.made import implicit
 from .motion.implicit.suited import IMPLICIT, explicit, suited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
@@ -87,7 +88,7 @@ def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Resul
     """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
-    announce_motion(model, not isinstance(o.method, Stepping), o.method in IMPLICIT)
+    announce_motion(model, not isinstance(o.method, Stepping), o.method)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
@@ -98,7 +99,7 @@ def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Resul
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
-        begun = suited(begun, o.coordinates, o.parameters)
+        begun = suited(begun, str(o.method), o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
@@ -106,7 +107,7 @@ def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Resul
     made = False if o.method in IMPLICIT else o.specialize
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
-        begun.engine.told = f"{TABLES}: {IMPLICIT[0]} goes through the tables"
+        begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -145,11 +146,11 @@ def moved(
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
     if task == INTEGRATE and o.method in IMPLICIT:
-        loop = Implicit(c, clock, _width(begun.assembly), o.step or 0.0)
-        rows, interrupted = run_implicit(loop, _width(begun.assembly), known, tell, begun.part)
+        loop = implicit(c, clock, width(begun.assembly), o)
+        rows, interrupted = run_implicit(loop, width(begun.assembly), known, tell, begun.part)
         here.failed = loop.failed
-    elif watched(begun) or len(known.times):
-        rows, interrupted = run_events(here, tableau(explicit(o.method)), _width(begun.assembly), tell, engine, known)
+    elif watched(begun) or len(known.times) or c.structure.sampled:
+        rows, interrupted = run_events(here, tableau(explicit(o.method)), width(begun.assembly), tell, engine, known)
     else:
         rows, interrupted = run_clock(
             begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine, begun.part
@@ -199,7 +200,7 @@ def clock_for(
     ``sampled`` are the laws that are looked at within steps; without it all that can act briefly are.
     """
     a, y = start.assembly, start.y
-    refuse_unheld(len(times), _width(a))
+    refuse_unheld(len(times), width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
@@ -212,7 +213,7 @@ def clock_for(
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls), s.nq
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
@@ -242,7 +243,7 @@ def energy_size(a: Assembly, span: float) -> float:
     return float(mass * (g * length + fast * fast) + moving)
 
 
-def _width(a: Assembly) -> int:
+def width(a: Assembly) -> int:
     """How many numbers are kept of each output time."""
     s = a.compiled.structure
     return 1 + s.nq + s.nv + len(a.compiled.z) + s.nv + len(a.compiled.values.system.row_i) + len(s.prescribed)
@@ -263,8 +264,8 @@ def run_clock(
     early where ``part`` does.
     """
     c, engine, part = a.compiled, engine or Engine(a.compiled, False), part or whole()
-    s, width = c.structure, _width(a)
-    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
+    s, wide = c.structure, width(a)
+    buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
     rows = []
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
@@ -293,6 +294,6 @@ def run_clock(
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
     except KeyboardInterrupt:
-        return np.concatenate(rows) if rows else np.zeros((0, width)), True
+        return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:
         engine.end()

@@ -14,7 +14,7 @@ from ..compiler.door import enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..numerics.integrators.clock import GROW, NEXT, NOW, SPAN, H, T
-from ..numerics.integrators.implicit.desk import JACOBIANS, SOFT, START
+from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START
 from ..numerics.integrators.implicit.radau import advance
 from ..tables.system import COORDINATES, FORCE_WORK, LAM, LENGTH, NU, ROW_WORK
 from .dispatch import progress
@@ -64,6 +64,22 @@ def compose(y, d, v, z, out, A):
 @formula
 def residual(t, k, A, K, c):
     """What the equations miss at stage k, into its row; rates of integrals there. Returns a status."""
+    status = missed(t, k, A, K, c)
+    out = K.out[k]
+    turned(A[PLAN], K.d[k], out)
+    for i in range(K.v.shape[1]):
+        out[i] = K.dd[k, i] - out[i]
+    if status == 0:
+        powers(A, K, k)
+    return status
+
+
+@formula
+def missed(t, k, A, K, c):
+    """The same, but that the first rows are v + D G^T mu, which increments follow. Returns a status.
+
+    Of index 3 only positions are held to the constraints, and mu is none.
+    """
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[SHEET].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
     own.real[T] = t
@@ -83,17 +99,13 @@ def residual(t, k, A, K, c):
         out[2 * nv + r] = rows[0, nv + nr + r]
         out[2 * nv + nr + r] = rows[0, nv + r] if P.valued[r] == 1 else K.mu[k, r]
         bad += rows[0, nv + r] - rows[0, nv + r]
-        if P.valued[r] == 1 and K.mu[k, r] != 0.0:
+        if P.valued[r] == 1 and K.count[INDEX_3] == 1:
+            out[2 * nv + r], out[2 * nv + nr + r] = rows[0, nv + r], K.mu[k, r]
+        elif P.valued[r] == 1 and K.mu[k, r] != 0.0:
             for e in range(S.row_p[r], S.row_p[r + 1]):
                 i = S.col_i[e]
                 out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
-    turned(P, K.d[k], out)
-    for i in range(nv):
-        out[i] = K.dd[k, i] - out[i]
-    if far(P, K.d[k]):
-        return 1
-    powers(A, K, k)
-    return 0 if bad == 0.0 else 1
+    return 0 if bad == 0.0 and not far(P, K.d[k]) else 1
 
 
 @formula

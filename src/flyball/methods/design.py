@@ -186,6 +186,7 @@ class Design(Model):
         atol: float | None = None,
         max_step: float | str = math.inf,
         step: float | str | None = None,
+        rho_inf: float | None = None,
         max_steps: int = 10_000_000,
         stabilization: str = "projection",
         alpha: float | None = None,
@@ -231,7 +232,7 @@ class Design(Model):
             Every run goes on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             As for `simulate`.
-        method : {"auto", "dop853", "rk45", "radau", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "impulse"} or Stepping
             As for `simulate`.
         rtol : float [1]
             As for `simulate`.
@@ -240,6 +241,8 @@ class Design(Model):
         max_step : float or str [s]
             As for `simulate`.
         step : float or str [s], optional
+            As for `simulate`.
+        rho_inf : float [1], optional
             As for `simulate`.
         max_steps : int
             As for `simulate`.

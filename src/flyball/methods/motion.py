@@ -41,6 +41,7 @@ class Motions(Model):
         beta: float | None = None,
         specialize: bool | str = "auto",
         step: float | str | None = None,
+        rho_inf: float | None = None,
         checkpoint: str | PathLike[str] | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
@@ -67,9 +68,10 @@ class Motions(Model):
             Go on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
-        method : {"auto", "dop853", "rk45", "radau", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "impulse"} or Stepping
             ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``radau``: implicit,
-            Radau IIA of order 5, for stiff springs and strong damping. ``impulse``, or a
+            Radau IIA of order 5, for stiff springs and strong damping. ``generalised-alpha``: implicit, of order 2, at
+            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``impulse``, or a
             `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
             ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
             ways that it does not know: ``health.method`` says why.
@@ -98,6 +100,9 @@ class Motions(Model):
         step : float or str [s], optional
             Steps of this width, whose errors are then not looked at; one ends early at an event, the next begins there.
             ``rtol`` is then how exactly the equations of a step are solved.
+        rho_inf : float [1], optional
+            Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if
+            not given. 1 damps nothing.
         checkpoint : path, optional
             Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
             minute of computing at most, the same call goes on from there, to the same digits. Where the motion is
@@ -161,6 +166,7 @@ class Motions(Model):
         parameters: Mapping[str, float | str] | None = None,
         start: Result | None = None,
         method: str = "dop853",
+        step: float | str | None = None,
         rtol: float = 1e-7,
         atol: float | None = None,
         max_step: float | str = math.inf,
@@ -185,7 +191,9 @@ class Motions(Model):
             Number of times at which drift and energy are looked at, or the times themselves.
         formulations : sequence of str, optional
             Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
-            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default.
+            ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Besides methods that
+            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3`` and
+            ``generalised-alpha index 3``.
         repeats : int
             Times that each is run for its cost, fewer where that takes long; 0 for none.
         parameters : mapping, optional
@@ -194,6 +202,8 @@ class Motions(Model):
             Go on from where this result ended.
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
+        step : float or str [s], optional
+            Width of steps of ``radau``, which chooses it by itself if none is given, and ``generalised-alpha``.
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
         atol : float [m, rad, m/s, rad/s], optional

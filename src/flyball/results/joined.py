@@ -34,6 +34,9 @@ def joined(parts: Sequence[Result], times: np.ndarray) -> Result:
     keep = [np.isin(p.t, times) for p in parts]
     if len(keep[-1]):
         keep[-1][-1] = True
+    for p, mine, after in zip(parts, keep, parts[1:], strict=False):
+        if len(p.t) and len(after.t) and p.t[-1] == after.t[0]:  # what happened at that time is in the later one
+            mine[-1] = False
     t, *rows = (
         np.concatenate([getattr(p, name)[k] for p, k in zip(parts, keep, strict=True)])
         for name in ("t", "q", "v", "states", "vdot", "multipliers")

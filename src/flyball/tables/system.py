@@ -50,8 +50,8 @@ GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
 G_CONE, G_TURNS, G_ASTRAY = 10, 11, 12
 FALLING, EITHER, RISING = -1, 0, 1
-# columns of System.control_i: the law of a state's rate (-1: it is held), which clock samples it (-1: none)
-CONTROL_RATE, CONTROL_CLOCK = range(2)
+# columns of System.control_i: the law of a state's rate (-1: it is held between instants)
+CONTROL_RATE = 0
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
@@ -104,7 +104,7 @@ class System(NamedTuple):
     switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
     switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
     guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
-    control_i: np.ndarray  # (nc, 2): states of controllers, the first of all states: law of the rate, clock
+    control_i: np.ndarray  # (nc, 1): states of controllers, the first of all states: law of the rate
     kinds: (
         np.ndarray
     )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground

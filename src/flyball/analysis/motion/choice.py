@@ -14,7 +14,7 @@ from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.result import Result
 from .engines import AUTO as EITHER
 from .engines import check_specialize
-from .implicit.suited import IMPLICIT, refuse_idle
+from .implicit.suited import ALPHA, IMPLICIT, refuse_idle
 from .impulse.settings import Stepping
 from .jams import Overlap, Unresolved
 from .options import MOST, Integration
@@ -29,11 +29,16 @@ CALLED = {
     "rk": "rk45",
     "stiff": "radau",
     "implicit": "radau",
+    "generalized-alpha": ALPHA,
+    "alpha": ALPHA,
+    "newmark": ALPHA,
+    "hht": ALPHA,
 }
 """What methods are called in words."""
 IDLE = {
     "rtol": 1e-7, "atol": None, "stabilization": "projection", "alpha": None, "beta": None, "specialize": EITHER,
     "max_steps": MOST, "step": None,
+    "rho_inf": None,
 }  # fmt: skip
 """Options of an integration that mean nothing to steps by impulses, and what they are when they are not given."""
 STEPS = "steps by impulses"
@@ -57,6 +62,17 @@ class SimulateOptions(Integration):
         check_specialize(self.specialize)
         if self.method in IMPLICIT:
             refuse_idle(self)
+        self._check_damping()
+
+    def _check_damping(self) -> None:
+        """The spectral radius at infinity is one, and has something to do."""
+        if self.rho_inf is None:
+            return
+        if self.method != ALPHA:
+            raise ModelError(f"rho_inf is a number of method={ALPHA!r}; with method={self.method!r} it does nothing")
+        if isinstance(self.rho_inf, bool) or not 0.0 <= self.rho_inf <= 1.0:
+            raise ModelError(f"rho_inf is a number from 0 (swings too fast for a step go at once) to 1 (no swing is "
+                             f"damped), got {self.rho_inf!r}")  # fmt: skip
 
     def check_method(self) -> None:
         """An integrator, steps by impulses, or what suits the model."""

@@ -49,6 +49,7 @@ class Integration(Options):
     alpha: float | None
     beta: float | None
     step: float | None
+    rho_inf: float | None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -78,7 +79,7 @@ class Integration(Options):
             tableau(self.method)
         except ValueError as error:
             raise ModelError(
-                f"{error}; simulate knows radau too, for stiff mechanisms, and impulse, for contact"
+                f"{error}; simulate knows implicit ones too (radau for stiff mechanisms), and impulse, for contact"
             ) from None
 
     def _rates(self) -> None:
@@ -124,6 +125,7 @@ def projected(coordinates: str, rtol: float, atol: float, max_steps: int = MOST)
         alpha=None,
         beta=None,
         step=None,
+        rho_inf=None,
     )
 
 

@@ -70,7 +70,9 @@ def outcome(
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved
     result.wound = start.wound
-    result.carried = carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
+    if here.start.part.open:
+        result.carried["open"] = True
+    result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
     health.late = {
         "mobility": partial(mobility, model, start.base),
         "energy_drift": partial(_energy_drift, result),

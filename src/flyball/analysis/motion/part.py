@@ -39,10 +39,13 @@ class Part:
     ----------
     paused : bool
         Whether it has ended before the motion did.
+    open : bool
+        Whether something is still to happen at the time at which it ended: the output of that time is not there.
     """
 
     def __init__(self, first: float | None = None, later: bool = False, lasts: float | None = None) -> None:
         self.first, self.later, self.paused = first, later, False
+        self.open = False
         self._lasts = LASTS if lasts is None else lasts
         self._whole = self._left = math.inf
         self._event, self._since = 0.0, time.monotonic()

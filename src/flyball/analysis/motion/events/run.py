@@ -5,6 +5,7 @@ Where nothing is watched, steps only end on these times: the engine's own loop r
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
+from ....equations.sampled import Sampling
 from ....equations.watched import Watched
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
@@ -39,6 +41,7 @@ from .happen import begin, happen
 from .here import Here
 from .instant import instant_of
 from .legs import Legs, breaks
+from .sampling import sampling
 from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
@@ -80,6 +83,27 @@ class Run:
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
+        self.sampling = self._sampling(here.t)
+
+    def _sampling(self, t: float) -> Sampling | None:
+        span, rows = (t, float(self.here.clock.real[ex.T_END])), (self.width, len(self.buffer))
+        return sampling(self.here.c, self.method, span, rows)
+
+    def _instant(self) -> float:
+        """Until when the watched loop may run: the next instant of a sampled controller."""
+        return math.inf if self.sampling is None or self.loop is None else self.sampling.next()
+
+    def sampled(self) -> bool:
+        """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
+        here = self.here
+        if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
+            return False
+        before = expressions(here)
+        if self.sampling.sample(here.c.system, here.c.work, here.clock) == 0:
+            self.jumped(before)
+        if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+            self.rows[-1][-1] = self.row()
+        return True
 
     def _loop(self) -> Watched:
         c = self.here.c
@@ -92,7 +116,7 @@ class Run:
         try:
             self.begin()
             engine.begin(here.clock)
-            self.legs = Legs(here.clock, known)
+            self.legs = Legs(here.clock, known, self._instant)
             while not here.stopped:
                 self.integrate()
                 if self.over():
@@ -121,6 +145,9 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
+            if self.sampled():
+                self.legs.aim()
+                return False
             sharp = self.legs.ends_sharply() and self.loop is not None
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
@@ -144,8 +171,11 @@ class Run:
 
     def begin(self) -> None:
         """What happens as the motion begins."""
-        begin(self.here)
-        self.here.true = true_already(self.here)
+        here = self.here
+        if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
+            self.sampling.sample(here.c.system, here.c.work, here.clock)
+        begin(here)
+        here.true = true_already(here)
         self.here.fresh = False
 
     def integrate(self) -> None:
@@ -155,7 +185,9 @@ class Run:
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         clock.count[ex.QUOTA] = self.part.most(self.quota)
         with interrupts_kept(c.structure.functions):
-            if self.loop is None:
+            if self.loop is None and self.sampling is not None:
+                used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
+            elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
                 used = self.loop.go_on(c.system, c.work, self.buffer)
@@ -207,7 +239,10 @@ class Run:
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
-            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._instant)
+            other = self._sampling(here.t)
+            if other is not None and self.sampling is not None and other.differs(self.sampling):
+                self.sampling = other
         self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
@@ -232,15 +267,22 @@ class Run:
 
     def stop(self) -> None:
         """The motion, or a part of it, ends here: the last row is written, but where it is already."""
-        here, clock = self.here, self.here.clock
-        c, status = here.c, clock.count[ex.STATUS]
-        if self.part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+        here, clock, part = self.here, self.here.clock, self.part
+        if part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             return
+        part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
+        self.take(self.row()[None, :])
+        if not part.paused:
+            clock.count[ex.STATUS] = ex.DONE
+
+    def row(self) -> np.ndarray:
+        """The row of output of here and now."""
+        here, c = self.here, self.here.c
+        status = here.clock.count[ex.STATUS]
         row, y = np.zeros((1, self.width)), here.y.copy()
-        motion_kernel(c.system, c.work, self.method, clock, row, REPORT)
-        here.y[:] = y
-        self.take(row)
-        clock.count[ex.STATUS] = status if self.part.paused else ex.DONE
+        motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
+        here.y[:], here.clock.count[ex.STATUS] = y, status
+        return row[0]
 
 
 def told(loop: Watched) -> str:

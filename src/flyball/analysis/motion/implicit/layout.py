@@ -29,9 +29,12 @@ class Layout:
     ----------
     s : Structure
     S : System
+    index_3 : bool
+        Whether only positions are held to the constraints: lam by g = 0, and no mu.
     """
 
-    def __init__(self, s: Structure, S: System) -> None:
+    def __init__(self, s: Structure, S: System, index_3: bool = False) -> None:
+        self.index_3 = index_3
         self.s, self.nv, self.nr = s, s.nv, len(s.rows)
         self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
         self.touched, self.group = sparsity(s, self.width, S)
@@ -83,9 +86,18 @@ class Layout:
             one.append((w + x.ravel(), w + y.ravel(), turns + 9 * n_th + at(9)))
         for n_th, p in enumerate(self.pressing.tolist()):
             one.append((v + ways, np.full(nv, lam + p), presses + n_th * nv + at(nv)))
+        if self.index_3:
+            loose = ~np.isin(k, np.flatnonzero(self.valued == 1))
+            one[2] = tuple(x[loose] for x in one[2])
+            one[4] = (np.r_[lam + row[held], lam + row[~held]], np.r_[self.col_i[held], v + self.col_i[~held]],
+                      rows + np.r_[at(nG)[held], at(nG)[~held]])  # fmt: skip
+            one[5] = one[6] = (at(0),) * 3
+            one[8] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
         scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a))]
         valued = np.flatnonzero(self.valued == 1)
-        soft = [(lam + at(nr), lam + at(nr), sizes + at(nr)), (mu + valued, mu + valued, sizes + valued)]
+        soft = [(lam + at(nr), lam + at(nr), sizes + at(nr))]
+        if not self.index_3:
+            soft.append((mu + valued, mu + valued, sizes + valued))
         self._place(one, scaled, soft, rows + at(nG)[~pressed])
 
     def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
@@ -150,9 +162,9 @@ def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
     return s.kept.get("sparsity by branches", None, 1, found)
 
 
-def layout(s: Structure, S: System) -> Layout:
+def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
     """The same for every run of a structure."""
-    return s.kept.get("implicit", None, 1, lambda: Layout(s, S))
+    return s.kept.get("implicit", index_3, 2, lambda: Layout(s, S, index_3))
 
 
 def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:

@@ -23,7 +23,7 @@ from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, complex_tables
 from ...progress import Tell
 from ..events.legs import Legs
-from ..part import Part
+from ..part import Part, whole
 from .layout import layout, metric
 
 SOFT = 1e-10  # regularisation of rows, as part of their natural size
@@ -45,13 +45,15 @@ class Implicit:
         Of a row of output.
     step : float
         Fixed width of steps [s]; 0: adaptive.
+    index_3 : bool
+        Whether velocities are not held to the constraints.
     """
 
-    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0) -> None:
+    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float = 0.0, index_3: bool = False) -> None:
         refuse_functions(c.structure)
         s, S = c.structure, c.system
         self.c, self.clock = c, clock
-        self.layout = layout(s, S)
+        self.layout = layout(s, S, index_3)
         ny = clock.y.shape[1]
         y = clock.y[ex.NOW].copy()
         x = self.layout
@@ -105,6 +107,7 @@ class Implicit:
         real[ds.STEP], real[ds.SOFT] = step, SOFT
         count = np.zeros(ds.COUNTS, np.int64)
         count[ds.LEAST] = 2 if len(self.c.system.angle_i) else 1
+        count[ds.INDEX_3] = int(x.index_3)
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P
@@ -145,7 +148,9 @@ class Implicit:
         )  # fmt: skip
 
 
-def run_implicit(loop: Implicit, width: int, known: Breaks, tell: Tell, part: Part) -> tuple[np.ndarray, bool]:
+def run_implicit(
+    loop: Implicit, width: int, known: Breaks, tell: Tell, part: Part | None = None
+) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through, or the part is. Returns (rows, whether the user interrupted)."""
     c, clock = loop.c, loop.clock
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
@@ -153,7 +158,7 @@ def run_implicit(loop: Implicit, width: int, known: Breaks, tell: Tell, part: Pa
     first = clock.real[ex.T]
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
-    legs, quota = Legs(clock, known), int(clock.count[ex.QUOTA])
+    legs, quota, part = Legs(clock, known), int(clock.count[ex.QUOTA]), part or whole()
     try:
         while True:
             begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)

@@ -11,8 +11,11 @@ from ...mobility import mobility
 from ..start import Start, begin_at
 from .layout import sparsity
 
-IMPLICIT = ("radau",)
-"""Implicit integrators by name."""
+RADAU, ALPHA = "radau", "generalised-alpha"
+IMPLICIT = (RADAU, ALPHA)
+"""Integrators with loops of their own, by name."""
+EVEN = (ALPHA,)
+"""Those of them whose steps are of one width, which has to be given."""
 FEW = 40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
 
 
@@ -29,10 +32,13 @@ def refuse_idle(o: Any) -> None:
     ModelError
         Naming the option.
     """
-    if o.stabilization != "projection":
+    if o.method in EVEN and o.step is None:
+        raise ModelError(f"method={o.method!r} takes steps of fixed width: give one, for instance step='1 ms'")
+    if o.stabilization not in ("projection", "none"):
         raise ModelError(
             f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
-            f"velocities on the constraints itself; leave it out"
+            f"velocities on the constraints itself; leave it out, or give 'none', and it keeps positions alone "
+            f"(index 3)"
         )
     if o.specialize is True:
         raise ModelError(
@@ -40,7 +46,7 @@ def refuse_idle(o: Any) -> None:
         )
 
 
-def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> Start:
+def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float] | None) -> Start:
     """The start in coordinates that implicit integrators are good at.
 
     Joint coordinates of long chains have full matrices, and drivers prescribe some; such mechanisms go to absolute
@@ -56,17 +62,17 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
         names = [x.title for x in s.model.events] + [x.element.title for x in s.switches]
         what = ", ".join(dict.fromkeys(names)) or "what switches"
         raise ModelError(
-            f"method='radau' does not know events, nor what holds at times and lets go at others: {what}; leave method "
-            f"out, or give method='dop853'"
+            f"method={method!r} does not know events, nor what holds at times and lets go at others: {what}; leave "
+            f"method out, or give method='dop853'"
         )
-    _refuse_open_loads(begun)
+    _refuse_open_loads(begun, method)
     if not s.tree or wish == "absolute":
         return begun
     if s.prescribed:
         if wish == "joint":
             raise ModelError(
-                f"method='radau' does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as they "
-                f"are in joint coordinates: leave coordinates out"
+                f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as "
+                f"they are in joint coordinates: leave coordinates out"
             )
         why = "drivers' coordinates are rows in an implicit method"
     elif wish == "auto" and (groups := _groups(begun)) > FEW:
@@ -78,14 +84,14 @@ def suited(begun: Start, wish: str, parameters: Mapping[str, float] | None) -> S
     return out
 
 
-def _refuse_open_loads(begun: Start) -> None:
+def _refuse_open_loads(begun: Start, method: str) -> None:
     """Friction under reactions that redundancy leaves open takes them from Newton's method, where they are any."""
     s = begun.base.compiled.structure
     found = open_loads(s.loads, mobility(s.model, begun.base).undetermined) if s.loads else []
     if found:
         names = ", ".join(f.title for f, _ in found)
         raise ModelError(
-            f"method='radau' cannot have {names}: it follows reactions that redundant constraints leave open "
+            f"method={method!r} cannot have {names}: it follows reactions that redundant constraints leave open "
             f"(m.mobility() names them); leave method out, or take the redundancy out"
         )
 

@@ -17,8 +17,8 @@ from ...ldl import Pattern
 
 # entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
 # whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
-# iterations of all stages together
-ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, COUNTS = range(9)
+# iterations of all stages together; whether velocities are not held to the constraints (index 3)
+ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, COUNTS = range(10)
 # entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
 # width that is factored for; width and error of the step before; fixed width or 0; regularisation; size of corrections
 # that are taken for rounding where they do not fall any more

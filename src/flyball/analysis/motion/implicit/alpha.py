@@ -1,0 +1,91 @@
+"""A motion by the generalised-alpha method: what its compiled loop works with."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....equations import residual
+from ....equations.alpha import alpha_kernel
+from ....equations.engine import engine
+from ....numerics.integrators import clock as ex
+from ....numerics.integrators.implicit import desk as ds
+from ....numerics.ldl import Pattern
+from ...compiled import Compiled
+from .loop import Implicit
+
+RHO = 0.8  # spectral radius at infinity, where none is given
+
+
+class Desk(NamedTuple):
+    """Scratch and tables of one run; what has the same name as in `numerics.integrators.implicit.desk` is the same."""
+
+    count: np.ndarray  # type: ignore[assignment]
+    real: np.ndarray
+    rho: np.ndarray  # (1,): spectral radius at infinity
+    d: np.ndarray
+    v: np.ndarray
+    dd: np.ndarray
+    a: np.ndarray
+    lam: np.ndarray
+    found: np.ndarray
+    mu: np.ndarray
+    z: np.ndarray
+    rate: np.ndarray
+    out: np.ndarray
+    tol: np.ndarray
+    place: np.ndarray
+    x: np.ndarray
+    J: np.ndarray
+    put: np.ndarray
+    part: np.ndarray
+    real_A: np.ndarray
+    real_L: np.ndarray
+    real_U: np.ndarray
+    real_D: np.ndarray
+    real_Y: np.ndarray
+    P: Pattern
+    past: np.ndarray  # (4, nv): accelerations that the method remembers
+    ends: np.ndarray  # (3, nv): rates at the ends of the step
+
+
+class Alpha(Implicit):
+    """A motion by the generalised-alpha method, ready to run.
+
+    Parameters
+    ----------
+    c : Compiled
+    clock : Clock
+    width : int
+        Of a row of output.
+    step : float
+        Width of steps [s].
+    rho : float
+        Spectral radius at infinity: 1 damps nothing, 0 all that steps do not resolve.
+    index_3 : bool
+        Whether velocities are not held to the constraints.
+    """
+
+    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float, rho: float, index_3: bool) -> None:
+        self.rho = rho
+        super().__init__(c, clock, width, step, index_3)
+
+    def _desk(self, nz: int, step: float) -> Desk:  # type: ignore[override]
+        w = super()._desk(nz, step)
+        nv = self.layout.nv
+        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], 0.1)
+        kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
+        return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv)), ends=np.zeros((3, nv)))
+
+    def go_on(self, out: np.ndarray) -> int:
+        """Go on until the end, or what else `fixed.advance` returns for. Returns rows written."""
+        S, W = self.c.system, self.c.work
+        doors = (
+            engine.address(S, W, self.R, self.own, self.sheet),
+            residual.address(self.SC, self.WC, self.benches[0]),
+        )
+        return alpha_kernel(
+            doors, S, W, self.R, self.own, self.sheet, self.SC, self.WC, self.benches, self.plan, self.desk, self.clock,
+            out,
+        )  # fmt: skip

@@ -1,0 +1,67 @@
+"""A motion by the generalised-alpha method: what it asks of the equations, as `implicit` asks it."""
+
+from __future__ import annotations
+
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..math.scalar import atan, sqrt
+from ..numerics.integrators.implicit import fixed
+from ..numerics.integrators.implicit.even import refuse
+from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
+from ..numerics.integrators.implicit.hermite import between
+from .implicit import PLAN, TURNS, arrive, compose, inspect, linearise, missed, powers, report, turned
+
+SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
+
+
+@formula
+def turned_rates(d, w, A):
+    """Velocities w into rates of increments, in place."""
+    turned(A[PLAN], d, w)
+
+
+@formula
+def straight(d, out, A):
+    """Increments into those of constant velocity: of turns, Cayley's step into the rotation vector."""
+    for i in range(d.shape[0]):
+        out[i] = d[i]
+    turns = A[PLAN].turns
+    for n in range(turns.shape[0]):
+        i = turns[n]
+        x = 0.5 * sqrt(d[i] * d[i] + d[i + 1] * d[i + 1] + d[i + 2] * d[i + 2])
+        by = atan(x) / x if x > SMALL else 1.0 - x * x / 3.0 + x * x * x * x / 5.0
+        for m in range(3):
+            out[i + m] *= by
+
+
+@formula
+def residual(t, k, A, K, c):
+    """What the equations miss at the end of the step; rates of increments are those of constant velocities."""
+    status = missed(t, k, A, K, c)
+    for i in range(K.v.shape[1]):
+        K.out[k, i] = K.dd[k, i] - K.out[k, i]
+    if status == 0:
+        powers(A, K, k)
+    return status
+
+
+@formula
+def slopes(t, k, A, K, c):
+    """As `implicit.linearise`; rates of increments do not depend on these."""
+    status = linearise(t, k, A, K, c)
+    P = A[PLAN]
+    for e in range(9 * P.turns.shape[0]):
+        K.J[k, P.first[TURNS] + e] = 0.0
+    return status
+
+
+@kernel
+def alpha_kernel(doors, S, W, R, own, sheet, SC, WC, benches, plan, desk, clock, out):
+    """Go on with steps of the generalised-alpha method; see `implicit.implicit_kernel`."""
+    moved, pushed, pressed = held(benches[0]), held(benches[1]), held(benches[2])
+    A = (
+        doors[0], doors[1], held(S), held(W), held(R), held(own), held(sheet), held(SC), held(WC), moved, pushed,
+        pressed, held(plan),
+    )  # fmt: skip
+    callbacks = (residual, slopes, compose, arrive, inspect, turned_rates, straight, report)
+    return fixed.advance((attempt, between, enter, refuse), callbacks, A, held(desk), held(clock), out)

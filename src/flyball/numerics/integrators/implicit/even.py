@@ -1,0 +1,34 @@
+"""What methods of fixed steps have in common: how a step is entered, its works, and that none is tried again."""
+
+from __future__ import annotations
+
+from ....compiler.jit import formula
+from ..clock import ACCEPTED, GROW, NEW, NOW, STEP, H, T
+
+GROWN = 6.0  # what tells that the last step was not refused
+
+
+@formula
+def account(c, h):
+    """Integrals of the motion at the end of the step, by their rates at its ends."""
+    for n in range(c.accounts.shape[0]):
+        i = c.accounts[n]
+        c.y[NEW, i] = c.y[NOW, i] + 0.5 * h * (c.K[0, i] + c.K[1, i])
+
+
+@formula
+def enter(c, t):
+    """Make the end of the step the present state."""
+    for i in range(c.y.shape[1]):
+        c.y[NOW, i] = c.y[NEW, i]
+        c.K[0, i] = c.K[1, i]
+    c.real[H] = c.real[STEP]
+    c.real[T] = t
+    c.real[GROW] = GROWN
+    c.count[ACCEPTED] += 1
+
+
+@formula
+def refuse(K, c):
+    """There is nothing else to try."""
+    return 1
