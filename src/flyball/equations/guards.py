@@ -10,6 +10,7 @@
     an elastic stop that is open   how far it is, past it -(k d + c ddot)
     one that is pressed            what it pushes with, k d + c ddot
     a place of contact             see `sliding.watched_place`
+    a group that shares            see `sharing`, which is asked by itself
 
 A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
 """
@@ -33,6 +34,7 @@ from ..tables.system import (
     G_PRESS_LOWER,
     G_PRESS_UPPER,
     G_PULL,
+    G_SHARED,
     G_SLIDES,
     G_UPPER,
     GUARD_KIND,
@@ -44,6 +46,7 @@ from ..tables.system import (
     OFF,
     RATE,
     RETURNED,
+    SHARED,
     SWITCH_DAMPING,
     SWITCH_FORCE,
     SWITCH_KIND,
@@ -62,7 +65,16 @@ from .sliding import watched_place
 NOT_WATCHED = float("nan")
 GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
 NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
-KEPT = (G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CONE)  # guards above zero as long as modes are right
+KEPT = (
+    G_LOWER,
+    G_UPPER,
+    G_PULL,
+    G_HOLDS,
+    G_SLIDES,
+    G_BACK,
+    G_CONE,
+    G_SHARED,
+)  # guards above zero as long as modes are right
 RESTING = 1e-9  # of the same a second: not coming nearer
 CREEP = 1e-13  # of the same a second: a rate that is none
 
@@ -81,6 +93,8 @@ def watch(S, W, t, out):
 @formula
 def watched(S, W, t, kind, s):
     """Value of a guard of switch s."""
+    if kind == G_SHARED or (W.switch[SHARED, s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
+        return NOT_WATCHED
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
         return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)
@@ -123,8 +137,11 @@ def distance(S, x, rate):
 
 
 @formula
-def grains(S, W, out):
-    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,): of distances, rates, forces."""
+def grains(S, W, t, trial, out):
+    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
+
+    ``trial`` is scratch of the shape of ``W.sensed``.
+    """
     fastest, strongest = 0.0, 0.0
     for m in range(measured(S)):
         fastest = max(fastest, magnitude(W.sensed[RATE, m]))
@@ -140,8 +157,27 @@ def grains(S, W, out):
             out[g] = max(NOISE * fastest, GRAIN * max(1.0, S.glob[LENGTH]))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
-        elif kind == G_LAW or kind == G_CORNER:  # of places
-            out[g] = GRAIN * max(1.0, S.glob[LENGTH])
+        elif kind == G_LAW or kind == G_CORNER:
+            out[g] = law_grain(S, W, t, of if kind == G_LAW else S.switch_i[of, SWITCH_LAW], trial, fastest)
+
+
+@formula
+def law_grain(S, W, t, at, trial, fastest):
+    """By how much a law changes with the last places of what it is asked with; ``fastest``: the largest rate."""
+    size, nm = max(1.0, S.glob[LENGTH]), measured(S)
+    f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
+    most = GRAIN * magnitude(f)
+    for n in range(3):  # all up; of two, and of four, one half up and the other down
+        for m in range(trial.shape[1]):
+            x = W.sensed[VALUE, m]
+            if m < 2 * nm:
+                way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
+                x += way * GRAIN * max(magnitude(x), size if m < nm else fastest)
+            trial[VALUE, m] = x
+        g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
+        if g - g == 0.0:
+            most = max(most, magnitude(g - f))
+    return most
 
 
 @formula

@@ -171,6 +171,7 @@ def _health(data: dict[str, Any]) -> Health:
     late["acceleration_violation"] = data.get("acceleration_violation", 0.0)
     late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
     late["warnings"] = tuple(data.get("warnings", ()))
+    late["doubtful"] = tuple(data.get("doubtful", ()))
     data["remarks"] = tuple(data.get("remarks", ()))
     if data.get("contact"):
         data["contact"] = ContactHealth.from_dict(data["contact"])

@@ -17,6 +17,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ..compile_time import compiled_since
 from ..mobility import mobility
 from .events.carried import carried
 from .events.here import Here
@@ -79,6 +80,7 @@ def outcome(
         "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
+        "doubtful": partial(doubts.doubtful, result),
     }
     result.events = here.records
     if here.seen is not None:
@@ -102,6 +104,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
+        compiling=compiled_since(start.since),
         options=o.choices(),
         remarks=(
             *map(not_allowed, changed_velocities(start.base.departures)),

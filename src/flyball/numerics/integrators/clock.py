@@ -22,6 +22,7 @@ FROM, FROM_RATE, TO, TO_RATE = range(1, 5)
 AT_START, AT_END = -2, -1  # what ``inspect`` takes note of, in place of looking at law k
 LOOSER = 10.0  # accounts are held to this many times the relative tolerance
 RUNNING, DONE, STUCK, NOT_FINITE, UNREPORTED, TOO_MANY = 0, 1, 2, 3, 4, 5
+ULP = 2.3e-16  # a unit in the last place, as a part
 NOTHING = np.zeros((6, 0))
 
 

@@ -7,18 +7,17 @@ its width, until it ends on the event: what is found is as good as the integrati
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import LARGEST, T
+from .clock import LARGEST, ULP, T
 from .glance import true_guard
 from .panels import fires
 from .step import attempt
-from .watching import AGAIN, BEYOND, END, EXTENDED, STAGE, START
+from .watching import AGAIN, BEYOND, BRACKET, END, EXTENDED, MARK, STAGE, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
 CLOSE = 1e-13  # part of the step that a bracket is closed to
 FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
-ULP = 2.3e-16
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 
 
@@ -40,6 +39,8 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
+    if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[MARK, i]:
+        fa = 0.0  # on no side: it is rounding
     if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
         b = last
         status, a, fa = lowest(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
@@ -56,8 +57,10 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
             b, fb = m, fm
         else:
             a, fa = m, fm
-    if a > 0.0 and W.g[START, i] * fa < 0.0:
+    begun = W.kept[i] == 0 and abs(W.g[START, i]) <= W.g[MARK, i]  # about zero, on no side
+    if a > 0.0 and (begun or W.g[START, i] * fa < 0.0):
         W.real[BEYOND] = a
+    W.real[BRACKET] = b - a
     status, x = bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
     return status, max(x, CLOSE)  # one within rounding of the step's start is an event too
 

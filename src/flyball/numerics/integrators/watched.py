@@ -27,15 +27,37 @@ from .clock import (
     STUCK,
     T_END,
     TOO_MANY,
+    WIDE,
     H,
     T,
 )
 from .explicit import overlooked, start, width, write
 from .glance import NOISE
+from .panels import rounding, side_of
 from .refusal import enter, refuse, shorten
 from .sought import CUT, first_event
 from .step import attempt
-from .watching import CUTS, END, EVENT, EVENTS, EXTENDED, FRESH, SIDE, STAGE, START, STEPS
+from .watching import (
+    CUTS,
+    END,
+    EVENT,
+    EVENTS,
+    EXTENDED,
+    FIRED,
+    FRESH,
+    GRAIN_END,
+    GRAIN_START,
+    LATEST,
+    LEAST,
+    MOST,
+    SIDE,
+    STAGE,
+    START,
+    STEPS,
+    UNKNOWN,
+)
+
+OFTEN = 64.0  # times as long as from event to event that the step after one is at most
 
 
 @formula
@@ -75,7 +97,7 @@ def advance_watched(callbacks, inspect, report, S, W, R, c, out):
             if c.real[T] < t:  # the step before is taken back
                 W.count[FRESH] = 1
                 for i in range(W.side.shape[0]):
-                    W.side[i] = 1.0
+                    W.side[i] = UNKNOWN
                 see(watch, note, S, W, c)
             continue
         used, over = go_on(callbacks, inspect, report, S, W, R, c, out, used, (h, error))
@@ -120,11 +142,13 @@ def go_on(callbacks, inspect, report, S, W, R, c, out, used, step):
     W.count[STEPS] += 1
     W.count[CUTS] = 0
     if hit:
-        c.real[H] = max(c.real[H], whole)
+        c.real[H], c.real[WIDE] = max(c.real[H], whole), max(c.real[WIDE], whole)
+        if c.real[T] > W.real[LATEST]:  # as wide as it can be looked through for more that come as soon
+            c.real[H] = min(c.real[H], OFTEN * (c.real[T] - W.real[LATEST]))
+            W.real[LATEST] = c.real[T]
         c.count[STATUS] = EVENT
         W.count[EVENTS] += 1
-        for i in range(W.side.shape[0]):
-            W.side[i] = 0.0 if W.fired[i] == 1 else 1.0
+        known_sides(W, c, h)
     else:
         settled(W)
     return used, hit
@@ -136,7 +160,25 @@ def see(watch, note, S, W, c):
     status = watch(c.real[T], c.y[NOW], S, W, START)
     if status == 0:
         note(S, W, START)
+    for i in range(W.side.shape[0]):  # what jumped since is on no known side
+        if abs(W.side[i]) == 1.0 and not W.side[i] * W.g[START, i] >= 0.5 * abs(W.g[END, i]):
+            W.side[i] = UNKNOWN
     return status
+
+
+@formula
+def known_sides(W, c, h):
+    """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
+
+    So what is to fire next, however soon, is not taken for what has just fired.
+    """
+    for i in range(W.side.shape[0]):
+        f, slope = W.g[END, i], (W.g[MOST, i] - W.g[LEAST, i]) / h
+        W.side[i] = UNKNOWN
+        if W.fired[i] == 1:
+            W.side[i], W.g[FIRED, i] = 0.0, abs(f)
+        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > rounding(W, c, i, slope, GRAIN_END):
+            W.side[i] = side_of(f)
 
 
 @formula
@@ -145,7 +187,7 @@ def settled(W):
     W.count[FRESH] = 0
     for i in range(W.way.shape[0]):
         W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END, i]) <= NOISE * W.grain[i] else W.g[SIDE, i]
-        W.g[START, i] = W.g[END, i]
+        W.g[START, i], W.g[GRAIN_START, i] = W.g[END, i], W.g[GRAIN_END, i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):
             W.moving[0, k, m] = W.moving[1, k, m]

@@ -20,7 +20,7 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import Tableau
-from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....numerics.integrators.watching import AWAY, CHECKS, END, EVENT, FIRED, LOOKS, NODES, STEPS, UNKNOWN
 from ....tables.system import (
     G_BACK,
     G_CONE,
@@ -28,6 +28,7 @@ from ....tables.system import (
     G_HOLDS,
     G_LOWER,
     G_PULL,
+    G_SHARED,
     G_UPPER,
     GUARD_KIND,
     GUARD_OF,
@@ -35,8 +36,9 @@ from ....tables.system import (
 )
 from ...progress import Tell
 from ..engines import Engine
-from .actions import expressions, say_never, stepped_over, true_already
-from .failed import endless
+from .accumulating import Counts
+from .actions import at_the_seam, expressions, say_never, stepped_over, true_already
+from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
 from .instant import instant_of
@@ -51,7 +53,7 @@ LATEST = 20  # events of which it is told who they were
 DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
 HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
-HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
+HOLDING = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -80,6 +82,7 @@ class Run:
         self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
+        self.counts = Counts()
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
@@ -107,7 +110,7 @@ class Run:
 
     def _loop(self) -> Watched:
         c = self.here.c
-        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
+        return Watched(self.method, self.here.clock, c.system, c.work, self.width, self.here.group)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
@@ -175,8 +178,22 @@ class Run:
         if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
             self.sampling.sample(here.c.system, here.c.work, here.clock)
         begin(here)
+        if self.loop is not None and here.start.before is not None:
+            self.resume(self.loop)
         here.true = true_already(here)
         self.here.fresh = False
+
+    def resume(self, loop: Watched) -> None:
+        """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
+
+        What did not is ahead, however near.
+        """
+        here, desk = self.here, loop.desk
+        told = at_the_seam(here)
+        values = instant_of(here).guards()
+        for g, e in here.structure.events.items():
+            desk.side[g] = 0.0 if e.name in told else np.sign(values[g]) or UNKNOWN
+            desk.g[END, g], desk.g[FIRED, g] = values[g], abs(values[g])
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
@@ -213,6 +230,9 @@ class Run:
         self.latest.append(fired)
         if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
             raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+        self.counts.add(fired, here.t)
+        if found := self.counts.accumulate(fired, self.legs.end):
+            raise accumulating(instant_of(here), *found)
         if self.loop is not None and self.loop.desk.count[AWAY]:
             here.crept = self.crept(self.loop)
         self.happens(fired)

@@ -60,6 +60,8 @@ KEPT = 1.2  # a step that could be wider by this is not: the factors serve on
 SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 FIRST = 1e-4  # part of the time span that is tried first
 WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
+FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is so much narrower, if it is no rounding
+SLIGHT = 10.0  # an error from rounding that is accepted where no step of another width is found
 ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
 JUMPED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
 SINGULAR = 3
@@ -210,16 +212,26 @@ def refuse(K, c, h, factor):
 
 @formula
 def pardon(K, c, h, error):
-    """Where ever narrower steps miss the tolerance, take the best of them: near a singular position rounding decides.
+    """Where ever narrower steps miss the tolerance by as much, rounding decides: the widest of them is taken.
 
-    What is accepted so is told (c.real[EXCESS]).
+    So it is near a singular position, where it grows as steps get narrower. What is accepted so is told
+    (c.real[EXCESS]).
     """
-    if error < c.real[BEST]:
+    if error < FALLS * c.real[BEST]:
         c.real[BEST] = error
         c.real[BEST_H] = h
-    if c.real[H] < WALKED * c.real[WIDE] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
+    elif h < NARROWER * c.real[BEST_H] and c.real[BEST] * K.real[RTOL] < ROUGH and c.real[PARDON] == 0.0:
         c.real[PARDON] = 2.0 * c.real[BEST]
         c.real[H] = c.real[BEST_H]
+        c.real[BLURRED_AT] = c.real[T]
+
+
+@formula
+def stranded(c):
+    """Where the iteration fails in ever narrower steps, a wide one is tried, which ends beyond the place."""
+    if c.real[H] < WALKED * c.real[WIDE] and c.real[PARDON] == 0.0:
+        c.real[PARDON] = SLIGHT
+        c.real[H] = c.real[WIDE]
         c.real[BLURRED_AT] = c.real[T]
 
 
@@ -240,14 +252,14 @@ def enter(K, c, t, h, error, iterations):
         c.real[EXCESS] = error
         c.real[EXCESS_AT] = c.real[T]
     wide, safe = wider(h, error, iterations)
-    if c.real[PARDON] > 0.0:
-        wide = h
-    afresh(c)
     if K.real[LAST_ERROR] > 0.0 and error > 0.0:
         f = (h / K.real[LAST_H]) * (K.real[LAST_ERROR] / (error * error)) ** 0.25 * safe
         wide = min(wide, h * max(NARROWEST, min(WIDEST, f)))
     if c.real[GROW] <= 1.0:
         wide = min(wide, h)
+    if c.real[PARDON] > 0.0:
+        wide = max(h, c.real[WIDE])
+    afresh(c)
     for i in range(c.seen.shape[1]):
         c.seen[FROM, i] = c.seen[TO, i]
         c.seen[FROM_RATE, i] = c.seen[TO_RATE, i]
@@ -293,6 +305,7 @@ def advance(callbacks, S, K, c, out):
             return used
         if status != 0:
             refuse(K, c, h, asked)
+            stranded(c)
             continue
         if error > max(1.0, c.real[PARDON]):
             refuse(K, c, h, wider(h, error, asked)[0] / h if c.count[ACCEPTED] > 0 else 0.1)
