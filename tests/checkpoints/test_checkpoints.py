@@ -23,7 +23,7 @@ CASES = {  # mechanism, options, steps of a part; how near it is to the motion t
     "implicit": (soft, {"t_end": 1, "method": "radau"}, 30, 1e-4, "a.x b.x"),
     "events": (bouncer, {"t_end": 4, "rtol": 1e-9}, 6, 1e-7, "b.x b.y b.vx S.work"),
     "sampled controller": (sampled, {"t_end": 1, "outputs": 201}, 11, 1e-6, "a.x pid.output M.torque"),
-    "corners": (twisting, {"t_end": 6.5, "rtol": 1e-10}, 20, 1e-8, "p.x p.vx M.force"),
+    "corners": (twisting, {"t_end": 6.5, "rtol": 1e-10}, 8, 1e-8, "p.x p.vx M.force"),
     "impulses": (pile, {"t_end": 0.4, "method": "impulse"}, 8, 2e-2, "arm.z balls[0].z balls[5].z"),
 }
 

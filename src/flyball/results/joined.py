@@ -156,7 +156,7 @@ def _health(every: Sequence[Health]) -> Health:
     )
 
 
-COUNTED = ("steps", "rejected", "evaluations", "factorisations", "seconds")
+COUNTED = ("steps", "rejected", "evaluations", "factorisations", "seconds", "compiling")
 LARGEST = ("most", "worst_overlap", "residual", "force_residual")
 ADDED = ("solves", "iterations", "unconverged", "halved", "reduced", "impacted")
 

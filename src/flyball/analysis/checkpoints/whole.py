@@ -25,5 +25,6 @@ def finished(result: Result, parts: Sequence[Result]) -> Result:
         "acceleration_violation": partial(acceleration_violation, result),
         "creep": partial(doubts.creep, result),
         "warnings": partial(doubts.warnings, result),
+        "doubtful": partial(doubts.doubtful, result),
     }
     return result
