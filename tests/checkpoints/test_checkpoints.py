@@ -21,6 +21,7 @@ CASES = {  # mechanism, options, steps of a part; how near it is to the motion t
     "joint": (double_pendulum, {"t_end": 4, "rtol": 1e-9, "coordinates": "joint"}, 40, 1e-6, "a.x b.x b.angle S.work"),
     "fixed steps": (double_pendulum, {"t_end": 1, "step": 0.004, "method": "rk45"}, 30, 1e-6, "a.x b.x b.angle"),
     "implicit": (soft, {"t_end": 1, "method": "radau"}, 30, 1e-4, "a.x b.x"),
+    "implicit events": (bouncer, {"t_end": 2, "method": "radau"}, 60, 1e-3, "b.x b.y"),
     "events": (bouncer, {"t_end": 4, "rtol": 1e-9}, 6, 1e-7, "b.x b.y b.vx S.work"),
     "sampled controller": (sampled, {"t_end": 1, "outputs": 201}, 11, 1e-6, "a.x pid.output M.torque"),
     "corners": (twisting, {"t_end": 6.5, "rtol": 1e-10}, 8, 1e-8, "p.x p.vx M.force"),

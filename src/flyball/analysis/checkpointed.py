@@ -20,6 +20,7 @@ from ..model.model import Model
 from ..results.result import Result
 from ..results.study_reading import fingerprint
 from .checkpoints.keeper import Keeper
+from .motion.choice import AUTO as ANY
 from .motion.choice import SimulateOptions, Way, chosen, instead_of, unresolved
 from .motion.engines import AUTO
 from .motion.options import output_times
@@ -55,7 +56,7 @@ def checkpointed(model: Model, o: CheckpointOptions) -> Result:
     if kept.read(cls):
         return kept.parts[-1]
     with shown(o.progress, "simulating") as tell:
-        return _Motion(model, way, span, kept, tell).all()
+        return _Motion(model, way, span, kept, tell, o.method == ANY).all()
 
 
 def _mark(model: Model, o: CheckpointOptions, span: Span) -> str:
@@ -69,8 +70,9 @@ def _mark(model: Model, o: CheckpointOptions, span: Span) -> str:
 class _Motion:
     """Part after part."""
 
-    def __init__(self, model: Model, way: Way, span: Span, kept: Keeper, tell: Tell) -> None:
+    def __init__(self, model: Model, way: Way, span: Span, kept: Keeper, tell: Tell, auto: bool) -> None:
         self.model, self.way, self.span, self.kept, self.tell = model, way, span, kept, tell
+        self.auto = auto
 
     def all(self) -> Result:
         """To the end."""
@@ -125,5 +127,5 @@ class _Motion:
             made = o.specialize if o.specialize != AUTO else bool(before.carried.get("made"))
             changed = {**changed, "start": before, "t_start": None, "specialize": made}
             times = times[times >= t] if before.carried.get("open") else times[times > t]
-        result = told(self.model, o.known(**changed), (t, last, times), why, part)
+        result = told(self.model, o.known(**changed), (t, last, times), why, self.auto, part)
         return result, part.paused

@@ -23,16 +23,14 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
-from .motion.choice import SimulateOptions, chosen, instead_of, unresolved
+from .motion.choice import AUTO, SimulateOptions, chosen, instead_of, unresolved
 from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.loop import run_implicit
-from .motion.implicit.made import implicit
-from .motion.implicit.suited import IMPLICIT, explicit, suited
+from .motion.implicit.suited import IMPLICIT, explicit, suited, unsuited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -41,6 +39,7 @@ from .motion.options import STABILIZATION, Integration, output_times, refuse_unh
 from .motion.outcome import outcome
 from .motion.part import Part, whole
 from .motion.start import Start, begin, start_time
+from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
 from .progress import Tell, shown
 from .watched import remark_friction
@@ -58,12 +57,12 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
     way = chosen(model, o)
     try:
-        return told(model, way.options, span, way.why)
+        return told(model, way.options, span, way.why, o.method == AUTO)
     except (ModelError, SimulationError) as error:
         if way.instead is None or not unresolved(error):
             raise
         try:
-            return told(model, way.instead, span, instead_of(error))
+            return told(model, way.instead, span, instead_of(error), False)
         except FlyballError:
             raise error from None
 
@@ -72,19 +71,23 @@ Span = tuple[float, float, np.ndarray]
 """Start and end of a motion [s], and its output times."""
 
 
-def told(model: Model, o: SimulateOptions, span: Span, why: str, part: Part | None = None) -> Result:
-    """The motion, or a part of it, which says by what it was computed, and why."""
+def told(model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None) -> Result:
+    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change."""
     try:
-        result = _computed(model, o, span, part or whole())
+        result = _computed(model, o, span, auto, part or whole())
     except SimulationError as error:
         if isinstance(error.result, Result):
-            error.result.health.method = why
+            _tell(error.result, why)
         raise
-    result.health.method = why
+    _tell(result, why)
     return result
 
 
-def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Result:
+def _tell(result: Result, why: str) -> None:
+    result.health.method = "; ".join(x for x in (why, result.health.method) if x)
+
+
+def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Part) -> Result:
     """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
@@ -108,6 +111,8 @@ def _computed(model: Model, o: SimulateOptions, span: Span, part: Part) -> Resul
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
         begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
+    mixed = auto and o.stabilization == "projection" and o.step is None
+    begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun))
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -145,16 +150,16 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if task == INTEGRATE and o.method in IMPLICIT:
-        loop = implicit(c, clock, width(begun.assembly), o)
-        rows, interrupted = run_implicit(loop, width(begun.assembly), known, tell, begun.part)
-        here.failed = loop.failed
-    elif watched(begun) or len(known.times) or c.structure.sampled:
-        rows, interrupted = run_events(here, tableau(explicit(o.method)), width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
+        rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(
-            begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine, begun.part
-        )
+        method = tableau(explicit(o.method))
+        rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace, begun.part)
+        if begun.pace is not None and begun.pace.asked:
+            more, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
+            rows = np.concatenate([rows, more])
+        elif begun.pace is not None:
+            here.method = "; ".join(begun.pace.told)
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
@@ -256,12 +261,13 @@ def run_clock(
     tell: Tell,
     task: int,
     engine: Engine | None = None,
+    pace: Pace | None = None,
     part: Part | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
-    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven. It ends
-    early where ``part`` does.
+    ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    ``pace`` may ask for another method, and then this one goes no further. It ends early where ``part`` does.
     """
     c, engine, part = a.compiled, engine or Engine(a.compiled, False), part or whole()
     s, wide = c.structure, width(a)
@@ -272,6 +278,8 @@ def run_clock(
     forget(c.work.stack)
     engine.begin(clock)
     quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
+    if pace is not None:
+        quota = pace.limited(clock, quota)
     try:
         while True:
             begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
@@ -293,6 +301,11 @@ def run_clock(
             if part.over(clock):
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
+            if pace is not None and task == INTEGRATE:
+                pace.asked = pace.turns(c, clock, EXPLICIT)
+                if pace.asked:
+                    return np.concatenate(rows), False
+                quota = pace.limited(clock, quota)
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:

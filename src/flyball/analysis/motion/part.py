@@ -19,6 +19,7 @@ LASTS = 4e9  # that a part should last, as estimated [ns]
 STAGES = 12  # evaluations that a step takes, about
 LEAST = 50  # steps of a part
 LATEST = 40.0  # seconds after which a part ends in any case
+WEIGHT = 10.0  # explicit steps that a step of an implicit method takes as long as
 DECISION = 1e6  # what an event costs [ns]
 BODY = 2e4  # what a body that touches costs in a step by impulses [ns]
 
@@ -66,9 +67,9 @@ class Part:
         """The part begins once more."""
         self._left = self._whole
 
-    def most(self, steps: float) -> int:
-        """As many of these steps as are left of it; one at least."""
-        return int(max(1.0, min(steps, self._left)))
+    def most(self, steps: float, weight: float = 1.0) -> int:
+        """As many of these steps, each of which counts so much, as are left of it; one at least."""
+        return int(max(1.0, min(steps, math.ceil(self._left / weight) if self._left < math.inf else steps)))
 
     def took(self, steps: float) -> None:
         """So many steps were taken."""
