@@ -32,7 +32,8 @@ from .motion.events.legs import breaks
 from .motion.events.run import run_events
 from .motion.implicit.loop import run_implicit
 from .motion.implicit.made import implicit
-from .motion.implicit.suited import IMPLICIT, explicit, suited
+from .motion.implicit.suited import IMPLICIT, VARIATIONAL, explicit, suited
+from .motion.implicit.variational import refuse_unknown
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -95,6 +96,8 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
+        if o.method == VARIATIONAL:
+            refuse_unknown(begun)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):

@@ -14,7 +14,7 @@ from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.result import Result
 from .engines import AUTO as EITHER
 from .engines import check_specialize
-from .implicit.suited import ALPHA, IMPLICIT, refuse_idle
+from .implicit.suited import ALPHA, IMPLICIT, VARIATIONAL, refuse_idle
 from .impulse.settings import Stepping
 from .jams import Overlap, Unresolved
 from .options import MOST, Integration
@@ -33,6 +33,10 @@ CALLED = {
     "alpha": ALPHA,
     "newmark": ALPHA,
     "hht": ALPHA,
+    "symplectic": VARIATIONAL,
+    "verlet": VARIATIONAL,
+    "rattle": VARIATIONAL,
+    "energy-momentum": VARIATIONAL,
 }
 """What methods are called in words."""
 IDLE = {

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from ....numerics.integrators import clock as ex
 from ...compiled import Compiled
 from ..options import Integration
 from .alpha import RHO, Alpha
 from .loop import Implicit
-from .suited import ALPHA
+from .suited import ALPHA, VARIATIONAL
+from .variational import Variational
 
 
-def implicit(c: Compiled, clock: ex.Clock, width: int, o: Integration) -> Implicit:
+def implicit(c: Compiled, clock: ex.Clock, width: int, o: Integration) -> Any:
     """A motion by the method that is asked for, ready to run.
 
     Parameters
@@ -22,6 +25,8 @@ def implicit(c: Compiled, clock: ex.Clock, width: int, o: Integration) -> Implic
         Of a row of output.
     o : Integration
     """
+    if o.method == VARIATIONAL:
+        return Variational(c, clock, width)
     index_3 = o.stabilization == "none"
     if o.method == ALPHA:
         rho = RHO if o.rho_inf is None else o.rho_inf
