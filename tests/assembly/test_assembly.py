@@ -214,6 +214,15 @@ def test_initial_values_and_rates_are_met(value):
     assert r.health.velocity_violation < 1e-9
 
 
+@pytest.mark.parametrize("value", [2e3, -1e6])
+def test_a_slide_starts_far_from_where_it_is_drawn(value):
+    """Drawn at the origin, told to begin a thousand times its size away."""
+    m = fb.Mechanism("far", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=0.1), fb.Prismatic("J", "ground", "b", at=(0, 0), axis=(3, 4)))
+    m.add(fb.Initial("J.displacement", value=value))
+    assert m.assemble().q[:3] == pytest.approx([0.6 * value, 0.8 * value, 0.0], rel=1e-12, abs=1e-9)
+
+
 def test_initial_values_of_points_slides_and_spatial_angles():
     m = actuated()
     for name, value in (("slide.displacement", 0.12), ("shoulder.angle", 0.4), ("load.x", 0.8), ("waist.angle", 0.7)):

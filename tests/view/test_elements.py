@@ -205,6 +205,30 @@ def test_a_rope_runs_over_its_points_and_knows_its_length() -> None:
     assert np.allclose(pull[:, 1], wanted)
 
 
+def test_springs_along_coordinates() -> None:
+    """A slide's and a height's springs run from what moves to a place that stands still; about a pin there is a spiral."""
+    m = fb.Mechanism("springs", planar=True, gravity=(0, -9.81))
+    m.add(body("block", (0, 0)), fb.Prismatic("A", "ground", "block", at=(0, 0), axis=(3, 4)))
+    m.add(fb.CoordinateSpring("s", "A.displacement", stiffness=40), fb.CoordinateSpring("d", "block.x", damping=2))
+    m.add(body("arm", (2, 0)), fb.Revolute("B", "ground", "arm", at=(1, 0)))
+    m.add(fb.TorsionalSpringDamper("coil", "B", stiffness=20), fb.Actuator("push", "A.displacement", force=3))
+    result = m.simulate(1.0, outputs=41)
+    r = record(result)
+    check(r)
+    lines = {line.name: line for line in r.lines}
+    assert {k: line.kind for k, line in lines.items()} == {"s": "spring", "d": "damper"}
+    foot, end = lines["s"].points
+    assert np.allclose(end[:, :2], result["block"].position, atol=1e-9)
+    assert np.abs(foot - foot[0]).max() < 1e-9
+    length = np.sqrt(((end - foot) ** 2).sum(axis=1))
+    assert np.allclose(length - length[0], result["A.displacement"] - result["A.displacement"][0], atol=1e-9)
+    assert length.min() > 0
+    (coil,) = r.curves
+    assert coil.body == "ground"
+    far = np.sqrt(((coil.points - (1, 0, 0)) ** 2).sum(axis=1))
+    assert (np.diff(far) > 0).all()
+
+
 @pytest.mark.parametrize("ball", [False, True])
 def test_wheels_touch_the_plane_that_is_drawn(ball: bool) -> None:
     m = fb.Mechanism("wheel", gravity=(0, 0, -9.81))

@@ -13,6 +13,7 @@ from flyball.analysis.motion.events.told import FREE_WORDS, HELD_WORDS, PLACE_WO
 from flyball.results.kinds import HAPPENED
 from flyball.view.animate import record
 from flyball.view.edged import edged
+from flyball.view.figures import figures
 from flyball.view.report import report
 from flyball.view.tables import tables
 from tests.program.test_cli import Said
@@ -242,3 +243,20 @@ def test_warnings_are_at_the_top():
     page = report(m.simulate(0.3))
     assert '<p class="verdict early" role="status">The run reached its end; 1 warning.</p>' in page
     assert page.index("never happened") < page.index("<dl class='cards'>")
+
+
+def test_couplings_are_told():
+    """A rack of 2 kg that falls on a pinion held by a motor: 2 g on the rack, R 2 g on the pinion; no bearing feels it."""
+    m = fb.Mechanism("hoist", planar=True, gravity=(0, -10))
+    m.add(fb.Body("drum", mass=3, inertia=0.1), fb.Revolute("axle", "ground", "drum", at=(0, 0)))
+    m.add(fb.Body("load", mass=2, inertia=1, position=(0.5, -1)))
+    m.add(fb.Prismatic("guide", "ground", "load", at=(0.5, -1), axis=(0, 1)))
+    m.add(fb.RackAndPinion("winding", "guide", "axle", radius=0.5), fb.Motor("motor", "axle", torque=10))
+    r = m.simulate(0.2, outputs=3)
+    assert r["winding.effort_1"] == pytest.approx(20, abs=1e-9)
+    assert r["winding.effort_2"] == pytest.approx(-10, abs=1e-9)
+    rows = {row[0]: row for row in by_name(r)["joints"].rows}
+    assert rows["winding"][6:8] == ("20", "10")
+    assert rows["axle"][6] == "30"
+    drawn = {c.name for f in figures(r) if f.name == "actuation" for p in f.panels for c in p.curves}
+    assert {"winding.effort_1", "winding.effort_2"} <= drawn

@@ -146,7 +146,7 @@ def moved(
         loop = implicit(c, clock, width(begun.assembly), o)
         rows, interrupted = run_implicit(loop, width(begun.assembly), known, tell)
         here.failed = loop.failed
-    elif watched(begun) or len(known.times):
+    elif watched(begun) or len(known.times) or c.structure.sampled:
         rows, interrupted = run_events(here, tableau(explicit(o.method)), width(begun.assembly), tell, engine, known)
     else:
         rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
@@ -207,7 +207,7 @@ def clock_for(
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
-    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls), s.nq
+    count[ex.CONTROLLED], count[ex.POSITIONS] = s.nq + s.nv + len(s.controls) - len(s.sampled), s.nq
     Y = np.zeros((ex.STATES, len(y)))
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]

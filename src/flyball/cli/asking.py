@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_type_hints
 
-from .common import Changes, Json, Model, app, make_folder, print_json, reported, table
+from .common import Changes, Json, Model, Without, app, make_folder, print_json, reported, table
 from .compiling import announce_compiling
 from .docs import described, summary
 from .flags import Flag, Option, options
-from .loading import load_mechanism, set_parameters
+from .loading import leave_out, load_mechanism, set_parameters
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
@@ -103,15 +103,18 @@ def command(
         def run(**words: Any) -> None:
             with reported(words["as_json"]):
                 mechanism = load_mechanism(words["model"])
+                mechanism = leave_out(mechanism, words["without"] or [])
                 set_parameters(mechanism, words["change"] or [])
                 given = {o.name: o.read(words[o.name]) for o in known if _told(words[o.name], o)}
                 if "progress" in arguments:
                     given["progress"] = not words["as_json"]
-                announce_compiling(not words["as_json"], *kernels)
+                refused = kernels and mechanism.events  # what has derivatives knows no events, and says so
+                announce_compiling(not words["as_json"] and not refused, *kernels)
                 question = Asked(mechanism, method.__name__, given, words["model"], words["as_json"])
                 conclude(question, **{p.name: words[p.name] for p in extra})
 
-        shared = [_parameter("model", Model), _parameter("change", Changes, None), _parameter("as_json", Json, False)]
+        shared = [_parameter("model", Model), _parameter("change", Changes, None)]
+        shared += [_parameter("without", Without, None), _parameter("as_json", Json, False)]
         own_options = [o.parameter for o in known]
         first = [p for p in own_options if p.default is p.empty]
         rest = [p for p in own_options if p.default is not p.empty]

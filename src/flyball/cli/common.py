@@ -6,6 +6,7 @@ Exit codes: 0 done, 2 wrong input, 3 the analysis failed, 130 interrupted.
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -38,6 +39,10 @@ Page = Annotated[Path | None, typer.Option("--out", "-o", help="Write a page (.h
 Out = Annotated[
     Path | None, typer.Option("--out", "-o", help="Folder for the results; by default named after the model.")
 ]
+Without = Annotated[
+    list[str] | None,
+    typer.Option(help="Leave out a part, or a kind of them: --without brake, --without events; may be repeated."),
+]
 Changes = Annotated[list[str] | None, typer.Option("--set", help='Set a parameter: --set speed="120 rpm".')]
 
 
@@ -48,9 +53,20 @@ def reported(as_json: bool) -> Iterator[None]:
         yield
     except FlyballError as error:
         code = FAILED if isinstance(error, AnalysisError) else BAD_INPUT
-        fail(str(error).replace("about=m.equilibrium()", "--equilibrium"), type(error).__name__, code, as_json)
+        fail(as_options(str(error)), type(error).__name__, code, as_json)
     except KeyboardInterrupt:
         fail("interrupted", "KeyboardInterrupt", INTERRUPTED, as_json)
+
+
+def as_options(text: str) -> str:
+    """A message whose remedies are options of the command line, where they are calls in Python."""
+    text = text.replace("about=m.equilibrium()", "--equilibrium")
+    return re.sub(r"m\.changed\(\{(.*?)\}\)\.\w+\(\.\.\.\)", _leaving_out, text)
+
+
+def _leaving_out(call: re.Match) -> str:
+    names = re.findall(r"('[^']*'|\"[^\"]*\"): None", call[1])
+    return " ".join(f"--without {name}" for name in names)
 
 
 def fail(message: str, kind: str, code: int, as_json: bool, more: dict[str, Any] | None = None) -> None:

@@ -44,3 +44,31 @@ def set_parameters(mechanism: Mechanism, changes: Sequence[str]) -> None:
         env = mechanism.environment()
         for e in mechanism.elements():
             mechanism.validate(e, env)
+
+
+def leave_out(mechanism: Mechanism, names: Sequence[str]) -> Mechanism:
+    """The mechanism without parts of these names, or of these kinds (``events``, ``limits``, ...).
+
+    Raises
+    ------
+    ModelError
+        If there is none of that name, or what is left names one that is left out.
+    """
+    from ..model.model import CATEGORIES, suggest
+
+    if not names:
+        return mechanism
+    kinds = [k for k in CATEGORIES if getattr(mechanism, k)]
+    parts = {e.name: None for name in names if name in kinds for e in getattr(mechanism, name)}
+    for name in (n for n in names if n not in kinds):
+        if name not in mechanism.by_name:
+            known = suggest(name, [*mechanism.by_name, *kinds])
+            raise ModelError(
+                f"--without {name!r}: {mechanism.name!r} has no such part{known}; kinds: {', '.join(kinds)}"
+            )
+        parts[name] = None
+    left = mechanism.changed(parts)
+    env = left.environment()
+    for e in left.elements():
+        left.validate(e, env)
+    return left

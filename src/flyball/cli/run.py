@@ -70,6 +70,8 @@ def _conclude(
         if error is not None:
             lines[0] = ("status", f"stopped at t = {error.t:.6g} s")
         page = [("open this", str(f)) for f in files if f.name == "report.html"]
+        if len(result.events):
+            typer.echo(f"{result.events!r}\n")
         table([*lines, *(("written", str(f)) for f in files), *(("note", n) for n in notes), *page])
     if error is not None:
         fail(str(error), type(error).__name__, FAILED, as_json, summary)

@@ -21,6 +21,8 @@ class Integrator(Controller):
     gain : expression
     initial : number
         What the integral begins with.
+    period, offset : number [s], optional
+        It is sampled at offset, offset + period, ...: y + period gain u from the next instant on (Euler's rule).
     """
 
     of: Law
@@ -29,7 +31,7 @@ class Integrator(Controller):
 
     def given(self) -> dict[str, Any]:
         """Input and gain."""
-        return {"of": self.of, "gain": self.gain}
+        return {"of": self.of, "gain": self.gain, "period": self.period}
 
     def signals(self) -> dict[str, str]:
         """The integral, and what is integrated."""
@@ -37,4 +39,5 @@ class Integrator(Controller):
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """The integral."""
-        return (ControlState("value", "gain*of", n.initial),)
+        law = "value + period*gain*input" if self.sampled else "gain*input"
+        return (ControlState("value", law, n.initial),)

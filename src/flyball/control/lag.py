@@ -27,6 +27,8 @@ class Lag(Controller):
     gain : expression
     initial : number
         What the output of the lag alone, without gain and lead, begins with.
+    period, offset : number [s], optional
+        It is sampled at offset, offset + period, ...: exact for inputs that are held.
 
     Notes
     -----
@@ -46,7 +48,7 @@ class Lag(Controller):
 
     def given(self) -> dict[str, Any]:
         """Input, times and gain."""
-        return {"of": self.of, "time": self.time, "lead": self.lead, "gain": self.gain}
+        return {"of": self.of, "time": self.time, "lead": self.lead, "gain": self.gain, "period": self.period}
 
     def signals(self) -> dict[str, str]:
         """What follows, and what it follows."""
@@ -55,4 +57,5 @@ class Lag(Controller):
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """What lags."""
-        return (ControlState("value", "(input - value)/time", n.initial),)
+        law = "value + (1 - exp(-period/time))*(input - value)" if self.sampled else "(input - value)/time"
+        return (ControlState("value", law, n.initial),)

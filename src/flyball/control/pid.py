@@ -41,6 +41,8 @@ class PID(Controller):
         Added to the output before limits: what holds against gravity, for instance.
     initial : number
         What the integral part I begins with.
+    period, offset : number [s], optional
+        It is sampled at offset, offset + period, ...: I by Euler's rule, D by backward differences.
 
     Notes
     -----
@@ -98,7 +100,7 @@ class PID(Controller):
 
     def given(self) -> dict[str, Any]:
         """Inputs, gains, limits."""
-        numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias")
+        numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias", "period")
         own = {k: getattr(self, k) for k in ("setpoint", "measured", *numbers)}
         return {k: v for k, v in own.items() if v is not None} | {
             "weight_p": self.setpoint_weight,
@@ -112,6 +114,8 @@ class PID(Controller):
             parts["proportional"] = "kp*error" if self.setpoint_weight == 1.0 else "kp*(weight_p*setpoint - measured)"
         if self.kd != 0.0:
             parts["derivative"] = "kd/filter*(damped - slow)"
+            if self.sampled:
+                parts["derivative"] = "filter/(filter + period)*before + kd/(filter + period)*(damped - last)"
         total = " + ".join([*parts, *(["integral"] if self.ki != 0.0 else []), *(["bias"] if self.bias != 0.0 else [])])
         out = "unlimited" if self.lower is None else "max(unlimited, lower)"
         out = out if self.upper is None else f"min({out}, upper)"
@@ -130,8 +134,11 @@ class PID(Controller):
         """The integral part; what the derivative is filtered by."""
         out = []
         if self.ki != 0.0:
-            out.append(ControlState("integral", self._rate_of_integral(), n.initial))
-        if self.kd != 0.0:
+            rate = self._rate_of_integral()
+            out.append(ControlState("integral", f"integral + period*({rate})" if self.sampled else rate, n.initial))
+        if self.kd != 0.0 and self.sampled:
+            out += [ControlState("before", "derivative"), ControlState("last", "damped")]
+        elif self.kd != 0.0:
             out.append(ControlState("slow", "(damped - slow)/filter", 0.0))
         return tuple(out)
 

@@ -34,7 +34,7 @@ Matrix = Annotated[tuple[Numbers, ...], BeforeValidator(_matrix)]
 
 @element
 class StateSpace(Controller):
-    """A linear system x' = A x + B u, y = C x + D u.
+    """A linear system x' = A x + B u, y = C x + D u; sampled, with a period, x_(k+1) = A x_k + B u_k.
 
     Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one by
     the system's name. States are ``K.x1``, ``K.x2``, ...
@@ -50,6 +50,8 @@ class StateSpace(Controller):
         Names of the outputs.
     initial : list of numbers, optional
         What the states begin with; zero if not given.
+    period, offset : number [s], optional
+        It is sampled at offset, offset + period, ...; outputs are held in between.
 
     See Also
     --------
@@ -75,7 +77,7 @@ class StateSpace(Controller):
             Or anything that has A, B, C, D, or num and den, and dt.
         inputs : list of expressions
         fields
-            As of `StateSpace`: outputs, initial.
+            As of `StateSpace`: outputs, initial; period, of a discrete system that does not say its own.
 
         Raises
         ------
@@ -83,7 +85,11 @@ class StateSpace(Controller):
             If it is no such system.
         """
         given = matrices(system, name)
-        return cls(name, inputs=inputs, **(given | fields))
+        if getattr(system, "dt", None) is True and "period" not in fields:
+            raise ModelError(f"{cls.__name__} {name!r}: the system is discrete without a period; give period=...")
+        if "period" in fields and "period" not in given and getattr(system, "dt", None) is not True:
+            raise ModelError(f"{cls.__name__} {name!r}: the system is continuous; sample it: system.sample(period)")
+        return cls(name, inputs=inputs, **(fields | given))
 
     @property
     def sizes(self) -> tuple[int, int, int]:

@@ -12,7 +12,7 @@ from ..model.element import Law, Numbers, Unit, element
 
 @element
 class Transfer(Controller):
-    """A transfer function y / u = num(s) / den(s), proper, from rest.
+    """A transfer function y / u = num(s) / den(s), proper, from rest; with a period num(z) / den(z).
 
     Parameters
     ----------
@@ -20,7 +20,9 @@ class Transfer(Controller):
     of : expression
         The signal u: of ``t``, parameters, sensors, curves such as ``A.angle``, and controllers.
     num, den : lists of numbers
-        Coefficients from the highest power of s: ``num=[1], den=[0.1, 1]`` is 1 / (0.1 s + 1).
+        Coefficients from the highest power of s, or of z: ``num=[1], den=[0.1, 1]`` is 1 / (0.1 s + 1).
+    period, offset : number [s], optional
+        It is sampled at offset, offset + period, ...
 
     Notes
     -----

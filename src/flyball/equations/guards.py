@@ -10,6 +10,7 @@
     an elastic stop that is open   how far it is, past it -(k d + c ddot)
     one that is pressed            what it pushes with, k d + c ddot
     a place of contact             see `sliding.watched_place`
+    a group that shares            see `sharing`, which is asked by itself
 
 A guard that means nothing in the present mode is nan. Modes and ways stand in `Work` and change between steps only.
 """
@@ -33,6 +34,7 @@ from ..tables.system import (
     G_PRESS_LOWER,
     G_PRESS_UPPER,
     G_PULL,
+    G_SHARED,
     G_SLIDES,
     G_UPPER,
     GUARD_KIND,
@@ -44,6 +46,7 @@ from ..tables.system import (
     OFF,
     RATE,
     RETURNED,
+    SHARED,
     SWITCH_DAMPING,
     SWITCH_FORCE,
     SWITCH_KIND,
@@ -62,7 +65,16 @@ from .sliding import watched_place
 NOT_WATCHED = float("nan")
 GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
 NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
-KEPT = (G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CONE)  # guards above zero as long as modes are right
+KEPT = (
+    G_LOWER,
+    G_UPPER,
+    G_PULL,
+    G_HOLDS,
+    G_SLIDES,
+    G_BACK,
+    G_CONE,
+    G_SHARED,
+)  # guards above zero as long as modes are right
 RESTING = 1e-9  # of the same a second: not coming nearer
 CREEP = 1e-13  # of the same a second: a rate that is none
 
@@ -81,6 +93,8 @@ def watch(S, W, t, out):
 @formula
 def watched(S, W, t, kind, s):
     """Value of a guard of switch s."""
+    if kind == G_SHARED or (W.switch[SHARED, s] > 0.0 and (kind == G_PULL or kind == G_HOLDS or kind == G_CONE)):
+        return NOT_WATCHED
     way = W.sensed[VALUE, way_of(S, W, s)]
     if kind == G_CORNER:
         return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)

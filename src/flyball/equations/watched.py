@@ -16,14 +16,28 @@ from ..numerics.integrators.expected import expect
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watched import advance_watched
 from ..numerics.integrators.watching import STAGE, START, watching
-from ..tables.system import BIAS, GUARD_KIND, GUARD_WAY, LAM, RATE, RETURNED, SWITCH_ROW, VALUE, X_SOLVED, System, Work
+from ..tables.system import (
+    BIAS,
+    G_SHARED,
+    GUARD_KIND,
+    GUARD_WAY,
+    LAM,
+    RATE,
+    RETURNED,
+    SWITCH_ROW,
+    VALUE,
+    X_SOLVED,
+    System,
+    Work,
+)
 from .engine import Sheet, engine
 from .guards import KEPT, grains
 from .guards import watch as guards
 from .rows import measured
+from .sharing import GRAIN, Sharing, margin, renewed
 from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
 
-ENGINE, S_, W_, R_, OWN, SHEET, EXPECTED = range(7)
+ENGINE, S_, W_, R_, OWN, SHEET, EXPECTED, GROUP = range(8)
 
 
 @formula
@@ -41,6 +55,22 @@ def put(own, t, y):
 
 
 @formula
+def all_guards(A, W, t, out):
+    """Guards by what stands in W, that of the group last."""
+    S = A[S_]
+    guards(S, W, t, out)
+    last = out.shape[0] - 1
+    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+        out[last] = margin(S, W, t, A[GROUP])
+
+
+@formula
+def balanced(A):
+    """Bring what is in balance by itself up to the state last evaluated."""
+    renewed(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], A[GROUP])
+
+
+@formula
 def derivative(t, y, dy, A, K):
     """The right-hand side; levels are kept at the stages chosen for it."""
     own = A[OWN]
@@ -55,7 +85,7 @@ def derivative(t, y, dy, A, K):
             levels(A, K, 1 + j)
     for j in range(K.met.shape[0]):
         if K.met[j] == K.count[STAGE]:
-            guards(A[S_], A[W_], t, K.met_g[j])
+            all_guards(A, A[W_], t, K.met_g[j])
     return status
 
 
@@ -115,7 +145,9 @@ def watch(t, y, A, K, row):
     own = A[OWN]
     put(own, t, y)
     status = through(A, MOTION)
-    guards(A[S_], A[W_], t, K.g[row])
+    if status == 0:
+        balanced(A)
+    all_guards(A, A[W_], t, K.g[row])
     return status
 
 
@@ -131,8 +163,12 @@ def note(A, K, row):
             a += W.G[e] * W.vel[X_SOLVED, S.col_i[e]]
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
-    guards(S, W, A[OWN].real[T], K.g[row])
+    balanced(A)
+    all_guards(A, W, A[OWN].real[T], K.g[row])
     grains(S, W, K.grain)
+    last = K.grain.shape[0] - 1
+    if S.guard_i[last, GUARD_KIND] == G_SHARED:
+        K.grain[last] = GRAIN * A[GROUP].size[0]
 
 
 @formula
@@ -150,13 +186,13 @@ def levels(A, K, at):
 def look(t, h, x, A, K, row):
     """Guards expected at a part x of the step that begins at t."""
     expect(K, x, h)
-    guards(A[S_], A[EXPECTED], t + x * h, K.g[row])
+    all_guards(A, A[EXPECTED], t + x * h, K.g[row])
 
 
 @kernel
-def watched_kernel(address, S, W, R, own, sheet, expected, desk, clock, out):
+def watched_kernel(address, S, W, R, own, sheet, expected, desk, clock, group, out):
     """Go on with a watched integration; see `watched`."""
-    A = (address, held(S), held(W), held(R), held(own), held(sheet), held(expected))
+    A = (address, held(S), held(W), held(R), held(own), held(sheet), held(expected), held(group))
     callbacks = (derivative, arrive, tangent, watch, note, look)
     return advance_watched(callbacks, inspect, report, A, held(desk), held(R), held(clock), out)
 
@@ -172,9 +208,11 @@ class Watched:
     S, W : System, Work
     width : int
         Of a row of output.
+    group : Sharing
+        What holds together.
     """
 
-    def __init__(self, R: Tableau, clock: Clock, S: System, W: Work, width: int) -> None:
+    def __init__(self, R: Tableau, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
         nm = len(S.row_p) - 1 - len(S.row_i)
         self.R, self.clock, self.W = R, clock, W
         rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
@@ -190,13 +228,13 @@ class Watched:
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,
             clock.seen,
         )  # fmt: skip
-        self.sheet = Sheet(np.zeros((1, max(width, 1))))
+        self.sheet, self.group = Sheet(np.zeros((4, max(width, W.vel.shape[1], len(S.row_i), 1)))), group
 
     def go_on(self, S: System, W: Work, out: np.ndarray) -> int:
         """Go on until an event, the end, or what else `explicit.advance` returns for. Returns rows written."""
         address = engine.address(S, W, self.R, self.own, self.sheet)
         return watched_kernel(
-            address, S, W, self.R, self.own, self.sheet, self.expected, self.desk, self.clock, out
+            address, S, W, self.R, self.own, self.sheet, self.expected, self.desk, self.clock, self.group, out
         )  # fmt: skip
 
     @property

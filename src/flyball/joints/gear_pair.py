@@ -23,7 +23,8 @@ class GearPair(Coupling):
 
     With numbers of teeth z and angles seen from the carrier about axes that point the same way:
     z_1 angle_1 + z_2 angle_2 = constant for external gears, z_1 angle_1 - z_2 angle_2 = constant where the second is
-    a ring with its teeth inside. Whole turns count.
+    a ring with its teeth inside. Whole turns count. It acts along the two angles only: what the teeth press loads no
+    bearing; ``run["name.effort_1"]`` and ``run["name.effort_2"]`` are the torques on the gears.
 
     Parameters
     ----------

@@ -19,6 +19,10 @@ if TYPE_CHECKING:
 class RackAndPinion(Coupling):
     """A rack that moves by radius times angle of the pinion; whole turns count.
 
+    It acts along the two coordinates only: what the teeth press loads neither the pinion's bearing nor the rack's
+    guide.
+    ``run["name.effort_1"]`` is the force along the rack, ``run["name.effort_2"]`` the torque on the pinion.
+
     Parameters
     ----------
     name : str

@@ -1,17 +1,18 @@
 """What every controller declares: states of its own, signals that laws may name, and what it is given.
 
 A controller is described by formulas in the language of the laws, whose names are those of its own states, of its own
-signals and of what it is given. A state of a continuous controller has a rate.
+signals and of what it is given. A state of a continuous controller has a rate, one of a sampled controller a next
+value. A sampled controller holds its signals from one instant to the next: to laws they are states, too.
 """
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 from ..errors import ModelError
-from .element import Element
+from .element import Element, Number, Unit, positive
 
 OUTPUT = "output"
 """The signal that the bare name of a controller stands for, if it has one of that name."""
@@ -43,12 +44,30 @@ class Controller(Element):
 
     _: KW_ONLY
 
+    period: Annotated[Number | None, Unit("s")] = None
+    offset: Annotated[Number, Unit("s")] = 0.0
+
     category: ClassVar[str] = "controllers"
-    held: ClassVar[tuple[str, ...]] = ()  # signals that a sampled controller holds between samples: its outputs
+
+    @property
+    def sampled(self) -> bool:
+        """Whether it acts at instants: offset, offset + period, offset + 2 period, ..."""
+        return self.period is not None
+
+    @property
+    def holds(self) -> bool:
+        """Whether it holds its signals from one instant to the next; if not they follow from its states."""
+        return self.sampled
 
     def ends(self) -> dict[str, str]:
         """It has no frame."""
         return {}
+
+    def check_period(self, n: SimpleNamespace) -> None:
+        """Refuse instants that are none."""
+        positive(self, n, "period")
+        if n.period is None and n.offset != 0.0:
+            raise ModelError(f"{self.title}: offset does nothing without period; leave it out")
 
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""

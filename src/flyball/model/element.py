@@ -7,6 +7,8 @@ expression of parameters) into SI floats, and complains with the element's and t
 from __future__ import annotations
 
 import dataclasses
+import inspect
+import re
 import typing
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
@@ -116,18 +118,33 @@ def element(cls: T) -> T:
             raise ModelError(f"{cls.__name__}: {error}") from None
         finally:
             if made.__init__ is not __init__:  # the first one made: pydantic has put its own there
-                made.__init__ = __init__  # type: ignore[misc, method-assign]
+                made.__init__, made.__signature__ = __init__, signature  # type: ignore[misc, method-assign, attr-defined]
 
-    __init__.__doc__ = original.__doc__
-    __init__.__signature__ = _signature(made)  # type: ignore[attr-defined]
-    made.__init__ = __init__  # type: ignore[misc, method-assign]
+    __init__.__doc__ = "The fields; those behind the star by name."
+    signature = _signature(made)
+    own = inspect.Parameter("self", inspect.Parameter.POSITIONAL_OR_KEYWORD)
+    __init__.__signature__ = signature.replace(parameters=[own, *signature.parameters.values()])  # type: ignore[attr-defined]
+    made.__init__, made.__signature__ = __init__, signature  # type: ignore[misc, method-assign, attr-defined]
     return typing.cast(T, made)
 
 
-def _signature(cls: type) -> Any:
-    import inspect
+class _Type(str):
+    """A type as it is written, without quotation marks."""
 
-    return inspect.signature(cls)
+    __repr__ = str.__str__
+    __slots__ = ()
+
+
+def _signature(cls: Any) -> inspect.Signature:
+    """The fields, those without a name first: what editors and ``help`` show before pydantic has seen the class."""
+    parameters = []
+    for f in dataclasses.fields(cls):
+        kind = inspect.Parameter.KEYWORD_ONLY if f.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD
+        default = inspect.Parameter.empty if f.default is dataclasses.MISSING else f.default
+        told = f.type if isinstance(f.type, str) else getattr(f.type, "__name__", str(f.type))
+        told = _Type(re.sub(r"^Annotated\[([^,\[]*(?:\[[^]]*\])?[^,]*),.*$", r"\1", told))
+        parameters.append(inspect.Parameter(f.name, kind, default=default, annotation=told))
+    return inspect.Signature(sorted(parameters, key=lambda p: p.kind))
 
 
 def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error: ValidationError) -> str:
@@ -158,7 +175,9 @@ def _explain(kind: str, cls: type, args: tuple, kwargs: Mapping[str, Any], error
             wanted = e["ctx"].get("max_length", e["ctx"].get("min_length"))
             wrong.setdefault(where, []).append(f"a list of {wanted}")
         elif e["type"] in _TYPES:
-            wrong.setdefault(where, []).append(_TYPES[e["type"]])
+            kind = _TYPES[e["type"]]
+            texts = kind == "a text" and "tuple[str, ...]" in str(cls.__dataclass_fields__[where].type)  # type: ignore[attr-defined]
+            wrong.setdefault(where, []).append("a list of texts" if texts else kind)
         else:
             message = e["msg"].removeprefix("Value error, ")
             lines.append(f"field {where!r}: {message} (got {_short(e['input'])})")

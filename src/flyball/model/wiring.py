@@ -27,11 +27,12 @@ GIVEN = LawOf(None, curves=True)
 
 
 class Wired(NamedTuple):
-    """One state of a controller, wired."""
+    """One state of a controller, wired; of a sampled one also a signal, which is held."""
 
     controller: Controller
     state: str
     law: Expression  # its rate, or its value from the next sample on
+    signal: bool = False
 
     @property
     def name(self) -> str:
@@ -74,17 +75,54 @@ def signal(model: Model, e: Controller, name: str) -> Expression:
 
 
 def wired(model: Model) -> list[Wired]:
-    """All states of all controllers, in order."""
+    """All states of all controllers: those with a rate; then of sampled ones signals, in the order in which they are
+    known, and states.
+
+    Raises
+    ------
+    ModelError
+        If signals of sampled controllers depend on each other in a ring.
+    """
     wiring = _wiring(model)
-    return [
-        Wired(e, x.name, Expression(x.law, wiring.template(e, x.law), None, f"{x.name} of {e.title}"))
-        for e in controllers(model).values()
-        for x in wiring.states[e.name]
-    ]
+    every = controllers(model).values()
+
+    def made(e: Controller, name: str, text: str, signal: bool = False) -> Wired:
+        return Wired(e, name, Expression(text, wiring.template(e, text), None, f"{name} of {e.title}"), signal)
+
+    rates = [made(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
+    held = [made(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
+    later = [made(e, x.name, x.law) for e in every if e.sampled for x in wiring.states[e.name]]
+    return [*rates, *_in_order(held), *later]
+
+
+def _in_order(held: list[Wired]) -> list[Wired]:
+    """Signals that are held, each after those that it is said by at the same instant."""
+    waiting, out = {x.name: x for x in held}, list[Wired]()
+    while waiting:
+        ready = [x for x in waiting.values() if not x.law.names & waiting.keys()]
+        if not ready:
+            raise ModelError(_ringed(waiting))
+        out += ready
+        waiting = {k: x for k, x in waiting.items() if x not in ready}
+    return out
+
+
+def _ringed(waiting: dict[str, Wired]) -> str:
+    """What to say of signals that need each other at one instant."""
+    way = [next(iter(waiting))]
+    while (name := next(iter(sorted(waiting[way[-1]].law.names & waiting.keys())))) not in way:
+        way.append(name)
+    ring = " -> ".join([*way[way.index(name) :], name])
+    e = waiting[name].controller
+    return (
+        f"{e.title}: at an instant at which it is sampled its {waiting[name].state} depends on itself: {ring}. Have "
+        f"one of them go through a state, or sample them one after the other (offset=...)"
+    )
 
 
 def check(model: Model, e: Controller) -> None:
     """Refuse a controller whose laws name what is not there, or depend on themselves."""
+    e.check_period(resolve(e, model.environment()))
     own = wiring_of(model, e)
     refuse_equal(e, own)
     for name, law in e.given().items():
@@ -95,6 +133,7 @@ def check(model: Model, e: Controller) -> None:
         wiring.signal(e, name)
     for x in wiring.states[e.name]:
         wiring.template(e, x.law)
+    wired(model)
 
 
 def wiring_of(model: Model, e: Controller) -> list[str]:
@@ -123,7 +162,7 @@ class _Wiring:
         key = e.name, name
         if key in self.known:
             return self.known[key]
-        if name not in e.signals():
+        if e.holds or name not in e.signals():
             return Node("name", (), f"{e.name}.{name}")
         told = f"{e.name}.{name}"
         if told in self.way:

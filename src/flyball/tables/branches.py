@@ -35,7 +35,8 @@ from .terms import measured_term
 def laws(model: Model) -> Iterator[tuple[Element, Expression, tuple[str, ...]]]:
     """The laws of forces, controllers and drivers: whose, and of which inputs besides time."""
     for x in wired(model):
-        yield x.controller, x.law, ()
+        if not x.controller.sampled:
+            yield x.controller, x.law, ()
     for e in model.forces:
         for name, of in fields_with(e.__class__, LawOf).items():
             value = getattr(e, name)

@@ -41,12 +41,16 @@ def slots(s: Structure) -> None:
 
 def table(s: Structure) -> None:
     """The laws of the rates."""
-    s.tables["control_i"] = ints([(s.law(x.law, (), x.controller), -1) for x in s.controls], 2)
+    rows, s.sampled = [], []
+    for k, x in enumerate(s.controls):
+        at = s.law(x.law, (), None if x.controller.sampled else x.controller)
+        rows.append((-1 if x.controller.sampled else at,))
+        if x.controller.sampled:
+            s.sampled.append((x.controller.name, k, at, not x.signal))
+    s.tables["control_i"] = ints(rows, 1)
 
 
 def initial(model: Model, env: Any) -> list[Any]:
     """What the states begin with, at these values of the parameters."""
-    out = []
-    for e in model.controllers:
-        out += [x.initial for x in e.states(resolve(e, env))]
-    return out
+    found = {e.name: {x.name: x.initial for x in e.states(resolve(e, env))} for e in model.controllers}
+    return [found[x.controller.name].get(x.state, 0.0) for x in wired(model)]

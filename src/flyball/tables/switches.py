@@ -28,6 +28,7 @@ from .system import (
     G_PRESS_LOWER,
     G_PRESS_UPPER,
     G_PULL,
+    G_SHARED,
     G_SLIDES,
     G_TURNS,
     G_UPPER,
@@ -127,10 +128,19 @@ def table(s: Structure) -> None:
             spec.force = next(i for i, f in enumerate(s.forces) if f is spec.element)
             s.tables["force_i"][spec.force, FORCE_SWITCH] = k
         s.guards += [(kind, k, FALLING) for kind in _watched(k, spec)]
+    if _may_share(s):
+        s.guards.append((G_SHARED, 0, FALLING))
     s.tables["switch_i"] = ints(
         [(x.row, x.measured, x.switch.kind, x.force, max(x.law, x.partner), x.other) for x in s.switches], 6
     )
     s.tables["guard_i"] = ints(s.guards, 3)
+
+
+def _may_share(s: Structure) -> bool:
+    """Whether what holds by friction may have company: then how they share what they hold can be open."""
+    gaps = {x.other for x in s.switches if x.switch.kind == SLIP}
+    holding = [x for k, x in enumerate(s.switches) if x.row >= 0 and k not in gaps and not -1 < x.partner < k]
+    return len(holding) > 1 and any(x.switch.kind in (FRICTION, SLIP) for x in holding)
 
 
 def _watched(k: int, x: SwitchSpec) -> tuple[int, ...]:

@@ -42,16 +42,18 @@ SWITCH_TOOTH, SWITCH_PITCH = 0, 1  # of a ratchet
 SWITCH_REST, SWITCH_SLIDING = range(2)  # coefficients of friction of a slip
 # rows of Work.switch; and modes: the row counts for nothing, holds its quantity where it is, or at rest
 MODE, HOLD, LOWER, UPPER, SPARE = range(5)
+# (weight of a row of a group that shares what it holds, 0 of others: `equations/sharing.py`)
+SHARED = 5
 # (of corners of laws that hold the motion: du/dt; side and du/dt of the pass before; scratch; sides by du/dt)
-DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(5, 11)
+DRIFT_OFF, SIDE_BEFORE, DRIFT_BEFORE, SIDE_MOVED, SIDE_TOLD, INVERSE_SLOPES = range(6, 12)
 OFF, HELD, STEADY = 0.0, 1.0, 2.0
 # columns of System.guard_i; kinds of guards; what a guard's zero is watched for
 GUARD_KIND, GUARD_OF, GUARD_WAY = range(3)
 G_LAW, G_LOWER, G_UPPER, G_PULL, G_HOLDS, G_SLIDES, G_BACK, G_CORNER, G_PRESS_LOWER, G_PRESS_UPPER = range(10)
-G_CONE, G_TURNS, G_ASTRAY = 10, 11, 12
+G_CONE, G_TURNS, G_ASTRAY, G_SHARED = range(10, 14)
 FALLING, EITHER, RISING = -1, 0, 1
-# columns of System.control_i: the law of a state's rate (-1: it is held), which clock samples it (-1: none)
-CONTROL_RATE, CONTROL_CLOCK = range(2)
+# columns of System.control_i: the law of a state's rate (-1: it is held between instants)
+CONTROL_RATE = 0
 # rows of Work.row, each (nr,)
 G_VALUE, NU, GAMMA, DIAGONAL, LAM, R1, R2, RESIDUAL, NU_DOT = range(9)
 # rows of Work.vel, each (nv,)
@@ -104,7 +106,7 @@ class System(NamedTuple):
     switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
     switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
     guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
-    control_i: np.ndarray  # (nc, 2): states of controllers, the first of all states: law of the rate, clock
+    control_i: np.ndarray  # (nc, 1): states of controllers, the first of all states: law of the rate
     kinds: (
         np.ndarray
     )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
@@ -134,7 +136,7 @@ class Work(NamedTuple):
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (8, nv)
     sensed: np.ndarray  # (6 + nl, 2 nm + nl + nc + nw): what is measured: value, rate, bias; loads; controls; ways
-    switch: np.ndarray  # (11 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
+    switch: np.ndarray  # (12 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor
     D: np.ndarray  # (3, n): inverse diagonal, scratch, right-hand side

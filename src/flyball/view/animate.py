@@ -13,6 +13,7 @@ from ..errors import ModelError
 from ..model.body import GROUND, Body, Frame
 from ..model.geometry import matrix_to_quaternion, vector
 from ..model.model import suggest
+from .along import spring_along
 from .arrows import arrows, rope_ends
 from .edged import with_edges
 from .facts import facts
@@ -195,8 +196,8 @@ def _drawn(result: Result, places: Places, looks: Looks, every: np.ndarray) -> I
             yield from (
                 replace(d, scale=1.0) for d in symbols(e, places, every, wheels) if isinstance(d, RecordedJoint)
             )
-        elif (line := _line(e, places, every)) is not None:
-            yield line
+        elif (found := _line(e, places, every) or spring_along(e, places, every, looks.size)) is not None:
+            yield found
 
 
 def _line(e: Any, places: Places, every: np.ndarray) -> RecordedLine | None:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.force import BodyForce, CoordinateForce
-from ..model.joint import Joint
+from .along import axes, frames, turning
 from .figures import some
 from .places import End, Places, three
 from .recording import RecordedArrow
@@ -114,22 +114,9 @@ def rope_ends(places: Places, name: str) -> list[End]:
 
 def _along(result: Result, places: Places, name: str, coordinate: str, effort: np.ndarray) -> Iterator[Found]:
     """An effort along a coordinate of a joint or a point: a force or moment on the second body."""
-    owner, what = result.model.coordinate(coordinate, result.model[name])
-    if not isinstance(owner, Joint):
-        end = places.end(name, "M") or places.end(owner.name, "M")
-        if end is not None and what == "angle":
-            yield name, "element", "moment", end, effort[:, None] * np.array([0.0, 0.0, 1.0])
-        elif end is not None:
-            yield name, "element", "force", end, effort[:, None] * np.eye(3)["xyz".index(what)]
-        return
-    c = owner.coordinates[what]
-    base, M = places.end(owner.name, c.frames[0]), places.end(owner.name, "M")
-    if base is None or M is None:
-        return
-    R = places.track(base)[1]
-    turn = getattr(c, f"turn_{c.frames[0]}")
-    if len(turn):
-        R = R @ np.array(turn, float)
-    turning = c.unit == "rad"
-    axis = R[:, :, "xyz".index(what) if what in ("x", "y", "z") and not turning else 2]
-    yield name, "element", "moment" if turning else "force", M, effort[:, None] * axis
+    e = result.model[name]
+    owner, what = result.model.coordinate(coordinate, e)
+    base, end = frames(e, owner, what, places)
+    if base is not None and end is not None:
+        kind = "moment" if turning(owner, what) else "force"
+        yield name, "element", kind, end, effort[:, None] * axes(owner, what, base, places)

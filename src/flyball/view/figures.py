@@ -107,9 +107,9 @@ def reactions(result: Result) -> Figure | None:
 
 
 def actuation(result: Result) -> Figure | None:
-    """What drivers need, and what force elements do."""
+    """What drivers need, and what couplings and force elements do."""
     curves: list[Channel] = []
-    for e in (*result.model.drivers, *result.model.forces, *result.model.limits):
+    for e in (*result.model.drivers, *result.model.couplings, *result.model.forces, *result.model.limits):
         channels = result[e.name].channels()
         curves += [Channel(f"{e.name}.{k}", u, np.asarray(v)) for k, (u, v) in channels.items() if u in ("N", "N*m")]
     parts = panels(curves)

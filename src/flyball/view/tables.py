@@ -125,6 +125,7 @@ def joints(result: Result) -> Table:
     """Where joints are at the start, what they hold, and the largest reactions they carried."""
     p, s, rows = result.planar, result.values.structure, []
     sizes = {e.name: _largest(result[e.name]) for e in result.model.joints}
+    passed = {e.name: _passed(result[e.name]) for e in result.model.couplings}
     force, torque = (max((v[i] for v in sizes.values()), default=0.0) for i in (0, 1))
     least = (1e-9 * force, 1e-9 * max(torque, force * result.values.length))  # below, rounding errors
     for e in (*result.model.joints, *result.model.couplings):
@@ -137,7 +138,7 @@ def joints(result: Result) -> Table:
         count = str(len(e.rows(p))) if isinstance(e, Joint) else "1"
         free = ", ".join(getattr(result[e.name], "undetermined", ()))
         most = [fixed(v if v > tiny else 0.0) for v, tiny in zip(sizes.get(e.name, ()), least, strict=False)]
-        rows.append((e.name, type(e).__name__, between(e), at, axis, count, *(most or ["", ""]), free))
+        rows.append((e.name, type(e).__name__, between(e), at, axis, count, *(most or passed[e.name]), free))
     columns = ("joint", "kind", "between", "at, start [m]", "axis, start", "rows")
     loads = ("largest |force| [N]", "largest |torque| [N m]")
     if not any(r[-1] for r in rows):
@@ -153,6 +154,13 @@ def _largest(view: Any) -> tuple[float, float]:
         size = np.abs(a) if a.ndim == 1 else np.sqrt((a**2).sum(axis=1))
         sizes.append(float(np.nanmax(size, initial=0.0)))
     return sizes[0], sizes[1]
+
+
+def _passed(view: Any) -> tuple[str, str]:
+    """The largest force and torque that a coupling puts on its coordinates."""
+    curves = view.channels().values()
+    sizes = [[np.nanmax(np.abs(v), initial=0.0) for u, v in curves if u == unit] for unit in ("N", "N*m")]
+    return tuple(fixed(max(x)) if x else "" for x in sizes)  # type: ignore[return-value]
 
 
 def forces(result: Result) -> Table:

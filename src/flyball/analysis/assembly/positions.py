@@ -11,6 +11,7 @@ CLOSED = 1e-10  # part of the mechanism's length, or radians, by which closed ro
 OPEN = 1e-6  # the same, above which a position found on residuals that lead from far away is none
 RESTARTS = 12
 ITERATIONS = 200
+WALK = 50  # steps of the usual length before longer ones
 DENSE = 300  # rows up to which a step of assembly goes through a singular value decomposition
 NO_PIVOT = 1e-14  # added for redundant rows of large mechanisms; iterations take it out again
 DIGITS = 16 * np.finfo(float).eps  # part of a coordinate that a few operations leave uncertain
@@ -51,12 +52,17 @@ def movable(c: Compiled) -> np.ndarray:
 
 def inverse_weights(c: Compiled) -> np.ndarray:
     """Inverse weights of the steps of assembly: metres against radians; bodies that must not move have none."""
+    return np.where(_shifts(c), 1.0, 1.0 / c.values.length**2) * movable(c)
+
+
+def _shifts(c: Compiled) -> np.ndarray:
+    """Which velocities are those of points, not turning."""
     body_i = c.structure.tables["body_i"]
-    w = np.ones(c.structure.nv)
+    out = np.ones(c.structure.nv, bool)
     shifts = 2 if c.structure.model.planar else 3
     for v0, n in zip(body_i[:, V0], body_i[:, NV], strict=True):
-        w[v0 + min(n, shifts) : v0 + n] = 1.0 / c.values.length**2
-    return w * movable(c)
+        out[v0 + min(n, shifts) : v0 + n] = False
+    return out
 
 
 def _step(c: Compiled, r: np.ndarray, R, damping: float) -> np.ndarray:
@@ -97,19 +103,19 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
     """Damped Gauss-Newton until closed or no better. Returns (q, iterations)."""
     import scipy.sparse as sp
 
-    w = inverse_weights(c)
+    w, shifts = inverse_weights(c), _shifts(c)
     R = sp.diags(np.sqrt(w)).tocsr()
     limit = 0.7 * c.values.length * np.sqrt(np.where(w > 0.0, w, 1.0))  # 0.7 rad, or 0.7 of the mechanism's size
     size = misfit(c, t, q, v)
     g = c.work.row[G_VALUE].copy()
-    damping = 0.0
+    damping, wider, capped = 0.0, 1.0, 0
     norm = float(g @ g)
     for k in range(ITERATIONS):
         if size < 1e-13:
             return q, k
         c.at(t, q, v)
         d = _step(c, -g, R, damping)
-        over = np.abs(d / limit).max(initial=0.0)
+        over = np.abs(d / np.where(shifts, wider * limit, limit)).max(initial=0.0)
         d = d / over if over > 1.0 else d
         new = _moved_by(c, q, d)
         new_size = misfit(c, t, new, v)
@@ -119,10 +125,13 @@ def newton(c: Compiled, t: float, q: np.ndarray, v: np.ndarray) -> tuple[np.ndar
             gain = 1.0 - new_norm / norm
             q, g, size, norm = new, trial, new_size, new_norm
             damping = 0.0 if damping < 1e-12 else damping / 10
+            capped += over > 1.0
+            if capped > WALK:  # it is a long way, straight on: as many steps as its length would take are not there
+                wider *= 2.0
             if gain < 1e-9:
                 return q, k
         else:
-            damping = max(10 * damping, 1e-8)
+            damping, wider, capped = max(10 * damping, 1e-8), 1.0, min(capped, WALK)
             if damping > 1e4 or size < 1e-11:
                 return q, k
     return q, ITERATIONS

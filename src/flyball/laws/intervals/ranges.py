@@ -62,7 +62,9 @@ def times(a: Range, b: Range) -> Range:
     p = [np.where(np.isnan(x), 0.0, x) for x in (a[0] * b[0], a[0] * b[1], a[1] * b[0], a[1] * b[1])]
     lo = np.minimum(np.minimum(p[0], p[1]), np.minimum(p[2], p[3]))
     hi = np.maximum(np.maximum(p[0], p[1]), np.maximum(p[2], p[3]))
-    return wider(lo, hi)
+    below = (lo == 0.0) & np.signbit(p).any(axis=0)  # zero may be -0.0, of which atan2 makes something else
+    lo, hi = wider(lo, hi)
+    return np.where(below, -0.0, lo), hi
 
 
 def over(a: Range) -> Range:
@@ -138,7 +140,9 @@ def broken_power(a: Range, b: float) -> tuple[Range, Range]:
 
 def angle(y: Range, x: Range) -> tuple[Range, Range, Range]:
     """Ranges of atan2(y, x) and of its two slopes."""
-    vague = (x[0] <= 0.0) & (y[0] <= 0.0) & (y[1] >= 0.0) & ~((y[0] == 0.0) | (y[1] == 0.0))
+    y = y[0], y[1] + 0.0  # a zero at the upper end may be 0.0 as well as -0.0
+    from_zero = (y[0] == 0.0) & ~np.signbit(y[0])
+    vague = (x[0] <= 0.0) & (y[0] <= 0.0) & (y[1] >= 0.0) & ~(from_zero | (y[1] == 0.0) & (y[0] < 0.0))
     vague |= (x[0] <= 0.0) & (x[1] >= 0.0) & (y[0] <= 0.0) & (y[1] >= 0.0)
     lo, hi = hull([np.arctan2(v, u) for v in y for u in x])
     square = plus(whole_power(x, 2), whole_power(y, 2))

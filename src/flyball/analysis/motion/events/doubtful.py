@@ -14,7 +14,7 @@ import numpy as np
 from ....equations.instant import BLOWS, OF_A_STEP
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
-from ....tables.system import GUARD_OF
+from ....tables.system import G_SHARED, SHARED
 from ..jams import bodies
 from .instant import Instant, Part
 from .jump import Jump, finish, nothing
@@ -38,8 +38,10 @@ def doubt(n: Instant, found: Decided) -> None:
 
 def shared(n: Instant, guards: Sequence[int]) -> None:
     """Say whose shares of what holds a body no guard watches: it holds by others than those that are computed."""
-    which = [n.here.structure.switches[s].element for s in dict.fromkeys(n.S.guard_i[list(guards), GUARD_OF].tolist())]
-    who = " and ".join(f"{e.title} of {bodies(e)}" if isinstance(e, Touch) else e.title for e in which)
+    group = np.flatnonzero(n.W.switch[SHARED]).tolist()
+    own = [x for g in guards for x in (group if n.guarded[g][0] == G_SHARED else [n.guarded[g][1]])]
+    which = [n.here.structure.switches[s].element for s in dict.fromkeys(own)]
+    who = " and ".join(dict.fromkeys(f"{e.title} of {bodies(e)}" if isinstance(e, Touch) else e.title for e in which))
     said = (
         f"{who} would carry more than can be held there by the least forces, by others it holds: how rigid bodies at "
         f"rest share what holds them is not determined, and when this gives way can be wrong. Steps by impulses "

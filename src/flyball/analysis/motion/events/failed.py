@@ -10,7 +10,7 @@ from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....errors import ModelError
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import DRIVEN, GRIPS, NOT_HELD
-from ....tables.system import G_LAW, GUARD_KIND, GUARD_OF, LOWER, UPPER
+from ....tables.system import G_LAW, G_SHARED, GUARD_KIND, GUARD_OF, LOWER, SHARED, UPPER
 from ..jams import Overlap, Unresolved, bodies, jam
 from .bounds import told
 from .instant import Instant, Part
@@ -39,9 +39,10 @@ def guard_names(n: Instant, fired: Iterable[int]) -> list[str]:
         kind, s = n.S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
         if kind == G_LAW:
             out.append(n.here.structure.events[int(g)].title)
-        else:
-            e = n.here.structure.switches[s].element
-            out.append(n.name(s) if e.category == "events" else e.title)
+            continue
+        for k in np.flatnonzero(n.W.switch[SHARED]).tolist() if kind == G_SHARED else [s]:
+            e = n.here.structure.switches[k].element
+            out.append(n.name(k) if e.category == "events" else e.title)
     return list(dict.fromkeys(out))
 
 

@@ -231,8 +231,12 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
 
 def broken(n: Instant, found: Decided, guards: np.ndarray) -> list[int]:
     """Guards of what holds that say that it cannot, beyond rounding."""
-    return [
+    out = [
         k
         for k, (kind, s, _) in enumerate(n.guarded)
         if kind in (G_PULL, G_HOLDS, G_CONE) and s in found.sizes and guards[k] < -BROKEN * found.sizes[s]
     ]
+    last = len(guards) - 1
+    if n.shares and guards[last] < -BROKEN * n.here.group.size[0]:
+        out.append(last)
+    return out

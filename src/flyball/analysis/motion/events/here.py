@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....equations.engine import MOTION, evaluate
+from ....equations.sharing import Sharing, sharing
 from ....numerics.integrators.clock import NOW, Clock, T
 from ....tables.specs import Structure
 from ....tables.system import VALUE
@@ -59,6 +60,8 @@ class Here:
         How closely it was looked for events, in words.
     crept : frozenset of int
         Switches that were at a side and left it the wrong way, with no speed: they close there without a bounce.
+    sharing : Sharing, optional
+        What holds together and shares its forces (`equations.sharing`).
     seen : Segments, optional
         What held at the rows of output so far (`events.segments`).
     """
@@ -79,6 +82,7 @@ class Here:
     bounces: dict[int, Any] = field(default_factory=dict)
     swings: dict[int, list[float]] = field(default_factory=dict)
     seen: Any = None
+    sharing: Any = None
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
@@ -103,6 +107,13 @@ class Here:
     def y(self) -> np.ndarray:
         """The state there (q, v, z), to be written to in place, (ny,)."""
         return self.clock.y[NOW]
+
+    @property
+    def group(self) -> Sharing:
+        """What holds together and shares its forces: `sharing`, made when it is first asked for."""
+        if self.sharing is None:
+            self.sharing = sharing(len(self.c.system.switch_i), len(self.c.system.row_i))
+        return self.sharing
 
     @property
     def q(self) -> np.ndarray:

@@ -11,6 +11,7 @@ from ....compiler.bound import Bound, Written
 from ....constraints.modes import FRICTION, LOCK, ONE_WAY, RATCHET, SLIP, STOP
 from ....equations.engine import Sheet, engine
 from ....equations.instant import AGAIN, BALANCE, BARE, IMPULSES, LOOK, Bench, Desk, bench, instant
+from ....equations.sharing import margin_kernel
 from ....equations.tasks import ARRIVE, SOLVE, WATCH
 from ....numerics.cone.dense.problem import FREE, Dense, dense
 from ....numerics.integrators.clock import COUNTS, REALS, SPAN, STATES, Clock, T
@@ -18,6 +19,7 @@ from ....numerics.integrators.tableaux import tableau
 from ....tables.system import (
     EFFORT,
     FORCE_LOAD,
+    G_SHARED,
     HELD,
     HOLD,
     INERTIA,
@@ -78,6 +80,8 @@ class Instant:
         What of these is nothing.
     mode, hold, way : ndarray (ns,)
         Modes, places and ways as they were when it was looked at.
+    shares : bool
+        Whether what holds may share it with others: the last guard is that of the group.
     over : float
         When a series of bounces is over that has become shorter than rounding here.
     """
@@ -107,6 +111,7 @@ class Instant:
         self.near, self.least = NEAR * self.unit, REST * self.unit / here.clock.real[SPAN]
         self.rooms: dict[int, Room] = {}
         self.guarded: list[list[int]] = S.guard_i.tolist()
+        self.shares = bool(self.guarded) and self.guarded[-1][0] == G_SHARED
         self.all = self.room(len(self.m))
         self.all.B.which[:] = np.arange(len(self.m))
         self.rooms.clear()
@@ -234,7 +239,10 @@ class Instant:
     def guards(self) -> np.ndarray:
         """What is watched, (ng,)."""
         self.ask(WATCH)
-        return self.sheet.rows[0, : len(self.S.guard_i)].copy()
+        out = self.sheet.rows[0, : len(self.S.guard_i)].copy()
+        if self.shares:
+            out[-1] = margin_kernel(self.S, self.W, self.here.t, self.here.group)
+        return out
 
     def name(self, s: int) -> str:
         """Name of the element that switch s is of; of the coordinate that an event locks."""

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+
 import numpy as np
 
 from ....constraints.modes import BRANCH
@@ -57,10 +60,12 @@ class Legs:
     clock : Clock
         As the motion begins.
     found : Breaks
+    until : callable
+        A time up to which the clock is to run at most, for reasons of its own.
     """
 
-    def __init__(self, clock: ex.Clock, found: Breaks) -> None:
-        self.clock, self.end = clock, float(clock.real[ex.T_END])
+    def __init__(self, clock: ex.Clock, found: Breaks, until: Callable[[], float] = lambda: math.inf) -> None:
+        self.clock, self.end, self.until = clock, float(clock.real[ex.T_END]), until
         self.times, self.sharp = found.times, found.sharp
         self.at = 0
         self.aim()
@@ -80,7 +85,7 @@ class Legs:
             end = float(self.times[self.at])
             if self.sharp[self.at]:
                 end -= margin(end)
-        self.clock.real[ex.T_END] = end
+        self.clock.real[ex.T_END] = min(end, self.until())
 
     def whole(self) -> None:
         """Have it run to the end of the motion."""

@@ -17,6 +17,7 @@ from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOAD, LOWER, MODE, OFF, UPPER
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
+from .shares import give_way, rests, slides, write_group
 from .slips import loose, slide_on, write_slips
 
 TIED = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
@@ -27,7 +28,8 @@ CASCADE = 20  # times that others are asked again after some began to slide
 class Decided:
     """Modes at an instant: rows that took part, and the problem as it was solved.
 
-    ``sizes`` has of each switch the forces that its own is the difference of.
+    ``sizes`` has of each switch the forces that its own is the difference of; ``taken_up``: all of them hold, by shares
+    that are clearly within their bounds.
     """
 
     parts: list[Part]
@@ -40,6 +42,7 @@ class Decided:
     sizes: dict[int, float]
     A: np.ndarray
     gain: np.ndarray
+    taken_up: bool = False
 
 
 def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fired: np.ndarray) -> Decided:
@@ -51,6 +54,10 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     found = solved(n, of_accelerations(n, at, still))
     parts = found.parts
     let_go = _loose(n, found, fired) if found.ended == FOUND else {}
+    if let_go and (others := solved(n, parts, company=True)).taken_up:  # what touches can carry more from here on
+        found, let_go = others, {}
+    if found.ended == FOUND:
+        let_go |= give_way(n, parts, fired)
     while let_go:
         other = solved(n, [let_go.get(i, p) for i, p in enumerate(parts)])
         back = [i for i in let_go if other.ended != FOUND or _against(n, other, i)]
@@ -91,18 +98,29 @@ def _let_go(p: Part, x: float) -> Part:
     return p._replace(rule=DRIVEN, way=way, lean=way)
 
 
-def solved(n: Instant, parts: list[Part]) -> Decided:
-    """The problem solved; what begins to slide slides with what it carries then."""
+def solved(n: Instant, parts: list[Part], *, company: bool = False) -> Decided:
+    """The problem solved; what begins to slide slides with what it carries then.
+
+    ``company``: all that touches holds if it can, though less would do.
+    """
     B, P, _ = n.problem(parts)
     free = [i for i in range(len(parts)) if P.rule[i] != GRIPS or P.A[i, i] > 0.0]
     if len(free) < len(parts):  # nothing free moves it, so its row cannot hold it
         parts = [parts[i]._replace(of=free.index(parts[i].of) if parts[i].of >= 0 else -1) for i in free]
         B, P, _ = n.problem(parts)
-    ended = FOUND
+    ended, resting = FOUND, np.zeros(len(parts), bool)
     for _ in range(CASCADE):
         ended = n.balance(B, P, FORCES)
-        slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN)).tolist()
-        if ended != FOUND or not (slide_on(n, parts, P) or slips):
+        resting = rests(n, parts, P, None if company else ended)
+        if resting.any() and (P.state[resting] == EVEN).all():
+            ended = FOUND
+        if ended != FOUND and (sliding := slides(n, parts, P)):
+            parts = [sliding.get(i, p) for i, p in enumerate(parts)]
+            B, P, _ = n.problem(parts)
+            continue
+        slips = np.flatnonzero((P.rule == GRIPS) & (P.state != EVEN) & ~resting).tolist()
+        if ended != FOUND or not (slide_on(n, parts, P, resting) or slips):
+            P.state[resting] = EVEN
             break
         for i in slips:
             P.rule[i], P.lean[i] = DRIVEN, 1.0 if P.state[i] == LOW else -1.0
@@ -111,8 +129,9 @@ def solved(n: Instant, parts: list[Part]) -> Decided:
     terms = (np.abs(P.b) + np.abs(P.A) @ np.abs(x)) / np.maximum(P.A.diagonal(), 1e-300)
     sizes = {p.switch: float(z) for p, z in zip(parts, terms, strict=True)}
     return Decided(
-        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, P.A.copy(), P.gain.copy()
-    )
+        parts, ended, x, P.u.copy(), P.state.copy(), P.lean.copy(), P.reach.copy(), sizes, P.A.copy(), P.gain.copy(),
+        company and bool(resting.any()),
+    )  # fmt: skip
 
 
 def elements(n: Instant, parts: list[Part]) -> list[str]:
@@ -152,6 +171,7 @@ def write(n: Instant, found: Decided, still: np.ndarray) -> None:
         elif kind == FRICTION:
             ways[s] = found.lean[i]
     write_slips(n, found.parts, (found.state, found.x, found.u, found.lean))
+    write_group(n, found.parts, (found.state, found.A, found.gain))
     if len(n.S.load_i):
         W.info[LEARNT] = FORGOTTEN
         W.sensed[LOAD, 2 * len(n.here.structure.measured) : n.first] = 0.0  # of two solutions the one from no load

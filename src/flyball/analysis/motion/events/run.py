@@ -5,6 +5,7 @@ Where nothing is watched, steps only end on these times: the engine's own loop r
 
 from __future__ import annotations
 
+import math
 import time
 from collections import deque
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
+from ....equations.sampled import Sampling
 from ....equations.watched import Watched
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
@@ -26,6 +28,7 @@ from ....tables.system import (
     G_HOLDS,
     G_LOWER,
     G_PULL,
+    G_SHARED,
     G_UPPER,
     GUARD_KIND,
     GUARD_OF,
@@ -39,6 +42,7 @@ from .happen import begin, happen
 from .here import Here
 from .instant import instant_of
 from .legs import Legs, breaks
+from .sampling import sampling
 from .segments import Segments
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
@@ -48,7 +52,7 @@ LATEST = 20  # events of which it is told who they were
 DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
 HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
-HOLDING = (G_PULL, G_HOLDS, G_CONE, G_CORNER)  # guards of what holds, by the forces that it carries
+HOLDING = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
 
 
@@ -79,10 +83,31 @@ class Run:
         watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop() if len(here.c.system.guard_i) else None
+        self.sampling = self._sampling(here.t)
+
+    def _sampling(self, t: float) -> Sampling | None:
+        span, rows = (t, float(self.here.clock.real[ex.T_END])), (self.width, len(self.buffer))
+        return sampling(self.here.c, self.method, span, rows)
+
+    def _instant(self) -> float:
+        """Until when the watched loop may run: the next instant of a sampled controller."""
+        return math.inf if self.sampling is None or self.loop is None else self.sampling.next()
+
+    def sampled(self) -> bool:
+        """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
+        here = self.here
+        if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
+            return False
+        before = expressions(here)
+        if self.sampling.sample(here.c.system, here.c.work, here.clock) == 0:
+            self.jumped(before)
+        if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+            self.rows[-1][-1] = self.row()
+        return True
 
     def _loop(self) -> Watched:
         c = self.here.c
-        return Watched(self.method, self.here.clock, c.system, c.work, self.width)
+        return Watched(self.method, self.here.clock, c.system, c.work, self.width, self.here.group)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
@@ -91,7 +116,7 @@ class Run:
         try:
             self.begin()
             engine.begin(here.clock)
-            self.legs = Legs(here.clock, known)
+            self.legs = Legs(here.clock, known, self._instant)
             while not here.stopped:
                 self.integrate()
                 if self.over():
@@ -119,6 +144,9 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
+            if self.sampled():
+                self.legs.aim()
+                return False
             sharp = self.legs.ends_sharply() and self.loop is not None
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
@@ -139,7 +167,10 @@ class Run:
 
     def begin(self) -> None:
         """What happens as the motion begins."""
-        begin(self.here)
+        here = self.here
+        if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
+            self.sampling.sample(here.c.system, here.c.work, here.clock)
+        begin(here)
         self.true = true_already(self.here)
         self.here.fresh = False
 
@@ -149,7 +180,9 @@ class Run:
         before = time.perf_counter()
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
-            if self.loop is None:
+            if self.loop is None and self.sampling is not None:
+                used = self.sampling.go_on(c.system, c.work, clock, self.buffer)
+            elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
                 used = self.loop.go_on(c.system, c.work, self.buffer)
@@ -198,7 +231,10 @@ class Run:
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
-            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end))
+            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._instant)
+            other = self._sampling(here.t)
+            if other is not None and self.sampling is not None and other.differs(self.sampling):
+                self.sampling = other
         self.legs.passed()
         if self.loop is not None and here.c.work is not self.loop.W:
             self.loop = self._loop()
@@ -223,13 +259,16 @@ class Run:
 
     def stop(self) -> None:
         """The motion ends here: the last row is written."""
-        here, clock = self.here, self.here.clock
-        c = here.c
+        self.take(self.row()[None, :])
+        self.here.clock.count[ex.STATUS] = ex.DONE
+
+    def row(self) -> np.ndarray:
+        """The row of output of here and now."""
+        here, c = self.here, self.here.c
         row, y = np.zeros((1, self.width)), here.y.copy()
-        motion_kernel(c.system, c.work, self.method, clock, row, REPORT)
+        motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
         here.y[:] = y
-        self.take(row)
-        clock.count[ex.STATUS] = ex.DONE
+        return row[0]
 
 
 def told(loop: Watched) -> str:

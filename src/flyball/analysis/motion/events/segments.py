@@ -13,6 +13,7 @@ from ....results.result import Result
 from ....results.stretches import Stretch, stretched
 from ....tables.system import HELD, MODE, OFF, SPARE, SWITCH_ROW, VALUE
 from .here import Here
+from .reported import share
 
 
 @dataclass
@@ -29,6 +30,7 @@ class Segments:
         if any(x.switch.kind == BRANCH and W.switch[MODE, k] != OFF for k, x in enumerate(here.structure.switches)):
             ways = _ways(here, rows)
         _quiet(here, rows)
+        share(here, rows)
         self.all.append(
             Stretch(
                 len(rows),

@@ -90,11 +90,14 @@ def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> 
     return [Part(s, DRIVEN, lean=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
 
 
-def slide_on(n: Instant, parts: Sequence[Part], P: Dense) -> bool:
-    """Let what begins to slip hold what it carries in motion. Returns whether that is another problem."""
+def slide_on(n: Instant, parts: Sequence[Part], P: Dense, resting: np.ndarray) -> bool:
+    """Let what begins to slip hold what it carries in motion, not what others keep at rest.
+
+    Returns whether that is another problem.
+    """
     other = False
     for i, p in enumerate(parts):
-        if n.kind[p.switch] == SLIP and P.rule[i] != WITH and P.state[i] != EVEN:
+        if n.kind[p.switch] == SLIP and P.rule[i] != WITH and P.state[i] != EVEN and not resting[i]:
             mu = float(n.S.switch_x[p.switch, SWITCH_SLIDING])
             other |= P.gain[i, p.of] != mu
             P.gain[i, p.of] = mu

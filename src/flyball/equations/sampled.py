@@ -1,0 +1,198 @@
+"""Sampled controllers: at their instants they look, say what they hold until the next, and take their next states.
+
+    y_k = h(t_k, x_k, what is measured),  x_(k+1) = f(t_k, x_k, what is measured, y_k)
+
+Signals first, one after the other in an order in which each is known before it is needed, those of other controllers
+that are sampled at the same instant too; then all states at once. What is measured is that of just before: positions
+and velocities do not jump there. No table changes, so that an instant costs two evaluations of the motion.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ..compiler.door import enter
+from ..compiler.held import held
+from ..compiler.jit import formula, kernel
+from ..laws.evaluation import evaluate
+from ..numerics.integrators.clock import (
+    ACCEPTED,
+    DONE,
+    NEXT,
+    QUOTA,
+    REJECTED,
+    RUNNING,
+    STARTED,
+    STATUS,
+    T_END,
+    WIDE,
+    Clock,
+    H,
+    T,
+)
+from ..numerics.integrators.tableaux import Tableau
+from ..tables.system import COORDINATES, VALUE, System, Work
+from .control import column_of
+from .engine import Sheet, engine
+from .tasks import INTEGRATE, MOTION
+
+PERIOD, OFFSET = range(2)  # columns of Samples.clock
+SAMPLED, STATE, LAW, LATER = range(4)  # columns of Samples.row: clock, state, law, whether it waits for all others
+NEAR = 1e-9  # of a period: a time that is an instant
+ROWS = 64  # of output that are taken at once
+ENGINE, S_, W_, R_, CLOCK, SHEET, PLAN = range(7)
+
+
+class Samples(NamedTuple):
+    """When what is sampled."""
+
+    clock: np.ndarray  # (ns, 2): period and offset [s]
+    next: np.ndarray  # (ns,): number of the next instant
+    row: np.ndarray  # (nu, 4): clock, state, law, whether all others come first; in order
+    value: np.ndarray  # (nu,): scratch
+    end: np.ndarray  # (1,): end of the motion [s], at which nothing is sampled any more
+
+
+@formula
+def instant(P, k):
+    """Time of the next instant of clock k."""
+    return P.clock[k, OFFSET] + P.next[k] * P.clock[k, PERIOD]
+
+
+@formula
+def coming(P):
+    """The next instant at which something is sampled; none before the end: infinite."""
+    first = np.inf
+    for k in range(P.next.shape[0]):
+        at = instant(P, k)
+        if at < P.end[0] - NEAR * P.clock[k, PERIOD]:
+            first = min(first, at)
+    return first
+
+
+@formula
+def due(P, k, t):
+    """Whether clock k samples at t."""
+    near = NEAR * P.clock[k, PERIOD]
+    return instant(P, k) <= t + near and instant(P, k) < P.end[0] - near
+
+
+@formula
+def reached(P, t):
+    """Whether something is sampled at t."""
+    count = 0
+    for k in range(P.next.shape[0]):
+        count += 1 if due(P, k, t) else 0
+    return count > 0
+
+
+@formula
+def sample(A):
+    """Sample what is due at the time and state of the clock. Returns the status of the evaluation there."""
+    S, W, clock, P = A[S_], A[W_], A[CLOCK], A[PLAN]
+    t = clock.real[T]
+    status = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], MOTION)
+    if status != 0:
+        return status
+    z = S.kinds[COORDINATES] + W.vel.shape[1]
+    for late in range(2):
+        for u in range(P.row.shape[0]):
+            if P.row[u, LATER] == late and due(P, P.row[u, SAMPLED], t):
+                at = instant(P, P.row[u, SAMPLED])  # laws of time that jump there are those from then on
+                P.value[u] = evaluate(S.code, S.const, P.row[u, LAW], W.stack, (at, 0.0, 0.0), W.sensed)
+                if late == 0:
+                    W.sensed[VALUE, column_of(S, W, P.row[u, STATE])] = P.value[u]
+    for u in range(P.row.shape[0]):
+        if due(P, P.row[u, SAMPLED], t):
+            clock.y[0, z + P.row[u, STATE]] = P.value[u]
+    for k in range(P.next.shape[0]):
+        while due(P, k, t):
+            P.next[k] += 1
+    clock.count[STARTED] = 0
+    clock.real[H] = max(clock.real[H], clock.real[WIDE])  # the last step was cut short
+    return 0
+
+
+@kernel
+def sample_kernel(address, S, W, R, clock, sheet, P):
+    """Sample what is due."""
+    return sample((address, held(S), held(W), held(R), held(clock), held(sheet), held(P)))
+
+
+@kernel
+def sampled_kernel(address, S, W, R, clock, sheet, P, out):
+    """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
+    A = (address, held(S), held(W), held(R), held(clock), held(sheet), held(P))
+    return advance(A, A[CLOCK], A[SHEET], A[PLAN], out)
+
+
+@formula
+def advance(A, clock, sheet, P, out):
+    """Go on until the end of the stretch, at which nothing is sampled, or for what else the engine returns."""
+    used = 0
+    end = clock.real[T_END]
+    taken = clock.count[ACCEPTED] + clock.count[REJECTED]
+    while True:
+        if reached(P, clock.real[T]):
+            clock.count[STATUS] = sample(A)
+            if clock.count[STATUS] != 0:
+                break
+        at = min(coming(P), end)
+        clock.real[T_END] = at
+        n = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)
+        clock.real[T_END] = end
+        over = clock.count[STATUS] != DONE or at == end
+        if not over and n > 0 and sheet.rows[n - 1, 0] == at:  # written when it is known what is held from then on
+            n -= 1
+            clock.count[NEXT] -= 1
+        for i in range(n):
+            for j in range(out.shape[1]):
+                out[used + i, j] = sheet.rows[i, j]
+        used += n
+        if over:
+            break
+        full = used + sheet.rows.shape[0] > out.shape[0]
+        if full or clock.count[ACCEPTED] + clock.count[REJECTED] - taken >= clock.count[QUOTA]:
+            clock.count[STATUS] = RUNNING
+            break
+    return used
+
+
+class Sampling:
+    """What is sampled in a motion, and when next.
+
+    Parameters
+    ----------
+    plan : Samples
+    R : Tableau
+    width, most : int
+        Of a row of output; how many rows there is room for.
+    """
+
+    def __init__(self, plan: Samples, R: Tableau, width: int, most: int) -> None:
+        self.plan, self.R = plan, R
+        self.sheet = Sheet(np.zeros((max(1, min(ROWS, most // 2)), max(width, 1))))
+
+    def go_on(self, S: System, W: Work, clock: Clock, out: np.ndarray) -> int:
+        """Integrate on, sampling on the way. Returns rows written."""
+        address = engine.address(S, W, self.R, clock, self.sheet)
+        return int(sampled_kernel(address, S, W, self.R, clock, self.sheet, self.plan, out))
+
+    def differs(self, other: Sampling) -> bool:
+        """Whether another one has other instants."""
+        return not np.array_equal(self.plan.clock, other.plan.clock)
+
+    def due(self, t: float) -> bool:
+        """Whether something is sampled at t."""
+        return bool(reached(self.plan, t))
+
+    def next(self) -> float:
+        """The next instant; infinite if there is none."""
+        return float(coming(self.plan))
+
+    def sample(self, S: System, W: Work, clock: Clock) -> int:
+        """Sample what is due now. Returns the status of the evaluation there."""
+        address = engine.address(S, W, self.R, clock, self.sheet)
+        return int(sample_kernel(address, S, W, self.R, clock, self.sheet, self.plan))

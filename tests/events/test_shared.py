@@ -1,0 +1,100 @@
+"""What sticks at several places at once holds as long as some shares of friction hold, and no longer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+G = 10.0
+BOXES = [(0.4, 0.1), (0.1, 0.1), (0.1, 0.2), (0.1, 0.24)]  # the last one tips beyond 4.17 m/s^2
+MU = [(0.4, 0.4), (0.2, 0.4)]  # in motion, at rest
+LAYERS = ["absolute", "joint"]
+
+
+def box(w, h, mu, **more):
+    m = fb.Mechanism("box", planar=True, gravity=(0, -G))
+    m.add(fb.Body("box", shape=fb.Box(edges=(w, h, 0.1), mass=1), position=(0, h / 2)))
+    m.add(fb.Contact(friction=mu[0], static_friction=mu[1], **more))
+    return m
+
+
+def pushed(w, h, mu, up=0.0):
+    """By 2 t, ``up`` above its middle."""
+    m = box(w, h, mu)
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))))
+    m.add(fb.PointForce("push", "box", at=(0, h / 2 + up), force=("2*t", 0)))
+    return m
+
+
+def on_a_plate(w, h, mu):
+    """That accelerates by 2 t."""
+    m = box(w, h, mu)
+    m.add(fb.Body("plate", shape=fb.Box(edges=(20, 0.1, 1), mass=5), position=(0, -0.05)))
+    m.add(fb.Prismatic("J", "ground", "plate", at=(0, -0.05), axis=(1, 0)), fb.Driver("D", "J.displacement", "t**3/3"))
+    return m
+
+
+def within_cones(run, mu):
+    """Friction that is told is within mu N at every place that sticks."""
+    for e in run.model.forces:
+        if type(e).__name__ == "Touch" and e.slips:
+            N, T = run[e.name].normal, np.hypot.reduce(np.atleast_2d(run[e.name].friction))
+            assert (mu * N + 1e-6 >= T).all()
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("mu", MU)
+@pytest.mark.parametrize(("w", "h"), BOXES)
+def test_a_pushed_box_slips_where_all_friction_is_used_up(w, h, mu, layer):
+    """At 2 t = mu m g, whichever corner bears more; then x'' = 2 t - mu_k g."""
+    run = pushed(w, h, mu).simulate(2.5, outputs=26, rtol=1e-9, coordinates=layer)
+    (slip,) = run.events
+    assert slip.kind == "slip" and slip.t == pytest.approx(2.0, abs=1e-9)
+    assert run["box.x"][-1] == pytest.approx((4 - G * mu[0]) / 8 + 1 / 24, abs=1e-9)
+    assert run["box.angle"] == pytest.approx(np.zeros(26), abs=1e-12)
+    assert not run.health.warnings
+    within_cones(run, 0.4)
+
+
+@pytest.mark.parametrize("up", [-0.04, 0.0, 0.03, 0.05])
+def test_at_any_height_below_tipping(up):
+    """Tips about its edge at F (h / 2 + up) = m g w / 2: for w = h = 0.1 at 10 N / (1 + 20 up), beyond 4 N."""
+    run = pushed(0.1, 0.1, (0.2, 0.4), up).simulate(2.2, outputs=3, rtol=1e-9)
+    assert run.events[0].t == pytest.approx(2.0, abs=1e-9) and run.events[0].kind == "slip"
+
+
+def test_what_is_tall_tips_instead():
+    """F h / 2 = m g w / 2 at F = 3.5 N, before mu m g = 4 N: the rear corner opens, the front one goes on to stick."""
+    run = pushed(0.07, 0.2, (0.4, 0.4)).simulate(1.8, outputs=3, rtol=1e-9)
+    assert run.events[0].t == pytest.approx(1.75, abs=1e-9)
+    assert run.events[0].kind == "open" or "parts" in str(run.events[0])
+    assert run["box.angle"][-1] < -1e-6
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("mu", MU)
+@pytest.mark.parametrize(("w", "h"), BOXES)
+def test_a_box_on_a_plate_that_a_driver_moves(w, h, mu, layer):
+    """It slips where 2 t = mu g; then x'' = mu_k g."""
+    run = on_a_plate(w, h, mu).simulate(2.5, outputs=6, rtol=1e-9, coordinates=layer)
+    (slip,) = run.events
+    assert slip.kind == "slip" and slip.t == pytest.approx(2.0, abs=1e-9)
+    assert run["box.x"][-1] == pytest.approx(8 / 3 + 2 + mu[0] * G / 8, abs=1e-8)
+    assert not run.health.warnings
+
+
+def test_a_brake_that_helps_a_stop():
+    """Pressed against a stop, friction does not have to hold: nothing slides. Pulled away it holds 3 N by itself."""
+    m = fb.Mechanism("slider", planar=True)
+    m.add(
+        fb.Body("b", mass=1, inertia=0.01),
+        fb.Prismatic("J", "ground", "b", at=(0, 0), axis=(1, 0)),
+        fb.Limit("stop", "J.displacement", upper=0),
+    )
+    m.add(fb.JointFriction("rub", "J", static=0.3, preload=10), fb.PointForce("F", "b", force=("20*sin(t)", 0)))
+    run = m.simulate(4.0, outputs=41, rtol=1e-9)
+    slip = next(e for e in run.events if e.kind == "slip")
+    assert slip.t == pytest.approx(np.pi + np.arcsin(3 / 20), abs=1e-8)
+    assert np.abs(run["b.x"][run.t < slip.t]).max() < 1e-15
