@@ -38,7 +38,8 @@ def off(exact: np.ndarray, found: np.ndarray) -> dict[str, float]:
 
 
 def of_tree(name: str, tree: Tree, setting: str, t_end: float, read: Callable, n: float, samples: int) -> Any:
-    """What is compared, by a peer."""
+    """What is compared, by a peer; samples lie on its steps."""
+    n = max(samples, 1) * -(-n // max(samples, 1))
     motion, seconds = import_module(f"peer_{name}").solve(tree, t_end, n, setting, samples)
     return (None if motion is None else read(motion)), seconds
 
@@ -75,6 +76,7 @@ def honey() -> list[dict[str, Any]]:
 
 def by_exudyn(p: Planar, setting: str, n: float, samples: int) -> Any:
     """The crank's centre in the planar model."""
+    n = max(samples, 1) * -(-n // max(samples, 1))
     motion, seconds = import_module("peer_exudyn").solve(p, 2.0, n, setting, samples)
     return (None if motion is None else motion[0][:, 0, :2]), seconds
 
@@ -82,6 +84,7 @@ def by_exudyn(p: Planar, setting: str, n: float, samples: int) -> Any:
 def by_mujoco(p: Planar, setting: str, n: float, samples: int) -> Any:
     """The crank's centre."""
     tree = planar_tree(p)
+    n = max(samples, 1) * -(-n // max(samples, 1))
     motion, seconds = import_module("peer_mujoco").solve(tree, 2.0, n, setting, samples)
     return (None if motion is None else planar_motion(p, tree, motion)[0][:, 0, :2]), seconds
 

@@ -30,7 +30,9 @@ def test_ball_comes_to_rest_at_the_sum_of_its_series(coordinates, e):
     hits = run.events.of("impact").t
     series = T * (1.0 + 2.0 * np.cumsum(e ** np.arange(1, len(hits) + 1)) * (e > 0))
     np.testing.assert_allclose(hits[0], T, rtol=1e-12)
-    np.testing.assert_allclose(hits[1:], series[: len(hits) - 1], rtol=1e-10)
+    speed = np.sqrt(2.0 * G) * e ** np.arange(1, len(hits))  # a place has 16 digits, a slow hit's time less
+    if e > 0.0:
+        assert (np.abs(hits[1:] - series[: len(hits) - 1]) < 2e-10 + 1e-15 / speed).all()
     end = T * (1 + e) / (1 - e)
     if e > 0.0:
         (rest,) = run.events.of("rest")

@@ -128,8 +128,8 @@ def test_strong_damping():
     assert r.health.steps < 100
 
 
-def windows(double):
-    m = example("n_four_bar.py", windows=1)
+def windows(double, number=1):
+    m = example("n_four_bar.py", windows=number)
     if double:
         m.add(fb.Revolute("again", "bar 0", "post 1", at=(1, 1)))
     return m
@@ -148,6 +148,21 @@ def test_singular_positions_are_passed(coordinates, double):
     off = r["post 0"].position[-1, :2] - 0.5 * np.array([np.cos(angle), np.sin(angle)])
     assert np.linalg.norm(off) < 1e-5
     assert r.health.energy_drift < 1e-5
+
+
+@pytest.mark.parametrize(("number", "double"), [(1, False), (1, True), (10, False), (10, True)])
+def test_energy_through_singular_positions(number, double):
+    """A microjoule in 10 s: ten passes, where rounding decides how wide a step may be."""
+    r = windows(double, number).simulate(10.0, outputs=2, method="radau", rtol=1e-10)
+    assert r.health.energy_drift < 1e-6
+    assert not r.health.doubtful
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-10])
+def test_the_widest_step_passes_where_rounding_decides(rtol):
+    """Narrower ones lead into the singular position; this ended there with a width of 1e-14 s."""
+    r = windows(True).simulate(10.0, outputs=2, method="radau", rtol=rtol, coordinates="absolute")
+    assert r.health.energy_drift < 1e-7
 
 
 @pytest.mark.parametrize(("step", "allowed"), [(0.02, 1e-4), (0.01, 4e-6)])
@@ -241,12 +256,6 @@ def test_what_does_nothing_is_refused():
 
 
 def test_what_it_does_not_know_is_refused_by_name():
-    with pytest.raises(fb.ModelError, match=r"does not know events.*'pawl'|does not know events"):
-        example("ratchet.toml").simulate(0.1, method="radau")
-    m = pendulum()
-    m.add(fb.Motor("m", joint="pin", torque="0.3*sign(angle - 0.1)"))
-    with pytest.raises(fb.ModelError, match="Motor 'm'"):
-        m.simulate(1.0, method="radau")
     m = pendulum()
     m.add(fb.Body("other", mass=1.0, inertia=1.0, position=(2, 0)))
     m.add(fb.Revolute("far", "ground", "other", at=(1, 0)), fb.Driver("d", "far.angle", "t"))

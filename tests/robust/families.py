@@ -12,6 +12,7 @@ from .dice import Dice, plus
 from .forces import FORCES, driven
 from .joints import coordinates, coupling, joint
 from .shaken import MAKERS, noted
+from .stiffened import stiffened
 from .switching import switched
 
 
@@ -211,6 +212,16 @@ def extremes(d: Dice) -> Case:
     return case
 
 
+def stiff(d: Dice) -> Case:
+    """Springs, mounts and dampers up to 1e9 N/m between ordinary bodies, by the implicit method."""
+    case, m = _case(d, "stiff", d.pick([0.2, 1.0]), method="radau")
+    tree(d, m, case, d.whole(1, 5))
+    close(d, m, case, d.pick([0, 0, 1, 1, 2]))
+    stiffened(d, m, case, 3)
+    case.options["max_steps"] = 100_000
+    return case
+
+
 def drivers(d: Dice) -> Case:
     case, m = _case(d, "drivers", 0.5)
     tree(d, m, case, d.whole(1, 4))
@@ -318,7 +329,7 @@ def shaken(d: Dice) -> Case:
 FAMILIES = {
     f.__name__: f
     for f in (
-        chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, drivers, couplings, friction,
+        chains, trees, loops, redundant, parallel_cranks, singular, windows, extremes, stiff, drivers, couplings, friction,
         crowds, stops, sticking, ropes, latches, happenings, shaken,
     )
 }  # fmt: skip

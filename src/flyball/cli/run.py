@@ -60,6 +60,7 @@ def _conclude(
         "success": result.health.success,
         "message": result.health.message,
         "ended_early": result.health.ended_early,
+        "doubtful": list(result.health.doubtful),
         "t": float(result.t[-1]) if len(result.t) else None,
         "health": result.health.as_dict(),
         "files": [str(f) for f in files],

@@ -137,8 +137,11 @@ def distance(S, x, rate):
 
 
 @formula
-def grains(S, W, out):
-    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,): of distances, rates, forces."""
+def grains(S, W, t, trial, out):
+    """What is rounding of every guard at the state last evaluated, into ``out`` (ng,).
+
+    ``trial`` is scratch of the shape of ``W.sensed``.
+    """
     fastest, strongest = 0.0, 0.0
     for m in range(measured(S)):
         fastest = max(fastest, magnitude(W.sensed[RATE, m]))
@@ -154,8 +157,27 @@ def grains(S, W, out):
             out[g] = max(NOISE * fastest, GRAIN * max(1.0, S.glob[LENGTH]))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
-        elif kind == G_LAW or kind == G_CORNER:  # of places
-            out[g] = GRAIN * max(1.0, S.glob[LENGTH])
+        elif kind == G_LAW or kind == G_CORNER:
+            out[g] = law_grain(S, W, t, of if kind == G_LAW else S.switch_i[of, SWITCH_LAW], trial, fastest)
+
+
+@formula
+def law_grain(S, W, t, at, trial, fastest):
+    """By how much a law changes with the last places of what it is asked with; ``fastest``: the largest rate."""
+    size, nm = max(1.0, S.glob[LENGTH]), measured(S)
+    f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
+    most = GRAIN * magnitude(f)
+    for n in range(3):  # all up; of two, and of four, one half up and the other down
+        for m in range(trial.shape[1]):
+            x = W.sensed[VALUE, m]
+            if m < 2 * nm:
+                way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
+                x += way * GRAIN * max(magnitude(x), size if m < nm else fastest)
+            trial[VALUE, m] = x
+        g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
+        if g - g == 0.0:
+            most = max(most, magnitude(g - f))
+    return most
 
 
 @formula

@@ -9,22 +9,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.door import door
+from ..compiler.jit import formula
 from ..math.scalar import sqrt, tan
 from ..math.vec import add, cross, dot, load9, mv, scale, sub
 from ..numerics.integrators.clock import T
-from ..numerics.integrators.implicit import fixed
-from ..numerics.integrators.implicit.even import refuse
 from ..numerics.integrators.implicit.hermite import between
-from ..numerics.integrators.implicit.variational import attempt, enter
+from ..numerics.integrators.implicit.variational import answer
 from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0
-from .implicit import OWN, S_, SHEET, W_, arrive, compose, inspect, report, through, turned
+from .callbacks import OWN, S_, SHEET, W_, inspect, through
+from .implicit import PLAN, compose, land, turned
 from .solve import inverse_mass
 from .tasks import POSITION, RESIDUAL, SOLVE
 from .tree import quaternion_at
 
-TURNS_ = 7  # place of what says where turns are
 MOST = 20  # iterations for a turn
 ENOUGH = 1e-15  # part of a turn's momentum that its equation may miss
 ROUNDED = 1e-12  # what it misses that does not fall
@@ -227,34 +225,22 @@ def rows_to(G, A):
 @formula
 def turned_rates(d, w, A):
     """Velocities w into rates of increments, in place."""
-    turned(A[TURNS_], d, w)
+    turned(A[PLAN], d, w)
 
 
-@kernel
-def variational_kernel(doors, S, W, R, own, sheet, plan, desk, clock, out):
-    """Go on with steps of the variational method.
-
-    Parameters
-    ----------
-    doors : tuple of int
-        Address of the engine, and nothing.
-    S, W : System, Work
-    R, own, sheet : Tableau, Clock, Sheet
-        The engine's.
-    plan : Turns
-    desk : Desk
-    clock : Clock
-    out : (n, width)
-        Rows of output.
-
-    Returns
-    -------
-    int
-        The number of rows written.
-    """
-    A = (doors[0], doors[1], held(S), held(W), held(R), held(own), held(sheet), held(plan))
-    callbacks = (
-        refuse, refuse, compose, arrive, inspect, turned_rates, weigh, speed, fly, push, place, relax, pull, rows_to,
-        report,
+@formula
+def by_variation(S, W, M, own, going, task):
+    """The variational method; places in A are those of `implicit`."""
+    A = (
+        own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, 0, 0, 0, 0, 0, 0, M.turns, going, between,
     )  # fmt: skip
-    return fixed.advance((attempt, between, enter, refuse), callbacks, A, held(desk), held(clock), out)
+    callbacks = (
+        compose, land, inspect, turned_rates, weigh, speed, fly, push, place, relax, pull, rows_to,
+    )  # fmt: skip
+    return answer(callbacks, A, M.desk, going.clock, task)
+
+
+@door
+def variational_steps(S, W, M, own, going, task):
+    """`by_variation` behind an address."""
+    return by_variation(S, W, M, own, going, task)

@@ -44,7 +44,7 @@ class Event(Element):
     do : list of actions
         `Stop`, `Set`, `Lock`, `Release`, `Impulse`, `Note`; all at once. Only noted if there is none.
     times : int
-        How often it happens at most; however often if not given. A motion that goes on from a result counts anew.
+        How often it happens at most; however often if not given. A motion that goes on from a result counts on.
     """
 
     when: Law = field(kw_only=False)

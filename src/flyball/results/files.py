@@ -201,6 +201,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "tree": json.dumps(list(s.tree)),
         "parameters": json.dumps(list(result.model.parameters)),
         "wound": json.dumps(result.wound),
+        "counted": json.dumps(result.counted),
     }
     told, more = packed(result)
     happened, states = events_packed(result)

@@ -9,7 +9,10 @@ from typing import Any
 from .contact_health import ContactHealth
 from .departure import Departure, summary
 
-LATE = ("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings")
+LATE = (
+    *("freedoms", "redundant", "undetermined", "energy_drift", "acceleration_violation", "creep", "warnings"),
+    "doubtful",
+)
 """Figures that are found when first asked for."""
 
 
@@ -39,6 +42,7 @@ class Health:
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
     watched: str = ""  # how closely it was looked for events
+    compiling: float = 0.0  # of these seconds, those in which code was compiled or read: at first calls [s]
     events: str = ""  # how many happened at instants, and how often each
     contact: ContactHealth | None = None  # how contacts were solved, where there are any
 
@@ -56,7 +60,8 @@ class Health:
     @property
     def status(self) -> str:
         """How it ended: ``"done"``, or where and by which event of the model, or why it could not go on."""
-        return "done" if self.success and self._simulated and not self.ended_early else self.message
+        end = "done" if self.success and self._simulated and not self.ended_early else self.message
+        return f"{end}, but doubtful" if self.success and self.doubtful else end
 
     @property
     def ended_early(self) -> bool:
@@ -94,6 +99,11 @@ class Health:
         return self._found("creep") if "creep" in self.late else {}
 
     @property
+    def doubtful(self) -> tuple[str, ...]:
+        """Reasons to think that the motion is not what its tolerance asks for: its energy balance, its constraints."""
+        return tuple(self._found("doubtful")) if "doubtful" in self.late else ()
+
+    @property
     def warnings(self) -> tuple[str, ...]:
         """Reasons to look at the result twice: energy balance, violated constraints, undetermined loads, creep."""
         found = self._found("warnings") if "warnings" in self.late else self.remarks
@@ -107,6 +117,10 @@ class Health:
         plain["departures"] = [d.as_dict() for d in self.departures]
         return plain | {k: getattr(self, k) for k in LATE}
 
+    @property
+    def _compiled(self) -> str:
+        return f", of which {self.compiling:.2f} s of compiling" if self.compiling > 0.1 * self.seconds else ""
+
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
@@ -119,7 +133,7 @@ class Health:
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
             ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
-            ("time used", f"{self.seconds:.2f} s"),
+            ("time used", f"{self.seconds:.2f} s{self._compiled}"),
         ]
         out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []
@@ -140,7 +154,9 @@ class Health:
             out.append(("events", self.events))
         if self.contact:
             out += self.contact.lines()
-        return out + [(f"warning {k}", text) for k, text in enumerate(self.warnings, 1)]
+        out += [("doubtful", text) for text in self.doubtful]
+        others = [text for text in self.warnings if text not in self.doubtful]
+        return out + [(f"warning {k}", text) for k, text in enumerate(others, 1)]
 
     def __str__(self) -> str:
         width = max(len(k) for k, _ in self.lines())

@@ -153,6 +153,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     result.final = (float(final[0]), final[1:])
     unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
+    result.counted = json.loads(stored.get("counted", "{}"))
     stretches_unpack(stored, result)
     events_unpack(stored, result)
     return result
@@ -170,6 +171,7 @@ def _health(data: dict[str, Any]) -> Health:
     late["acceleration_violation"] = data.get("acceleration_violation", 0.0)
     late["creep"] = {k: tuple(v) for k, v in data.get("creep", {}).items()}
     late["warnings"] = tuple(data.get("warnings", ()))
+    late["doubtful"] = tuple(data.get("doubtful", ()))
     data["remarks"] = tuple(data.get("remarks", ()))
     if data.get("contact"):
         data["contact"] = ContactHealth.from_dict(data["contact"])

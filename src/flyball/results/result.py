@@ -61,6 +61,8 @@ class Result:
         Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
     events : Events
         What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
+    counted : dict
+        Event of the model -> how often it has happened, in this motion and in those that it goes on from.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
         surfaces that move, given by kicks and changes of parameters.
@@ -93,6 +95,7 @@ class Result:
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
         self.stretches: Stretches | None = None
+        self.counted: dict[str, int] = {}
         self._events = Events((), self)
         self.energy = Energy(self)
 

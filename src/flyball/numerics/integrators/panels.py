@@ -8,7 +8,7 @@ whether that is so, else the panel is halved. `glance.glance` writes the guards 
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import T
+from .clock import LARGEST, ULP, T
 from .glance import NOISE, glance
 from .watching import (
     AWAY,
@@ -16,7 +16,9 @@ from .watching import (
     CUTS,
     DONE_TO,
     END,
+    FIRED,
     FRESH,
+    GRAIN_START,
     LEAST,
     LOOKS,
     MARK,
@@ -45,9 +47,11 @@ QUIET = 0.3  # a guard that stays farther from zero than this part of its change
 NOTHING = 1e-200  # a guard that is no larger is zero
 GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
 PARTS = 16  # of a panel, in which slopes are compared
+AT_FIRST = 2.0**-40  # part of a step over which slopes at its start are found
 CLOSEST, FARTHEST = 44, 5  # powers of a half: places near the start where a guard that begins at zero is looked at
 NEAR = 1e-6  # part of its size in a step by which a guard that has just fired is not more than about zero
 ROUNDING = 1e-12  # part of its size in a step by which any other guard is not more than zero
+RESOLVED = 16.0 * ULP  # part of the largest time that is none
 
 
 @formula
@@ -213,7 +217,7 @@ def passing(W, i):
                 W.g[SIDE, i] = s
                 return x, y
             s = side_of(f1)
-        elif s == 0.0 and (W.kept[i] == 0 or f1 > W.g[MARK, i]):
+        elif s == 0.0 and (f1 if W.kept[i] == 1 else abs(f1)) > W.g[MARK, i]:
             s = side_of(f1)
         d = d1
     W.g[SIDE, i] = s
@@ -233,7 +237,7 @@ def jumping(W, i):
                 W.g[SIDE, i] = s
                 return W.nodes[j - 1], W.nodes[j]
             s = side_of(f)
-        elif s == 0.0 and (W.kept[i] == 0 or f > W.g[MARK, i]):
+        elif s == 0.0 and (f if W.kept[i] == 1 else abs(f)) > W.g[MARK, i]:
             s = side_of(f)
     W.g[SIDE, i] = s
     return 0.0, -1.0
@@ -268,12 +272,12 @@ def begin_sides(callbacks, S, W, R, c, h):
     on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
     soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
     """
-    look, t, ng = callbacks[5], c.real[T], W.way.shape[0]
+    look, t, ng = callbacks[7], c.real[T], W.way.shape[0]
     W.count[AWAY] = 0
     if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):
             W.g[SIDE, i] = W.side[i]
-            W.g[MARK, i] = -1.0
+            W.g[MARK, i] = NOISE * W.g[GRAIN_START, i] if W.side[i] == 0.0 and W.kept[i] == 0 else -1.0
         return -1, 0.0, 0.0, 0.0
     if not begins_near(callbacks, S, W, R, c, h):
         return -1, 0.0, 0.0, 0.0
@@ -286,6 +290,8 @@ def begin_sides(callbacks, S, W, R, c, h):
         if i >= 0:
             return i, before, x, x
         before = x
+        if not undecided(W):
+            break
     return -1, 0.0, 0.0, before
 
 
@@ -303,22 +309,36 @@ def doubtful(W):
 def begins_near(callbacks, S, W, R, c, h):
     """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
     fill(callbacks, S, W, R, c, h, 0.0, 1.0)
+    first = min(1.0, max(AT_FIRST, 4.0 * RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) / h))
+    callbacks[7](c.real[T], h, first, S, W, THERE)
     near = False
     for i in range(W.way.shape[0]):
         low, high = extent(W, i)
-        W.g[SIDE, i] = side_of(W.g[START, i]) if W.count[FRESH] == 1 else W.side[i]
+        fresh = W.count[FRESH] == 1 and (W.kept[i] == 1 or abs(W.side[i]) != 1.0)
+        W.g[SIDE, i] = side_of(W.g[START, i]) if fresh else W.side[i]
         W.g[MARK, i] = -1.0
-        if W.count[FRESH] == 0 and not (W.kept[i] == 1 and W.side[i] <= 0.0):
+        if not fresh and (W.count[FRESH] == 1 or not (W.kept[i] == 1 and W.side[i] <= 0.0)):
             continue
         size = max(abs(low), abs(high))
         now = abs(W.g[START, i])
         just = W.side[i] == 0.0
         below = W.kept[i] == 1 and W.g[START, i] < 0.0
-        if finite(low, high) and (below or now <= (NEAR if just else ROUNDING) * size):
+        nothing = 0.0
+        if W.kept[i] == 0 and finite(low, high):
+            slope = min(high - low, abs(W.g[THERE, i] - W.g[START, i]) / first) / h
+            nothing = max(rounding(W, c, i, slope, GRAIN_START), NOISE * W.g[FIRED, i] if just else 0.0)
+        if finite(low, high) and (below or now <= max((NEAR if just else ROUNDING) * size, nothing)):
             W.g[SIDE, i] = 0.0
-            W.g[MARK, i] = max(NOISE * now if just or below else ROUNDING * size, W.kept[i] * NOISE * W.grain[i])
+            mark = NOISE * now if just or below else ROUNDING * size
+            W.g[MARK, i] = max(mark, W.kept[i] * NOISE * W.grain[i], nothing)
             near = True
     return near
+
+
+@formula
+def rounding(W, c, i, slope, row):
+    """What is no more than rounding of a guard, of what it depends on, or of time, by which it changes so fast."""
+    return NOISE * W.g[row, i] + RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) * abs(slope)
 
 
 @formula
@@ -340,6 +360,16 @@ def begun(W):
                 return i
             W.g[SIDE, i] = side_of(f)
     return -1
+
+
+@formula
+def undecided(W):
+    """Whether a guard that begins about zero is on no side yet, or has to be followed to the end."""
+    n = 0
+    for i in range(W.way.shape[0]):
+        if W.g[MARK, i] >= 0.0 and (W.g[SIDE, i] == 0.0 or W.kept[i] == 1):
+            n += 1
+    return n > 0
 
 
 @formula

@@ -7,18 +7,17 @@ its width, until it ends on the event: what is found is as good as the integrati
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import LARGEST, T
+from .clock import LARGEST, TRIED, ULP, T
 from .glance import true_guard
+from .loop import TRY
 from .panels import fires
-from .step import attempt
-from .watching import AGAIN, BEYOND, END, EXTENDED, STAGE, START
+from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
 CLOSE = 1e-13  # part of the step that a bracket is closed to
 FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
-ULP = 2.3e-16
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 
 
@@ -40,6 +39,8 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
         status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
     if status != 0:
         return status, -1.0
+    if a <= 0.0 and W.kept[i] == 0 and abs(fa) <= W.g[MARK, i]:
+        fa = 0.0  # on no side: it is rounding
     if not s * fa > 0.0:  # it is on that side nowhere before: only for a while, perhaps, or not at all
         b = last
         status, a, fa = lowest(callbacks, S, W, R, c, h, i, max(0.0, first - (last - first)), last, -s)
@@ -56,8 +57,10 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
             b, fb = m, fm
         else:
             a, fa = m, fm
-    if a > 0.0 and W.g[START, i] * fa < 0.0:
+    begun = W.kept[i] == 0 and abs(W.g[START, i]) <= W.g[MARK, i]  # about zero, on no side
+    if a > 0.0 and (begun or W.g[START, i] * fa < 0.0):
         W.real[BEYOND] = a
+    W.real[BRACKET] = b - a
     status, x = bracketed(callbacks, S, W, R, c, h, i, (a, fa, b, fb))
     return status, max(x, CLOSE)  # one within rounding of the step's start is an event too
 
@@ -148,23 +151,23 @@ def bracketed(callbacks, S, W, R, c, h, i, bracket):
 
 
 @formula
-def retake(derivative, arrive, tangent, note, S, W, R, c, h):
-    """Take the step again with width h, and note its end. Returns (status, error)."""
-    W.count[STAGE] = 0
-    W.count[EXTENDED] = 0
+def retake(callbacks, S, W, R, c, h):
+    """Take the step again with width h, and note its end. Returns a status."""
+    ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     W.count[AGAIN] += 1
-    status, error = attempt(derivative, arrive, tangent, S, W, R, c, h)
+    c.real[TRIED] = h
+    status = ask(own, S, W, R, c, TRY)
     if status == 0:
         note(S, W, END)
-    return status, error
+    return status
 
 
 @formula
-def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, between):
-    """Take the step again until it ends where guard i leaves side s, near width h: (status, width, error).
+def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
+    """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
 
     The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``between``: a width at
-    which it has not left, and the width of the step as it was. An error of -1 says that it was on that side nowhere.
+    which it has not left, and the width of the step as it was. It does not where it was on that side nowhere.
     """
     least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
@@ -173,9 +176,9 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, betwee
     bound = False  # whether a step that does not reach the event is known
     rough = stride = CLOSE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
-    status, error, done = 0, 0.0, False
+    status, done = 0, False
     for n in range(TRIES):
-        status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+        status = retake(callbacks, S, W, R, c, h)
         f = W.g[END, i]
         if status != 0 or f == 0.0 or done:
             break
@@ -199,9 +202,8 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, betwee
         else:
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
-    if least > 0.0 and not bound and not done and abs(W.g[END, i]) > 1e3 * near * abs(slope):
-        error = -1.0
-    return status, h, error
+    found = not least > 0.0 or bound or done or abs(W.g[END, i]) <= 1e3 * near * abs(slope)
+    return status, found
 
 
 @formula

@@ -8,18 +8,19 @@ it first does not is found by halves.
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import NEW, SPAN, T
+from .clock import EXTENDED, NEW, SPAN, T_END, TRIED, ULP, T
 from .glance import compare, exactly, glance, true_guard
-from .panels import band, begin_sides, fires, side_of, survey
-from .pinned import ULP, crossing, end_on, retake
+from .panels import band, begin_sides, fires, rounding, side_of, survey
+from .pinned import crossing, end_on, retake
 from .watching import (
     AWAY,
     BEYOND,
+    BRACKET,
     CUTS,
     DONE_TO,
     END,
-    EXTENDED,
     FRESH,
+    GRAIN_END,
     LOST,
     MARK,
     PLAIN,
@@ -32,33 +33,35 @@ from .watching import (
 
 AT_ONCE = 1e-11  # part of the step within which events are at the same instant
 SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
+LITTLE = 1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
+LAST = 1e-4  # part of the step over which slopes at its end are found
 OTHERS = 20  # guards that may turn out to be earlier
 HALVES = 44  # times that it is halved where a guard has been left unseen
 SHORTER = 6  # times that a step is made shorter since what begins at zero does not go as expected
-CUT, UNKNOWN = 2, 1  # why a step is not gone on from: not looked through; not to be evaluated
+CUT, LOST_SIGHT = 2, 1  # why a step is not gone on from: not looked through; not to be evaluated
 
 
 @formula
-def first_event(callbacks, S, W, R, c, h, error):
-    """End the step on the first event in it, if there is one: (status, width, error, whether there is one).
+def first_event(callbacks, S, W, R, c):
+    """End the step on the first event in it, if there is one: (status, width to try next, whether there is one).
 
-    Callbacks: derivative, arrive, tangent, watch, note, look. Where the status is `CUT` the width is one to try next.
+    Where the status is `CUT` the step is not gone on from, and the width is one to try next.
     """
-    derivative, arrive, tangent, watch, note, look = callbacks
-    most = h
+    watch, look = callbacks[5], callbacks[7]
+    h = most = c.real[TRIED]
     hit = False
     for i in range(W.fired.shape[0]):
         W.fired[i] = 0
     W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
     compare(look, S, W, c.real[T], h, c.real[SPAN])
     if W.count[PLAIN] == 0 and W.count[FRESH] == 1 and W.count[CUTS] < SHORTER and begins_at_zero(W):
-        return CUT, 0.25 * h, error, False
+        return CUT, 0.25 * h, False
     for _ in range(OTHERS):
         status, i, x, s = next_event(callbacks, S, W, R, c, h)
         if status == CUT and not hit:
-            return CUT, max(W.real[DONE_TO], SKIPPED) * h, error, False
-        if status == UNKNOWN:
-            return UNKNOWN, h, error, False
+            return CUT, max(W.real[DONE_TO], SKIPPED) * h, False
+        if status == LOST_SIGHT:
+            return LOST_SIGHT, h, False
         if status != 0 or i < 0:
             break
         if hit and x * h >= h - W.real[SAME]:
@@ -67,26 +70,26 @@ def first_event(callbacks, S, W, R, c, h, error):
         for j in range(W.fired.shape[0]):
             W.fired[j] = 0
         if W.count[AWAY] == 1:
-            h *= x
-            status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+            status = retake(callbacks, S, W, R, c, x * h)
         else:
             slope = expected_slope(callbacks, S, W, R, c, h, x, i)
-            between = W.real[BEYOND] * h, most
-            whole = h
-            status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, between)
-            if error < 0.0 and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
-                return CUT, 0.5 * whole, error, False
+            status, found = end_on(callbacks, S, W, R, c, x * h, slope, i, s, (W.real[BEYOND] * h, most))
+            if not found and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
+                return CUT, 0.5 * h, False
+        h = c.real[TRIED]
         if status != 0:
-            return UNKNOWN, h, error, False
+            return LOST_SIGHT, h, False
         hit = True
         compare(look, S, W, c.real[T], h, c.real[SPAN])
         W.fired[i] = 1
         if W.count[AWAY] == 1:
             break
         at_once(callbacks, S, W, R, c, h, i)
-    if hit and W.count[EXTENDED] == 1:  # places within were looked at: back to the end
-        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, error, True
-    return 0, h, error, hit
+    if not hit and h == c.real[T_END] - c.real[T]:
+        hit = at_the_end(callbacks, S, W, R, c, h)
+    if hit and c.count[EXTENDED] == 1:  # places within were looked at: back to the end
+        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, True
+    return 0, h, hit
 
 
 @formula
@@ -123,7 +126,7 @@ def next_event(callbacks, S, W, R, c, h):
             return status, i, x, s
         i, a, b = survey(callbacks, S, W, R, c, h, at)
     if W.count[LOST] == 1:
-        return UNKNOWN, -1, 0.0, 0.0
+        return LOST_SIGHT, -1, 0.0, 0.0
     if W.real[DONE_TO] < 1.0:
         return CUT, -1, 0.0, 0.0
     return trespass(callbacks, S, W, R, c, h)
@@ -149,7 +152,7 @@ def trespass(callbacks, S, W, R, c, h):
         else:
             continue
         if status != 0:
-            return UNKNOWN, -1, 0.0, 0.0
+            return LOST_SIGHT, -1, 0.0, 0.0
         if 0.0 < x < at:
             best, at, side, away = i, x, s, W.count[AWAY]
     W.count[AWAY] = away
@@ -166,7 +169,7 @@ def left(callbacks, S, W, R, c, h, i, b):
         x = 0.5 * (a + b)
         status, f = true_guard(callbacks, S, W, R, c, h, x, i)
         if status != 0:
-            return UNKNOWN, i, x, 1.0
+            return LOST_SIGHT, i, x, 1.0
         if f < -least:
             b = x
         else:
@@ -181,7 +184,7 @@ def resume(callbacks, S, W, R, c, h, a, x):
     What has left its side in between is an event.
     """
     if exactly(callbacks, S, W, R, c, h, x, THERE) != 0:
-        return UNKNOWN, -1, 0.0, 0.0
+        return LOST_SIGHT, -1, 0.0, 0.0
     best, at, side = -1, 2.0, 0.0
     for i in range(W.way.shape[0]):
         f, s = W.g[THERE, i], W.g[SIDE, i]
@@ -190,7 +193,7 @@ def resume(callbacks, S, W, R, c, h, a, x):
         if s * f < 0.0 and fires(W.way[i], s):
             status, z = crossing(callbacks, S, W, R, c, h, i, a, x, s)
             if status != 0:
-                return UNKNOWN, -1, 0.0, 0.0
+                return LOST_SIGHT, -1, 0.0, 0.0
             if 0.0 < z < at:
                 best, at, side = i, z, s
         elif f != 0.0 and f == f:
@@ -201,7 +204,7 @@ def resume(callbacks, S, W, R, c, h, a, x):
 @formula
 def expected_slope(callbacks, S, W, R, c, h, x, i):
     """How fast guard i is expected to change there [1/s]."""
-    d = 1e-4
+    d = min(LAST, LITTLE * W.real[BRACKET])
     a, b = max(0.0, x - d), min(1.0, x + d)
     f = W.g[START, i]
     if a > 0.0:
@@ -217,13 +220,31 @@ def expected_slope(callbacks, S, W, R, c, h, x, i):
 @formula
 def at_once(callbacks, S, W, R, c, h, first):
     """Note in W.fired all other guards that leave their sides with the first, at the end of the step."""
-    d = 1e-4
-    glance(callbacks, S, W, R, c, h, 1.0 - d, THERE)
+    glance(callbacks, S, W, R, c, h, 1.0 - LAST, THERE)
     for i in range(W.way.shape[0]):
         if i == first:
             continue
         f = W.g[END, i]
-        slope = (f - W.g[THERE, i]) / (d * h)
+        slope = (f - W.g[THERE, i]) / (LAST * h)
         came = -1.0 if slope > 0.0 else 1.0  # the side that it comes from
         if fires(W.way[i], came) and abs(f) <= W.real[SAME] * abs(slope) and slope != 0.0:
             W.fired[i] = 1
+
+
+@formula
+def at_the_end(callbacks, S, W, R, c, h):
+    """Note in W.fired the guards that are zero where the motion ends, to rounding of time; whether there are any.
+
+    What passes zero at the very end belongs to the motion that ends there.
+    """
+    n = 0
+    glance(callbacks, S, W, R, c, h, 1.0 - LAST, THERE)
+    for i in range(W.way.shape[0]):
+        f, s = W.g[END, i], W.g[SIDE, i]
+        if W.kept[i] == 1 or not f - f == 0.0:
+            continue
+        slope = (f - W.g[THERE, i]) / (LAST * h)
+        if fires(W.way[i], s) and s * slope < 0.0 and abs(f) <= rounding(W, c, i, slope, GRAIN_END):
+            W.fired[i] = 1
+            n += 1
+    return n > 0

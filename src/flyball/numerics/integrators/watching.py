@@ -9,21 +9,23 @@ import numpy as np
 # what a guard's way means: which passing of zero is an event
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
-# making; what is zero of those that begin near it; least, largest and farthest from what is expected at stages; then
-# at the nodes of a panel, and where these are checked
-START, END, TRUE, THERE, SIDE, MARK, LEAST, MOST, MISS, NODE = range(10)
+# making; what is zero of those that begin near it; what they were as they fired; what is rounding of them at the start
+# and the end; least, largest and farthest from what is expected at stages; then at the nodes of a panel, and where
+# these are checked
+START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST, MISS, NODE = range(13)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it
 # entries of Watch.real: panel's begin and width; time within which events are at the same instant;
-# the part of the step that was looked through; where a guard that comes back is beyond zero
-PANEL, WIDTH, SAME, DONE_TO, BEYOND, REAL = range(6)
-# entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
-# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events; whether what
-# is expected within the step is borne out; places looked at with the equations since it was taken, and in all; whether
-# they could not be evaluated at one; times that a step was cut since it could not be looked through; whether a guard
-# leaves the side that it has to keep
-STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(14)
+# the part of the step that was looked through; where a guard that comes back is beyond zero; how far apart places are
+# between which it passes; when the last event was
+PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, LATEST, REAL = range(8)
+# entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
+# be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
+# out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
+# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(13)
+UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
 
@@ -32,10 +34,8 @@ class Watch(NamedTuple):
 
     way: np.ndarray  # (ng,): which passing of zero is an event
     kept: np.ndarray  # (ng,): 1 of those that are above zero by what holds now
-    grain: np.ndarray  # (ng,): what is rounding of them
-    side: (
-        np.ndarray
-    )  # (ng,): 1 where the guard is above zero now, -1 below; in the first step 0 where it has just fired
+    grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
     g: np.ndarray  # (GUARDS, ng)
     poly: np.ndarray  # (NODES,): a guard over a panel, in powers
@@ -123,18 +123,20 @@ def watching(
     ng = len(way)
     kept, met = (np.array(x, np.int64) for x in kept_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
+    g = np.full((GUARDS, ng), np.nan)
+    g[GRAIN_START : GRAIN_END + 1] = 0.0
     return Watch(
         way=np.array(way, np.int64),
         kept=np.array(holding, np.int64),
         grain=np.zeros(ng),
-        side=np.ones(ng),
+        side=np.full(ng, UNKNOWN),
         fired=np.zeros(ng, np.int64),
-        g=np.full((GUARDS, ng), np.nan),
+        g=g,
         poly=np.zeros(NODES),
         basis=basis(),
         nodes=np.r_[nodes(), CHECKED],
         checks=checks(),
-        real=np.zeros(REAL),
+        real=np.r_[np.zeros(REAL - 1), -np.inf],
         count=np.zeros(COUNT, np.int64),
         stages=kept,
         met=met,

@@ -26,6 +26,7 @@ from .holding import gone_on, hold, let_go
 from .setting import set_parameters
 
 AT_ONCE = 64  # units of the last place of a time: the gap that a jump of laws leaves, and more
+TOGETHER = 1e-11  # part of a motion within which events happen at once
 MOST = 1000  # expressions of events that are kept as they were read
 CLEAR = 1e-9  # of what an expression was at most: beyond it, it has passed zero by a jump
 
@@ -118,6 +119,7 @@ def act_at_start(here: Here) -> Acts:
             here.c.work.switch[MODE, k] = HELD
     if here.start.before is not None:
         gone_on(here, here.start.before)
+        here.counts.update(here.start.before.counted)
         return Acts(here, (), before=here.y.copy(), tables=here.c.values)
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
@@ -166,6 +168,16 @@ def true_already(here: Here) -> list[str]:
     texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
     values = expressions(here) if texts else {}
     return [every[g].name for g, text in texts.items() if values[g] > 0.0 and compared(text, every[g]) is not None]
+
+
+def at_the_seam(here: Here) -> set[str]:
+    """Names of events that happened at the very end of the motion that this one goes on from."""
+    before = here.start.before
+    if before is None:
+        return set()
+    end, first = before.final[0], float(before.t[0])
+    since = end - max(AT_ONCE * float(np.spacing(max(abs(end), abs(first)))), TOGETHER * (end - first))
+    return {h.name for h in takewhile(lambda h: h.t >= since, reversed(before.events)) if h.kind == "event"}
 
 
 def say_never(here: Here, true: Sequence[str]) -> None:

@@ -93,6 +93,15 @@ def endless(n: Instant, recent: Iterable[Sequence[int]], many: int, within: floa
     )
 
 
+def accumulating(n: Instant, guard: int, many: int, end: float) -> Unresolved:
+    """Events of one guard, ``many`` so far, that come ever closer towards the time ``end``."""
+    return Unresolved(
+        f"at t = {n.here.t:.9g} s {guard_names(n, [guard])[0]} has happened {many} times, ever sooner after the last, "
+        f"without end before t = {end:.6g} s",
+        t=n.here.t,
+    )
+
+
 def no_impulses(n: Instant, parts: list[Part]) -> Unresolved:
     """Velocities cannot change as all ask."""
     return Unresolved(

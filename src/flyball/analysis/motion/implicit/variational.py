@@ -6,16 +6,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....equations.engine import Sheet, engine
+from ....compiler.bound import Bound, Written
+from ....equations.callbacks import Going, Own
 from ....equations.tree import quaternion_at
-from ....equations.variational import Turns, variational_kernel
+from ....equations.variational import Turns, variational_steps
 from ....errors import ModelError, SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.integrators.tableaux import tableau
-from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE
+from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE, System, Work
 from ...compiled import Compiled
 from ..start import Start
+from .loop import SEEN
 from .suited import VARIATIONAL
 
 TIGHT, CLOSED = 1e-15, 1e-9  # parts of the mechanism's length: violations that are none; that rounding may leave
@@ -44,36 +46,44 @@ class Desk(NamedTuple):
     pushes: np.ndarray  # (KEPT, nv): and of that for forces
 
 
+class Means(NamedTuple):
+    """What its steps work with."""
+
+    turns: Turns
+    desk: Desk
+
+
 class Variational:
-    """A motion by the variational method, ready to run.
+    """Steps of the variational method for one motion.
 
     Parameters
     ----------
     c : Compiled
         In absolute coordinates.
     clock : Clock
-    width : int
-        Of a row of output.
     """
 
-    def __init__(self, c: Compiled, clock: ex.Clock, width: int) -> None:
+    R = tableau("rk45")  # is not looked at
+    c, stages = SEEN, len(SEEN)
+
+    def __init__(self, c: Compiled, clock: ex.Clock) -> None:
         s, S = c.structure, c.system
-        nv, nr, nz, ny = s.nv, len(s.rows), len(s.states), clock.y.shape[1]
-        self.c, self.clock = c, clock
-        self.own = clock._replace(
-            real=clock.real.copy(), count=clock.count.copy(), y=np.zeros((ex.STATES, ny)), K=np.zeros((1, ny))
-        )
-        self.sheet = Sheet(np.zeros((4, max(width, nv + 3 * nr + 3 * len(s.measured), 1))))
-        self.R = tableau("rk45")
+        nv, nr, nz = s.nv, len(s.rows), len(s.states)
+        self.clock = clock
+        self.width = nv + 3 * nr + 3 * len(s.measured)
         turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0]
-        self.turns = Turns(np.array(turns, np.int64))
         real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
         real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.glob[LENGTH], CLOSED * S.glob[LENGTH]
         n, z = int(S.row_p[nr]), np.zeros
-        self.desk = Desk(
+        desk = Desk(
             count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((3, nv)),
             z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
         )  # fmt: skip
+        self.means = Means(Turns(np.array(turns, np.int64)), desk)
+
+    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+        """The door with these tuples bound to it."""
+        return Bound(variational_steps, *map(Written, (S, W, self.means, own, going)))
 
     @property
     def failed(self) -> SimulationError | None:
@@ -86,12 +96,6 @@ class Variational:
             f"velocities return: give a shorter step; for strong damping and stiff springs method='radau'",
             t=t,
         )
-
-    def go_on(self, out: np.ndarray) -> int:
-        """Go on until the end, or what else `fixed.advance` returns for. Returns rows written."""
-        S, W = self.c.system, self.c.work
-        door = engine.address(S, W, self.R, self.own, self.sheet)
-        return variational_kernel((door, 0), S, W, self.R, self.own, self.sheet, self.turns, self.desk, self.clock, out)
 
 
 def refuse_unknown(begun: Start) -> None:

@@ -1,0 +1,59 @@
+"""Motions that are not what their tolerance asks for say so, everywhere; sound ones do not."""
+
+import json
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import flyball as fb
+from flyball.cli import app
+from tests.mechanisms import example
+
+
+def coupled() -> fb.Mechanism:
+    """A crank and a rocker whose coupler is a spring of 1e8 N/m: what swings at 25 000 rad/s never dies out."""
+    m = fb.Mechanism("coupled", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("crank", mass=1, inertia=1 / 12, position=(0, 0.5), angular_velocity=-1))
+    m.add(fb.Body("rocker", mass=1, inertia=1.5**2 / 12, position=(2, 0.25), angular_velocity=-2 / 3))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "ground", "rocker", at=(2, -0.5)))
+    m.add(fb.SpringDamper("coupler", "crank", "rocker", at=((0, 1), (2, 1)), stiffness=1e8))
+    return m
+
+
+@pytest.mark.parametrize("method", ["dop853", "rk45"])
+def test_a_stiff_motion_at_a_rough_tolerance(method):
+    """It comes out off by as much as it moves, and nothing is raised."""
+    m = coupled()
+    exact = m.simulate(2.0, outputs=11, method="radau", rtol=1e-8)
+    assert not exact.health.doubtful
+    rough = m.simulate(2.0, outputs=11, method=method, rtol=1e-2)
+    assert np.abs(rough["crank"].angular_velocity - exact["crank"].angular_velocity).max() > 1.0
+    (text,) = rough.health.doubtful
+    assert text.startswith("the energy balance is off by ")
+    assert rough.health.status == "done, but doubtful"
+    assert ("doubtful", text) in rough.health.lines()
+    assert rough.health.as_dict()["doubtful"] == (text,)
+    assert text in rough.health.warnings
+
+
+def test_it_is_kept_and_shown(tmp_path):
+    m = coupled()
+    r = m.simulate(0.1, outputs=5, method="rk45", rtol=1e-2)
+    r.save(tmp_path / "r.nc")
+    assert fb.load_result(tmp_path / "r.nc").health.doubtful == r.health.doubtful
+    assert "The run reached its end, but is doubtful" in r.report()
+    m.save(tmp_path / "m.toml")
+    asked = ["run", str(tmp_path / "m.toml"), "--t-end", "0.1", "--method", "rk45", "--rtol", "1e-2", "--no-plots"]
+    out = CliRunner().invoke(app, [*asked, "--out", str(tmp_path / "o"), "--json"])
+    assert json.loads(out.stdout)["doubtful"]
+    out = CliRunner().invoke(app, [*asked, "--out", str(tmp_path / "p")])
+    assert "done, but doubtful" in out.stdout
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-5, 1e-7, 1e-10])
+@pytest.mark.parametrize("name", ["slider_crank.toml", "car_axis.toml", "heavy_top.toml", "governor.toml"])
+def test_sound_motions_are_not_doubted(name, rtol):
+    """At a rough tolerance a rough balance is what was asked for."""
+    m = example(name)
+    assert not m.simulate(0.5, outputs=11, rtol=rtol).health.doubtful
