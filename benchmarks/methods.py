@@ -79,8 +79,8 @@ def main() -> None:
         for name in METHODS:
             rows.append({"problem": problem, "method": name} | cheapest(m, t_end, exact, name, asked.error))
     columns = {
-        "problem": "problem", "method": "method", "rtol": "rtol", "step": "step [s]", "steps": "steps", "error": "error",
-        "cpu": "CPU [ms]",
+        "problem": "problem", "method": "method", "rtol": "rtol", "step": "step [s]", "steps": "steps",
+        "error": "error", "cpu": "CPU [ms]",
     }  # fmt: skip
     print(timing.table([{k: row.get(k, "") for k in columns} for row in rows], columns))
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from ....numerics.integrators import clock as ex
 from ...compiled import Compiled
 from ..options import Integration
-from .alpha import RHO, Alpha
+from .alpha import Alpha
 from .loop import Implicit
-from .suited import ALPHA, VARIATIONAL
+from .suited import ALPHA, RHO, VARIATIONAL
 from .variational import Variational
 
 

@@ -18,6 +18,7 @@ IMPLICIT = (RADAU, ALPHA, VARIATIONAL)
 """Integrators with loops of their own, by name."""
 EVEN = (ALPHA, VARIATIONAL)
 """Those of them whose steps are of one width, which has to be given."""
+RHO = 0.8  # spectral radius at infinity of generalised-alpha, where none is given
 FEW = 40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
 
 
