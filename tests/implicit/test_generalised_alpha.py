@@ -173,5 +173,3 @@ def test_what_makes_no_sense_is_refused():
     assert "rho_inf is a number of method='generalised-alpha'" in refused(method="radau", rho_inf=0.5)
     assert "did you mean 'generalised-alpha'" in refused(method="newmark")
     assert "stabilization='baumgarte' does nothing" in refused(method=ALPHA, step=0.1, stabilization="baumgarte")
-    with pytest.raises(fb.ModelError, match=r"method='generalised-alpha' does not know events"):
-        example("ratchet.toml").simulate(0.1, method=ALPHA, step=0.01)

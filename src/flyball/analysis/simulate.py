@@ -96,7 +96,7 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
     begun.since = started
-    if o.method in IMPLICIT and not leaves_no_freedom(begun):
+    if o.method in IMPLICIT and (watched(begun) or not leaves_no_freedom(begun)):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
