@@ -101,7 +101,8 @@ def test_a_law_held_on_its_corner_is_computed_by_the_explicit_method():
     m = fb.Mechanism("relay", planar=True)
     m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(1, 0)))
     m.add(
-        fb.Actuator("u", "A.displacement", "-2*sign(displacement) - rate + t"), fb.Initial("A.displacement", value=0.5)
+        fb.Actuator("u", "A.displacement", force="-2*sign(value) - rate + t"),
+        fb.Initial("A.displacement", value=0.5),
     )
     e = m.simulate(4.0, outputs=41, rtol=1e-11, method="dop853")
     r = m.simulate(4.0, outputs=41, rtol=1e-8, method="radau")
