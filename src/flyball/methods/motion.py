@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from ..analysis.motion.impulse.settings import Stepping
     from ..analysis.prepared import Prepared
     from ..model.model import Model
@@ -40,6 +42,7 @@ class Motions(Model):
         specialize: bool | str = "auto",
         step: float | str | None = None,
         rho_inf: float | None = None,
+        checkpoint: str | PathLike[str] | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
         """Integrate the equations of motion.
@@ -101,6 +104,10 @@ class Motions(Model):
         rho_inf : float [1], optional
             Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if
             not given. 1 damps nothing.
+        checkpoint : path, optional
+            Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
+            minute of computing at most, the same call goes on from there, to the same digits. Where the motion is
+            there to its end, it is what is returned.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.
@@ -118,10 +125,9 @@ class Motions(Model):
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
         """
-        from ..analysis.motion.choice import SimulateOptions
-        from ..analysis.simulate import simulate
+        from ..analysis.checkpointed import CheckpointOptions, checkpointed
 
-        return simulate(self, SimulateOptions.asked(locals()))
+        return checkpointed(self, CheckpointOptions.asked(locals()))
 
     def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.

@@ -76,7 +76,7 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
     else:
         return begun
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
-    out.since, out.coordinates = begun.since, f"absolute: {why}"
+    out.since, out.part, out.coordinates = begun.since, begun.part, f"absolute: {why}"
     return out
 
 
