@@ -98,3 +98,65 @@ def test_a_brake_that_helps_a_stop():
     slip = next(e for e in run.events if e.kind == "slip")
     assert slip.t == pytest.approx(np.pi + np.arcsin(3 / 20), abs=1e-8)
     assert np.abs(run["b.x"][run.t < slip.t]).max() < 1e-15
+
+
+def in_space(mu, force=("0", "0", "0"), at=None, torque=None, edges=(0.4, 0.3, 0.2)):
+    """A box of 2 kg on a floor, on four corners."""
+    m = fb.Mechanism("box", gravity=(0, 0, -G))
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 0, 1))), fb.Contact(friction=mu[0], static_friction=mu[1]))
+    m.add(fb.Body("box", shape=fb.Box(edges=edges, mass=2), position=(0, 0, edges[2] / 2)))
+    m.add(fb.PointForce("push", "box", force=force, at=at or (0, 0, edges[2] / 2)))
+    if torque:
+        m.add(fb.PointTorque("spin", "box", torque=torque))
+    return m
+
+
+def slipped(m, t_end, layer="absolute"):
+    run = m.simulate(t_end, outputs=6, rtol=1e-9, method="dop853", coordinates=layer)
+    (slip,) = run.events
+    assert slip.kind == "slip" and not run.health.warnings
+    return slip.t, run
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("mu", MU)
+@pytest.mark.parametrize("up", [0.05, 0.1])
+def test_a_box_in_space_is_pushed(mu, up, layer):
+    """All four corners slip at 2 t = mu m g = 8 N, wherever they have their load from; the way is open."""
+    force = ("2*t*0.6", "2*t*0.8", "0")
+    t, run = slipped(in_space(mu, force, (0, 0, up)), 5.0, layer)
+    assert t == pytest.approx(4.0, abs=1e-9)
+    far = (8 - 20 * mu[0]) / 4 + 1 / 6
+    assert run["box"].position[-1] == pytest.approx((0.6 * far, 0.8 * far, 0.1), abs=1e-9)
+    within_cones(run, 0.4)
+
+
+@pytest.mark.parametrize("mu", MU)
+def test_a_box_in_space_is_spun(mu):
+    """About the vertical, by 0.5 t: it slips at mu m g r = 2 N m, r = 0.25 m being half its diagonal."""
+    t, run = slipped(in_space(mu, torque=("0", "0", "0.5*t")), 4.4)
+    assert t == pytest.approx(4.0, abs=1e-9)
+    inertia = 2 * (0.4**2 + 0.3**2) / 12
+    assert run["box.omega_z"][-1] == pytest.approx(((2 - 5 * mu[0]) * 0.4 + 0.25 * 0.4**2) / inertia, abs=1e-8)
+
+
+def test_a_tall_box_in_space_tips():
+    """About its edge at F h / 2 = m g w / 2: at 2 t = 20 * 0.1 / 0.3 N, before mu m g = 8 N."""
+    m = in_space((0.4, 0.4), ("2*t", "0", "0"), edges=(0.1, 0.1, 0.3))
+    run = m.simulate(3.4, outputs=3, rtol=1e-9, method="dop853")
+    assert run.events[0].t == pytest.approx(10 / 3, abs=1e-9)
+    assert run["box.omega_y"][-1] > 1e-3 and abs(run["box.x"][-1]) < 0.01
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+def test_a_ball_rolls_in_a_groove(layer):
+    """On two planes at right angles, half its radius by sqrt(2) from its axis: a = g sin / (1 + 2/5 * 2)."""
+    m = fb.Mechanism("groove", gravity=(0, G * np.sin(0.2), -G * np.cos(0.2)))
+    m.add(fb.Ground("left", shape=fb.Plane(normal=(1, 0, 1))), fb.Ground("right", shape=fb.Plane(normal=(-1, 0, 1))))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1), density=1000, position=(0, 0, 0.1 * np.sqrt(2))))
+    m.add(fb.Contact(friction=0.5))
+    run = m.simulate(2.0, outputs=11, rtol=1e-9, method="dop853", coordinates=layer)
+    assert run["ball.y"] == pytest.approx(G * np.sin(0.2) / 1.8 * run.t**2 / 2, abs=1e-8)
+    assert run["ball.omega_x"][-1] == pytest.approx(-run["ball.vy"][-1] / (0.1 / np.sqrt(2)), rel=1e-9)
+    assert not run.health.warnings and len(run.events) <= 1
+    within_cones(run, 0.5)

@@ -9,8 +9,10 @@ import numpy as np
 
 from flyball.numerics.integrators import clock as ex
 from flyball.numerics.integrators.expected import expect
+from flyball.numerics.integrators.explicit import answer
+from flyball.numerics.integrators.loop import TRY, advance
 from flyball.numerics.integrators.tableaux import tableau
-from flyball.numerics.integrators.watched import advance_watched
+from flyball.numerics.integrators.watched import begun, onward
 from flyball.numerics.integrators.watching import EVENT, STAGE, START, Watch, watching
 
 
@@ -68,6 +70,12 @@ def look(t, h, x, S, W, row):
     W.g[row] = S.g(t + x * h, W.sensed[0, : W.moving.shape[2]], W.sensed[1, : W.moving.shape[2]])
 
 
+def ask(own, S, W, R, c, task):
+    if task == TRY:
+        W.count[STAGE] = 0
+    return answer(own, S, W, R, c, task)
+
+
 def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", most=10_000, h_max=np.inf):
     """Events (t, fired, y before) of y'' = f(t, q, v), rows of output; ``act(t, y, fired)`` changes y, True: stop."""
     R, y = tableau(method), np.array(y, float)
@@ -85,9 +93,9 @@ def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", mo
     K = np.zeros((len(R.c) + 1, 2 * n))
     c = ex.Clock(real, count, np.array(times, float), Y, K, np.zeros(0, np.int64), np.zeros((6, 0)))
     out, rows, events = np.zeros((64, 1 + 2 * n)), [], []
-    callbacks = derivative, arrive, tangent, watch, note, look
+    callbacks = ask, (derivative, arrive, tangent, inspect), report, begun, onward, watch, note, look
     while True:
-        used = advance_watched(callbacks, inspect, report, S, W, R, c, out)
+        used = advance(callbacks, S, W, R, c, out)
         rows.append(out[:used].copy())
         status = count[ex.STATUS]
         if status == EVENT:

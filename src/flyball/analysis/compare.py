@@ -22,9 +22,9 @@ from ..tables.system import EVALUATIONS, EXCHANGES, FACTORISATIONS, G_VALUE, NU,
 from .compiled import Compiled, compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
+from .motion.engines import Engine
 from .motion.events.here import Here
-from .motion.implicit.loop import run_implicit
-from .motion.implicit.made import implicit
+from .motion.events.run import run_events
 from .motion.implicit.suited import ALPHA, EVEN, IMPLICIT, RADAU, suited
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
@@ -251,16 +251,17 @@ def _run(
         partition.choose(job.model, start)
     start.since = time.perf_counter()
     clock = clock_for(start, *job.span, times, o)
-    loop = implicit(start.assembly.compiled, clock, width(start.assembly), o) if o.method in IMPLICIT else None
+    here = Here(start, clock)
     begun = time.thread_time()
-    if loop is not None:
-        rows, interrupted = run_implicit(loop, width(start.assembly), NO_BREAKS, unwatched)
+    if o.method in IMPLICIT:
+        engine = Engine(start.assembly.compiled, False)
+        rows, interrupted = run_events(here, o, width(start.assembly), unwatched, engine, NO_BREAKS)
     else:
         rows, interrupted = run_clock(start.assembly, clock, tableau(o.method), unwatched, INTEGRATE)
     taken = time.thread_time() - begun
     if interrupted:
         raise KeyboardInterrupt
-    return clock, rows, taken, loop.failed if loop is not None else None
+    return clock, rows, taken, here.failed
 
 
 def _row(job: _Task, name: str, starts: dict[str, Start], truth: Result | None) -> Formulation:

@@ -257,7 +257,6 @@ def _simulated(
         outputs=times.tolist(),
         parameters=parameters,
         start=None,
-        step=None,
         specialize=False,  # differences of motions: all by one engine
         progress=False,
         **projected(coordinates, rtol, atol).choices(),

@@ -23,16 +23,14 @@ from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TO
 from .assembly.start import Assembly
 from .motion import partition
 from .motion.ahead import refuse_missing
-from .motion.choice import SimulateOptions, chosen, instead_of, unresolved
+from .motion.choice import AUTO, SimulateOptions, chosen, instead_of, unresolved
 from .motion.compiling import announce_motion
 from .motion.driven import at_outputs, leaves_no_freedom, owed_works
 from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.loop import run_implicit
-from .motion.implicit.made import implicit
-from .motion.implicit.suited import IMPLICIT, explicit, suited
+from .motion.implicit.suited import IMPLICIT, explicit, suited, unsuited
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -40,6 +38,7 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
+from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
 from .progress import Tell, shown
 from .watched import remark_friction
@@ -57,29 +56,33 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
     way = chosen(model, o)
     try:
-        return _told(model, way.options, span, way.why)
+        return _told(model, way.options, span, way.why, o.method == AUTO)
     except (ModelError, SimulationError) as error:
         if way.instead is None or not unresolved(error):
             raise
         try:
-            return _told(model, way.instead, span, instead_of(error))
+            return _told(model, way.instead, span, instead_of(error), False)
         except FlyballError:
             raise error from None
 
 
-def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], why: str) -> Result:
-    """The motion, which says by what it was computed, and why."""
+def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], why: str, auto: bool) -> Result:
+    """The motion, which says by what it was computed, and why; ``auto``: methods may change on the way."""
     try:
-        result = _computed(model, o, span)
+        result = _computed(model, o, span, auto)
     except SimulationError as error:
         if isinstance(error.result, Result):
-            error.result.health.method = why
+            _tell(error.result, why)
         raise
-    result.health.method = why
+    _tell(result, why)
     return result
 
 
-def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray]) -> Result:
+def _tell(result: Result, why: str) -> None:
+    result.health.method = "; ".join(x for x in (why, result.health.method) if x)
+
+
+def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], auto: bool) -> Result:
     """The motion by a method that is chosen: start, end, output times."""
     started = time.perf_counter()
     t_start, _, times = span
@@ -103,6 +106,8 @@ def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.nda
     begun.engine = Engine(begun.assembly.compiled, made, UNMADE.get(o.stabilization, ""))
     if o.method in IMPLICIT:
         begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
+    mixed = auto and o.stabilization == "projection" and o.step is None
+    begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun))
     follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
@@ -139,14 +144,16 @@ def moved(
     later = not watched(begun) and open_until_asked(begun, o, task)
     begun.assembly.compiled.work.option[LATER] = float(later)
     here = Here(begun, clock)
-    if task == INTEGRATE and o.method in IMPLICIT:
-        loop = implicit(c, clock, width(begun.assembly), o)
-        rows, interrupted = run_implicit(loop, width(begun.assembly), known, tell)
-        here.failed = loop.failed
-    elif watched(begun) or len(known.times) or c.structure.sampled:
-        rows, interrupted = run_events(here, tableau(explicit(o.method)), width(begun.assembly), tell, engine, known)
+    if task == INTEGRATE and (o.method in IMPLICIT or watched(begun) or len(known.times) or c.structure.sampled):
+        rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
     else:
-        rows, interrupted = run_clock(begun.assembly, clock, tableau(explicit(o.method)), tell, task, engine)
+        method = tableau(explicit(o.method))
+        rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace)
+        if begun.pace is not None and begun.pace.asked:
+            more, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
+            rows = np.concatenate([rows, more])
+        elif begun.pace is not None:
+            here.method = "; ".join(begun.pace.told)
     if task == INTEGRATE:
         here.watched = "; ".join(x for x in (here.watched, told_of(c, sampled)) if x)
     owed = None
@@ -241,11 +248,18 @@ def width(a: Assembly) -> int:
 
 
 def run_clock(
-    a: Assembly, clock: ex.Clock, method: Tableau, tell: Tell, task: int, engine: Engine | None = None
+    a: Assembly,
+    clock: ex.Clock,
+    method: Tableau,
+    tell: Tell,
+    task: int,
+    engine: Engine | None = None,
+    pace: Pace | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
     ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
+    ``pace`` may ask for another method, and then this one goes no further.
     """
     c, engine = a.compiled, engine or Engine(a.compiled, False)
     s, wide = c.structure, width(a)
@@ -256,6 +270,8 @@ def run_clock(
     forget(c.work.stack)
     engine.begin(clock)
     clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
+    if pace is not None:
+        clock.count[ex.QUOTA] = pace.limited(clock, int(clock.count[ex.QUOTA]))
     try:
         while True:
             begin = time.perf_counter()
@@ -272,7 +288,13 @@ def run_clock(
             if engine.begins_anew(clock):
                 rows.clear()
                 forget(c.work.stack)
-            clock.count[ex.QUOTA] = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
+            quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
+            if pace is not None and task == INTEGRATE:
+                pace.asked = pace.turns(c, clock, EXPLICIT)
+                if pace.asked:
+                    return np.concatenate(rows), False
+                quota = pace.limited(clock, quota)
+            clock.count[ex.QUOTA] = quota
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:

@@ -55,6 +55,7 @@ class Bound:
             raise TypeError(f"{door.__qualname__} was not made for such tuples")
         self.enter = _C(self.address)
         self.places = [x.place for x in tuples]
+        self.asked = np.array([self.address, *self.places], np.int64)  # for `door.ask`
 
     def __call__(self, task: int) -> int:
         """Have a task done."""

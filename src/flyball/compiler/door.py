@@ -112,12 +112,34 @@ def enter(address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
     raise NotImplementedError("doors are for compiled code")
 
 
+def ask(places, task):  # type: ignore[no-untyped-def]
+    """Go through a door with tuples written down beforehand (``bound.Bound.asked``); in compiled code only.
+
+    ``places`` are the door's address and those of its five tuples, of types that the caller need not know.
+    """
+    raise NotImplementedError("doors are for compiled code")
+
+
 @on_numba
 def _register() -> None:
     from llvmlite import ir
     from numba import types
     from numba.core.errors import TypingError
     from numba.extending import intrinsic, overload
+
+    @intrinsic
+    def leap(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]
+        def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+            of = ir.FunctionType(ir.IntType(64), [ir.IntType(64)] * 6)
+            return builder.call(builder.inttoptr(args[0], of.as_pointer()), list(args[1:]))
+
+        return types.int64(*[types.int64] * 7), generate
+
+    @overload(ask, jit_options=OPTIONS)
+    def call(places, task):  # type: ignore[no-untyped-def]
+        return lambda places, task: leap(
+            places[0], places[1], places[2], places[3], places[4], places[5], types.int64(task)
+        )
 
     @intrinsic
     def jump(typing, address, A, B, C, D, E, task):  # type: ignore[no-untyped-def]

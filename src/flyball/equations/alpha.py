@@ -1,15 +1,15 @@
-"""A motion by the generalised-alpha method: what it asks of the equations, as `implicit` asks it."""
+"""Steps of the generalised-alpha method behind a door: what they ask of the equations, as `implicit` asks it."""
 
 from __future__ import annotations
 
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
+from ..compiler.door import door
+from ..compiler.jit import formula
 from ..math.scalar import atan, sqrt
-from ..numerics.integrators.implicit import fixed
 from ..numerics.integrators.implicit.even import refuse
 from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
 from ..numerics.integrators.implicit.hermite import between
-from .implicit import PLAN, TURNS, arrive, compose, inspect, linearise, missed, powers, report, turned
+from .callbacks import inspect
+from .implicit import PLAN, TURNS, compose, land, linearise, missed, perform, powers, turned
 
 SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
 
@@ -55,13 +55,14 @@ def slopes(t, k, A, K, c):
     return status
 
 
-@kernel
-def alpha_kernel(doors, S, W, R, own, sheet, SC, WC, benches, plan, desk, clock, out):
-    """Go on with steps of the generalised-alpha method; see `implicit.implicit_kernel`."""
-    moved, pushed, pressed = held(benches[0]), held(benches[1]), held(benches[2])
-    A = (
-        doors[0], doors[1], held(S), held(W), held(R), held(own), held(sheet), held(SC), held(WC), moved, pushed,
-        pressed, held(plan),
-    )  # fmt: skip
-    callbacks = (residual, slopes, compose, arrive, inspect, turned_rates, straight, report)
-    return fixed.advance((attempt, between, enter, refuse), callbacks, A, held(desk), held(clock), out)
+@formula
+def by_alpha(S, W, M, own, going, task):
+    """The generalised-alpha method."""
+    callbacks = (residual, slopes, compose, land, inspect, turned_rates, straight)
+    return perform((attempt, between, enter, refuse), callbacks, S, W, M, own, going, task)
+
+
+@door
+def alpha_steps(S, W, M, own, going, task):
+    """`by_alpha` behind an address."""
+    return by_alpha(S, W, M, own, going, task)

@@ -14,7 +14,8 @@ from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..numerics.integrators.clock import COUNTS, GROW, NEXT, REALS, SPAN, STATES, Clock, H, T
-from ..numerics.integrators.explicit import advance
+from ..numerics.integrators.explicit import answer
+from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..tables.system import COORDINATES, System, Work
 from .dispatch import remember
@@ -102,7 +103,8 @@ def perform(S, W, R, clock, out, task):
         slopes(S, W, t, out)
         return 0
     if task == INTEGRATE:
-        return advance(derivative, arrive, tangent, inspect, report, S, W, R, clock, out)
+        callbacks = (answer, (derivative, arrive, tangent, inspect), report, nothing, whole)
+        return advance(callbacks, S, W, R, clock, out)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""A motion by an implicit integrator: what it asks of the equations, through the doors of engine and residuals.
+"""Steps of implicit methods behind a door, for the loops of all integrators: see `callbacks`.
 
 Stages are asked of the engine's own residual, Jacobians of the same formulas by complex steps (``residual.py``); ends
 of steps and rows of output are the engine's, projected and solved as everywhere.
@@ -10,22 +10,42 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter
-from ..compiler.held import held
-from ..compiler.jit import formula, kernel
-from ..numerics.integrators.clock import GROW, NEXT, NOW, SPAN, H, T
-from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START
-from ..numerics.integrators.implicit.radau import advance
-from ..tables.system import COORDINATES, FORCE_WORK, LAM, LENGTH, NU, ROW_WORK
+from ..compiler.door import door, enter
+from ..compiler.jit import formula
+from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
+from ..numerics.integrators.implicit.asked import answer, rates_at_begin
+from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START, Desk
+from ..numerics.integrators.implicit.radau import attempt, refuse
+from ..numerics.integrators.implicit.radau import enter as enter_radau
+from ..numerics.integrators.implicit.step import between as between_radau
+from ..numerics.integrators.loop import BEGIN
+from ..tables.system import (
+    COORDINATES,
+    FORCE_WORK,
+    LAM,
+    LENGTH,
+    MODE,
+    NU,
+    ROW_WORK,
+    STEADY,
+    SWITCH_ROW,
+    VALUE,
+    System,
+    Work,
+)
+from .callbacks import OWN, S_, SHEET, W_, inspect, meet, through
+from .callbacks import arrive as arrive_there
 from .dispatch import progress
-from .tasks import ARRIVE, INSPECT, POSITION, REPORT, RESIDUAL, STEPS
+from .residual import Bench
+from .rows import way_of
+from .tasks import POSITION, RESIDUAL, STEPS, WATCH
 from .tree import retract
 
 STEP = 1e-40
 FAR = 12.0  # square of an increment 2 tan(angle / 2): a third of a turn in a step is the most
-ENGINE, RESIDUALS, S_, W_, R_, OWN, SHEET, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN = range(13)
+RESIDUALS, SC_, WC_, MOVED, PUSHED, PRESSED, PLAN, GOING, BETWEEN = range(7, 16)
 # entries of Plan.first: numbers of the Jacobian that begin there
-PICKED, PICKED_MASS, ROWS, ROWS_METRIC, SIZES, TURNS, PRESSES, END = range(8)
+PICKED, PICKED_MASS, ROWS, ROWS_METRIC, ROWS_HELD, SIZES, TURNS, PRESSES, END = range(9)
 
 
 class Plan(NamedTuple):
@@ -34,17 +54,24 @@ class Plan(NamedTuple):
     first: np.ndarray  # (END + 1,)
     pick: np.ndarray  # (n, 2): by positions and velocities, then by accelerations: step, residual
     metric: np.ndarray  # (nv,): D
-    valued: np.ndarray  # (nr,): whether a row restrains positions
+    holonomic: np.ndarray  # (nr,): whether a row restrains positions
+    valued: np.ndarray  # (nr,): and does so in its present mode
     turns: np.ndarray  # first angular velocity of each quaternion
     pressing: np.ndarray  # rows whose multipliers some friction depends on
     fixed: np.ndarray  # (1,): whether the mass matrix does not change
     negative: np.ndarray  # numbers whose negatives stand behind all others and a -1
 
 
-@formula
-def through(A, task):
-    """Have the engine do a task at the state on its desk."""
-    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
+class Means(NamedTuple):
+    """What steps of an implicit method work with."""
+
+    SC: System  # in complex numbers
+    WC: Work
+    moved: Bench  # with steps of positions and velocities
+    pushed: Bench  # of accelerations
+    pressed: Bench  # without
+    plan: Plan
+    desk: Desk  # of the method
 
 
 @formula
@@ -191,7 +218,8 @@ def rows_of(S, W, K, P, k):
         for e in range(S.row_p[r], S.row_p[r + 1]):
             g = W.G[e]
             J[P.first[ROWS] + e] = g
-            J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g
+            J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g * P.valued[r]
+            J[P.first[ROWS_HELD] + e] = g * P.valued[r]
             size += (g * g + lever) * P.metric[S.col_i[e]]
         J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
     for n in range(P.negative.shape[0]):
@@ -245,75 +273,65 @@ def press(A, K, k, n):
 @formula
 def arrive(t, y, dy, A, K):
     """Put y on the constraints, in place, and evaluate there; how far it moved. Multipliers go to ``K.found``."""
-    own, W = A[OWN], A[W_]
-    own.real[T] = t
-    for i in range(y.shape[0]):
-        own.y[0, i] = y[i]
-    status = through(A, ARRIVE)
+    status, moved = arrive_there(t, y, dy, A, K)
     if status == 0:
-        for i in range(dy.shape[0]):
-            y[i] = own.y[0, i]
-            dy[i] = own.K[0, i]
         for r in range(K.found.shape[0]):
-            K.found[r] = W.row[LAM, r]
-    return status, A[SHEET].rows[0, 0]
+            K.found[r] = A[W_].row[LAM, r]
+    return status, moved
 
 
 @formula
-def inspect(t, h, span, first, seen, A):
-    """What laws do within a step; see ``within.inspect``."""
-    if seen.shape[1] == 0:
-        return 0, 0.0, 0.0
-    own = A[OWN]
-    own.real[T], own.real[H], own.real[SPAN] = t, h, span
-    own.count[NEXT] = first
-    through(A, INSPECT)
-    return own.count[NEXT], own.real[H], own.real[GROW]
+def land(t, y, dy, A, K):
+    """`arrive`; at the end of a step guards are kept within it first."""
+    own, c, watch = A[OWN], A[GOING].clock, A[GOING].watch
+    h, begin = c.real[TRIED], c.real[T]
+    rates_at_begin(K, c)
+    for j in range(watch.met.shape[0] if watch.way.shape[0] > 0 and c.count[STARTED] == 1 else 0):
+        x = watch.met_at[j]
+        z = c.y[ASIDE, : K.z.shape[1]]
+        A[BETWEEN](K, x, h, K.d[START], K.a[START], z)
+        compose(c.y[NOW], K.d[START], K.a[START], z, own.y[0], A)
+        own.real[T] = begin + x * h
+        if through(A, WATCH) != 0:
+            return 1, 0.0
+        meet(A, watch, j)
+    return arrive(t, y, dy, A, K)
 
 
 @formula
-def report(t, y, out, A):
-    """Write a row of output."""
-    own = A[OWN]
-    own.real[T] = t
-    for i in range(y.shape[0]):
-        own.y[0, i] = y[i]
-    status = through(A, REPORT)
-    for i in range(out.shape[0]):
-        out[i] = A[SHEET].rows[0, i]
-    return status
+def as_modes_are(A):
+    """Tell the residuals the present modes and ways, and which rows restrain positions: between steps they stay."""
+    S, W, WC, P = A[S_], A[W_], A[WC_], A[PLAN]
+    for s in range(S.switch_i.shape[0]):
+        for m in range(W.switch.shape[0]):
+            WC.switch[m, s] = complex(W.switch[m, s], 0.0)
+        m = way_of(S, W, s)
+        WC.sensed[VALUE, m] = complex(W.sensed[VALUE, m], 0.0)
+        r = S.switch_i[s, SWITCH_ROW]
+        if r >= 0:
+            P.valued[r] = 0 if W.switch[MODE, s] == STEADY else P.holonomic[r]
 
 
-@kernel
-def implicit_kernel(doors, S, W, R, own, sheet, SC, WC, benches, plan, desk, clock, out):
-    """Go on with an implicit integration; see ``radau.advance``.
-
-    Parameters
-    ----------
-    doors : tuple of int
-        Addresses of the engine and of the residuals.
-    S, W : System, Work
-    R, own, sheet : Tableau, Clock, Sheet
-        The engine's.
-    SC, WC : System, Work
-        In complex numbers.
-    benches : tuple of Bench
-        With steps of positions and velocities, of accelerations, and without.
-    plan : Plan
-    desk : Desk
-    clock : Clock
-    out : (n, width)
-        Rows of output.
-
-    Returns
-    -------
-    int
-        The number of rows written.
-    """
-    moved, pushed, pressed = held(benches[0]), held(benches[1]), held(benches[2])
+@formula
+def perform(method, callbacks, S, W, M, own, going, task):
+    """What a loop asks of an implicit method."""
     A = (
-        doors[0], doors[1], held(S), held(W), held(R), held(own), held(sheet), held(SC), held(WC), moved, pushed,
-        pressed, held(plan),
+        own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, own.doors[1], M.SC, M.WC, M.moved, M.pushed,
+        M.pressed, M.plan, going, method[1],
     )  # fmt: skip
-    callbacks = (residual, linearise, compose, arrive, inspect, report)
-    return advance(callbacks, A, held(desk), held(clock), out)
+    if task == BEGIN:
+        as_modes_are(A)
+    return answer(method, callbacks, A, M.desk, going.clock, task)
+
+
+@formula
+def by_radau(S, W, M, own, going, task):
+    """Radau IIA of order 5."""
+    method = (attempt, between_radau, enter_radau, refuse)
+    return perform(method, (residual, linearise, compose, land, inspect), S, W, M, own, going, task)
+
+
+@door
+def radau_steps(S, W, M, own, going, task):
+    """`by_radau` behind an address."""
+    return by_radau(S, W, M, own, going, task)

@@ -7,7 +7,7 @@ slides is pushed by -mu N d, N being the multiplier of the gap and d the directi
 from __future__ import annotations
 
 from ..compiler.jit import formula
-from ..math.scalar import sqrt
+from ..math.scalar import exp, sqrt
 from ..tables.system import (
     FORCE_F,
     FORCE_LOAD,
@@ -32,6 +32,10 @@ from ..tables.system import (
 from .rows import way_of
 
 SLOW = 1e-10  # lengths of the mechanism a second: slower sliding in space goes the way of its switch
+FRESH = 2.0  # length of the way of what begins to slide in space: in its first moments it goes that way
+FIRST = 3e-5  # lengths a second: so fast it goes its own way for the most part; so many times as fast, wholly
+OVER = 8.0
+BACK = 1e-11  # lengths a second: so fast it goes back when it is told; at first its acceleration is rounding
 TURNED = 0.5  # cosine of the angle by which a direction of sliding turns before its way is told anew
 NOT_WATCHED = float("nan")
 
@@ -47,7 +51,8 @@ def heading(S, W, sensed, s):
     """Direction of sliding along the tangents of slip s and of its partner, and the speed.
 
     In the plane it is the way of the switch. In space it is that of the velocity, reversed where it is more against the
-    way than with it: what comes to rest would slide on smoothly, until the event is found.
+    way than with it: what comes to rest would slide on smoothly, until the event is found. What has just begun to slide
+    goes its way, and that of its velocity as it gets faster: by itself the velocity turns infinitely fast there.
     """
     way = sensed[VALUE, way_of(S, W, s)]
     u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
@@ -57,11 +62,23 @@ def heading(S, W, sensed, s):
     side = sensed[VALUE, way_of(S, W, other)]
     v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
     square = u * u + v * v
+    if (way * way + side * side).real > FRESH:
+        return begins(S, (way, side), (u, v), square)
     slow = SLOW * S.glob[LENGTH]
     if square.real <= slow.real * slow.real:
         return way, side, u * way + v * side
     speed = sqrt(square) if (u * way + v * side).real >= 0.0 else -sqrt(square)
     return u / speed, v / speed, speed
+
+
+@formula
+def begins(S, way, velocity, square):
+    """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths a second."""
+    first = FIRST * S.glob[LENGTH]
+    c = first * exp(-square / (first * first)) / FRESH
+    a, b = velocity[0] + c * way[0], velocity[1] + c * way[1]
+    size = sqrt(a * a + b * b)
+    return a / size, b / size, (velocity[0] * a + velocity[1] * b) / size
 
 
 @formula
@@ -106,5 +123,9 @@ def watched_place(S, W, sensed, lam, kind, s):
     if other < 0:
         return sensed[VALUE, way_of(S, W, s)] * u
     v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
-    along = sensed[VALUE, way_of(S, W, s)] * u + sensed[VALUE, way_of(S, W, other)] * v
-    return along - TURNED * sqrt(u * u + v * v)
+    way, side = sensed[VALUE, way_of(S, W, s)], sensed[VALUE, way_of(S, W, other)]
+    speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
+    turned = (way * u + side * v) / size - TURNED * speed
+    if size * size > FRESH:
+        return min(turned + BACK * S.glob[LENGTH], OVER * FIRST * S.glob[LENGTH] - speed)
+    return turned

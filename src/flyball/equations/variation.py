@@ -12,20 +12,15 @@ engine and of the residuals.
 
 from __future__ import annotations
 
-from ..compiler.door import enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..numerics.integrators.clock import GROW, NEXT, SPAN, H, T
-from ..numerics.integrators.explicit import advance
+from ..numerics.integrators.clock import T
+from ..numerics.integrators.explicit import answer
+from ..numerics.integrators.loop import advance, nothing, whole
 from ..tables.system import BODY_LAW
-from .changes import COUNT, ENGINE, NQ, NZ, OWN, POWERS, R_, S_, SHEET, W_, change, closed, press, settle_at
-from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
-
-
-@formula
-def through(A, task):
-    """Have the engine do a task at the state on its desk."""
-    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
+from .callbacks import OWN, S_, SHEET, W_, inspect, through
+from .changes import COUNT, NQ, NZ, POWERS, change, closed, press, settle_at
+from .tasks import ARRIVE, MOTION, REPORT, TANGENT
 
 
 @formula
@@ -111,18 +106,6 @@ def tangent(y, e, A, P):
 
 
 @formula
-def inspect(t, h, span, first, seen, A, P):
-    """What laws do within a step; see ``within.inspect``."""
-    if seen.shape[1] == 0:
-        return 0, 0.0, 0.0
-    own = A[OWN]
-    own.real[T], own.real[H], own.real[SPAN] = t, h, span
-    own.count[NEXT] = first
-    through(A, INSPECT)
-    return own.count[NEXT], own.real[H], own.real[GROW]
-
-
-@formula
 def report(t, y, out, A, P):
     """Write a row of output: the motion's own; then of each parameter changes of positions, velocities, accelerations,
     multipliers, efforts and works (or powers).
@@ -186,10 +169,11 @@ def variation_kernel(address, residual, S, W, R, own, sheet, SC, WC, bench, plan
     int
         The number of rows written.
     """
-    A = (address, residual, held(S), held(W), held(R), held(own), held(sheet), held(SC), held(WC), held(bench))
+    A = (address, held(S), held(W), held(R), held(own), held(sheet), residual, held(SC), held(WC), held(bench))
     P, c = held(plan), held(clock)
     if states.shape[0] == 0:
-        return advance(derivative, arrive, tangent, inspect, report, A, P, held(R), c, out)
+        callbacks = (answer, (derivative, arrive, tangent, inspect), report, nothing, whole)
+        return advance(callbacks, A, P, held(R), c, out)
     for n in range(states.shape[0]):
         if report(c.times[n], states[n], out[n], A, P) != 0:
             return n

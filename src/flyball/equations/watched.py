@@ -1,21 +1,25 @@
-"""A motion whose steps end on events: the watched loop of the integrators, through the engine's door.
+"""A motion that goes on by steps of any method, and whose steps end on events where there are guards.
 
-What guards depend on is kept at the ends of every step, and multipliers and loads at late stages of it; so between the
-ends guards are the same formula on another `Work`, whose measured quantities and multipliers are expected ones.
+The loops of the integrators, through the engine's door and that of a method. What guards depend on is kept at the ends
+of every step, and multipliers and loads at some places within it; so between the ends guards are the same formula on
+another `Work`, whose measured quantities and multipliers are expected ones.
 """
 
 from __future__ import annotations
 
+from typing import Any, Protocol
+
 import numpy as np
 
-from ..compiler.door import enter
+from ..compiler.bound import Bound
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
-from ..numerics.integrators.clock import GROW, NEXT, SPAN, Clock, H, T
+from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
-from ..numerics.integrators.tableaux import Tableau
-from ..numerics.integrators.watched import advance_watched
-from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, STAGE, START, watching
+from ..numerics.integrators.loop import advance, nothing, whole
+from ..numerics.integrators.tableaux import Tableau, tableau
+from ..numerics.integrators.watched import begun, onward
+from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, watching
 from ..tables.system import (
     BIAS,
     G_SHARED,
@@ -30,28 +34,15 @@ from ..tables.system import (
     System,
     Work,
 )
+from .callbacks import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, Going, Own, levels, put, report, steps, through
 from .engine import Sheet, engine
 from .guards import KEPT, grains
 from .guards import watch as guards
 from .rows import measured
 from .sharing import GRAIN, Sharing, margin, renewed
-from .tasks import ARRIVE, INSPECT, MOTION, REPORT, TANGENT
+from .tasks import MOTION
 
-ENGINE, S_, W_, R_, OWN, SHEET, EXPECTED, GROUP = range(8)
-
-
-@formula
-def through(A, task):
-    """Have the engine do a task at the state on its desk."""
-    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], task)
-
-
-@formula
-def put(own, t, y):
-    """Lay a time and a state on the engine's desk."""
-    own.real[T] = t
-    for i in range(y.shape[0]):
-        own.y[0, i] = y[i]
+EXPECTED = 7
 
 
 @formula
@@ -68,75 +59,6 @@ def all_guards(A, W, t, out):
 def balanced(A):
     """Bring what is in balance by itself up to the state last evaluated."""
     renewed(A[ENGINE], A[S_], A[W_], A[R_], A[OWN], A[SHEET], A[GROUP])
-
-
-@formula
-def derivative(t, y, dy, A, K):
-    """The right-hand side; levels are kept at the stages chosen for it."""
-    own = A[OWN]
-    put(own, t, y)
-    status = through(A, MOTION)
-    if status == 0:
-        for i in range(dy.shape[0]):
-            dy[i] = own.K[0, i]
-    K.count[STAGE] += 1
-    for j in range(K.stages.shape[0]):
-        if K.stages[j] == K.count[STAGE]:
-            levels(A, K, 1 + j)
-    for j in range(K.met.shape[0]):
-        if K.met[j] == K.count[STAGE]:
-            all_guards(A, A[W_], t, K.met_g[j])
-    return status
-
-
-@formula
-def arrive(t, y, dy, A, K):
-    """Put y on the constraints, in place, and evaluate there; how far it moved."""
-    own = A[OWN]
-    put(own, t, y)
-    status = through(A, ARRIVE)
-    if status == 0:
-        for i in range(dy.shape[0]):
-            y[i] = own.y[0, i]
-            dy[i] = own.K[0, i]
-    return status, A[SHEET].rows[0, 0]
-
-
-@formula
-def tangent(y, e, A, K):
-    """Take from an error what the projection takes."""
-    own = A[OWN]
-    put(own, own.real[T], y)
-    for i in range(e.shape[0]):
-        own.K[0, i] = e[i]
-    through(A, TANGENT)
-    for i in range(e.shape[0]):
-        e[i] = own.K[0, i]
-
-
-@formula
-def inspect(t, h, span, first, seen, A, K):
-    """What laws do within a step; see ``within.inspect``."""
-    if seen.shape[1] == 0:
-        return 0, 0.0, 0.0
-    own = A[OWN]
-    own.real[T], own.real[H], own.real[SPAN] = t, h, span
-    own.count[NEXT] = first
-    through(A, INSPECT)
-    return own.count[NEXT], own.real[H], own.real[GROW]
-
-
-@formula
-def report(t, y, out, A, K):
-    """Write a row of output."""
-    own = A[OWN]
-    put(own, t, y)
-    status = through(A, REPORT)
-    for i in range(y.shape[0]):
-        y[i] = own.y[0, i]
-    for i in range(out.shape[0]):
-        out[i] = A[SHEET].rows[0, i]
-    return status
 
 
 @formula
@@ -175,17 +97,6 @@ def note(A, K, row):
 
 
 @formula
-def levels(A, K, at):
-    """Keep what has no known rate."""
-    W = A[W_]
-    n = K.rows.shape[0]
-    for k in range(n):
-        K.levels[at, k] = W.row[LAM, K.rows[k]]
-    for k in range(K.spots.shape[0]):
-        K.levels[at, n + k] = W.sensed[K.spots[k, 0], K.spots[k, 1]]
-
-
-@formula
 def look(t, h, x, A, K, row):
     """Guards expected at a part x of the step that begins at t."""
     expect(K, x, h)
@@ -193,31 +104,51 @@ def look(t, h, x, A, K, row):
 
 
 @kernel
-def watched_kernel(address, S, W, R, own, sheet, expected, desk, clock, group, out):
-    """Go on with a watched integration; see `watched`."""
-    A = (address, held(S), held(W), held(R), held(own), held(sheet), held(expected), held(group))
-    callbacks = (derivative, arrive, tangent, watch, note, look)
-    return advance_watched(callbacks, inspect, report, A, held(desk), held(R), held(clock), out)
+def watched_kernel(doors, S, W, R, own, sheet, group, expected, desk, clock, out):
+    """Go on with a watched integration; ``doors``: what the method is asked by (`door.ask`); the engine's address."""
+    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet), held(group), held(expected))
+    callbacks = (steps, doors[0], report, begun, onward, watch, note, look)
+    return advance(callbacks, A, held(desk), held(R), held(clock), out)
 
 
-class Watched:
-    """A motion that is watched: the compiled loop and what it keeps.
+@kernel
+def unwatched_kernel(doors, S, W, R, own, sheet, desk, clock, out):
+    """Go on with an integration in which nothing is watched."""
+    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet))
+    callbacks = (steps, doors[0], report, nothing, whole)
+    return advance(callbacks, A, held(desk), held(R), held(clock), out)
+
+
+class Steps(Protocol):
+    """Steps of a method behind a door."""
+
+    R: Tableau
+    c: np.ndarray  # where in a step guards may be seen, as stages of a method
+    stages: int  # how many of these there are
+    failed: Exception | None  # why it does not go on, where that is the method's own reason
+
+    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+        """The door with these tuples bound to it."""
+
+
+class Loop:
+    """A motion by steps of a method: the compiled loop and what it keeps; watched where there are guards.
 
     Parameters
     ----------
-    R : Tableau
+    steps : Steps
     clock : Clock
         Of the integration.
     S, W : System, Work
     width : int
-        Of a row of output.
+        Of a row of output, and of what the method has the engine write.
     group : Sharing
         What holds together.
     """
 
-    def __init__(self, R: Tableau, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
+    def __init__(self, steps: Any, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
         nm = len(S.row_p) - 1 - len(S.row_i)
-        self.R, self.clock, self.W = R, clock, W
+        self.steps, self.clock, self.S, self.W = steps, clock, S, W
         rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
         columns = np.arange(2 * nm, W.sensed.shape[1])
         loads = columns[: len(columns) - len(S.switch_i)]
@@ -225,20 +156,28 @@ class Watched:
         self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
         there = self.expected.sensed, self.expected.row[LAM]
         guarded = S.guard_i[:, GUARD_WAY], np.isin(S.guard_i[:, GUARD_KIND], KEPT)
-        self.desk = watching(*guarded, R.c, int(R.order_i[1]), nm, rows, np.array(spots, int), there)
+        self.desk = watching(*guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there)
         ny = clock.y.shape[1]
-        self.own = Clock(
+        own = Clock(
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,
             clock.seen,
         )  # fmt: skip
-        self.sheet, self.group = Sheet(np.zeros((4, max(width, W.vel.shape[1], len(S.row_i), 1)))), group
+        self.group, nv = group, W.vel.shape[1]
+        sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
+        self.own = Own(own, sheet, tableau("rk45"), np.zeros(2, np.int64))
+        self._bound: Bound | None = None
 
     def go_on(self, S: System, W: Work, out: np.ndarray) -> int:
-        """Go on until an event, the end, or what else `explicit.advance` returns for. Returns rows written."""
-        address = engine.address(S, W, self.R, self.own, self.sheet)
-        return watched_kernel(
-            address, S, W, self.R, self.own, self.sheet, self.expected, self.desk, self.clock, self.group, out
-        )  # fmt: skip
+        """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written."""
+        x = self.own
+        if self._bound is None or S is not self.S:
+            x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
+            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group))
+        doors = self._bound.asked, x.doors
+        tables = S, W, x.R, x.clock, x.sheet
+        if not len(S.guard_i):
+            return int(unwatched_kernel(doors, *tables, self.desk, self.clock, out))
+        return int(watched_kernel(doors, *tables, self.group, self.expected, self.desk, self.clock, out))
 
     @property
     def fired(self) -> tuple[int, ...]:

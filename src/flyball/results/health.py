@@ -42,6 +42,7 @@ class Health:
     remarks: tuple[str, ...] = ()  # warnings that the analysis itself has to give
     departures: tuple[Departure, ...] = ()  # what of the description the start does not have: element, given, got
     watched: str = ""  # how closely it was looked for events
+    compiling: float = 0.0  # of these seconds, those in which code was compiled or read: at first calls [s]
     events: str = ""  # how many happened at instants, and how often each
     contact: ContactHealth | None = None  # how contacts were solved, where there are any
 
@@ -116,6 +117,10 @@ class Health:
         plain["departures"] = [d.as_dict() for d in self.departures]
         return plain | {k: getattr(self, k) for k in LATE}
 
+    @property
+    def _compiled(self) -> str:
+        return f", of which {self.compiling:.2f} s of compiling" if self.compiling > 0.1 * self.seconds else ""
+
     def lines(self) -> list[tuple[str, str]]:
         """Label and text of what a reader wants to see first."""
         out = [
@@ -128,7 +133,7 @@ class Health:
             ("steps", f"{self.steps} accepted, {self.rejected} refused"),
             ("energy balance", f"{self.energy_drift:.2e} J largest deviation"),
             ("violation", f"{self.violation:.2e} of positions, {self.velocity_violation:.2e} of velocities"),
-            ("time used", f"{self.seconds:.2f} s"),
+            ("time used", f"{self.seconds:.2f} s{self._compiled}"),
         ]
         out = [line for line in out if self._simulated or line[0] not in ("steps", "energy balance", "time used")]
         more = []

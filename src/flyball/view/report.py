@@ -18,6 +18,7 @@ from .tabled import Table
 from .tables import tables
 
 if TYPE_CHECKING:
+    from ..results.health import Health
     from ..results.result import Result
 
 
@@ -124,13 +125,19 @@ def _cards(result: Result) -> str:
         ("Energy balance", f"{number(h.energy_drift)} J", h.energy_drift, relative or "largest deviation"),
         ("Violation", number(h.violation), h.violation, "largest gap of a constraint [m or rad]"),
         ("Velocity violation", number(h.velocity_violation), h.velocity_violation, "[m/s or rad/s]"),
-        ("Steps", str(h.steps), h.steps, f"{h.rejected} refused, {h.seconds:.2f} s of computing"),
+        ("Steps", str(h.steps), h.steps, f"{h.rejected} refused, {_time(h)}"),
     ]
     return "".join(
         f'<div><dt>{escape(term)}</dt><dd data-value="{value!r}">{escape(text)}</dd>'
         f'<dd class="more">{escape(more)}</dd></div>'
         for term, text, value, more in cards
     )
+
+
+def _time(h: Health) -> str:
+    """What was computed, and what was compiled first."""
+    compiled = f", after {h.compiling:.1f} s of compiling" if h.compiling > 0.1 * h.seconds else ""
+    return f"{h.seconds - h.compiling:.2f} s of computing{compiled}"
 
 
 def _plot(figure: Figure) -> str:

@@ -23,6 +23,7 @@ from ...laws.evaluation import evaluate_jet
 from ...laws.opcodes import BY_TIME
 from ...tables.specs import Structure
 from ...tables.system import (
+    ALONG,
     BODY_LAW,
     EFFORT,
     FORCE_ALONG,
@@ -32,6 +33,7 @@ from ...tables.system import (
     LAM,
     NV,
     OFFSET,
+    SLIDING,
     X_SOLVED,
     System,
     Work,
@@ -279,8 +281,10 @@ def pattern(s: Structure, S: System, above: Sequence[Sequence[int]] = ()) -> Any
     reach: list[tuple[np.ndarray, np.ndarray]] = [(np.arange(nb)[b : b + 1],) * 2 for b in range(nb)]
     reach += [(at, at) for at in of_row[:nr]]
     for force in S.force_i:
-        if force[FORCE_ALONG] == 1:
+        if force[FORCE_ALONG] == ALONG:
             at = of_row[nr + force[FORCE_F]]
+        elif force[FORCE_ALONG] == SLIDING:  # along one tangent or two
+            at = np.unique(np.concatenate([of_row[nr + m] for m in force[[FORCE_F, FORCE_M]] if m >= 0]))
         else:
             at = S.frame_i[[force[FORCE_F], force[FORCE_M]]]
             at = at[at >= 0]

@@ -37,7 +37,8 @@ def derivative(x: np.ndarray) -> np.ndarray:
 
 def pressing(s: Structure) -> np.ndarray:
     """The rows whose multipliers some friction depends on."""
-    return np.unique(s.tables["term_i"][s.tables["load_i"][:, 1], TERM_ROW]) if s.loads else np.zeros(0, int)
+    terms = s.tables["load_i"][:, 1] if s.loads else np.zeros(0, int)
+    return np.unique(s.tables["term_i"][terms[terms >= 0], TERM_ROW])
 
 
 def as_complex(system: System) -> System:

@@ -3,27 +3,29 @@
 from __future__ import annotations
 
 from ...compiler.notice import Part, announce
-from ...equations.alpha import alpha_kernel
+from ...equations.alpha import alpha_steps
 from ...equations.engine import engine
-from ...equations.implicit import implicit_kernel
+from ...equations.explicit import explicit_steps
+from ...equations.implicit import radau_steps
 from ...equations.instant import instant
 from ...equations.residual import stepped
-from ...equations.watched import watched_kernel
+from ...equations.watched import unwatched_kernel, watched_kernel
 from ...model.model import Model
 from ...tables.switches import declared
 from .implicit.suited import ALPHA, RADAU
 
 ENGINE = Part("the equations of motion", 22.0, (engine,))
-EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, instant))
+EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, explicit_steps, instant))
 DERIVATIVES = Part("the derivatives of the equations", 15.0, (stepped,))
+LOOP = Part("the loop of implicit methods", 2.0, (unwatched_kernel,))
 STAGES = {
-    RADAU: (DERIVATIVES, Part("the implicit method", 10.0, (implicit_kernel,))),
-    ALPHA: (DERIVATIVES, Part("the generalised-alpha method", 6.0, (alpha_kernel,))),
+    RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 7.0, (radau_steps,))),
+    ALPHA: (DERIVATIVES, LOOP, Part("the generalised-alpha method", 5.0, (alpha_steps,))),
 }
 
 
 def announce_motion(model: Model, integrated: bool, method: object = "") -> None:
     """Say what a motion of the model has to compile first, if it has to: the first on a machine does."""
     stages = STAGES.get(method, ()) if isinstance(method, str) else ()
-    eventful = integrated and not stages and bool(model.events or model.contacts or declared(model))
+    eventful = integrated and bool(model.events or model.contacts or declared(model))
     announce((ENGINE, *((EVENTS,) if eventful else ()), *stages))

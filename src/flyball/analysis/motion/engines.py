@@ -144,6 +144,13 @@ class Engine:
         done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED])
         return int(min(max(steps, 1.0), max(self.due - done, 1.0), LONGEST))
 
+    def stop(self) -> None:
+        """The motion goes on by another method, which goes through the tables."""
+        self.end()
+        self.due = math.inf
+        if self.c.made is not None:
+            self.c.run_on_tables()
+
     def end(self) -> None:
         """The motion is over: what was computed is added up."""
         if self.due < math.inf:

@@ -17,6 +17,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ..compile_time import compiled_since
 from ..mobility import mobility
 from .events.here import Here
 from .options import Integration
@@ -56,7 +57,7 @@ def outcome(
     health = _health(start, clock, o)
     ended = here.failed is None and not interrupted
     health.message, health.success = message, ended and status == ex.DONE
-    health.watched = here.watched
+    health.watched, health.method = here.watched, here.method
     health.remarks = (*health.remarks, *here.doubts)
     s = a.compiled.structure
     cuts = list(accumulate((1, s.nq, s.nv, len(s.states), s.nv), initial=0))
@@ -97,6 +98,7 @@ def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:
         evaluations=int(W.info[EVALUATIONS]),
         factorisations=int(W.info[FACTORISATIONS]),
         seconds=time.perf_counter() - start.since,
+        compiling=compiled_since(start.since),
         options=o.choices(),
         remarks=(
             *map(not_allowed, changed_velocities(start.base.departures)),

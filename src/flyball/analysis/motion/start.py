@@ -23,6 +23,7 @@ from ..mobility import mobility
 from .engines import Engine
 from .joined import refuse_jump
 from .layer import in_coordinates, known
+from .stiff import Pace
 
 MOST = 4  # starts of the same numbers whose coordinates are kept
 
@@ -38,6 +39,7 @@ class Start:
     wound: dict[str, float]  # body -> whole turns that its coordinates count and its angle does not (`Result.wound`)
     engine: Engine | None = None  # what the motion is computed by; table-driven if none
     before: Result | None = None  # what it goes on from
+    pace: Pace | None = None  # whether it goes on by another method; none: it does not
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
 
 

@@ -11,10 +11,15 @@ T, H, T_END, RTOL, ATOL, H_MAX, GROW, LARGEST, SCALE, LEDGER, SPAN = range(11)
 # (of the steps refused since the last accepted one: the last error, the least, its width; an error that is good enough)
 LAST, BEST, BEST_H, PARDON = range(11, 15)
 # (widest step of late; begin of the step before, and of the last that was taken back; largest error accepted, its time;
-# when an error was last found to be rounding; width of fixed steps, 0: adaptive)
-WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT, STEP, REALS = range(15, 23)
+# when an error was last found to be rounding)
+WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT = range(15, 21)
+# (fixed width of steps, 0: adaptive; of the step in the making its width, its error in units of the tolerance, and a
+# part of it that is asked for)
+STEP, TRIED, ERROR, PART, REALS = range(21, 26)
 # entries of Clock.count
-ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS, COUNTS = range(10)
+ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS = range(9)
+# (how the last step tried ended; whether the state within it was asked for)
+TROUBLE, EXTENDED, COUNTS = range(9, 12)
 # rows of Clock.y: the state, the one in the making, the interpolated one; what a trial puts aside; the step before
 NOW, NEW, BETWEEN, ASIDE, ASIDE_RATE, OLD, OLD_RATE, STATES = range(8)
 # rows of Clock.seen that the integrator looks at: what is kept of the begin of a step, and of its end

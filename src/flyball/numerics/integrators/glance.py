@@ -7,9 +7,9 @@ hardly bends, of which a distance or a force does, the equations are evaluated a
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import BETWEEN, T
-from .step import extend, interpolate
-from .watching import END, EXTENDED, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, THERE, TRUE, TRULY
+from .clock import BETWEEN, PART, T
+from .loop import WITHIN
+from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, THERE, TRUE, TRULY
 
 ODD = 1e-2  # part of its change over a step by which a guard may differ from what is expected
 FAR = 0.05  # part of its least distance from zero by which it may
@@ -23,7 +23,7 @@ def glance(callbacks, S, W, R, c, h, x, row):
     """Write guards at a part x of the step to a row."""
     W.count[LOOKS] += 1
     if W.count[PLAIN] == 1:
-        callbacks[5](c.real[T], h, x, S, W, row)
+        callbacks[7](c.real[T], h, x, S, W, row)
     elif exactly(callbacks, S, W, R, c, h, x, row) != 0:
         W.count[LOST] = 1
 
@@ -31,14 +31,13 @@ def glance(callbacks, S, W, R, c, h, x, row):
 @formula
 def exactly(callbacks, S, W, R, c, h, x, row):
     """Write guards of the equations on the dense output at a part x of the step to a row. Returns a status."""
-    if W.count[EXTENDED] == 0:
-        if extend(callbacks[0], S, W, R, c, h) != 0:
-            return 1
-        W.count[EXTENDED] = 1
+    ask, own, watch = callbacks[0], callbacks[1], callbacks[5]
+    c.real[PART] = x
+    if ask(own, S, W, R, c, WITHIN) != 0:
+        return 1
     W.count[SOUGHT] += 1
     W.count[TRULY] += 1
-    interpolate(R, c, x, h, c.y[BETWEEN])
-    return callbacks[3](c.real[T] + x * h, c.y[BETWEEN], S, W, row)
+    return watch(c.real[T] + x * h, c.y[BETWEEN], S, W, row)
 
 
 @formula

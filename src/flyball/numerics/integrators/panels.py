@@ -272,7 +272,7 @@ def begin_sides(callbacks, S, W, R, c, h):
     on the side that it goes to: places closer and closer to the start tell which that is, and whether it comes back
     soon. One that has to stay above zero (W.kept) has not to go below: W.count[AWAY] says that it does.
     """
-    look, t, ng = callbacks[5], c.real[T], W.way.shape[0]
+    look, t, ng = callbacks[7], c.real[T], W.way.shape[0]
     W.count[AWAY] = 0
     if W.count[FRESH] == 0 and not doubtful(W):
         for i in range(ng):
@@ -310,7 +310,7 @@ def begins_near(callbacks, S, W, R, c, h):
     """Note in W.g[MARK] what is zero of guards that begin about there, -1 of others; whether there are any."""
     fill(callbacks, S, W, R, c, h, 0.0, 1.0)
     first = min(1.0, max(AT_FIRST, 4.0 * RESOLVED * max(abs(c.real[T]), c.real[LARGEST]) / h))
-    callbacks[5](c.real[T], h, first, S, W, THERE)
+    callbacks[7](c.real[T], h, first, S, W, THERE)
     near = False
     for i in range(W.way.shape[0]):
         low, high = extent(W, i)

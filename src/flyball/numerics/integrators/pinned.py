@@ -7,11 +7,11 @@ its width, until it ends on the event: what is found is as good as the integrati
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import LARGEST, ULP, T
+from .clock import LARGEST, TRIED, ULP, T
 from .glance import true_guard
+from .loop import TRY
 from .panels import fires
-from .step import attempt
-from .watching import AGAIN, BEYOND, BRACKET, END, EXTENDED, MARK, STAGE, START
+from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -151,23 +151,23 @@ def bracketed(callbacks, S, W, R, c, h, i, bracket):
 
 
 @formula
-def retake(derivative, arrive, tangent, note, S, W, R, c, h):
-    """Take the step again with width h, and note its end. Returns (status, error)."""
-    W.count[STAGE] = 0
-    W.count[EXTENDED] = 0
+def retake(callbacks, S, W, R, c, h):
+    """Take the step again with width h, and note its end. Returns a status."""
+    ask, own, note = callbacks[0], callbacks[1], callbacks[6]
     W.count[AGAIN] += 1
-    status, error = attempt(derivative, arrive, tangent, S, W, R, c, h)
+    c.real[TRIED] = h
+    status = ask(own, S, W, R, c, TRY)
     if status == 0:
         note(S, W, END)
-    return status, error
+    return status
 
 
 @formula
-def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, between):
-    """Take the step again until it ends where guard i leaves side s, near width h: (status, width, error).
+def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
+    """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
 
     The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``between``: a width at
-    which it has not left, and the width of the step as it was. An error of -1 says that it was on that side nowhere.
+    which it has not left, and the width of the step as it was. It does not where it was on that side nowhere.
     """
     least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
@@ -176,9 +176,9 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, betwee
     bound = False  # whether a step that does not reach the event is known
     rough = stride = CLOSE * most + 4.0 * ulp
     last, before, gone = 0.0, 0.0, 1e300
-    status, error, done = 0, 0.0, False
+    status, done = 0, False
     for n in range(TRIES):
-        status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+        status = retake(callbacks, S, W, R, c, h)
         f = W.g[END, i]
         if status != 0 or f == 0.0 or done:
             break
@@ -202,9 +202,8 @@ def end_on(derivative, arrive, tangent, note, S, W, R, c, h, slope, i, s, betwee
         else:
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
-    if least > 0.0 and not bound and not done and abs(W.g[END, i]) > 1e3 * near * abs(slope):
-        error = -1.0
-    return status, h, error
+    found = not least > 0.0 or bound or done or abs(W.g[END, i]) <= 1e3 * near * abs(slope)
+    return status, found
 
 
 @formula

@@ -28,7 +28,6 @@ from .clock import (
     OLD,
     OLD_RATE,
     PARDON,
-    REJECTED,
     RTOL,
     STEP,
     TO,
@@ -37,6 +36,7 @@ from .clock import (
     H,
     T,
 )
+from .loop import shorten
 from .step import LARGE, attempt
 
 SAFETY = 0.85
@@ -79,14 +79,6 @@ def enter(R, c, t, h, error):
     c.real[GROW] = 6.0
     c.count[ACCEPTED] += 1
     afresh(c)
-
-
-@formula
-def shorten(c, h):
-    """Try a step of that width next, as the last was refused."""
-    c.count[REJECTED] += 1
-    c.real[GROW] = 1.0
-    c.real[H] = h
 
 
 @formula

@@ -8,7 +8,7 @@ it first does not is found by halves.
 from __future__ import annotations
 
 from ...compiler.jit import formula
-from .clock import NEW, SPAN, T_END, ULP, T
+from .clock import EXTENDED, NEW, SPAN, T_END, TRIED, ULP, T
 from .glance import compare, exactly, glance, true_guard
 from .panels import band, begin_sides, fires, rounding, side_of, survey
 from .pinned import crossing, end_on, retake
@@ -19,7 +19,6 @@ from .watching import (
     CUTS,
     DONE_TO,
     END,
-    EXTENDED,
     FRESH,
     GRAIN_END,
     LOST,
@@ -43,26 +42,26 @@ CUT, LOST_SIGHT = 2, 1  # why a step is not gone on from: not looked through; no
 
 
 @formula
-def first_event(callbacks, S, W, R, c, h, error):
-    """End the step on the first event in it, if there is one: (status, width, error, whether there is one).
+def first_event(callbacks, S, W, R, c):
+    """End the step on the first event in it, if there is one: (status, width to try next, whether there is one).
 
-    Callbacks: derivative, arrive, tangent, watch, note, look. Where the status is `CUT` the width is one to try next.
+    Where the status is `CUT` the step is not gone on from, and the width is one to try next.
     """
-    derivative, arrive, tangent, watch, note, look = callbacks
-    most = h
+    watch, look = callbacks[5], callbacks[7]
+    h = most = c.real[TRIED]
     hit = False
     for i in range(W.fired.shape[0]):
         W.fired[i] = 0
     W.real[SAME] = AT_ONCE * h + 8.0 * ULP * (abs(c.real[T]) + h)
     compare(look, S, W, c.real[T], h, c.real[SPAN])
     if W.count[PLAIN] == 0 and W.count[FRESH] == 1 and W.count[CUTS] < SHORTER and begins_at_zero(W):
-        return CUT, 0.25 * h, error, False
+        return CUT, 0.25 * h, False
     for _ in range(OTHERS):
         status, i, x, s = next_event(callbacks, S, W, R, c, h)
         if status == CUT and not hit:
-            return CUT, max(W.real[DONE_TO], SKIPPED) * h, error, False
+            return CUT, max(W.real[DONE_TO], SKIPPED) * h, False
         if status == LOST_SIGHT:
-            return LOST_SIGHT, h, error, False
+            return LOST_SIGHT, h, False
         if status != 0 or i < 0:
             break
         if hit and x * h >= h - W.real[SAME]:
@@ -71,17 +70,15 @@ def first_event(callbacks, S, W, R, c, h, error):
         for j in range(W.fired.shape[0]):
             W.fired[j] = 0
         if W.count[AWAY] == 1:
-            h *= x
-            status, error = retake(derivative, arrive, tangent, note, S, W, R, c, h)
+            status = retake(callbacks, S, W, R, c, x * h)
         else:
             slope = expected_slope(callbacks, S, W, R, c, h, x, i)
-            between = W.real[BEYOND] * h, most
-            whole = h
-            status, h, error = end_on(derivative, arrive, tangent, note, S, W, R, c, x * h, slope, i, s, between)
-            if error < 0.0 and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
-                return CUT, 0.5 * whole, error, False
+            status, found = end_on(callbacks, S, W, R, c, x * h, slope, i, s, (W.real[BEYOND] * h, most))
+            if not found and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
+                return CUT, 0.5 * h, False
+        h = c.real[TRIED]
         if status != 0:
-            return LOST_SIGHT, h, error, False
+            return LOST_SIGHT, h, False
         hit = True
         compare(look, S, W, c.real[T], h, c.real[SPAN])
         W.fired[i] = 1
@@ -90,9 +87,9 @@ def first_event(callbacks, S, W, R, c, h, error):
         at_once(callbacks, S, W, R, c, h, i)
     if not hit and h == c.real[T_END] - c.real[T]:
         hit = at_the_end(callbacks, S, W, R, c, h)
-    if hit and W.count[EXTENDED] == 1:  # places within were looked at: back to the end
-        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, error, True
-    return 0, h, error, hit
+    if hit and c.count[EXTENDED] == 1:  # places within were looked at: back to the end
+        return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, True
+    return 0, h, hit
 
 
 @formula

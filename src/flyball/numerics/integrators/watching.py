@@ -20,12 +20,11 @@ CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same 
 # the part of the step that was looked through; where a guard that comes back is beyond zero; how far apart places are
 # between which it passes; when the last event was
 PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, LATEST, REAL = range(8)
-# entries of Watch.count: calls of the right-hand side since the step began; whether its dense output is ready; whether
-# the side of guards near zero is to be found; steps watched; places looked at; steps taken again; events; whether what
-# is expected within the step is borne out; places looked at with the equations since it was taken, and in all; whether
-# they could not be evaluated at one; times that a step was cut since it could not be looked through; whether a guard
-# leaves the side that it has to keep
-STAGE, EXTENDED, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(14)
+# entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
+# be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
+# out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
+# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(13)
 UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 

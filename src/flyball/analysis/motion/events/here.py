@@ -58,6 +58,8 @@ class Here:
         Why the motion cannot go on here.
     watched : str
         How closely it was looked for events, in words.
+    method : str
+        By what it was computed from when on, in words, where that was not one method.
     crept : frozenset of int
         Switches that were at a side and left it the wrong way, with no speed: they close there without a bounce.
     sharing : Sharing, optional
@@ -75,6 +77,7 @@ class Here:
     decider: Any = None
     failed: Exception | None = None
     watched: str = ""
+    method: str = ""
     given: float = 0.0
     kick: np.ndarray | None = None
     blows: list[Any] = field(default_factory=list)

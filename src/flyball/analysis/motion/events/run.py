@@ -13,13 +13,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....equations.engine import INTEGRATE, REPORT, motion_kernel
+from ....equations.explicit import Explicit
 from ....equations.sampled import Sampling
-from ....equations.watched import Watched
+from ....equations.watched import Loop
 from ....errors import FlyballError, ModelError
 from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
-from ....numerics.integrators.tableaux import Tableau
+from ....numerics.integrators.tableaux import tableau
 from ....numerics.integrators.watching import AWAY, CHECKS, END, EVENT, FIRED, LOOKS, NODES, STEPS, UNKNOWN
 from ....tables.system import (
     G_BACK,
@@ -35,7 +36,11 @@ from ....tables.system import (
     SWITCH_MEASURED,
 )
 from ...progress import Tell
-from ..engines import Engine
+from ..engines import FAILED, Engine
+from ..implicit.made import implicit
+from ..implicit.suited import IMPLICIT, explicit
+from ..options import Integration
+from ..stiff import EXPLICIT, Pace, on_corner
 from .accumulating import Counts
 from .actions import at_the_seam, expressions, say_never, stepped_over, true_already
 from .failed import accumulating, endless
@@ -63,7 +68,8 @@ class Run:
     Parameters
     ----------
     here : Here
-    method : Tableau
+    o : Integration
+        Which integrator, and its choices.
     width : int
         Of a row of output.
     tell : callable
@@ -72,9 +78,10 @@ class Run:
         Which loops compute it where nothing is watched.
     """
 
-    def __init__(self, here: Here, method: Tableau, width: int, tell: Tell, engine: Engine) -> None:
-        self.engine = engine
-        self.here, self.method, self.width, self.tell = here, method, width, tell
+    def __init__(self, here: Here, o: Integration, width: int, tell: Tell, engine: Engine) -> None:
+        self.engine, self.now, self.options = engine, o.method, o
+        self.pace = here.start.pace or Pace(float(here.clock.real[ex.T_END]), o.method, str)
+        self.here, self.method, self.width, self.tell = here, tableau(explicit(o.method)), width, tell
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
@@ -82,9 +89,11 @@ class Run:
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         self.counts = Counts()
-        watched = len(here.c.system.guard_i) or len(here.c.system.switch_i) or here.structure.model.events
+        self.guarded = len(here.c.system.guard_i) > 0
+        watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
-        self.loop = self._loop() if len(here.c.system.guard_i) else None
+        self.loop = self._loop()
+        self.quota = int(clock.count[ex.QUOTA])
         self.sampling = self._sampling(here.t)
 
     def _sampling(self, t: float) -> Sampling | None:
@@ -107,9 +116,15 @@ class Run:
             self.rows[-1][-1] = self.row()
         return True
 
-    def _loop(self) -> Watched:
-        c = self.here.c
-        return Watched(self.method, self.here.clock, c.system, c.work, self.width, self.here.group)
+    def _loop(self) -> Loop | None:
+        """By steps behind a door; nothing where the engine's own loop does."""
+        c, clock, width = self.here.c, self.here.clock, self.width
+        if self.now in IMPLICIT:
+            steps = implicit(self.now, c, clock, self.options)
+            return Loop(steps, clock, c.system, c.work, max(width, steps.width), self.here.group)
+        if not self.guarded:
+            return None
+        return Loop(Explicit(self.method), clock, c.system, c.work, width, self.here.group)
 
     def go(self, known: Breaks) -> tuple[np.ndarray, bool]:
         """Go to the end, or as far as it goes: (rows of output, whether the user interrupted)."""
@@ -135,9 +150,47 @@ class Run:
             here.failed = error
         finally:
             engine.end()
-            if self.loop is not None:
+            if self.loop is not None and self.guarded:
                 here.watched = told(self.loop)
+            if self.loop is not None and here.failed is None:
+                here.failed = self.loop.steps.failed
+            here.method = "; ".join(self.pace.told)
         return np.concatenate(self.rows), False
+
+    def turn(self, to: str, why: str) -> None:
+        """Go on by another method from here on."""
+        clock, before = self.here.clock, self.loop
+        self.pace.turned(clock, to, why)
+        self.now = to
+        self.engine.stop()
+        self.loop = self._loop()
+        if before is not None and self.loop is not None:
+            for mine, its in zip(
+                (self.loop.desk.side, self.loop.desk.g), (before.desk.side, before.desk.g), strict=True
+            ):
+                mine[:] = its
+        clock.count[ex.STARTED], clock.count[ex.STATUS] = 0, ex.RUNNING
+        if to not in IMPLICIT and not clock.real[ex.STEP]:
+            clock.real[ex.H] = 0.0  # as at a start
+
+    def turned(self) -> bool:
+        """Go on by another method where that pays, or where this one does not know what is; whether it does."""
+        pace, c, clock = self.pace, self.here.c, self.here.clock
+        implicit, corner = self.now in IMPLICIT, on_corner(c)
+        if implicit and corner:
+            pace.back = self.now
+            self.turn(EXPLICIT, "where a law is held on its corner")
+        elif pace.back and not corner:
+            to, pace.back = pace.back, ""
+            self.turn(to, "where none is any more")
+        elif implicit and pace.mixed and clock.count[ex.STATUS] in FAILED:
+            self.turn(EXPLICIT, f"where {self.now} could not go on")
+            pace.stays()
+        elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.asked or pace.turns(c, clock, self.now)):
+            self.turn(to, "where it is stiff" if to in IMPLICIT else "where it is not stiff any more")
+        else:
+            return False
+        return True
 
     def over(self) -> bool:
         """Do what the compiled loop has returned for: whether the motion is over."""
@@ -149,15 +202,16 @@ class Run:
             if self.sampled():
                 self.legs.aim()
                 return False
-            sharp = self.legs.ends_sharply() and self.loop is not None
+            sharp = self.legs.ends_sharply() and self.guarded
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
                 return True
             if sharp:
                 self.jumped(before)
             return False
-        elif status != ex.RUNNING and not engine.hands_over(clock):
+        elif status != ex.RUNNING and not engine.hands_over(clock) and not self.turned():
             return True
+        self.turned()
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
@@ -173,12 +227,13 @@ class Run:
         if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
             self.sampling.sample(here.c.system, here.c.work, here.clock)
         begin(here)
-        if self.loop is not None and here.start.before is not None:
+        if self.loop is not None and self.guarded and here.start.before is not None:
             self.resume(self.loop)
         self.true = true_already(self.here)
         self.here.fresh = False
+        self.turned()
 
-    def resume(self, loop: Watched) -> None:
+    def resume(self, loop: Loop) -> None:
         """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
 
         What did not is ahead, however near.
@@ -194,6 +249,7 @@ class Run:
         """Call the compiled loop once."""
         c, clock = self.here.c, self.here.clock
         before = time.perf_counter()
+        clock.count[ex.QUOTA] = self.pace.limited(clock, self.quota)
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
             if self.loop is None and self.sampling is not None:
@@ -207,7 +263,7 @@ class Run:
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
             done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            clock.count[ex.QUOTA] = self.engine.limited(clock, done * SLICE / took)
+            self.quota = self.engine.limited(clock, done * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
@@ -231,7 +287,7 @@ class Run:
         self.happens(fired)
         here.crept = frozenset()
 
-    def crept(self, loop: Watched) -> frozenset[int]:
+    def crept(self, loop: Loop) -> frozenset[int]:
         """Stops that what stood at them has crept past: at the step's begin it hardly moved; what did hits them."""
         S, out = self.here.c.system, set()
         for g in loop.fired:
@@ -290,7 +346,7 @@ class Run:
         return row[0]
 
 
-def told(loop: Watched) -> str:
+def told(loop: Loop) -> str:
     """How closely a motion was looked for events: what may have come and gone in between was not seen."""
     count = loop.desk.count
     guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
@@ -302,7 +358,7 @@ def told(loop: Watched) -> str:
 
 
 def run_events(
-    here: Here, method: Tableau, width: int, tell: Tell, engine: Engine, known: Breaks
+    here: Here, o: Integration, width: int, tell: Tell, engine: Engine, known: Breaks
 ) -> tuple[np.ndarray, bool]:
     """Integrate from event to event. Returns (output rows, whether the user interrupted).
 
@@ -310,7 +366,8 @@ def run_events(
     ----------
     here : Here
         Where the motion begins; gets what happens, and in ``failed`` why it could not go on.
-    method : Tableau
+    o : Integration
+        Which integrator, and its choices.
     width : int
         Of a row of output.
     tell : callable
@@ -320,4 +377,4 @@ def run_events(
     known : Breaks
         Times at which steps end.
     """
-    return Run(here, method, width, tell, engine).go(known)
+    return Run(here, o, width, tell, engine).go(known)

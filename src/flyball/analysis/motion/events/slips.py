@@ -11,6 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....constraints.modes import EDGE, SLIP, STOP
+from ....equations.sliding import FIRST, FRESH, OVER
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, GRIPS, HOLDS, SLIPS, TURNS, WITH, Dense
 from ....tables.system import (
     G_CONE,
@@ -26,6 +27,7 @@ from ....tables.system import (
 )
 from .instant import Instant, Part
 
+ALMOST = 0.9  # of the speed at which a slip goes the way of its velocity alone
 SLOW = 1e3  # times what is still: slower where the end of a slip in space was found, it is over
 
 
@@ -49,7 +51,7 @@ def ended(n: Instant, fired: np.ndarray, still: np.ndarray) -> None:
             still[s] |= s in done
         elif s < other:
             slow = np.hypot(n.rate[s], n.rate[other]) <= SLOW * (n.still[s] + n.still[other])
-            still[[s, other]] = (still[s] and still[other]) or (slow and s in done)
+            still[[s, other]] = (still[s] and still[other]) or (slow and s in done and not _goes_on(n, [s, other]))
 
 
 def stop_slips(n: Instant, fired: np.ndarray) -> None:
@@ -61,7 +63,7 @@ def stop_slips(n: Instant, fired: np.ndarray) -> None:
     for s in sorted(n.fired(fired, G_TURNS)):
         pair = [s, int(n.S.switch_i[s, SWITCH_PARTNER])]
         speed, still = np.linalg.norm(n.rate[pair]), n.still[pair].sum()
-        if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW * still:
+        if n.kind[s] == SLIP and pair[1] >= 0 and still < speed <= SLOW * still and not _goes_on(n, pair):
             over += pair
     if not over:
         return
@@ -71,6 +73,21 @@ def stop_slips(n: Instant, fired: np.ndarray) -> None:
     rates[: len(over)] = n.rate[over]
     n.here.v[:] -= np.linalg.lstsq(P.A, rates, rcond=1e-12)[0] @ B.Y
     n.look_again()
+
+
+def _goes_on(n: Instant, pair: list[int]) -> bool:
+    """Whether a slip that has just begun still goes its way: it is slow since it was at rest."""
+    fresh = len(pair) > 1 and n.way[pair] @ n.way[pair] > FRESH and n.way[pair] @ n.rate[pair] > 0.0
+    return bool(fresh and np.linalg.norm(n.rate[pair]) < ALMOST * OVER * FIRST * n.here.c.values.length)
+
+
+def _heading(n: Instant, own: list[int]) -> np.ndarray:
+    """Direction in which a place slides, as the motion has it (`equations.sliding.heading`)."""
+    u = n.rate[own]
+    if _goes_on(n, own):
+        first = FIRST * n.here.c.values.length
+        u = u + first * np.exp(-(u @ u) / first**2) * n.way[own] / FRESH
+    return np.asarray(u / np.linalg.norm(u))
 
 
 def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> list[Part]:
@@ -86,7 +103,7 @@ def parts_of(n: Instant, gap: int, at: int, still: np.ndarray, *, led: bool) -> 
     if held or not led:
         rules = (GRIPS,) if len(own) == 1 else (TURNS, WITH)
         return [Part(s, rule, state=EVEN, gain=mu, of=at) for s, rule in zip(own, rules, strict=True)]
-    d = n.rate[own] / np.linalg.norm(n.rate[own])
+    d = _heading(n, own)
     return [Part(s, DRIVEN, lean=float(x), gain=mu, of=at) for s, x in zip(own, d, strict=True)]
 
 
@@ -145,4 +162,13 @@ def write_slips(n: Instant, parts: Sequence[Part], found: tuple[np.ndarray, ...]
         if state[i] == SLIPS:  # the way it accelerates; against its friction, where that is none
             d = u[rows] if np.linalg.norm(u[rows]) > 0.0 else -x[rows]
             d = d / np.linalg.norm(d)
-        ways[own] = d
+        if n.mode[own[0]] == OFF and _goes_on(n, own):
+            ways[own] = n.way[own]
+            continue
+        ways[own] = FRESH * d if len(own) > 1 and _begins(n, own, d, u[rows]) else d
+
+
+def _begins(n: Instant, own: list[int], d: np.ndarray, u: np.ndarray) -> bool:
+    """Whether a slip in space has hardly any speed yet and gets faster the way d."""
+    speed = np.linalg.norm(n.rate[own])
+    return bool(speed <= n.still[own].sum() or (speed < FIRST * n.here.c.values.length and u @ d > 0.0))

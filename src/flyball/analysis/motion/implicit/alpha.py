@@ -1,4 +1,4 @@
-"""A motion by the generalised-alpha method: what its compiled loop works with."""
+"""A motion by the generalised-alpha method: what its steps work with."""
 
 from __future__ import annotations
 
@@ -6,9 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....equations import residual
-from ....equations.alpha import alpha_kernel
-from ....equations.engine import engine
+from ....equations.alpha import alpha_steps
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.ldl import Pattern
@@ -51,41 +49,27 @@ class Desk(NamedTuple):
 
 
 class Alpha(Implicit):
-    """A motion by the generalised-alpha method, ready to run.
+    """Steps of the generalised-alpha method for one motion.
 
     Parameters
     ----------
     c : Compiled
     clock : Clock
-    width : int
-        Of a row of output.
-    step : float
-        Width of steps [s].
     rho : float
         Spectral radius at infinity: 1 damps nothing, 0 all that steps do not resolve.
     index_3 : bool
         Whether velocities are not held to the constraints.
     """
 
-    def __init__(self, c: Compiled, clock: ex.Clock, width: int, step: float, rho: float, index_3: bool) -> None:
-        self.rho = rho
-        super().__init__(c, clock, width, step, index_3)
+    door = alpha_steps
 
-    def _desk(self, nz: int, step: float) -> Desk:  # type: ignore[override]
-        w = super()._desk(nz, step)
+    def __init__(self, c: Compiled, clock: ex.Clock, rho: float, index_3: bool) -> None:
+        self.rho = rho
+        super().__init__(c, clock, index_3)
+
+    def _desk(self, nz: int, turns: bool) -> Desk:  # type: ignore[override]
+        w = super()._desk(nz, turns)
         nv = self.layout.nv
         w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], 0.1)
         kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
         return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv)), ends=np.zeros((3, nv)))
-
-    def go_on(self, out: np.ndarray) -> int:
-        """Go on until the end, or what else `fixed.advance` returns for. Returns rows written."""
-        S, W = self.c.system, self.c.work
-        doors = (
-            engine.address(S, W, self.R, self.own, self.sheet),
-            residual.address(self.SC, self.WC, self.benches[0]),
-        )
-        return alpha_kernel(
-            doors, S, W, self.R, self.own, self.sheet, self.SC, self.WC, self.benches, self.plan, self.desk, self.clock,
-            out,
-        )  # fmt: skip

@@ -14,7 +14,18 @@ from ....numerics.integrators.implicit.whole import SOFT as SOFTENED
 from ....numerics.ldl import Pattern, analyse
 from ....numerics.lu import constrained_order
 from ....tables.specs import Structure
-from ....tables.system import NV, PARENT, SCHUR, SOLVER, System
+from ....tables.system import (
+    FORCE_ALONG,
+    FORCE_SWITCH,
+    NV,
+    PARENT,
+    SCHUR,
+    SLIDING,
+    SOLVER,
+    SWITCH_OTHER,
+    SWITCH_ROW,
+    System,
+)
 from ...compiled import Compiled
 from ...linear.derivatives import grouped, grouped_sparsity, pattern
 from ...linear.loads import pressing
@@ -39,7 +50,7 @@ class Layout:
         self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
         self.touched, self.group = sparsity(s, self.width, S)
         self.groups = int(self.group.max(initial=-1)) + 1
-        self.pressing = pressing(s).astype(np.int64)
+        self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
         self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
         self.row_p, self.col_i = S.row_p[: self.nr + 1], S.col_i[: S.row_p[self.nr]]
@@ -61,9 +72,9 @@ class Layout:
         i, j = all_rows[r], all_columns[r]
         k, m = all_rows[n] - nv - nr, all_columns[n]
         a, b, nG = len(i), len(k), len(self.col_i)
-        first = np.cumsum([1, 2 * a + b, a, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        first = np.cumsum([1, 2 * a + b, a, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
-        picked, mass, rows, metric, sizes, turns, presses, _ = first.tolist()
+        picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
@@ -77,7 +88,7 @@ class Layout:
             (v + i, v + j, picked + a + b + at(a)),
             (lam + row, v + self.col_i, rows + at(nG)),
             (self.col_i[held], mu + row[held], metric + at(nG)[held]),
-            (mu + row[held], self.col_i[held], rows + at(nG)[held]),
+            (mu + row[held], self.col_i[held], valued_rows + at(nG)[held]),
             (v + self.col_i[~pressed], lam + row[~pressed], None),
             (mu + free, mu + free, np.zeros(len(free), int)),
         ]
@@ -139,6 +150,12 @@ class Layout:
         P, place = analyse(n, i, j, constrained_order(groups, np.arange(bodies + self.nr) >= bodies, i, j))
         lower = P.perm[i] > P.perm[j]
         return P, np.ascontiguousarray(np.column_stack([place[: len(i)] + lower * len(P.Ai), number]))
+
+
+def pressed(S: System) -> np.ndarray:
+    """Rows of gaps of places of contact, whose multipliers the friction there follows."""
+    sliding = S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING, FORCE_SWITCH]
+    return np.asarray(S.switch_i[S.switch_i[sliding, SWITCH_OTHER], SWITCH_ROW], np.int64)
 
 
 def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:

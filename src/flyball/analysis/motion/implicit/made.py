@@ -1,4 +1,4 @@
-"""The loop of an implicit method, by its name."""
+"""The steps of an implicit method, by its name."""
 
 from __future__ import annotations
 
@@ -10,20 +10,18 @@ from .loop import Implicit
 from .suited import ALPHA
 
 
-def implicit(c: Compiled, clock: ex.Clock, width: int, o: Integration) -> Implicit:
-    """A motion by the method that is asked for, ready to run.
+def implicit(method: str, c: Compiled, clock: ex.Clock, o: Integration) -> Implicit:
+    """Steps of a method for one motion.
 
     Parameters
     ----------
+    method : str
     c : Compiled
         In the coordinates of the motion, with the scratch that it is run on.
     clock : Clock
-    width : int
-        Of a row of output.
     o : Integration
     """
     index_3 = o.stabilization == "none"
-    if o.method == ALPHA:
-        rho = RHO if o.rho_inf is None else o.rho_inf
-        return Alpha(c, clock, width, o.step or 0.0, rho, index_3)
-    return Implicit(c, clock, width, o.step or 0.0, index_3)
+    if method == ALPHA:
+        return Alpha(c, clock, RHO if o.rho_inf is None else o.rho_inf, index_3)
+    return Implicit(c, clock, index_3)

@@ -7,8 +7,10 @@ from typing import Any
 
 from ....errors import ModelError
 from ....results.doubts import open_loads
+from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at
+from ..stiff import EXPLICIT
 from .layout import sparsity
 
 RADAU, ALPHA = "radau", "generalised-alpha"
@@ -20,8 +22,8 @@ FEW = 40  # groups of joint coordinates that no equation sees together, up to wh
 
 
 def explicit(method: str) -> str:
-    """The explicit integrator whose tableau the engine is handed: of implicit ones any, which is not looked at."""
-    return "rk45" if method in IMPLICIT else method
+    """The explicit integrator that computes what an implicit one does not know."""
+    return EXPLICIT if method in IMPLICIT else method
 
 
 def refuse_idle(o: Any) -> None:
@@ -58,13 +60,6 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
         For what implicit integrators do not know.
     """
     s = begun.assembly.compiled.structure
-    if s.guards or s.switches or s.model.events:
-        names = [x.title for x in s.model.events] + [x.element.title for x in s.switches]
-        what = ", ".join(dict.fromkeys(names)) or "what switches"
-        raise ModelError(
-            f"method={method!r} does not know events, nor what holds at times and lets go at others: {what}; leave "
-            f"method out, or give method='dop853'"
-        )
     _refuse_open_loads(begun, method)
     if not s.tree or wish == "absolute":
         return begun
@@ -82,6 +77,23 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
     out = begin_at(begun.base, parameters, "absolute", begun.before, switches=True)
     out.since, out.coordinates = begun.since, f"absolute: {why}"
     return out
+
+
+def unsuited(begun: Start) -> str:
+    """Why a motion in those coordinates cannot go on by an implicit method, in words; empty: it can."""
+    s = begun.assembly.compiled.structure
+    if s.model.controllers:
+        return f"method='radau' does not know {s.model.controllers[0].title}"
+    try:
+        refuse_functions(s)
+        _refuse_open_loads(begun, RADAU)
+    except ModelError as error:
+        return str(error).removesuffix("; leave method out, or take the redundancy out")
+    if not s.tree:
+        return ""
+    if s.prescribed:
+        return f"drivers prescribe coordinates ({', '.join(s.prescribed)}); method='radau' takes absolute ones"
+    return "" if _groups(begun) <= FEW else "its chains are long; method='radau' takes absolute coordinates"
 
 
 def _refuse_open_loads(begun: Start, method: str) -> None:

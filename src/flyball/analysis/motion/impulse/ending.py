@@ -33,6 +33,7 @@ from ....stepping.tables import (
 )
 from ....tables.contact import Touching
 from ...assembly.start import Assembly
+from ...compile_time import compiled_since
 from ...mobility import mobility
 from .collect import Collected, coordinates, sets
 from .scene import smallest
@@ -72,6 +73,7 @@ def result_of(
         evaluations=int(count[ITERATIONS]),
         factorisations=0,
         seconds=time.perf_counter() - since,
+        compiling=compiled_since(since),
         options={"method": dataclasses.asdict(o)},
         coordinates="absolute: steps of impulses",
         remarks=nothing_touches(model),

@@ -45,8 +45,10 @@ THROUGH_START = _rows(np.linalg.inv(np.array([[c, c**2, c**3] for c in C])))
 THROUGH_STAGES = _rows(np.linalg.inv(np.array([[1.0, c, c**2] for c in C])))
 """Coefficients of 1, x, x^2 of the polynomial through values at the stages: rows times these."""
 _NODES = np.array([0.0, *C])
-UNSURE = tuple(
-    float(x)
-    for x in np.linalg.solve(np.vander(_NODES, increasing=True).T, 1.0 / np.arange(1.0, 5.0)) - np.r_[0.0, _A[2]]
-)
-"""Weights of an integral over the step by its begin and the stages, less those by the stages: how unsure it is."""
+BEND = tuple(float(1.0 / np.prod([a - b for b in _NODES if b != a])) for a in _NODES)
+"""Weights of the third divided difference of values at the begin of a step and its stages: the cubic through all four
+is the parabola through the stages and this times (x - c1) (x - c2) (x - 1)."""
+BENT = tuple(np.polynomial.Polynomial.fromroots(C).integ().coef[1:].tolist())
+"""Integral of (x - c1) (x - c2) (x - 1) from 0 to x, over x: coefficients of 1, x, x^2, x^3. It is 0 at 1 (Radau)."""
+BENT_MOST = float(np.abs(np.polynomial.Polynomial.fromroots(C).integ()(np.linspace(0.0, 1.0, 1001))).max())
+"""The most that it is within the step."""

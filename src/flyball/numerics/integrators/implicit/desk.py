@@ -20,9 +20,10 @@ from ...ldl import Pattern
 # iterations of all stages together; whether velocities are not held to the constraints (index 3)
 ITERATIONS, JACOBIANS, FACTORS, FRESH, BEFORE, REFINE, LEAST, WHOLE, INDEX_3, COUNTS = range(10)
 # entries of Desk.real: tolerances as the estimate needs them; bound of the iteration; its last ratio, and its rate;
-# width that is factored for; width and error of the step before; fixed width or 0; regularisation; size of corrections
-# that are taken for rounding where they do not fall any more
-RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, STEP, SOFT, ROUGH, REALS = range(12)
+# width that is factored for; width and error of the step before; what the last step asks for: iterations it took, or
+# the factor of its width; regularisation; size of corrections that are taken for rounding where they do not fall any
+# more
+RTOL, ATOL, NEWTON, THETA, RATE, WIDTH, LAST_H, LAST_ERROR, ASKED, SOFT, ROUGH, REALS = range(12)
 START = 3  # row of the state at which a step begins, and of the error estimate
 
 

@@ -8,8 +8,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, LOOSER, NOW, SCALE, T
-from ..clock import RTOL as CLOCK_RTOL
-from .coefficients import ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, UNSURE, A, C
+from .coefficients import BEND, BENT, BENT_MOST, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
 from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, START, THETA
 from .newton import correct, solve_real
 
@@ -209,7 +208,8 @@ def filtered(residual, S, K, c, t, h):
 def unsure(K, c, h):
     """Error of the integrals in units of the tolerance: relative to all that stands in them and to c.real[LEDGER].
 
-    A fast beginning that the state forgets within the step is not forgotten by its integrals.
+    Within the step: at its end they are of a higher order, of the state too, but what lies between is told as well; and
+    a fast beginning that the state forgets is not forgotten by its integrals.
     """
     size = c.real[LEDGER]
     for n in range(c.accounts.shape[0]):
@@ -217,15 +217,17 @@ def unsure(K, c, h):
     at = c.y.shape[1] - K.z.shape[1]
     s = 0.0
     for n in range(c.accounts.shape[0]):
-        i = c.accounts[n] - at
-        e = (
-            UNSURE[0] * K.rate[START, i]
-            + UNSURE[1] * K.rate[0, i]
-            + UNSURE[2] * K.rate[1, i]
-            + UNSURE[3] * K.rate[2, i]
-        )
+        e = BENT_MOST * bent(K, c.accounts[n] - at)
         s += e * e
-    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (LOOSER * c.real[CLOCK_RTOL] * size + 1e-300)
+    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (LOOSER * K.real[RTOL] * size + 1e-300)
+
+
+@formula
+def bent(K, i):
+    """Third divided difference of the rate of integral i, by its begin and the stages, over the step."""
+    return (
+        BEND[0] * K.rate[START, i] + BEND[1] * K.rate[0, i] + BEND[2] * K.rate[1, i] + BEND[3] * K.rate[2, i]
+    )  # fmt: skip
 
 
 @formula
@@ -253,7 +255,10 @@ def defect(residual, S, K, c, h, x):
 
 @formula
 def between(K, x, h, d, v, z):
-    """Increments, velocities and integrals at t + x h, by the polynomial through the stages."""
+    """Increments, velocities and integrals at t + x h, by the polynomial through the stages.
+
+    That of the rates of integrals goes through the begin of the step too: K.rate[START].
+    """
     for i in range(d.shape[0]):
         b1, b2, b3 = coefficients(K.d, i, 0.0)
         d[i] = x * (b1 + x * (b2 + x * b3))
@@ -261,8 +266,9 @@ def between(K, x, h, d, v, z):
         b1, b2, b3 = coefficients(K.v, i, v0)
         v[i] = v0 + x * (b1 + x * (b2 + x * b3))
     p, q, r = THROUGH_STAGES
+    more = x * (BENT[0] + x * (BENT[1] + x * (BENT[2] + x * BENT[3])))
     for i in range(z.shape[0]):
         a, b, c = K.rate[0, i], K.rate[1, i], K.rate[2, i]
         s = p[0] * a + p[1] * b + p[2] * c
         s += x / 2.0 * (q[0] * a + q[1] * b + q[2] * c) + x * x / 3.0 * (r[0] * a + r[1] * b + r[2] * c)
-        z[i] = K.z[START, i] + x * h * s
+        z[i] = K.z[START, i] + h * (x * s + more * bent(K, i))

@@ -1,0 +1,66 @@
+"""Steps of explicit methods behind a door, for loops that are not the engine's own: see `callbacks`."""
+
+from __future__ import annotations
+
+from ..compiler.bound import Bound, Written
+from ..compiler.door import door
+from ..compiler.jit import formula
+from ..numerics.integrators.explicit import answer
+from ..numerics.integrators.loop import TRY
+from ..numerics.integrators.tableaux import Tableau
+from ..numerics.integrators.watching import STAGE
+from ..tables.system import System, Work
+from .callbacks import OWN, Going, Own, arrive, inspect, meet, put, tangent, through
+from .tasks import MOTION, WATCH
+
+
+@formula
+def derivative(t, y, dy, A, K):
+    """The right-hand side; guards and what they depend on are kept at the stages chosen for it."""
+    own = A[OWN]
+    put(own, t, y)
+    K.count[STAGE] += 1
+    met = -1
+    for j in range(K.met.shape[0]):
+        if K.met[j] == K.count[STAGE]:
+            met = j
+    status = through(A, WATCH if met >= 0 else MOTION)
+    if status == 0:
+        for i in range(dy.shape[0]):
+            dy[i] = own.K[0, i]
+    if met >= 0:
+        meet(A, K, met)
+    return status
+
+
+@formula
+def perform(S, W, R, own, going, task):
+    """`explicit.answer`, asked of the engine."""
+    if task == TRY:
+        going.watch.count[STAGE] = 0
+    A = (own.doors[0], S, W, R, own.clock, own.sheet, going.group)
+    return answer((derivative, arrive, tangent, inspect), A, going.watch, R, going.clock, task)
+
+
+@door
+def explicit_steps(S, W, R, own, going, task):
+    """`perform` behind an address."""
+    return perform(S, W, R, own, going, task)
+
+
+class Explicit:
+    """Steps of an explicit method.
+
+    Parameters
+    ----------
+    R : Tableau
+    """
+
+    failed = None
+
+    def __init__(self, R: Tableau) -> None:
+        self.R, self.c, self.stages = R, R.c, int(R.order_i[1])
+
+    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+        """The door with these tuples bound to it."""
+        return Bound(explicit_steps, *map(Written, (S, W, self.R, own, going)))

@@ -1,0 +1,136 @@
+"""An implicit method of equations of motion as the `loop` of all integrators asks for it.
+
+A method is ``attempt(callbacks, S, K, c, h)`` (the step to c.y[NEW] and c.K[1]: status, error, what it asks for),
+``between(K, x, h, d, v, z)`` (increments, velocities, integrals within it), ``enter(K, c, t, h, error, asked)`` and
+``refuse(K, c)`` (what to try next). It knows nothing of mechanisms: it is given ``residual`` (see `step`);
+``linearise(t, k, S, K, c)``, which fills row k of the numbers of the Jacobian at stage k, or where the step begins;
+``compose(y, d, v, z, out, S)``, which makes a state of increments; ``arrive`` (which leaves the multipliers in
+``K.found``) and ``inspect``.
+"""
+
+from __future__ import annotations
+
+from ....compiler.jit import formula
+from ..clock import (
+    ASIDE,
+    AT_END,
+    AT_START,
+    BEFORE,
+    BETWEEN,
+    BLURRED_AT,
+    ERROR,
+    EXCESS,
+    EXTENDED,
+    GROW,
+    NEW,
+    NOT_FINITE,
+    NOW,
+    PART,
+    SPAN,
+    STEP,
+    STUCK,
+    TRIED,
+    H,
+    T,
+)
+from ..loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
+from ..refusal import afresh
+from .desk import ASKED, FRESH, LAST_ERROR, RATE, START, THETA, WIDTH
+from .desk import BEFORE as FOLLOWS
+from .step import defect
+
+SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
+WIDEST = 8.0  # what the width changes by at most
+FIRST = 1e-4  # part of the time span that is tried first
+JUMPED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
+
+
+@formula
+def begin(arrive, inspect, S, K, c):
+    """The state as a stretch of time begins, put on its constraints, and its derivative. Returns a status."""
+    y = c.y[NEW]
+    for i in range(y.shape[0]):
+        y[i] = c.y[NOW, i]
+    status, moved = arrive(c.real[T], y, c.K[0], S, K)
+    if status != 0 or moved > JUMPED:
+        return STUCK
+    for i in range(y.shape[0]):
+        c.y[NOW, i] = y[i]
+        if not c.K[0, i] - c.K[0, i] == 0.0:
+            return NOT_FINITE
+    inspect(c.real[T], 0.0, c.real[SPAN], AT_START, c.seen, S, K)
+    for i in range(K.found.shape[0]):
+        K.lam[START, i] = K.found[i]
+    K.count[FRESH] = K.count[FOLLOWS] = 0
+    K.real[WIDTH] = 0.0
+    K.real[RATE], K.real[THETA] = 1.0, SURE
+    K.real[LAST_ERROR] = 0.0
+    c.real[GROW] = WIDEST
+    c.real[EXCESS] = 1.0
+    c.real[BEFORE] = c.real[T]
+    c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
+    if c.real[H] <= 0.0:
+        c.real[H] = FIRST * c.real[SPAN]
+    afresh(c)
+    return 0
+
+
+@formula
+def overlooked(residual, inspect, S, K, c):
+    """Whether laws do something within the step that its stages have not seen, and that matters; see `explicit`."""
+    h = c.real[TRIED]
+    inspect(c.real[T], h, c.real[SPAN], AT_END, c.seen, S, K)
+    k, x, share = inspect(c.real[T], h, c.real[SPAN], 0, c.seen, S, K)
+    while k > 0:
+        if share > 1.0:
+            return 1
+        if c.real[STEP] == 0.0 and not defect(residual, S, K, c, h, x) * share <= 1.0:
+            return 1
+        k, x, share = inspect(c.real[T], h, c.real[SPAN], k, c.seen, S, K)
+    return 0
+
+
+@formula
+def rates_at_begin(K, c):
+    """Rates of integrals where the step begins: what else is looked at may have overwritten them."""
+    at = c.y.shape[1] - K.z.shape[1]
+    for i in range(K.z.shape[1]):
+        K.rate[START, i] = c.K[0, at + i]
+
+
+@formula
+def within(between, compose, S, K, c):
+    """The state at a part of the step."""
+    z = c.y[ASIDE, : K.z.shape[1]]
+    rates_at_begin(K, c)
+    between(K, c.real[PART], c.real[TRIED], K.d[START], K.a[START], z)
+    compose(c.y[NOW], K.d[START], K.a[START], z, c.y[BETWEEN], S)
+    c.count[EXTENDED] = 1
+    return 0
+
+
+@formula
+def answer(method, callbacks, S, K, c, task):
+    """What the `loop` asks of a method."""
+    attempt, between, enter, refuse = method
+    residual, compose, arrive, inspect = callbacks[0], callbacks[2], callbacks[3], callbacks[4]
+    if task == TRY:
+        c.count[EXTENDED] = 0
+        status, c.real[ERROR], K.real[ASKED] = attempt(callbacks, S, K, c, c.real[TRIED])
+        return status
+    if task == WITHIN:
+        return within(between, compose, S, K, c)
+    if task == ENTER:
+        c.real[BEFORE] = c.real[T]
+        enter(K, c, ending(c), c.real[TRIED], c.real[ERROR], K.real[ASKED])
+        return 0
+    if task == REFUSE:
+        return refuse(K, c)
+    if task == OVERLOOKED:
+        return overlooked(residual, inspect, S, K, c)
+    if task == ENDED:
+        inspect(c.real[T], c.real[TRIED], c.real[SPAN], AT_END, c.seen, S, K)
+        return 0
+    if task == BEGIN:
+        return begin(arrive, inspect, S, K, c)
+    return 0
