@@ -158,12 +158,29 @@ def test_systems_of_the_control_library():
         fb.StateSpace.from_control("c", {}, inputs=["1"])
 
 
-def test_two_that_need_each_other():
-    """A circle: x' = y, y' = -x."""
+def test_a_derivative_that_knows_what_was_before_does_not_kick():
+    """The slide begins drawn out by 0.3: what was measured before says whether that is a jump."""
+    for period in (None, 0.01):
+        first = {}
+        for known in (0.0, 0.3):
+            m = slide(pid(kp=0.0, ki=0.0, setpoint="0", initial_measured=known, period=period))
+            m.add(fb.Initial("A.displacement", value=0.3))
+            first[known] = m.simulate(0.005, outputs=2)["pid.output"][0]
+        assert first[0.3] == 0.0
+        assert first[0.0] == pytest.approx(-0.3 * KD / (TF + (period or 0.0)))
+
+
+def test_two_that_need_each_other(tmp_path):
+    """A circle: x' = y, y' = -x; a file may hold them too."""
     m = slide(fb.State("x", rate="y", initial=1), fb.State("y", rate="-x"), force="0.0*x")
     r = m.simulate(6, outputs=7, **TIGHT)
     assert np.abs(r["x"].output - np.cos(r.t)).max() < 1e-9
     assert np.abs(r["y"].output + np.sin(r.t)).max() < 1e-9
+    m.save(tmp_path / "m.toml")
+    assert fb.load(tmp_path / "m.toml") == m
+    (tmp_path / "m.toml").write_text((tmp_path / "m.toml").read_text().replace('rate = "-x"', 'rate = "-z"'))
+    with pytest.raises(fb.ModelError, match="unknown name"):
+        fb.load(tmp_path / "m.toml")
 
 
 def test_events_watch_what_controllers_say():

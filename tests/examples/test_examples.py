@@ -50,6 +50,7 @@ PROMISED = {
     "governor.toml",
     "governor_criterion.py",
     "heavy_top.toml",
+    "inverted_pendulum.py",
     "n_four_bar.py",
     "peaucellier.toml",
     "pendulum_chain.py",

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..errors import ModelError, SingularityError
 from ..model.model import Model
 from ..model.touching import holds_at_times
-from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
+from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
 from .assembly.start import Assembly
 from .linear.curves import snapshot
+from .linear.derivatives import State
 from .linear.found import finished
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.search import LONGEST, descent, failure, newton, pushed
+from .linear.sliders import STRIDE, places, refuse_sampled, slid, there
 from .linear.stability import GROWTH, stability
 from .linear.turning import turning as turn
-from .linearize import without_inputs
+from .linearize import LinearizeOptions, linearize, without_inputs
 from .options import Options
 from .resting.rest import rest
 from .steps import tangent_step
-from .untouched import refuse_controllers
+
+ABOUT: dict[str, Any] = {
+    "t": None, "parameters": None, "coordinates": "auto", "frozen": False, "inputs": (), "outputs": ()
+}  # fmt: skip
+"""What `linearize` is asked about an equilibrium, to judge it."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +72,8 @@ def resting(
 
 def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """A static equilibrium near the mechanism as described, or a steady motion: see `Mechanism.equilibrium`."""
-    refuse_controllers(model, "equilibrium")
+    if model.controllers:
+        return _controlled(model, o)
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin = _begun(a, o.start)
     if holds_at_times(model):
@@ -76,6 +84,35 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
     if o.preload:
         return finished(*preloaded(begin, o.preload), "preload")
     return _searched(Rest.at(a.compiled, a.t, begin.q), o.stable)
+
+
+def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
+    """Where a mechanism rests with its controllers: no state of theirs changes. Its stability is that of the motion."""
+    refuse_sampled(model, "equilibrium")
+    for name in ("stable", "preload", "turning"):
+        if getattr(o, name):
+            raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
+    a = assemble(model, t=o.t, parameters=o.parameters)
+    begin, c = _begun(a, o.start), a.compiled
+    names = [x.name for x in c.structure.controls]
+    old = dict(zip(names, (begin if o.start is None else o.start.assembly).compiled.z.tolist(), strict=False))
+    other = slid(model, {name: repr(z) for name, z in old.items()}, places=True)
+    if holds_at_times(other.model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "
+            f"leave what holds out, m.changed({{...: None}}), or simulate until it rests"
+        )
+    b = there(other, State.resting(c, a.t, begin.q), "absolute")
+    x = Rest.at(b.c, b.t, b.q)
+    if (found := newton(x)) is None:
+        raise failure(x)
+    q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
+    c.z[: len(names)] = [old[name] + STRIDE * at for name, at in zip(names, places(other, found), strict=True)]
+    out = finished(Rest.at(c, a.t, q), {}, "Newton's method")
+    w = linearize(model, LinearizeOptions(about=out, **ABOUT)).eigenvalues
+    grows = w.real.max(initial=-1.0) / max(np.abs(w).max(initial=0.0), 1e-300)
+    out.stability = UNSTABLE if grows > GROWTH else MARGINAL if grows > -GROWTH else STABLE
+    return out
 
 
 def _refuse_smooth_only(o: EquilibriumOptions) -> None:

@@ -8,7 +8,7 @@ accelerations; a change of the state, x~ = x - B2 w' - (B1 + A B2) w, takes the 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -33,12 +33,12 @@ from .linear.instant import instant
 from .linear.kinks import refuse_kinks
 from .linear.large import DENSE, Large, is_large
 from .linear.reduced import Frame, Inputs, Reduced, reduced
+from .linear.sliders import refuse_sampled, slid, there, without_places
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
 from .resting.instant import closed_instant
-from .untouched import refuse_controllers
 
 TURNED = 1e-5  # relative change of coefficients a moment later that is none
 IMPROPER = 1e-12  # part of what makes an output follow an input at all, below which its rate's part is rounding
@@ -80,7 +80,8 @@ class LinearizeOptions(InstantOptions):
 
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
-    refuse_controllers(model, "linearize")
+    if model.controllers:
+        return _controlled(model, o)
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "linearize")
         out = _linear(joined, there)
@@ -106,6 +107,35 @@ def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
     whole = Large.at(x, o.frozen, _parameters(named))
     later = partial(_state_space_of, model.snapshot(), o)
     return _told(whole.e, named, o.outputs, later, descriptor_of_large(whole, named, o.outputs), None)
+
+
+def _controlled(model: Model, o: LinearizeOptions) -> LinearModel:
+    """Of a mechanism with controllers: of one that has bodies in their place."""
+    refuse_sampled(model, "linearize")
+    here = o.state(model)
+    c = here.c.structure
+    other = slid(model, {x.name: repr(z) for x, z in zip(c.controls, here.z.tolist(), strict=False)}, o.outputs)
+    if holds_at_times(other.model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and linearize knows only one of the two; "
+            f"leave what holds out, m.changed({{...: None}}), or put joints in its place"
+        )
+    asked = replace(o, outputs=tuple(other.outputs.get(name, name) for name in o.outputs))
+    x, named = _with(there(other, here, o.coordinates), o.inputs)
+    found = _small(x, asked, named)
+    space = without_places(found.dense, other.slides)
+    units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=True)]
+    return LinearModel(
+        model.name,
+        list(zip(found.inputs, found.input_units, strict=True)),
+        list(zip(o.outputs, units, strict=True)),
+        found.output_values,
+        snapshot(here),
+        replace(space, eigenvalues=_sorted(space.eigenvalues)),
+        lambda: found.descriptor,
+        found.turning,
+        found.seen_from,
+    )
 
 
 def _small(x: State, o: LinearizeOptions, named: list[Input]) -> LinearModel:

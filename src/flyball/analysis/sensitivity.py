@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -28,6 +28,7 @@ from .linear.instant import instant
 from .linear.jumps import refuse_jumps
 from .linear.kinks import refuse_kinks
 from .linear.rest import Rest
+from .linear.sliders import beginnings, refuse_sampled, slid
 from .linear.tangent import Direction, Linear, Tangent, friction
 from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
@@ -39,7 +40,7 @@ from .motion.options import output_times, projected
 from .motion.start import begin
 from .options import Options, positive
 from .simulate import clock_for, simulate
-from .untouched import refuse_contact
+from .untouched import refuse_contact, refuse_controllers
 
 FLAT = 1e-8  # stiffness, of what acts, below which an equilibrium's place is not determined
 
@@ -120,6 +121,8 @@ class Question:
 
 def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
+    if model.controllers:
+        return _controlled(model, o)
     refuse_contact(model, "sensitivity")
     env = model.environment(o.parameters)
     for name in o.to:
@@ -148,6 +151,21 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     out = ANALYSES[o.analysis][0](a)
     out.parameters = {name: env[name] for name in a.to}
     return _verified(a, o.analysis, out) if o.verify else out
+
+
+def _controlled(model: Model, o: SensitivityOptions) -> Sensitivity:
+    """Of a mechanism with controllers: of one that has bodies in their place."""
+    if o.analysis != "motion" or model.events:
+        refuse_controllers(
+            model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
+        )
+    refuse_sampled(model, "sensitivity")
+    for name in o.of:
+        one(model, name)
+    other = slid(model, beginnings(model), o.of)
+    found = sensitivity(other.model, replace(o, of=tuple(other.outputs.get(name, name) for name in o.of)))
+    units = ("" if name in other.outputs else u for name, u in zip(o.of, found.units, strict=True))
+    return replace(found, of=o.of, units=tuple(units))
 
 
 def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:

@@ -64,8 +64,8 @@ def refuse_controllers(model: Model, analysis: str) -> None:
     if model.controllers:
         titles = ", ".join(e.title for e in model.controllers)
         raise ModelError(
-            f"{model.name!r} has {titles}, and {analysis} knows no controllers; simulate does. Ask it of a copy whose "
-            f"laws have formulas in their place"
+            f"{model.name!r} has {titles}, and {analysis} knows no controllers; simulate and linearize do. Ask it of "
+            f"a copy whose laws have formulas in their place"
         )
 
 

@@ -41,6 +41,8 @@ class PID(Controller):
         Added to the output before limits: what holds against gravity, for instance.
     initial : number
         What the integral part I begins with.
+    initial_measured : number
+        What was measured before the start, as the derivative sees it: what begins elsewhere has jumped there.
     period, offset : number [s], optional
         It is sampled at offset, offset + period, ...: I by Euler's rule, D by backward differences.
 
@@ -65,6 +67,7 @@ class PID(Controller):
     derivative_weight: Annotated[Number, Unit("1")] = 0.0
     bias: Law = 0.0
     initial: Annotated[Number, Unit(None)] = 0.0
+    initial_measured: Annotated[Number, Unit(None)] = 0.0
 
     @property
     def windup(self) -> str:
@@ -92,9 +95,14 @@ class PID(Controller):
             ("anti_windup", "limits and ki", self._limited and self.ki != 0.0),
             ("tracking", f"anti_windup={BACK!r}", self.windup == BACK),
             ("initial", "ki", self.ki != 0.0 or self.initial == 0.0),
+            ("initial_measured", "kd", self.kd != 0.0 or self.initial_measured == 0.0),
         ):
             if getattr(self, name) is not None and not there:
                 raise ModelError(f"{self.title}: {name} does nothing without {needs}; leave it out")
+        if self.windup == BACK and self.tracking is None and self.kp == 0.0 and self.kd == 0.0:
+            raise ModelError(
+                f"{self.title}: without kp and kd nothing tells how fast the integral follows; give tracking"
+            )
         if isinstance(self.lower, float) and isinstance(self.upper, float) and not self.lower < self.upper:
             raise ModelError(f"{self.title}: lower is {self.lower:g}, upper {self.upper:g}; lower must be less")
 
@@ -136,10 +144,11 @@ class PID(Controller):
         if self.ki != 0.0:
             rate = self._rate_of_integral()
             out.append(ControlState("integral", f"integral + period*({rate})" if self.sampled else rate, n.initial))
+        before = f"-({n.initial_measured})" if isinstance(n.initial_measured, str) else -n.initial_measured
         if self.kd != 0.0 and self.sampled:
-            out += [ControlState("before", "derivative"), ControlState("last", "damped")]
+            out += [ControlState("before", "derivative"), ControlState("last", "damped", before)]
         elif self.kd != 0.0:
-            out.append(ControlState("slow", "(damped - slow)/filter", 0.0))
+            out.append(ControlState("slow", "(damped - slow)/filter", before))
         return tuple(out)
 
     def _rate_of_integral(self) -> str:
@@ -147,7 +156,9 @@ class PID(Controller):
         if self.windup == BACK:
             usual = "sqrt(kd/ki)" if self.kd != 0.0 else "kp/ki"
             time = usual if self.tracking is None else "tracking"
-            return f"ki*error + (output - unlimited)/({time})"
+            # of a sampled one an instant takes back all at most
+            back = f"max(period, {time})" if self.sampled else time
+            return f"ki*error + (output - unlimited)/({back})"
         if self.windup == CLAMPING:
             beyond = []
             beyond += ["unlimited > upper and ki*error > 0"] if self.upper is not None else []

@@ -109,3 +109,8 @@ class Actuator(CoordinateForce):
     def laws(self) -> tuple[Law | None, ...]:
         """The force."""
         return (self.force,)
+
+
+def pushing(name: str, coordinate: str, force: str) -> Actuator:
+    """A force along a coordinate by a law."""
+    return Actuator(name, coordinate, force=force)

@@ -50,6 +50,7 @@ ONE_KIND = {
     "contacts": Contact,
     "events": Event,
 }
+TWINS = "controllers"  # which may need each other
 LATER = ("sensors", "controllers", "forces", "drivers")  # which alone may name one another
 NAMELESS = ("material_pairs", "contacts")  # that have a name of their own accord
 MANY_KINDS = {
@@ -224,13 +225,31 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
                 failed.append(entry)
                 errors.append(error)
         if len(failed) == len(waiting):
-            raise errors[0]
+            if not _together(model, failed):
+                raise errors[0]
+            failed = [entry for entry in failed if entry[0] != TWINS]
         if failed and all(category not in LATER for category, _, _ in failed):
             raise errors[0]  # only these can name one another
         waiting = failed
     place = {str(fields.get("name")): k for k, (_, fields, _) in enumerate(entries)}
     for category in LATER:
         getattr(model, category).sort(key=lambda e: place[e.name])
+
+
+def _together(model: Model, entries: list[Entry]) -> bool:
+    """Add controllers that name one another all at once, if that is what they wait for; whether it was."""
+    before = len(model.controllers)
+    try:
+        made = [
+            _kind(c, fields, where)(**fields) for c, table, where in entries for fields in [dict(table)] if c == TWINS
+        ]
+        model.add(*made)
+    except Exception:
+        for e in model.controllers[before:]:
+            model.by_name.pop(e.name)
+        del model.controllers[before:]
+        return False
+    return bool(made)
 
 
 def _parsed(text: str, source: str) -> dict[str, Any]:

@@ -34,6 +34,7 @@ def tables(result: Result) -> list[Table]:
         parameters(result),
         bodies(result),
         joints(result),
+        controllers(result),
         forces(result),
         drivers(result),
         sensors(result),
@@ -161,6 +162,17 @@ def _passed(view: Any) -> tuple[str, str]:
     curves = view.channels().values()
     sizes = [[np.nanmax(np.abs(v), initial=0.0) for u, v in curves if u == unit] for unit in ("N", "N*m")]
     return tuple(fixed(max(x)) if x else "" for x in sizes)  # type: ignore[return-value]
+
+
+def controllers(result: Result) -> Table:
+    """What controllers are given, as written, and between which values their first signal stayed."""
+    rows = []
+    for e in result.model.controllers:
+        name = next(iter(e.signals()))
+        values = result[e.name].quantity(name)[1]
+        span = f"{name} {fixed(np.nanmin(values))} to {fixed(np.nanmax(values))}" if len(values) else ""
+        rows.append((e.name, type(e).__name__, _given(e), span))
+    return Table("controllers", "Controllers", ("controller", "kind", "as written", "between"), tuple(rows))
 
 
 def forces(result: Result) -> Table:

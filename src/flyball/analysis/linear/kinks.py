@@ -223,7 +223,7 @@ def _laws(e: Equations, to: Sequence[str]) -> Iterator[tuple[str, str, list[str]
 def _names(model: Model, law: Expression, inputs: dict[str, str], to: Sequence[str]) -> dict[str, str]:
     """What a law depends on besides time: its names for it, and the curves' (a parameter's is its own)."""
     sensors = {x.name: f"{x.name}.value" for x in model.sensors}
-    curves = sensors | inputs | {name: name for name in to}
+    curves = sensors | inputs | {name: name for name in (*to, *law.names) if name in to or "." in name}
     return {name: curves[name] for name in sorted(law.names) if name in curves}
 
 

@@ -341,6 +341,8 @@ def _pacemaker(clock: ex.Clock) -> int:
 def _component(a: Assembly, i: int) -> str:
     """Name of the body or tree joint that a component of the state belongs to."""
     s = a.compiled.structure
+    if s.nq + s.nv <= i < s.nq + s.nv + len(s.controls):
+        return f"controller state {s.controls[i - s.nq - s.nv].name!r}"
     for joint in s.tree_joints.values():
         for b in joint.links:
             q0, v0, nq, nv = s.tables["body_i"][b, 2:6]
