@@ -118,7 +118,7 @@ class Corners:
                 ways[s] = np.sign(u)
         jumps = self.decide() if self.at else False
         moved = bool((np.abs(ways[self.all] - before) > 1e-6).any())
-        jumps = moved and (jumps or self._not_at(before)) or (jumps and (n.W.switch[MODE, self.all] != modes).any())
+        jumps = (moved and (jumps or self._not_at(before))) or (jumps and (n.W.switch[MODE, self.all] != modes).any())
         n.here.fresh = n.here.fresh or jumps
         self._tell()
         return jumps
