@@ -15,7 +15,7 @@ from flyball.tables.system import MODE, VALUE
 ASKED = {
     "method": "dop853", "t_end": 1.0, "t_start": None, "outputs": 2, "parameters": None, "start": None,
     "specialize": False, "progress": False, "rtol": 1e-9, "atol": None, "max_step": np.inf, "max_steps": 1000,
-    "stabilization": "projection", "alpha": None, "beta": None, "step": None,
+    "stabilization": "projection", "alpha": None, "beta": None, "step": None, "rho_inf": None,
 }  # fmt: skip
 
 

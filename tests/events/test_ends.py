@@ -90,7 +90,7 @@ def test_a_motion_that_goes_on_counts_on(tmp_path):
         third = m.simulate(6.0, start=second)
         for name, most in (("a", 3), ("c", 7), ("d", 9)):
             assert sum(e.name == name for r in (first, second, third) for e in r.events) == most
-        assert third.counted == {"a": 3, "c": 7, "d": 9}
+        assert third.carried["counts"] == {"a": 3, "c": 7, "d": 9}
 
 
 def chirp(when, **at):

@@ -30,13 +30,15 @@ from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.suited import IMPLICIT, explicit, suited, unsuited
+from .motion.implicit.suited import IMPLICIT, VARIATIONAL, explicit, suited, unsuited
+from .motion.implicit.variational import refuse_unknown
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
 from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
+from .motion.part import Part, whole
 from .motion.start import Start, begin, start_time
 from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
@@ -56,20 +58,24 @@ def simulate(model: Model, o: SimulateOptions) -> Result:
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
     way = chosen(model, o)
     try:
-        return _told(model, way.options, span, way.why, o.method == AUTO)
+        return told(model, way.options, span, way.why, o.method == AUTO)
     except (ModelError, SimulationError) as error:
         if way.instead is None or not unresolved(error):
             raise
         try:
-            return _told(model, way.instead, span, instead_of(error), False)
+            return told(model, way.instead, span, instead_of(error), False)
         except FlyballError:
             raise error from None
 
 
-def _told(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], why: str, auto: bool) -> Result:
-    """The motion, which says by what it was computed, and why; ``auto``: methods may change on the way."""
+Span = tuple[float, float, np.ndarray]
+"""Start and end of a motion [s], and its output times."""
+
+
+def told(model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None) -> Result:
+    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change."""
     try:
-        result = _computed(model, o, span, auto)
+        result = _computed(model, o, span, auto, part or whole())
     except SimulationError as error:
         if isinstance(error.result, Result):
             _tell(error.result, why)
@@ -82,22 +88,24 @@ def _tell(result: Result, why: str) -> None:
     result.health.method = "; ".join(x for x in (why, result.health.method) if x)
 
 
-def _computed(model: Model, o: SimulateOptions, span: tuple[float, float, np.ndarray], auto: bool) -> Result:
-    """The motion by a method that is chosen: start, end, output times."""
+def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Part) -> Result:
+    """The motion, or a part of it, by a method that is chosen."""
     started = time.perf_counter()
     t_start, _, times = span
     announce_motion(model, not isinstance(o.method, Stepping), o.method)
     if isinstance(o.method, Stepping):
         with shown(o.progress, "simulating") as tell:
-            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start)
+            return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
     model = with_places(model, o.parameters)
-    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True)
+    begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)
     slides = _no_stops(begun) and leaves_no_freedom(begun)  # what drivers prescribe follows no force
     if slides:
-        begun = begin(model, t_start, o.parameters, o.start, o.coordinates)
+        begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
     if o.method in IMPLICIT and not leaves_no_freedom(begun):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
+        if o.method == VARIATIONAL:
+            refuse_unknown(begun)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):
@@ -138,6 +146,7 @@ def moved(
     if o.stabilization == "partitioning":
         partition.choose(begun.base.compiled.structure.model, begun)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
+    begun.part.begin(c.structure)
     known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)
@@ -148,7 +157,7 @@ def moved(
         rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
     else:
         method = tableau(explicit(o.method))
-        rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace)
+        rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace, begun.part)
         if begun.pace is not None and begun.pace.asked:
             more, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
             rows = np.concatenate([rows, more])
@@ -203,11 +212,12 @@ def clock_for(
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
-    real[ex.SPAN] = (t_end - t) or 1.0
+    first = t if start.part.first is None else start.part.first
+    real[ex.SPAN] = (t_end - first) or 1.0
     real[ex.H] = real[ex.STEP] = o.step or 0.0
     real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = energy_size(start.base, (t_end - t) or 1.0)
+    real[ex.LEDGER] = energy_size(start.base, float(real[ex.SPAN]))
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
@@ -255,13 +265,14 @@ def run_clock(
     task: int,
     engine: Engine | None = None,
     pace: Pace | None = None,
+    part: Part | None = None,
 ) -> tuple[np.ndarray, bool]:
     """Call the compiled loop until it is through. Returns (output rows, whether the user interrupted).
 
     ``engine`` may choose another one on the way, and then all begins anew; without it the run is table-driven.
-    ``pace`` may ask for another method, and then this one goes no further.
+    ``pace`` may ask for another method, and then this one goes no further. It ends early where ``part`` does.
     """
-    c, engine = a.compiled, engine or Engine(a.compiled, False)
+    c, engine, part = a.compiled, engine or Engine(a.compiled, False), part or whole()
     s, wide = c.structure, width(a)
     buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // wide + 1)), wide))
     rows = []
@@ -269,12 +280,12 @@ def run_clock(
     span, reached = clock.real[ex.T_END] - first or 1.0, 0.0
     forget(c.work.stack)
     engine.begin(clock)
-    clock.count[ex.QUOTA] = engine.limited(clock, float(clock.count[ex.QUOTA]))
+    quota = engine.limited(clock, float(clock.count[ex.QUOTA]))
     if pace is not None:
-        clock.count[ex.QUOTA] = pace.limited(clock, int(clock.count[ex.QUOTA]))
+        quota = pace.limited(clock, quota)
     try:
         while True:
-            begin = time.perf_counter()
+            begin, clock.count[ex.QUOTA] = time.perf_counter(), part.most(quota)
             before = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
             with interrupts_kept(s.functions):
                 used = motion_kernel(c.system, c.work, method, clock, buffer, task)
@@ -285,16 +296,19 @@ def run_clock(
                 return np.concatenate(rows), False
             took = time.perf_counter() - begin
             done = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - before
+            part.took(done)
             if engine.begins_anew(clock):
                 rows.clear()
+                part.anew()
                 forget(c.work.stack)
+            if part.over(clock):
+                return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
             if pace is not None and task == INTEGRATE:
                 pace.asked = pace.turns(c, clock, EXPLICIT)
                 if pace.asked:
                     return np.concatenate(rows), False
                 quota = pace.limited(clock, quota)
-            clock.count[ex.QUOTA] = quota
     except KeyboardInterrupt:
         return np.concatenate(rows) if rows else np.zeros((0, wide)), True
     finally:

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 CSV_NUMBERS = 5_000_000  # above, the table is left out: such a file is of no use
 
 
-@command(Motions.simulate, name="run", own={"t_end": Flag(default="10")})
+@command(Motions.simulate, name="run", own={"t_end": Flag(default="10"), "checkpoint": Flag(type=Path)})
 def run(
     asked: Asked,
     *,

@@ -26,6 +26,7 @@ from ..numerics.integrators.clock import (
     RUNNING,
     STARTED,
     STATUS,
+    STUCK,
     T_END,
     WIDE,
     Clock,
@@ -135,10 +136,9 @@ def advance(A, clock, sheet, P, out):
     end = clock.real[T_END]
     taken = clock.count[ACCEPTED] + clock.count[REJECTED]
     while True:
-        if reached(P, clock.real[T]):
-            clock.count[STATUS] = sample(A)
-            if clock.count[STATUS] != 0:
-                break
+        if reached(P, clock.real[T]) and sample(A) != 0:
+            clock.count[STATUS] = STUCK
+            break
         at = min(coming(P), end)
         clock.real[T_END] = at
         n = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)

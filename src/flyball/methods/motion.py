@@ -7,6 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from os import PathLike
+
     from ..analysis.motion.impulse.settings import Stepping
     from ..analysis.prepared import Prepared
     from ..model.model import Model
@@ -40,6 +42,7 @@ class Motions(Model):
         specialize: bool | str = "auto",
         step: float | str | None = None,
         rho_inf: float | None = None,
+        checkpoint: str | PathLike[str] | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Result:
         """Integrate the equations of motion.
@@ -65,11 +68,12 @@ class Motions(Model):
             Go on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
-        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
             ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``radau``: implicit,
             Radau IIA of order 5, for stiff springs and strong damping. ``generalised-alpha``: implicit, of order 2, at
-            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``impulse``, or a
-            `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
+            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``variational``: symplectic, of
+            order 2, at fixed steps, for very long runs: energy and momenta do not drift. ``impulse``, or a `Stepping`
+            with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
             ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
             ways that it does not know: ``health.method`` says why.
         rtol : float [1]
@@ -100,6 +104,10 @@ class Motions(Model):
         rho_inf : float [1], optional
             Of ``generalised-alpha``: what is left of a swing after a step that is far too long for it, 0 to 1; 0.8 if
             not given. 1 damps nothing.
+        checkpoint : path, optional
+            Where the motion is kept while it is computed (a result file): after an interrupt or a crash, which cost a
+            minute of computing at most, the same call goes on from there, to the same digits. Where the motion is
+            there to its end, it is what is returned.
         progress : bool or callable
             A bar on a terminal and in a notebook from two seconds on; a callable gets the fraction done some twenty
             times a second.
@@ -117,10 +125,9 @@ class Motions(Model):
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
         """
-        from ..analysis.motion.choice import SimulateOptions
-        from ..analysis.simulate import simulate
+        from ..analysis.checkpointed import CheckpointOptions, checkpointed
 
-        return simulate(self, SimulateOptions.asked(locals()))
+        return checkpointed(self, CheckpointOptions.asked(locals()))
 
     def prepare(self, *, coordinates: str = "auto", parameters: Mapping[str, float | str] | None = None) -> Prepared:
         """The equations of motion as functions of plain arrays: mass matrix, accelerations, Jacobians, poses.
@@ -186,8 +193,8 @@ class Motions(Model):
         formulations : sequence of str, optional
             Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
             ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Besides methods that
-            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3`` and
-            ``generalised-alpha index 3``.
+            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3``,
+            ``generalised-alpha index 3``, ``variational``.
         repeats : int
             Times that each is run for its cost, fewer where that takes long; 0 for none.
         parameters : mapping, optional
@@ -197,7 +204,8 @@ class Motions(Model):
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
         step : float or str [s], optional
-            Width of steps of ``radau``, which chooses it by itself if none is given, and ``generalised-alpha``.
+            Width of steps of ``radau``, which chooses it by itself if none is given, and of the other methods of that
+            kind, which have to be given one.
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
         atol : float [m, rad, m/s, rad/s], optional

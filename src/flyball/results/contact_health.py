@@ -35,6 +35,8 @@ class ContactHealth:
         Time of the largest residual.
     size : float [m]
         Of the smallest body that touches, which overlaps are compared with.
+    halved, reduced, impacted : int
+        Steps that were taken in shorter ones; impacts that gave back less than their law says, of how many.
     notes : tuple of str
         What else has to be said: a law of impacts that was softened, a position without unique forces (Painleve).
     """
@@ -53,6 +55,9 @@ class ContactHealth:
     worst_at: float | None = None
     size: float = 0.0
     notes: tuple[str, ...] = field(default_factory=tuple)
+    halved: int = 0
+    reduced: int = 0
+    impacted: int = 0
 
     def lines(self) -> list[tuple[str, str]]:
         """Labels and texts for people."""
@@ -71,6 +76,16 @@ class ContactHealth:
     def warnings(self) -> tuple[str, ...]:
         """Reasons to look at the motion twice."""
         out = list(self.notes)
+        if self.halved:
+            out.append(
+                f"{self.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps"
+            )
+        if self.reduced:
+            law = self.impacts.partition(",")[0]
+            out.append(
+                f"{self.reduced} of {self.impacted} impacts gave back less than {law}'s law says, which would have "
+                f"made energy there"
+            )
         if self.unconverged:
             when = f", the worst at t = {self.worst_at:.4g} s" if self.worst_at is not None else ""
             share = f"{self.unconverged} of {self.solves} contact solves were cut off before they had converged{when}"

@@ -94,7 +94,9 @@ class Energy(Named):
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
                 stored = getattr(element, "energy", np.zeros(1))
-                out[element.element.name] = element.work + stored - stored[0] - given.get(element.element.name, 0.0)
+                out[element.element.name] = (
+                    element.work + stored - stored[:1].sum() - given.get(element.element.name, 0.0)
+                )
         return out
 
     def _of_pieces(self, name: str) -> np.ndarray:

@@ -93,11 +93,11 @@ def to_csv(result: Result, path: str | os.PathLike) -> None:
     replaced(path, write)
 
 
-def save(result: Result, path: str | os.PathLike) -> None:
-    """Write everything, the model included, to one NetCDF file."""
+def save(result: Result, path: str | os.PathLike, *, whole: bool = True) -> None:
+    """Write everything, the model included, to one NetCDF file; the labelled quantities for other programs if told."""
 
     def write(part: Path) -> None:
-        _write(result, part)
+        _write(result, part, whole)
         seal(part)
 
     replaced(path, write)
@@ -116,7 +116,7 @@ def replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
         part.unlink(missing_ok=True)
 
 
-def _write(result: Result, path: Path) -> None:
+def _write(result: Result, path: Path, whole: bool) -> None:
     import h5netcdf
 
     with h5netcdf.File(path, "w") as file:
@@ -126,9 +126,10 @@ def _write(result: Result, path: Path) -> None:
         for name, labels in coordinates(result).items():
             file.dimensions[name] = len(labels)
             file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
-        shown = list(labelled(result, MOST))
+        shown = list(labelled(result, MOST)) if whole else []
         if all(x.name.startswith(f"{ENERGY}.") for x in shown):
-            file.attrs["comment"] = "too many parts to list: read this file with flyball.load_result"
+            what = "too many parts to list" if whole else "a motion that is not at its end"
+            file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
         for x in shown:
             made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
             made.attrs.update(_attributes(x.unit, x.note))
@@ -201,7 +202,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "tree": json.dumps(list(s.tree)),
         "parameters": json.dumps(list(result.model.parameters)),
         "wound": json.dumps(result.wound),
-        "counted": json.dumps(result.counted),
+        "carried": json.dumps(result.carried),
     }
     told, more = packed(result)
     happened, states = events_packed(result)

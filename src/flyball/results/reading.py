@@ -153,7 +153,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     result.final = (float(final[0]), final[1:])
     unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
-    result.counted = json.loads(stored.get("counted", "{}"))
+    result.carried = json.loads(stored.get("carried", "{}"))
     stretches_unpack(stored, result)
     events_unpack(stored, result)
     return result

@@ -61,11 +61,11 @@ class Result:
         Set of bodies -> its motion (`Bulk`); their members are read by ``result["balls[17]"]``.
     events : Events
         What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
-    counted : dict
-        Event of the model -> how often it has happened, in this motion and in those that it goes on from.
     exchanged : dict
         Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
         surfaces that move, given by kicks and changes of parameters.
+    carried : dict
+        What a motion that goes on from it knows besides its end: how often events happened, for instance.
     stretches : Stretches
         What held between events: modes of what switches, parameters; None where nothing can switch.
     """
@@ -94,8 +94,8 @@ class Result:
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self.carried: dict[str, Any] = {}
         self.stretches: Stretches | None = None
-        self.counted: dict[str, int] = {}
         self._events = Events((), self)
         self.energy = Energy(self)
 

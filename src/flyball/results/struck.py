@@ -56,6 +56,10 @@ class Struck(Mapping):
         made._joints = tuple(j.name for j in s.model.joints if j.name in s.terms_of or j.name in s.tree_joints)
         return made
 
+    def loose(self) -> Struck:
+        """As it was found, without the states of its result."""
+        return Struck(self._own, self._rows, self._blows)
+
     @cached_property
     def _reactions(self) -> Reactions:
         """What joints carried, found when first asked for."""

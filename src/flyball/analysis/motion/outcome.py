@@ -19,8 +19,10 @@ from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..compile_time import compiled_since
 from ..mobility import mobility
+from .events.carried import carried
 from .events.here import Here
 from .options import Integration
+from .part import KEPT
 from .reasons import reason, remarks
 from .residual import acceleration_violation
 from .start import Start
@@ -50,12 +52,14 @@ def outcome(
     message, cause = here.stopped or "reached the end", here.failed
     if interrupted:
         message = f"interrupted by the user at t = {t:.6g} s; what was computed is kept"
+    elif here.start.part.paused:
+        message = KEPT.format(t)
     elif here.failed is not None:
         message = f"{model.name!r}: {here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
     elif status != ex.DONE:
         message, cause = reason(a, start.base, clock)
     health = _health(start, clock, o)
-    ended = here.failed is None and not interrupted
+    ended = here.failed is None and not interrupted and not here.start.part.paused
     health.message, health.success = message, ended and status == ex.DONE
     health.watched, health.method = here.watched, here.method
     health.remarks = (*health.remarks, *here.doubts)
@@ -67,6 +71,9 @@ def outcome(
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved
     result.wound = start.wound
+    if here.start.part.open:
+        result.carried["open"] = True
+    result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
     health.late = {
         "mobility": partial(mobility, model, start.base),
         "energy_drift": partial(_energy_drift, result),
@@ -76,7 +83,6 @@ def outcome(
         "doubtful": partial(doubts.doubtful, result),
     }
     result.events = here.records
-    result.counted = dict(here.counts)
     if here.seen is not None:
         here.seen.told(result)
         result.contacts = contacts(result)

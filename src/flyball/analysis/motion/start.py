@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from ..mobility import mobility
 from .engines import Engine
 from .joined import refuse_jump
 from .layer import in_coordinates, known
+from .part import Part, whole
 from .stiff import Pace
 
 MOST = 4  # starts of the same numbers whose coordinates are kept
@@ -41,6 +42,7 @@ class Start:
     before: Result | None = None  # what it goes on from
     pace: Pace | None = None  # whether it goes on by another method; none: it does not
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
+    part: Part = field(default_factory=whole)  # of the motion
 
 
 def start_time(t_start: float | None, before: Result | None) -> float:
@@ -68,11 +70,13 @@ def begin(
     coordinates: str,
     *,
     switches: bool = False,
+    part: Part | None = None,
 ) -> Start:
     """Assemble, or go on from an earlier result; choose coordinates.
 
     With ``switches`` there are rows for what holds at times (`tables.switches`), all off; else nothing holds, and
-    friction goes by the sign of the rate.
+    friction goes by the sign of the rate. ``part`` says which part of a motion it is: a later one has the coordinates,
+    and the parameters, of the one before it.
 
     Raises
     ------
@@ -81,12 +85,30 @@ def begin(
     ModelError
         If a body can move without inertia, or the earlier result is of another mechanism.
     """
+    part = part or whole()
     if before is not None and before.stretches is not None:
-        parameters = {**_set_by_events(model, before), **(parameters or {})}
+        set_by_events = _set_by_events(model, before)
+        parameters = {**(parameters or {}), **set_by_events} if part.later else {**set_by_events, **(parameters or {})}
     base = _base(model, t, parameters, before)
+    if part.later and before is not None:
+        return replace(_as_it_came(base, parameters, before, switches), part=part)
     if base.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
         mobility(model, base, inertia=True)
-    return begin_at(base, parameters, coordinates, before, switches=switches)
+    return replace(begin_at(base, parameters, coordinates, before, switches=switches), part=part)
+
+
+def _as_it_came(base: Assembly, parameters: Mapping[str, float] | None, before: Result, switches: bool) -> Start:
+    """Go on in the coordinates that an earlier part has."""
+    model, tree = base.compiled.structure.model, before.values.structure.tree
+    c = compiled(model, parameters=parameters, tree=tree) if tree else base.compiled.again()
+    nq, nv = c.structure.nq, c.structure.nv
+    y = before.final[1]
+    a = Assembly(c, base.t, y[:nq].copy(), y[nq : nq + nv].copy())
+    if switches:
+        a = with_switches(a, parameters)
+    y = _gone_on(before, a)
+    _holds(before, a)
+    return Start(base, a, y, before.health.coordinates, _wound(base, a, y), before=before)
 
 
 def _set_by_events(model: Model, before: Result) -> dict[str, float]:

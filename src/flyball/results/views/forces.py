@@ -191,7 +191,7 @@ class ForceView(View):
         states = self._x.structure.state_at
         if name in states:
             return self._result.states[:, states[name]]
-        return self.energy[0] - self.energy
+        return self.energy[:1].sum() - self.energy
 
     @property
     def _whole(self) -> tuple[np.ndarray, np.ndarray]:

@@ -21,6 +21,7 @@ from ....results.events import Happening
 from ....tables.system import GUARD_WAY, HELD, MODE
 from ....tables.values import Values
 from .blows import generalised
+from .carried import take_up
 from .here import Here
 from .holding import gone_on, hold, let_go
 from .setting import set_parameters
@@ -119,7 +120,7 @@ def act_at_start(here: Here) -> Acts:
             here.c.work.switch[MODE, k] = HELD
     if here.start.before is not None:
         gone_on(here, here.start.before)
-        here.counts.update(here.start.before.counted)
+        take_up(here, here.start.before.carried)
         return Acts(here, (), before=here.y.copy(), tables=here.c.values)
     return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
 
@@ -160,10 +161,10 @@ def expressions(here: Here) -> dict[int, float]:
 def true_already(here: Here) -> list[str]:
     """Names of events whose comparisons are true now: they become true only after they were false.
 
-    None where a motion goes on: what is true there may have become true in what went before.
+    Where a motion goes on, those of its begin: what is true now may have become true in what went before.
     """
     if here.start.before is not None:
-        return []
+        return here.true
     every = here.structure.events
     texts = {g: e.when for g, e in every.items() if isinstance(e.when, str) and e.direction != "falling"}
     values = expressions(here) if texts else {}
@@ -173,17 +174,17 @@ def true_already(here: Here) -> list[str]:
 def at_the_seam(here: Here) -> set[str]:
     """Names of events that happened at the very end of the motion that this one goes on from."""
     before = here.start.before
-    if before is None:
+    if before is None or not len(before.t):
         return set()
     end, first = before.final[0], float(before.t[0])
     since = end - max(AT_ONCE * float(np.spacing(max(abs(end), abs(first)))), TOGETHER * (end - first))
     return {h.name for h in takewhile(lambda h: h.t >= since, reversed(before.events)) if h.kind == "event"}
 
 
-def say_never(here: Here, true: Sequence[str]) -> None:
+def say_never(here: Here) -> None:
     """Say which events, true as the motion began, did not happen in it."""
     for e in here.structure.model.events:
-        if e.name in true and not here.counts.get(e.name):
+        if e.name in here.true and not here.counts.get(e.name):
             here.doubts.append(
                 f"{e.title} never happened: {e.when!r} was true from the start, and an event is where it becomes true"
             )

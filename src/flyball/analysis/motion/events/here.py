@@ -48,6 +48,8 @@ class Here:
         Switch -> when the last ways through its corner were (`swings`).
     counts : dict
         Event -> how often it happened so far.
+    true : list of str
+        Events whose comparisons were true as the motion began.
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
     fresh : bool
@@ -90,6 +92,7 @@ class Here:
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
     crept: frozenset[int] = frozenset()
+    true: list[str] = field(default_factory=list)
 
     @property
     def c(self) -> Compiled:

@@ -54,7 +54,9 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
     found = solved(n, of_accelerations(n, at, still))
     parts = found.parts
     let_go = _loose(n, found, fired) if found.ended == FOUND else {}
-    if let_go and (others := solved(n, parts, company=True)).taken_up:  # what touches can carry more from here on
+    if (
+        let_go and n.shares and (others := solved(n, parts, company=True)).taken_up
+    ):  # what touches can carry more from here on
         found, let_go = others, {}
     if found.ended == FOUND:
         let_go |= give_way(n, parts, fired)

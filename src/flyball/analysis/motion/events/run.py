@@ -40,6 +40,7 @@ from ..engines import FAILED, Engine
 from ..implicit.made import implicit
 from ..implicit.suited import IMPLICIT, explicit
 from ..options import Integration
+from ..part import WEIGHT
 from ..stiff import EXPLICIT, Pace, on_corner
 from .accumulating import Counts
 from .actions import at_the_seam, expressions, say_never, stepped_over, true_already
@@ -86,6 +87,7 @@ class Run:
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
+        self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         self.counts = Counts()
@@ -93,7 +95,6 @@ class Run:
         watched = self.guarded or len(here.c.system.switch_i) or here.structure.model.events
         here.seen = Segments() if watched else None
         self.loop = self._loop()
-        self.quota = int(clock.count[ex.QUOTA])
         self.sampling = self._sampling(here.t)
 
     def _sampling(self, t: float) -> Sampling | None:
@@ -110,8 +111,10 @@ class Run:
         if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
             return False
         before = expressions(here)
-        if self.sampling.sample(here.c.system, here.c.work, here.clock) == 0:
-            self.jumped(before)
+        if self.sampling.sample(here.c.system, here.c.work, here.clock) != 0:
+            here.clock.count[ex.STATUS] = ex.STUCK
+            return True
+        self.jumped(before)
         if len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             self.rows[-1][-1] = self.row()
         return True
@@ -138,9 +141,10 @@ class Run:
                 self.integrate()
                 if self.over():
                     break
-            if here.stopped:
+            if here.stopped or self.part.paused:
                 self.stop()
-            say_never(here, self.true)
+            if not self.part.paused:
+                say_never(here)
         except KeyboardInterrupt:
             here.clock.count[ex.STATUS] = ex.RUNNING
             return np.concatenate(self.rows), True
@@ -201,7 +205,7 @@ class Run:
         elif status == ex.DONE:
             if self.sampled():
                 self.legs.aim()
-                return False
+                return bool(clock.count[ex.STATUS] == ex.STUCK)
             sharp = self.legs.ends_sharply() and self.guarded
             before = expressions(self.here) if sharp else {}
             if not self.legs.next():
@@ -215,9 +219,12 @@ class Run:
         self.legs.whole()
         if self.loop is None and engine.begins_anew(clock):
             self.rows = self.rows[:1]
+            self.part.anew()
             self.here.seen = self.here.seen and Segments()
             forget(self.here.c.work.stack)
             self.legs.anew()
+        if clock.count[ex.ACCEPTED] > self.settled and self.part.over(clock):
+            return True
         self.legs.aim()
         return False
 
@@ -229,7 +236,7 @@ class Run:
         begin(here)
         if self.loop is not None and self.guarded and here.start.before is not None:
             self.resume(self.loop)
-        self.true = true_already(self.here)
+        here.true = true_already(here)
         self.here.fresh = False
         self.turned()
 
@@ -249,7 +256,8 @@ class Run:
         """Call the compiled loop once."""
         c, clock = self.here.c, self.here.clock
         before = time.perf_counter()
-        clock.count[ex.QUOTA] = self.pace.limited(clock, self.quota)
+        weight = WEIGHT if self.now in IMPLICIT else 1.0
+        clock.count[ex.QUOTA] = self.part.most(self.pace.limited(clock, self.quota), weight)
         steps = clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED]
         with interrupts_kept(c.structure.functions):
             if self.loop is None and self.sampling is not None:
@@ -260,10 +268,11 @@ class Run:
                 used = self.loop.go_on(c.system, c.work, self.buffer)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
+        done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps)
+        self.part.took(done * weight)
         if clock.count[ex.STATUS] == ex.RUNNING:
             took = max(time.perf_counter() - before, 1e-6)
-            done = max(int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps), 1)
-            self.quota = self.engine.limited(clock, done * SLICE / took)
+            self.quota = self.engine.limited(clock, max(done, 1) * SLICE / took)
 
     def take(self, rows: np.ndarray) -> None:
         """Keep rows of output."""
@@ -303,6 +312,8 @@ class Run:
         here, clock = self.here, self.here.clock
         system = here.c.system
         happen(here, fired)
+        self.part.decided()
+        self.settled = int(clock.count[ex.ACCEPTED])
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
@@ -333,16 +344,22 @@ class Run:
             self.happens(fired)
 
     def stop(self) -> None:
-        """The motion ends here: the last row is written."""
+        """The motion, or a part of it, ends here: the last row is written, but where it is already."""
+        here, clock, part = self.here, self.here.clock, self.part
+        if part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+            return
+        part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
         self.take(self.row()[None, :])
-        self.here.clock.count[ex.STATUS] = ex.DONE
+        if not part.paused:
+            clock.count[ex.STATUS] = ex.DONE
 
     def row(self) -> np.ndarray:
         """The row of output of here and now."""
         here, c = self.here, self.here.c
+        status = here.clock.count[ex.STATUS]
         row, y = np.zeros((1, self.width)), here.y.copy()
         motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
-        here.y[:] = y
+        here.y[:], here.clock.count[ex.STATUS] = y, status
         return row[0]
 
 

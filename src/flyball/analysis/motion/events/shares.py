@@ -90,6 +90,8 @@ def rests(n: Instant, parts: list[Part], P: Dense, ended: int | None) -> np.ndar
     hold clearly.
     """
     none = np.zeros(len(parts), bool)
+    if not n.shares:
+        return none
     friction = np.isin(P.rule, (GRIPS, TURNS, WITH))
     if ended is not None and not (friction & (P.state != EVEN)).any():
         return none
@@ -184,7 +186,7 @@ def give_way(n: Instant, parts: list[Part], fired: np.ndarray) -> dict[int, Part
 def slides(n: Instant, parts: list[Part], P: Dense) -> dict[int, Part]:
     """What slides where redundancy leaves the small problem without an answer, as `give_way` says."""
     together = np.flatnonzero(np.isin(P.rule, (HOLDS, PUSHES, GRIPS, TURNS, WITH)))
-    if not np.isin(P.rule, (GRIPS, TURNS)).any() or not free_shares(P, together).shape[1]:
+    if not n.shares or not free_shares(P, together).shape[1]:
         return {}
     return sliding(n, parts, P)
 
@@ -228,11 +230,13 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
 
     ``found`` are states, the matrix, and how what friction holds follows forces.
     """
+    if not n.shares:
+        return
     (state, A, gain), G, B = found, n.here.group, n.rooms[len(parts)].B
     n.W.switch[SHARED], G.Q.count[OPEN] = 0.0, 0
     rows = np.flatnonzero(state == EVEN)
     rules = np.array([p.rule for p in parts])
-    if not np.isin(rules[rows], (GRIPS, TURNS)).any() or not n.shares:
+    if not np.isin(rules[rows], (GRIPS, TURNS)).any():
         return
     d = roots(A)
     driven = np.flatnonzero((rules == DRIVEN) | ((state != EVEN) & np.isin(rules, (GRIPS, TURNS, WITH))))

@@ -77,11 +77,14 @@ class Collected:
             self.begin()
         self.contacts.append(self._touching() if moved else {})
 
+    def first(self) -> None:
+        """Keep the mean accelerations of the first step for the start, and what was stored there."""
+        self.sums[0][SUMS.index(STORED)] = self.stepper.pace.real[STORED_FIRST]
+        self.begin()
+
     def begin(self) -> None:
-        """Keep the mean accelerations of the last step; of the first one for the start, and what was stored."""
+        """Keep the mean accelerations of the last step."""
         s = self.stepper
-        if not self.acceleration and self.sums:
-            self.sums[0][SUMS.index(STORED)] = s.pace.real[STORED_FIRST]
         self.acceleration.append((s.rooms.X.v[:, :6] - s.free.before[:, :6]) / s.pace.real[STEP])
 
     def _touching(self) -> dict[str, np.ndarray]:

@@ -25,7 +25,6 @@ from ....stepping.tables import (
     MOST_CONTACTS,
     REDUCED,
     TAKEN,
-    TIME,
     WORST_AT,
     WORST_FORCE,
     WORST_OVERLAP,
@@ -39,6 +38,8 @@ from .collect import Collected, coordinates, sets
 from .scene import smallest
 from .settings import Stepping
 
+INTERRUPTED = "interrupted by the user at t = {:.6g} s; what was computed is kept"
+REACHED = "reached the end"
 ROUNDING = 1e-9
 SLIGHT = 1e-6  # part of the potential energy that is no reason to say anything
 NOTABLE = 0.01  # part of the largest kinetic energy
@@ -52,20 +53,17 @@ def result_of(
     sides: Sides,
     o: Stepping,
     since: float,
-    interrupted: bool,
+    message: str,
 ) -> Result:
-    """The motion by name."""
+    """The motion by name; ``message`` says how it ended."""
     values, model = base.compiled.values, base.compiled.structure.model
     q, v, vdot = coordinates(base, scene, kept)
     t = np.array(kept.t)
     count = stepper.pace.count
-    real = stepper.pace.real
     contact = _contact_health(scene, stepper, o, smallest(scene, values))
     health = Health(
-        success=not interrupted,
-        message=f"interrupted by the user at t = {real[TIME]:.6g} s; what was computed is kept"
-        if interrupted
-        else "reached the end",
+        success=message == REACHED,
+        message=message,
         violation=0.0,
         velocity_violation=0.0,
         steps=int(count[TAKEN]),
@@ -95,11 +93,11 @@ def result_of(
     result.exchanged = dict(zip((*EXCHANGED, STORED), sums.T, strict=True))
     result.contacts = kept.as_contacts(sides, model.planar)
     result.bulk = sets(model, scene, kept)
-    health.contact = dataclasses.replace(contact, notes=(*contact.notes, *_made_energy(result)))
+    health.contact = dataclasses.replace(contact, notes=made_energy(result))
     return result
 
 
-def _made_energy(result: Result) -> tuple[str, ...]:
+def made_energy(result: Result) -> tuple[str, ...]:
     """A note where contacts gave energy, which what rolls or turns on them gets from long steps."""
     lost = result.exchanged["friction_loss"] + result.exchanged["impact_loss"]
     made = float(np.max(np.maximum.accumulate(lost) - lost, initial=0.0))
@@ -127,16 +125,6 @@ def _picked(stepper: Stepper, solver: str) -> str:
 
 def _contact_health(scene: Touching, stepper: Stepper, o: Stepping, size: float) -> ContactHealth:
     real, count = stepper.pace.real, stepper.pace.count
-    notes = []
-    if stepper.halved:
-        notes.append(
-            f"{stepper.halved} steps were taken in shorter ones, as joints could not follow: give shorter steps"
-        )
-    if count[REDUCED]:
-        notes.append(
-            f"{count[REDUCED]} of {count[IMPACTS]} impacts gave back less than {o.restitution.title()}'s law says, "
-            f"which would have made energy there"
-        )
     return ContactHealth(
         solver=_picked(stepper, o.solver),
         impacts=f"{o.restitution.title()}, {o.impacts}" if count[IMPACTS] else "",
@@ -151,5 +139,7 @@ def _contact_health(scene: Touching, stepper: Stepper, o: Stepping, size: float)
         unconverged=int(count[CUTS]),
         worst_at=float(real[WORST_AT]),
         size=size,
-        notes=tuple(notes),
+        halved=int(stepper.halved),
+        reduced=int(count[REDUCED]),
+        impacted=int(count[IMPACTS]),
     )

@@ -21,9 +21,10 @@ from ....stepping.tables import TIME
 from ....tables.contact import Touching, touching
 from ...compiled import compiled
 from ...progress import Tell
+from ..part import KEPT, Part, whole
 from .collect import Collected
 from .drawn import as_drawn, moving
-from .ending import result_of
+from .ending import INTERRUPTED, REACHED, result_of
 from .going_on import base_of, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
@@ -46,6 +47,7 @@ def impulse_motion(
     parameters: Mapping[str, float] | None,
     tell: Tell,
     before: Result | None = None,
+    part: Part | None = None,
 ) -> Result:
     """The motion by steps of impulses over a span of time; see `Mechanism.simulate`.
 
@@ -56,7 +58,7 @@ def impulse_motion(
     SimulationError
         If the steps cannot go on.
     """
-    since = time.perf_counter()
+    since, part = time.perf_counter(), part or whole()
     model = model.snapshot()
     plain = compiled(model, parameters=parameters)
     values = plain.values
@@ -79,14 +81,16 @@ def impulse_motion(
     counts = [-1 if n in scene.carriers.single or n == "ground" else _size(scene, n) for n in names]
     sides = Sides(names, counts)
     kept = Collected(stepper, held, np.arange(len(scene.carriers.mass) + 1))
+    part.begin_by_impulses(len(scene.carriers.mass))
     try:
-        interrupted = march(stepper, span, times, o, kept, tell)
+        interrupted = march(stepper, span, times, o, kept, tell, part)
     except NoWay:
-        result = result_of(base, scene, stepper, kept, sides, o, since, True)
+        result = result_of(base, scene, stepper, kept, sides, o, since, "")
         t = float(stepper.pace.real[TIME])
         result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY}"
         raise SimulationError(result.health.message, result, t) from None
-    return result_of(base, scene, stepper, kept, sides, o, since, interrupted)
+    message = INTERRUPTED if interrupted else KEPT if part.paused else REACHED
+    return result_of(base, scene, stepper, kept, sides, o, since, message.format(float(stepper.pace.real[TIME])))
 
 
 def made_ready(scene: Touching, o: Stepping, free: int, mechanism: bool) -> Beside:
@@ -106,13 +110,22 @@ def _size(scene: Touching, name: str) -> int:
 
 
 def march(
-    stepper: Stepper, span: tuple[float, float], times: np.ndarray, o: Stepping, kept: Collected, tell: Tell
+    stepper: Stepper,
+    span: tuple[float, float],
+    times: np.ndarray,
+    o: Stepping,
+    kept: Collected,
+    tell: Tell,
+    part: Part,
 ) -> bool:
-    """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted."""
+    """Steps that end at the output times, as equal as these allow. Returns whether the user interrupted.
+
+    Where the part ends there is a row of output in any case.
+    """
     first, last = span
     real = stepper.pace.real
     real[TIME] = first
-    if times[0] == first:
+    if len(times) and times[0] == first:
         kept.add(False)
     try:
         for t in (*times[times > first].tolist(), last):
@@ -120,15 +133,27 @@ def march(
             steps = math.ceil(way / o.longest * (1.0 - 1e-9) - 1e-12)
             if steps > 0:
                 stepper.run(1, way / steps)
-                if not kept.acceleration:
-                    kept.begin()
-                for part in range(1, steps, EACH):
-                    stepper.run(min(EACH, steps - part), way / steps)
+                if kept.t and not kept.acceleration:
+                    kept.first()
+                part.took(1)
+                left = steps - 1
+                while left and not part.over():
+                    n = part.most(min(EACH, left))
+                    stepper.run(n, way / steps)
+                    part.took(n)
+                    left -= n
                     tell((float(real[TIME]) - first) / (last - first))
+                if left:
+                    kept.add(True)
+                    return False
             real[TIME] = t
             if len(kept.t) < len(times):
                 kept.add(True)
             tell((t - first) / (last - first))
+            if t < last and part.over():
+                if kept.t[-1] < t:
+                    kept.add(True)
+                return False
     except KeyboardInterrupt:
         return True
     return False

@@ -1,0 +1,1 @@
+"""Motions that are kept in a file on the way, and go on from it."""
