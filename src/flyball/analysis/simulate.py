@@ -102,7 +102,7 @@ def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Pa
     if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
-    if o.method in IMPLICIT and not leaves_no_freedom(begun):
+    if o.method in IMPLICIT and (watched(begun) or not leaves_no_freedom(begun)):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
         if o.method == VARIATIONAL:
             refuse_unknown(begun)

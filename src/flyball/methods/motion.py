@@ -73,9 +73,10 @@ class Motions(Model):
             Radau IIA of order 5, for stiff springs and strong damping. ``generalised-alpha``: implicit, of order 2, at
             fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``variational``: symplectic, of
             order 2, at fixed steps, for very long runs: energy and momenta do not drift. ``impulse``, or a `Stepping`
-            with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
-            ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
-            ways that it does not know: ``health.method`` says why.
+            with choices of its own: steps of fixed length by impulses, for contact with friction. auto: ``dop853``,
+            which goes from touch to touch, and ``radau`` for as long as a long motion is stiff; steps by impulses
+            where bodies may touch at many places, or in ways that it does not know: ``health.method`` says which,
+            from when on, and why.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least.
         atol : float [m, rad, m/s, rad/s], optional

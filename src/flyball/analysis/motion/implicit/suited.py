@@ -7,6 +7,7 @@ from typing import Any
 
 from ....errors import ModelError
 from ....results.doubts import open_loads
+from ....tables.system import SEMIDEFINITE
 from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at
@@ -61,7 +62,8 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
         For what implicit integrators do not know.
     """
     s = begun.assembly.compiled.structure
-    _refuse_open_loads(begun, method)
+    if method != RADAU:
+        _refuse_open_loads(begun, method)
     if method == VARIATIONAL and wish == "joint":
         raise ModelError(f"method={VARIATIONAL!r} takes absolute coordinates, in which masses do not change: leave "
                          f"coordinates out")  # fmt: skip
@@ -95,6 +97,8 @@ def unsuited(begun: Start) -> str:
         _refuse_open_loads(begun, RADAU)
     except ModelError as error:
         return str(error).removesuffix("; leave method out, or take the redundancy out")
+    if begun.assembly.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+        return "a body has no inertia about some axis, which method='radau' does not know"
     if not s.tree:
         return ""
     if s.prescribed:
