@@ -109,7 +109,7 @@ def see(watch, note, S, W, c):
 def known_sides(W, c, h):
     """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
 
-    So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each there.
+    So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each.
     """
     for i in range(W.side.shape[0]):
         f, slope = W.g[END, i], (W.g[MOST, i] - W.g[LEAST, i]) / h
