@@ -210,3 +210,29 @@ def test_what_is_held_stays_where_other_things_happen():
     m.add(fb.Event("look", "sin(40*t)", do=[]))
     r, x, v = moved(m, 2.0)
     assert np.ptp(x[r.t > 0.2]) < 1e-14
+
+
+def test_a_bounce_at_the_instant_of_a_corner_of_the_speed():
+    """Falls with g = 10 and hits at 2 m/s; below that speed exactly nothing else acts, so it rises with 1 m/s."""
+    m = cart("-10 + where(rate + 2 < 0, 100, 0)")
+    m.add(fb.Limit("floor", "track.displacement", lower=-0.2, restitution=0.5))
+    r, x, _v = moved(m, 0.4, outputs=[0.0, 0.2, 0.3, 0.4])
+    assert x == pytest.approx([0.0, -0.2, -0.15, -0.2], abs=1e-9)
+    assert r["drive"].force[1:3] == pytest.approx([-10.0, -10.0])
+
+
+@pytest.mark.parametrize("restitution", [0.0, 1.0])
+def test_what_a_users_friction_holds_is_hit_and_comes_to_rest_again(restitution):
+    """Two of one mass: it takes over all of the other's speed u, or both go on with u / 2 and the friction of one."""
+    a, u, gap = 5.0, 2.0, 0.5
+    m = cart(f"-{a}*sign(rate)")
+    m.add(fb.Body("other", mass=1, inertia=1, position=(-1, 0), velocity=(u, 0)))
+    m.add(fb.Prismatic("rail", "ground", "other", at=(-1, 0), axis=(1, 0)))
+    both = ("track.displacement", "rail.displacement")
+    m.add(fb.Backlash("buffer", both, gap=2 * gap, restitution=restitution))
+    v, slows = (u, a) if restitution == 1.0 else (u / 2, a / 2)
+    t = gap / u
+    r, x, _v = moved(m, 1.0, outputs=[0.0, t, t + v / slows / 2, 1.0])
+    assert x == pytest.approx([0.0, 0.0, 3 / 8 * v**2 / slows, v**2 / slows / 2], abs=1e-10)
+    assert [h.kind for h in r.events][:3] == ["hold", "impact", "leave"]
+    assert [h.t for h in r.events if h.kind == "hold"] == pytest.approx([0.0, t + v / slows], abs=1e-10)

@@ -173,3 +173,5 @@ def test_an_elastic_stop_that_is_just_reached_at_rest_never_pulls(stop):
     left = 1.0 - free
     run = m.simulate(2.0, outputs=[0.0, 1.0, 2.0], rtol=1e-11, atol=1e-13)
     assert way * run["S.displacement"] == pytest.approx([0.0, x, speed * left - 0.5 * F * left**2], abs=1e-8)
+    assert times(run, "stop") == pytest.approx([0.5, 1.0 + free], abs=1e-5)  # pressed as soon as it can be told
+    assert [h.kind for h in run.events] == (["taut", "slack"] if stop == "rope" else ["close", "open"])

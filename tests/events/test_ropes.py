@@ -113,3 +113,16 @@ def test_a_rope_with_restitution_bounces(coordinates):
     r = run(m, 1.0, coordinates)
     assert times(r, "tether") == pytest.approx([0.5], abs=1e-9)
     assert r["bob"].velocity[-1] == pytest.approx([-0.8, 0.0], abs=1e-9)
+
+
+@layers
+def test_an_elastic_rope_that_ends_where_a_rigid_one_does_never_pulls_nor_pushes(coordinates):
+    """It runs out at the instant at which the rigid one throws the bob back."""
+    m = fb.Mechanism("tethers", planar=True)
+    m.add(fb.Body("bob", mass=1.0, inertia=0.1, position=(1, 0), velocity=(2, 0)))
+    m.add(fb.Rope("rigid", ("ground", "bob"), at=((0, 0), (1, 0)), length=2.0, restitution=0.4))
+    m.add(fb.Rope("elastic", ("ground", "bob"), at=((0, 0), (1, 0)), length=2.0, stiffness=1e3, damping=5.0))
+    r = run(m, 1.0, coordinates)
+    assert times(r, "rigid") == pytest.approx([0.5], abs=1e-9)
+    assert r["bob"].velocity[-1] == pytest.approx([-0.8, 0.0], abs=1e-9)
+    assert (r["elastic"].tension == 0.0).all() and (r["elastic"].taut == 0.0).all()

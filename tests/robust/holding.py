@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 
 import numpy as np
 
@@ -52,8 +53,10 @@ def _wrong(e, own, r: Result, most: float) -> str:
 
 
 def _length(e: fb.Rope, own) -> float:
-    """Of a rope: given, or as long as it was drawn."""
-    return float(e.length) if isinstance(e.length, int | float) else own["length"][0]
+    """Of a rope: given, or as long as it was drawn, wherever its bodies were assembled."""
+    if isinstance(e.length, int | float):
+        return float(e.length)
+    return sum(math.dist(a, b) for a, b in itertools.pairwise(e.at)) if e.at else own["length"][0]
 
 
 def _beyond(e, own) -> float:

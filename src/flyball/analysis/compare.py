@@ -25,7 +25,8 @@ from .motion.ahead import refuse_missing
 from .motion.engines import Engine
 from .motion.events.here import Here
 from .motion.events.run import run_events
-from .motion.implicit.suited import ALPHA, EVEN, IMPLICIT, RADAU, suited
+from .motion.implicit.suited import ALPHA, EVEN, IMPLICIT, RADAU, VARIATIONAL, suited
+from .motion.implicit.variational import refuse_unknown
 from .motion.options import MOST, Integration, output_times
 from .motion.outcome import outcome
 from .motion.start import Start, begin, start_time
@@ -69,6 +70,7 @@ OF_THEIR_OWN = {
     f"{RADAU} index 3": Way("the same with positions alone held to the constraints", "none", method=RADAU),
     ALPHA: Way("generalised-alpha, implicit, of order 2, of the stabilised equations of index 2", method=ALPHA),
     f"{ALPHA} index 3": Way("the same with positions alone held to the constraints", "none", method=ALPHA),
+    VARIATIONAL: Way("a variational integrator on Lie groups, of order 2: symplectic", method=VARIATIONAL),
 }
 """Methods that hold motions to constraints themselves, by name."""
 ALL = WAYS | OF_THEIR_OWN
@@ -207,7 +209,10 @@ def _start(job: _Task, way: Way) -> Start:
     a, rows = job.base.assembly, len(job.base.assembly.compiled.structure.rows)
     if way.method:
         try:
-            return suited(job.base, way.method, "absolute", job.asked.parameters)
+            begun = suited(job.base, way.method, "absolute", job.asked.parameters)
+            if way.method == VARIATIONAL:
+                refuse_unknown(begun)
+            return begun
         except ModelError as error:
             raise AnalysisError(str(error)) from None
     if way.coordinates == "joint":

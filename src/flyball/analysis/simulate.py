@@ -30,7 +30,8 @@ from .motion.engines import TABLES, Engine
 from .motion.events.here import Here
 from .motion.events.legs import breaks
 from .motion.events.run import run_events
-from .motion.implicit.suited import IMPLICIT, explicit, suited, unsuited
+from .motion.implicit.suited import IMPLICIT, VARIATIONAL, explicit, suited, unsuited
+from .motion.implicit.variational import refuse_unknown
 from .motion.impulse.run import impulse_motion
 from .motion.impulse.settings import Stepping
 from .motion.known import sampled_laws, told_of
@@ -101,8 +102,10 @@ def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Pa
     if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
-    if o.method in IMPLICIT and not leaves_no_freedom(begun):
+    if o.method in IMPLICIT and (watched(begun) or not leaves_no_freedom(begun)):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
+        if o.method == VARIATIONAL:
+            refuse_unknown(begun)
     if o.stabilization != "projection":
         _refuse_idle(begun, o.stabilization)
     for d in changed_velocities(begun.base.departures):

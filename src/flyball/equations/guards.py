@@ -75,6 +75,7 @@ KEPT = (
     G_CONE,
     G_SHARED,
 )  # guards above zero as long as modes are right
+GRAZED = 1e-12  # of the same: an elastic stop that looks where it is by itself is pressed from there on
 RESTING = 1e-9  # of the same a second: not coming nearer
 CREEP = 1e-13  # of the same a second: a rate that is none
 
@@ -192,6 +193,8 @@ def pressing(S, W, s, kind, way):
         return push
     if told and way * side < -0.5:
         return NOT_WATCHED
+    if not told:  # it begins at the side, with nothing that tells where it goes
+        return GRAZED * max(1.0, S.glob[LENGTH]) - depth
     return -push if depth > 0.0 else -depth
 
 

@@ -232,7 +232,7 @@ class Design(Model):
             Every run goes on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             As for `simulate`.
-        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
             As for `simulate`.
         rtol : float [1]
             As for `simulate`.

@@ -68,13 +68,15 @@ class Motions(Model):
             Go on from where this result ended.
         coordinates : {"auto", "absolute", "joint"}
             Those of the equations; auto: those in which a right-hand side costs less. Results do not depend on it.
-        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "impulse"} or Stepping
+        method : {"auto", "dop853", "rk45", "radau", "generalised-alpha", "variational", "impulse"} or Stepping
             ``dop853``, ``rk45``: explicit Runge-Kutta pairs, of order 8 and 5, for smooth motions. ``radau``: implicit,
             Radau IIA of order 5, for stiff springs and strong damping. ``generalised-alpha``: implicit, of order 2, at
-            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``impulse``, or a
-            `Stepping` with choices of its own: steps of fixed length by impulses, for contact with friction. auto:
-            ``dop853``, which goes from touch to touch; steps by impulses where bodies may touch at many places, or in
-            ways that it does not know: ``health.method`` says why.
+            fixed steps (``step``), which damps what they do not resolve (``rho_inf``). ``variational``: symplectic, of
+            order 2, at fixed steps, for very long runs: energy and momenta do not drift. ``impulse``, or a `Stepping`
+            with choices of its own: steps of fixed length by impulses, for contact with friction. auto: ``dop853``,
+            which goes from touch to touch, and ``radau`` for as long as a long motion is stiff; steps by impulses
+            where bodies may touch at many places, or in ways that it does not know: ``health.method`` says which,
+            from when on, and why.
         rtol : float [1]
             Tolerance of the error of a step relative to the state; 1e-13 at least.
         atol : float [m, rad, m/s, rad/s], optional
@@ -192,8 +194,8 @@ class Motions(Model):
         formulations : sequence of str, optional
             Names out of ``none``, ``baumgarte``, ``positions``, ``velocities``, ``projection-steps``, ``projection``,
             ``partitioning``, ``coupled matrix`` and ``joint coordinates``; all of them by default. Besides methods that
-            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3`` and
-            ``generalised-alpha index 3``.
+            hold motions to the constraints themselves: ``radau``, ``generalised-alpha``, ``radau index 3``,
+            ``generalised-alpha index 3``, ``variational``.
         repeats : int
             Times that each is run for its cost, fewer where that takes long; 0 for none.
         parameters : mapping, optional
@@ -203,7 +205,8 @@ class Motions(Model):
         method : {"dop853", "rk45"}
             Explicit Runge-Kutta pair, of order 8 or 5.
         step : float or str [s], optional
-            Width of steps of ``radau``, which chooses it by itself if none is given, and ``generalised-alpha``.
+            Width of steps of ``radau``, which chooses it by itself if none is given, and of the other methods of that
+            kind, which have to be given one.
         rtol : float [1]
             Tolerance of the error of a step relative to the state.
         atol : float [m, rad, m/s, rad/s], optional

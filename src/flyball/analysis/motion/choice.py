@@ -14,7 +14,7 @@ from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.result import Result
 from .engines import AUTO as EITHER
 from .engines import check_specialize
-from .implicit.suited import ALPHA, IMPLICIT, refuse_idle
+from .implicit.suited import ALPHA, IMPLICIT, RHO, VARIATIONAL, refuse_idle
 from .impulse.settings import Stepping
 from .jams import Overlap, Unresolved
 from .options import MOST, Integration
@@ -33,6 +33,10 @@ CALLED = {
     "alpha": ALPHA,
     "newmark": ALPHA,
     "hht": ALPHA,
+    "symplectic": VARIATIONAL,
+    "verlet": VARIATIONAL,
+    "rattle": VARIATIONAL,
+    "energy-momentum": VARIATIONAL,
 }
 """What methods are called in words."""
 IDLE = {
@@ -127,7 +131,7 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
                 f"method={o.method!r} integrates from event to event, which does not know {model.bulk[0].title}: leave "
                 f"method out, or give method={IMPULSE!r}"
             )
-        return Way(o, f"{o.method}, as asked: from touch to touch" if touch else "")
+        return Way(o, _asked(o, touch))
     given = [f"{name}={getattr(o, name)!r}" for name in _given(o)]
     if unknown := _smooth(model):
         raise ModelError(
@@ -142,6 +146,18 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
             f"{STEPS} are taken in absolute coordinates, where joints close to rounding; leave coordinates out"
         )
     return Way(_by_steps(o), f"{STEPS}, as asked")
+
+
+def _asked(o: SimulateOptions, touch: bool) -> str:
+    """What is said of an integrator that was asked for, where there is something to say."""
+    parts = [f"steps of {o.step:g} s"] if o.step is not None else []
+    if o.method == ALPHA:
+        parts.append(f"rho_inf = {RHO if o.rho_inf is None else o.rho_inf:g}")
+    if o.method in IMPLICIT and o.stabilization == "none":
+        parts.append("index 3: velocities are not held to the constraints")
+    if not (touch or parts or o.method in IMPLICIT):
+        return ""
+    return ", ".join([f"{o.method}, as asked", *parts]) + (": from touch to touch" if touch else "")
 
 
 def _suitable(model: Model, o: SimulateOptions) -> Way:

@@ -9,10 +9,11 @@ from ...equations.explicit import explicit_steps
 from ...equations.implicit import radau_steps
 from ...equations.instant import instant
 from ...equations.residual import stepped
+from ...equations.variational import variational_steps
 from ...equations.watched import unwatched_kernel, watched_kernel
 from ...model.model import Model
 from ...tables.switches import declared
-from .implicit.suited import ALPHA, RADAU
+from .implicit.suited import ALPHA, RADAU, VARIATIONAL
 
 ENGINE = Part("the equations of motion", 22.0, (engine,))
 EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, explicit_steps, instant))
@@ -21,6 +22,7 @@ LOOP = Part("the loop of implicit methods", 2.0, (unwatched_kernel,))
 STAGES = {
     RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 7.0, (radau_steps,))),
     ALPHA: (DERIVATIVES, LOOP, Part("the generalised-alpha method", 5.0, (alpha_steps,))),
+    VARIATIONAL: (LOOP, Part("the variational method", 4.0, (variational_steps,))),
 }
 
 

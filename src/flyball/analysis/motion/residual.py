@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ...results.result import Result
 
 MOST = 100  # output times that are looked at
+NOTHING = 1e-14  # of the mechanism's length (or a radian) by the square of the motion's time: what is less is rounding
 
 
 def acceleration_violation(result: Result) -> float:
@@ -23,8 +24,8 @@ def acceleration_violation(result: Result) -> float:
     Looked at in absolute coordinates, whatever the motion was computed in: what two bodies add to a row cancels in
     others. The terms are what would be there without the constraints, |G| M^-1 |f|, which reactions cancel;
     |G| |vdot|; and what gamma is made of, rates of turn times rates of the rows: where nothing moves, or all moves
-    steadily, the accelerations themselves are only the rounding of these. With Baumgarte's stabilization gamma is what
-    that makes of it.
+    steadily, the accelerations themselves are only the rounding of these; where no force acts either, all of them are
+    (`NOTHING`). With Baumgarte's stabilization gamma is what that makes of it.
     """
     n, old = len(result.t), result.values.structure
     if not n or not (result.model.joints or result.model.drivers or old.switches):
@@ -41,7 +42,8 @@ def acceleration_violation(result: Result) -> float:
     picked = np.unique(np.linspace(0, n - 1, min(n, MOST)).astype(int)).tolist()
     accelerations, sizes = _accelerations(result, c), c.sizes
     held = None if result.stretches is None else result.stretches.over("switch")
-    worst = 0.0
+    span, worst = float(np.ptp(result.t)), 0.0
+    least = NOTHING / span**2 if span > 0.0 else 0.0
     for k in picked:
         q, v, own.z = result.q[k].copy(), result.v[k].copy(), result.states[k].copy()
         if c is not own:
@@ -51,6 +53,7 @@ def acceleration_violation(result: Result) -> float:
             c.work.sensed[VALUE, c.work.sensed.shape[1] - len(old.switches) :] = result.stretches.sigma[:, k]  # type: ignore[union-attr]
         c.at(result.t[k], q, v, MOTION)
         gap, largest, _ = missed(c, v, accelerations[k], sizes, result.health.options)
+        largest = max(largest, least)
         worst = max(worst, float(gap.max()) / largest if largest > 0.0 else 0.0)
     return worst
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -29,14 +30,16 @@ from ...special.recorder import PLAIN
 from ...tables.system import LATER, SEMIDEFINITE, System
 from ...tables.values import Values, values
 from ..compiled import Compiled
-from ..motion.choice import SimulateOptions, chosen
+from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
 from ..motion.engines import LONGEST, Engine
 from ..motion.events.legs import laws_of_time
+from ..motion.implicit.suited import unsuited
 from ..motion.known import sampled_laws
 from ..motion.later import open_until_asked, solved
 from ..motion.reasons import remarks
 from ..motion.start import Start, begin, start_time
+from ..motion.stiff import EXPLICIT, Pace
 from ..simulate import clock_for
 from .compute import DONE, Answers, Question, alone
 from .firm import Weighing, rests_as_drawn
@@ -56,6 +59,7 @@ class Shared:
     made: special.Made | None
     plain: tuple[np.ndarray, ...]  # where tables of the first run are 0, 1 or -1: made code goes by that
     fixed: tuple[tuple[str, int, float], ...]  # entries that made code knows, and their values
+    asked: str  # the method
 
     @property
     def values(self) -> Values:
@@ -97,7 +101,8 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
         fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in VARIED)
     if (filling := _filling(question, o, begun)) is None:
         return None
-    return Shared(question, o, begun, filling, made, _plain(S, filling.tables), fixed)
+    mixed = question.options.method == AUTO and o.step is None
+    return Shared(question, o, begun, filling, made, _plain(S, filling.tables), fixed, AUTO if mixed else str(o.method))
 
 
 def _filling(question: Question, o: SimulateOptions, begun: Start) -> Filling | Weighing | None:
@@ -170,8 +175,12 @@ class Desk:
             array[...] = new
         clock, used = self.clock, 0
         clock.real[ex.LEDGER] = self.own["ledger"][0]
+        pace = Pace(float(of.options.t_end), of.asked, partial(unsuited, of.begun))
         while clock.count[ex.STATUS] == ex.RUNNING:
+            clock.count[ex.QUOTA] = pace.limited(clock, LONGEST)
             used += motion_kernel(c.system, c.work, self.method, clock, self.rows[used:], INTEGRATE)
+            if clock.count[ex.STATUS] == ex.RUNNING and pace.turns(c, clock, EXPLICIT):
+                return False  # it is stiff: by itself it goes on by another method
         return bool(clock.count[ex.STATUS] == ex.DONE and used == len(clock.times))
 
 

@@ -38,6 +38,7 @@ REACHED = 1e-9  # how near to 1 the side is where the motion leaves a corner
 LEVEL = 1e-9  # part of what sides can do to du/dt, or of du/dt on both sides, that is nothing
 SWEEPS = 500
 KEPT = 1e3  # times rounding: where the motion is held on a corner it is still there
+THROWN = 10.0  # times what is left of u where its corner was found: farther off by a jump of velocities
 ALIKE = 1e-6  # of u: what is left of it where the same rate that is taken away was all of it
 AHEAD = 1e-7  # part of the time span by which it is tried where the motion goes
 
@@ -76,6 +77,7 @@ class Corners:
         self.old = n.W.switch[MODE].copy()
         self.sides = n.ways().copy()
         self.over = np.nan
+        self.fell = n.here.v.copy()
 
     def begin(self) -> None:
         """Sides as the motion begins."""
@@ -91,15 +93,17 @@ class Corners:
         self.n.ask(MOTION)
 
     def fired(self, guards: np.ndarray) -> None:
-        """Take note of guards that fired."""
+        """Take note of guards that fired, and of the velocities with which they did."""
         self.at |= self.n.fired(guards, G_CORNER)
+        self.fell = self.n.here.v.copy()
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""
         if not len(self.all):
             return False
         n, ways = self.n, self.n.ways()
-        before = ways[self.all].copy()
+        before, modes = ways[self.all].copy(), n.W.switch[MODE, self.all].copy()
+        self.at -= self._thrown()
         n.ask(MOTION)
         for s in self.all.tolist():
             if s in self.at:
@@ -113,13 +117,28 @@ class Corners:
             if abs(u) > least:
                 ways[s] = np.sign(u)
         jumps = self.decide() if self.at else False
-        jumps = jumps or bool((np.abs(ways[self.all] - before) > 1e-6).any() and self._not_at(before))
+        moved = bool((np.abs(ways[self.all] - before) > 1e-6).any())
+        jumps = (moved and (jumps or self._not_at(before))) or (jumps and (n.W.switch[MODE, self.all] != modes).any())
         n.here.fresh = n.here.fresh or jumps
+        self._tell()
         return jumps
 
     def _not_at(self, before: np.ndarray) -> bool:
         """Whether a side changed away from zero: a jump of velocities made it."""
         return any(s not in self.at and w != self.n.ways()[s] for s, w in zip(self.all.tolist(), before, strict=True))
+
+    def _thrown(self) -> set[int]:
+        """Corners that a jump of velocities has taken off zero."""
+        n, v = self.n, self.n.here.v.copy()
+        if not self.at or (v == self.fell).all():
+            return set()
+        n.ask(MOTION)
+        now = {s: self.value(s) for s in self.at}
+        n.here.v[:] = self.fell
+        n.ask(MOTION)
+        then = {s: self.value(s)[0] for s in self.at}
+        n.here.v[:] = v
+        return {s for s, (u, least) in now.items() if abs(u - then[s]) > KEPT * least + THROWN * abs(then[s])}
 
     def value(self, s: int) -> tuple[float, float]:
         """The u of a corner at the state last evaluated, and what of it is rounding."""
@@ -175,7 +194,6 @@ class Corners:
         if len(which) > 1:
             self._goes_on([s for s, going in zip(which, ~held & ~found.left, strict=True) if going])
         n.ask(MOTION)
-        self._tell(which)
         return bool(found.B.any())
 
     def ended(self, found: Pushed) -> Pushed:
@@ -264,9 +282,9 @@ class Corners:
                 t=t,
             )
 
-    def _tell(self, which: list[int]) -> None:
+    def _tell(self) -> None:
         n = self.n
-        for s in which:
+        for s in self.all.tolist():
             now = n.W.switch[MODE, s]
             if now != self.old[s]:
                 said = "stays on the corner of its law" if now != OFF else "leaves the corner of its law"

@@ -13,6 +13,8 @@ from ....tables.system import (
     G_CONE,
     G_CORNER,
     G_HOLDS,
+    G_PRESS_LOWER,
+    G_PRESS_UPPER,
     G_PULL,
     G_SLIDES,
     G_TURNS,
@@ -38,7 +40,7 @@ from .told import tell_jump, tell_modes
 
 ROUNDS = 100
 AGAIN = 5  # times that ways of sliding are decided again for the same modes
-RATES = (G_SLIDES, G_BACK, G_TURNS)  # guards of rates
+RATES = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
 
@@ -144,7 +146,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
             fired = unmoved(n, fired, rate)
             still = at_rest(n, fired)
             still[list(jumped.even)] = True
-        pressed(n, fired)
+        pressed(n, fired, ways)
         found = decided(n, at, still, fired)
         if isinstance(found, Jump):  # no accelerations: velocities have jumped, all is looked at again
             tell_jump(n, found, before)

@@ -75,16 +75,20 @@ def _acceleration(n: Instant, s: int) -> float:
     return float(n.gradients(np.array([s]))[0] @ vdot + n.W.sensed[BIAS, n.m[s]])
 
 
-def pressed(n: Instant, fired: np.ndarray) -> None:
-    """Which sides of elastic stops are pressed now; ``n`` has looked there."""
+def pressed(n: Instant, fired: np.ndarray, ways: np.ndarray) -> None:
+    """Which sides of elastic stops are pressed now; ``n`` has looked there.
+
+    What fired is pressed if it was open by the ``ways`` before the instant, and the other way round.
+    """
     for s in n.of(ELASTIC):
-        n.ways()[s] = FROZEN + _side(n, s, {k for k, of, _ in (n.guarded[g] for g in fired) if of == s})
+        hit = {k for k, of, _ in (n.guarded[g] for g in fired) if of == s}
+        n.ways()[s] = FROZEN + _side(n, s, float(ways[s]) - FROZEN, hit)
 
 
-def _side(n: Instant, s: int, hit: set[int]) -> float:
+def _side(n: Instant, s: int, old: float, hit: set[int]) -> float:
     """1 if pressed at the lower side, -1 at the upper, 0 if open; `BY_ITSELF` less `FROZEN` where nothing tells."""
     k, c = n.S.switch_x[s, SWITCH_STIFFNESS], n.S.switch_x[s, SWITCH_DAMPING]
-    old, now = n.way[s] - FROZEN, 0.0
+    now = 0.0
     for side, bound, guard in ((1.0, LOWER, G_PRESS_LOWER), (-1.0, UPPER, G_PRESS_UPPER)):
         depth, rate = side * (n.W.switch[bound, s] - n.x[s]), -side * n.rate[s]
         if not np.isfinite(depth):

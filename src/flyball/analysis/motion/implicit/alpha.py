@@ -13,8 +13,6 @@ from ....numerics.ldl import Pattern
 from ...compiled import Compiled
 from .loop import Implicit
 
-RHO = 0.8  # spectral radius at infinity, where none is given
-
 
 class Desk(NamedTuple):
     """Scratch and tables of one run; what has the same name as in `numerics.integrators.implicit.desk` is the same."""

@@ -5,12 +5,13 @@ from __future__ import annotations
 from ....numerics.integrators import clock as ex
 from ...compiled import Compiled
 from ..options import Integration
-from .alpha import RHO, Alpha
+from .alpha import Alpha
 from .loop import Implicit
-from .suited import ALPHA
+from .suited import ALPHA, RHO, VARIATIONAL
+from .variational import Variational
 
 
-def implicit(method: str, c: Compiled, clock: ex.Clock, o: Integration) -> Implicit:
+def implicit(method: str, c: Compiled, clock: ex.Clock, o: Integration) -> Implicit | Variational:
     """Steps of a method for one motion.
 
     Parameters
@@ -21,6 +22,8 @@ def implicit(method: str, c: Compiled, clock: ex.Clock, o: Integration) -> Impli
     clock : Clock
     o : Integration
     """
+    if method == VARIATIONAL:
+        return Variational(c, clock)
     index_3 = o.stabilization == "none"
     if method == ALPHA:
         return Alpha(c, clock, RHO if o.rho_inf is None else o.rho_inf, index_3)

@@ -7,17 +7,19 @@ from typing import Any
 
 from ....errors import ModelError
 from ....results.doubts import open_loads
+from ....tables.system import SEMIDEFINITE
 from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at
 from ..stiff import EXPLICIT
 from .layout import sparsity
 
-RADAU, ALPHA = "radau", "generalised-alpha"
-IMPLICIT = (RADAU, ALPHA)
+RADAU, ALPHA, VARIATIONAL = "radau", "generalised-alpha", "variational"
+IMPLICIT = (RADAU, ALPHA, VARIATIONAL)
 """Integrators with loops of their own, by name."""
-EVEN = (ALPHA,)
+EVEN = (ALPHA, VARIATIONAL)
 """Those of them whose steps are of one width, which has to be given."""
+RHO = 0.8  # spectral radius at infinity of generalised-alpha, where none is given
 FEW = 40  # groups of joint coordinates that no equation sees together, up to which these cost less than absolute ones
 
 
@@ -36,7 +38,7 @@ def refuse_idle(o: Any) -> None:
     """
     if o.method in EVEN and o.step is None:
         raise ModelError(f"method={o.method!r} takes steps of fixed width: give one, for instance step='1 ms'")
-    if o.stabilization not in ("projection", "none"):
+    if o.stabilization not in ("projection", "none") or (o.method == VARIATIONAL and o.stabilization == "none"):
         raise ModelError(
             f"stabilization={o.stabilization!r} does nothing with method={o.method!r}, which keeps positions and "
             f"velocities on the constraints itself; leave it out, or give 'none', and it keeps positions alone "
@@ -61,9 +63,14 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
     """
     s = begun.assembly.compiled.structure
     _refuse_open_loads(begun, method)
+    if method == VARIATIONAL and wish == "joint":
+        raise ModelError(f"method={VARIATIONAL!r} takes absolute coordinates, in which masses do not change: leave "
+                         f"coordinates out")  # fmt: skip
     if not s.tree or wish == "absolute":
         return begun
-    if s.prescribed:
+    if method == VARIATIONAL:
+        why = "masses do not change in these, as the variational method needs it"
+    elif s.prescribed:
         if wish == "joint":
             raise ModelError(
                 f"method={method!r} does not know coordinates that drivers prescribe ({', '.join(s.prescribed)}), as "
@@ -89,6 +96,8 @@ def unsuited(begun: Start) -> str:
         _refuse_open_loads(begun, RADAU)
     except ModelError as error:
         return str(error).removesuffix("; leave method out, or take the redundancy out")
+    if begun.assembly.compiled.values.system.glob[SEMIDEFINITE] > 0.0:
+        return "a body has no inertia about some axis, which method='radau' does not know"
     if not s.tree:
         return ""
     if s.prescribed:

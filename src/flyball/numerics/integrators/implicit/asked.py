@@ -30,6 +30,7 @@ from ..clock import (
     STEP,
     STUCK,
     TRIED,
+    WIDE,
     H,
     T,
 )
@@ -67,6 +68,7 @@ def begin(arrive, inspect, S, K, c):
     K.real[LAST_ERROR] = 0.0
     c.real[GROW] = WIDEST
     c.real[EXCESS] = 1.0
+    c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
     c.real[BEFORE] = c.real[T]
     c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
     if c.real[H] <= 0.0:

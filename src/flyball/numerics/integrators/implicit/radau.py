@@ -116,7 +116,8 @@ def refuse(K, c):
         stranded(c)
         return 0
     shorten(c, wider(h, error, asked)[0] if K.count[BEFORE] == 1 else 0.1 * h)
-    pardon(K, c, h, error)
+    if K.count[BEFORE] == 1:  # what a jump excites is not followed by steps as wide as those before it
+        pardon(K, c, h, error)
     return 0
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
-from ..clock import LEDGER, LOOSER, NOW, SCALE, T
+from ..clock import LEDGER, NOW, SCALE, T
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
 from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, START, THETA
 from .newton import correct, solve_real
@@ -219,7 +219,7 @@ def unsure(K, c, h):
     for n in range(c.accounts.shape[0]):
         e = BENT_MOST * bent(K, c.accounts[n] - at)
         s += e * e
-    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (LOOSER * K.real[RTOL] * size + 1e-300)
+    return h * sqrt(s / max(c.accounts.shape[0], 1)) / (K.real[RTOL] * size + 1e-300)
 
 
 @formula

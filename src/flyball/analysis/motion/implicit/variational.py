@@ -1,0 +1,126 @@
+"""A motion by the variational method: what its compiled loop works with, and what it does not know."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ....compiler.bound import Bound, Written
+from ....equations.callbacks import Going, Own
+from ....equations.tree import quaternion_at
+from ....equations.variational import Turns, variational_steps
+from ....errors import ModelError, SimulationError
+from ....numerics.integrators import clock as ex
+from ....numerics.integrators.implicit import desk as ds
+from ....numerics.integrators.tableaux import tableau
+from ....tables.system import EXCESS, EXCESS_MASS, LENGTH, SEMIDEFINITE, System, Work
+from ...compiled import Compiled
+from ..start import Start
+from .loop import SEEN
+from .suited import VARIATIONAL
+
+TIGHT, CLOSED = 1e-15, 1e-9  # parts of the mechanism's length: violations that are none; that rounding may leave
+
+KEPT = 12  # steps that the iteration remembers
+
+
+class Desk(NamedTuple):
+    """Scratch of one run; what has the same name as in `numerics.integrators.implicit.desk` is the same."""
+
+    count: np.ndarray  # type: ignore[assignment]
+    real: np.ndarray
+    d: np.ndarray
+    v: np.ndarray
+    a: np.ndarray
+    lam: np.ndarray
+    found: np.ndarray
+    z: np.ndarray
+    rate: np.ndarray
+    ends: np.ndarray  # (3, nv): rates at the ends of the step
+    p: np.ndarray  # (4, nv): momenta of the free way, on arrival, at the begin of the step and at its end
+    f: np.ndarray  # (3, nv): forces at its begin, at its end, and as they were thought to be there
+    g: np.ndarray  # (nr,): violations
+    rows: np.ndarray  # (2, nG): G at the begin and at the end
+    steps: np.ndarray  # (KEPT, nr): of the iteration for positions
+    pushes: np.ndarray  # (KEPT, nv): and of that for forces
+
+
+class Means(NamedTuple):
+    """What its steps work with."""
+
+    turns: Turns
+    desk: Desk
+
+
+class Variational:
+    """Steps of the variational method for one motion.
+
+    Parameters
+    ----------
+    c : Compiled
+        In absolute coordinates.
+    clock : Clock
+    """
+
+    R = tableau("rk45")  # is not looked at
+    c, stages = SEEN, len(SEEN)
+
+    def __init__(self, c: Compiled, clock: ex.Clock) -> None:
+        s, S = c.structure, c.system
+        nv, nr, nz = s.nv, len(s.rows), len(s.states)
+        self.clock = clock
+        self.width = nv + 3 * nr + 3 * len(s.measured)
+        turns = [w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0]
+        real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
+        real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.glob[LENGTH], CLOSED * S.glob[LENGTH]
+        n, z = int(S.row_p[nr]), np.zeros
+        desk = Desk(
+            count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((3, nv)),
+            z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
+        )  # fmt: skip
+        self.means = Means(Turns(np.array(turns, np.int64)), desk)
+
+    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+        """The door with these tuples bound to it."""
+        return Bound(variational_steps, *map(Written, (S, W, self.means, own, going)))
+
+    @property
+    def failed(self) -> SimulationError | None:
+        """Why steps do not go on; else nothing."""
+        t, step = float(self.clock.real[ex.T]), float(self.clock.real[ex.STEP])
+        if self.clock.count[ex.STATUS] != ex.STUCK:
+            return None
+        return SimulationError(
+            f"at t = {t:.6g} s a step of {step:g} s finds no positions on the constraints, or no forces that its "
+            f"velocities return: give a shorter step; for strong damping and stiff springs method='radau'",
+            t=t,
+        )
+
+
+def refuse_unknown(begun: Start) -> None:
+    """Refuse what the variational method does not know.
+
+    Raises
+    ------
+    ModelError
+        Naming it.
+    """
+    c = begun.assembly.compiled
+    s, S = c.structure, c.system
+    rolling = dict.fromkeys(r.element.title for r in s.rows if not r.holonomic)
+    if rolling:
+        raise ModelError(
+            f"method={VARIATIONAL!r} does not know rows that restrain velocities alone ({', '.join(rolling)}); leave "
+            f"method out, or give method='radau'"
+        )
+    if S.glob[SEMIDEFINITE] > 0.0:
+        thin = [
+            n
+            for n, b in s.place.items()
+            if b >= 0 and (S.body_x[b, EXCESS_MASS] or S.body_x[b, EXCESS : EXCESS + 9].any())
+        ]
+        raise ModelError(
+            f"method={VARIATIONAL!r} needs masses and inertias about all axes, which {', '.join(map(repr, thin))} does "
+            f"not have: give them, or leave method out"
+        )

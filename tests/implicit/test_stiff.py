@@ -1,0 +1,71 @@
+"""method="auto": stiff motions go on by an implicit method, others do not; both ways, told, and the same each time."""
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from flyball.analysis.motion import stiff
+from flyball.analysis.motion.start import begin
+from flyball.numerics.integrators import clock as ex
+
+
+def bushing(damping, *more):
+    """1 g on 1e6 N/m."""
+    m = fb.Mechanism("b", parameters={"c": damping})
+    m.add(fb.Body("x", mass=1e-3, inertia=(1e-7, 1e-7, 1e-7), velocity=(3.0, 0, 0)))
+    m.add(fb.Prismatic("s", "ground", "x", at=(0, 0, 0), axis=(1, 0, 0)))
+    m.add(fb.CoordinateSpring("k", "s.displacement", stiffness=1e6, damping="c"), *more)
+    return m
+
+
+def clock_at(start):
+    real, y = np.zeros(ex.REALS), np.zeros((ex.STATES, len(start.y)))
+    y[ex.NOW] = start.y
+    return ex.Clock(real, np.zeros(ex.COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
+
+
+@pytest.mark.parametrize(("damping", "rho"), [(0.0, 1e3 * 1e1**1.5), (1000.0, 998999.0), (10.0, 1e3 * 1e1**1.5)])
+def test_spectral_radius(damping, rho):
+    """Largest root of m s^2 + c s + k = 0, by the power method within some tenths."""
+    start = begin(bushing(damping).snapshot(), 0.0, None, None, "joint")
+    found = stiff.spectral_radius(start.assembly.compiled, clock_at(start))
+    assert rho / 1.5 < found < 1.5 * rho
+
+
+def test_a_stiff_motion_goes_over_and_says_so():
+    """In closed form, with the energy in the work of the damper; the same each time."""
+    r = bushing(1000.0).simulate(1.0, outputs=np.r_[0, np.geomspace(1e-6, 1, 30)])
+    roots = np.roots([1e-3, 1000.0, 1e6]).astype(complex)
+    a = 3.0 / (roots[0] - roots[1])
+    exact = (a * (np.exp(roots[0] * r.t) - np.exp(roots[1] * r.t))).real
+    assert np.abs(r["x"].position[:, 0] - exact).max() < 1e-5 * np.abs(exact).max()
+    assert r.health.method.startswith("dop853; radau from t = 0.00")
+    assert r.health.steps < 2000
+    assert r.health.energy_drift < 1e-5 * 4.5e-3
+    again = bushing(1000.0).simulate(1.0, outputs=r.t)
+    assert np.array_equal(again.q, r.q)
+    assert again.health.method == r.health.method
+
+
+def test_a_motion_that_is_short_or_not_stiff_does_not():
+    assert bushing(1000.0).simulate(0.01).health.method == ""
+    assert bushing(0.0).simulate(0.01).health.method == ""
+
+
+def test_it_comes_back_where_nothing_is_stiff_any_more():
+    """The damper lets go: then it swings freely, with what energy there is."""
+    off = fb.Event("off", "t - 0.5", do=[fb.Set("c", 0.0), fb.Impulse("s", "3e-3")])
+    r = bushing(1000.0, off).simulate(0.6, outputs=[0.5, 0.501, 0.6])
+    assert "radau from t = " in r.health.method
+    assert r.health.method.rpartition("; ")[2].startswith("dop853 from t = 0.5")
+    w = np.sqrt(1e9)
+    at = np.hypot(r["x"].position[1:, 0] * w, r["x"].velocity[1:, 0])
+    assert at == pytest.approx([3.0, 3.0], rel=1e-4)
+
+
+def test_what_radau_does_not_know_stays_explicit_and_health_says_why():
+    m = bushing(1000.0)
+    m.add(fb.Lag("l", of="s.displacement", time=1.0))
+    r = m.simulate(0.3, outputs=2)
+    assert "dop853, though it is stiff" in r.health.method
+    assert "Lag 'l'" in r.health.method
