@@ -123,7 +123,7 @@ def main() -> None:
     def end(run: Any) -> np.ndarray:
         return np.array([run[name].angle[-1] for name in JOINTS])
 
-    ours = [Flyball(model, end, method, arguments.coordinates) for method in ("dop853", "rk45")]
+    ours = [Flyball(model, end, method, arguments.coordinates) for method in ("dop853", "rk45", "radau")]
     ends = {"mujoco": mujoco_end, "exudyn": exudyn_end}
     peers = [Peer(name, setting, partial(ends[name], p, setting), first) for name, setting, first in PEERS]
     rows = contest.run(one, ours, peers)

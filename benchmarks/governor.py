@@ -88,7 +88,7 @@ def main() -> None:
     def height(run: Any) -> float:
         return run["guide"].displacement[-1]
 
-    ours = [Flyball(model, height, method, arguments.coordinates) for method in ("dop853", "rk45")]
+    ours = [Flyball(model, height, method, arguments.coordinates) for method in ("dop853", "rk45", "radau")]
     peers = [Peer(n.partition("_")[0], s, partial(solve, n, tree, s), first) for n, s, first in PEERS]
     rows = contest.run(one, ours, peers)
     print(contest.show(rows, ACCURACY, "CPU ms per s"))

@@ -28,7 +28,7 @@ TRAPEZOIDAL = ("exudyn_spatial", "trapezoidal, index 2"), ("exudyn_spatial", "tr
 MUJOCO = ("mujoco", "RK4, stiff"), ("mujoco", "implicitfast, stiff"), ("mujoco", "implicit, stiff")
 ERROR = {"error": "error [m]"}
 FINE = {"method": "dop853", "rtol": 1e-11}  # of motions that the others are compared with
-GAPS = 8  # halvings of a step that a peer's own motion is fine with
+EVEN = 100  # steps are multiples of it, so that samples lie on them
 
 
 def off(exact: np.ndarray, found: np.ndarray) -> dict[str, float]:
@@ -39,7 +39,7 @@ def off(exact: np.ndarray, found: np.ndarray) -> dict[str, float]:
 
 def of_tree(name: str, tree: Tree, setting: str, t_end: float, read: Callable, n: float, samples: int) -> Any:
     """What is compared, by a peer; samples lie on its steps."""
-    n = max(samples, 1) * -(-n // max(samples, 1))
+    n = EVEN * -(-n // EVEN)
     motion, seconds = import_module(f"peer_{name}").solve(tree, t_end, n, setting, samples)
     return (None if motion is None else read(motion)), seconds
 
@@ -76,7 +76,7 @@ def honey() -> list[dict[str, Any]]:
 
 def by_exudyn(p: Planar, setting: str, n: float, samples: int) -> Any:
     """The crank's centre in the planar model."""
-    n = max(samples, 1) * -(-n // max(samples, 1))
+    n = EVEN * -(-n // EVEN)
     motion, seconds = import_module("peer_exudyn").solve(p, 2.0, n, setting, samples)
     return (None if motion is None else motion[0][:, 0, :2]), seconds
 
@@ -84,7 +84,7 @@ def by_exudyn(p: Planar, setting: str, n: float, samples: int) -> Any:
 def by_mujoco(p: Planar, setting: str, n: float, samples: int) -> Any:
     """The crank's centre."""
     tree = planar_tree(p)
-    n = max(samples, 1) * -(-n // max(samples, 1))
+    n = EVEN * -(-n // EVEN)
     motion, seconds = import_module("peer_mujoco").solve(tree, 2.0, n, setting, samples)
     return (None if motion is None else planar_motion(p, tree, motion)[0][:, 0, :2]), seconds
 

@@ -21,9 +21,9 @@ from ..numerics.integrators.implicit.step import between as between_radau
 from ..numerics.integrators.loop import BEGIN
 from ..tables.system import (
     COORDINATES,
+    DIAGONAL,
     FORCE_WORK,
     LAM,
-    LENGTH,
     MODE,
     NU,
     ROW_WORK,
@@ -208,19 +208,17 @@ def linearise(t, k, A, K, c):
 def rows_of(S, W, K, P, k):
     """Entries of the rows, those along the metric of the stabilisation, and natural sizes of rows.
 
-    In joint coordinates a lever is added, as in `solve.factor_coupled`: what a row weighs must not vanish with entries
-    that are nothing but rounding, or it would hold what it does not.
+    The sizes are those of the engine's own solve, as it last factored: so redundant rows share as they do there, and
+    rows of nothing but rounding weigh enough to hold nothing.
     """
     J = K.J[k]
-    lever = 0.0 if P.fixed[0] == 1 else min(1.0, S.glob[LENGTH]) ** 2
     for r in range(S.row_i.shape[0]):
-        size = 0.0
         for e in range(S.row_p[r], S.row_p[r + 1]):
             g = W.G[e]
             J[P.first[ROWS] + e] = g
             J[P.first[ROWS_METRIC] + e] = -P.metric[S.col_i[e]] * g * P.valued[r]
             J[P.first[ROWS_HELD] + e] = g * P.valued[r]
-            size += (g * g + lever) * P.metric[S.col_i[e]]
+        size = W.row[DIAGONAL, r]
         J[P.first[SIZES] + r] = K.real[SOFT] * (size if size > 0.0 else 1.0)
     for n in range(P.negative.shape[0]):
         J[P.first[END] + 1 + n] = -J[P.negative[n]]

@@ -7,7 +7,7 @@ import numpy as np
 from ....compiler.bound import Bound, Written
 from ....equations import residual
 from ....equations.callbacks import Going, Own
-from ....equations.implicit import Means, Plan, radau_steps
+from ....equations.implicit import SIZES, Means, Plan, radau_steps
 from ....equations.residual import Bench
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
@@ -19,9 +19,11 @@ from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex, complex_tables
 from .layout import layout, metric
 
-SOFT = 1e-10  # regularisation of rows, as part of their natural size
+SOFT, SOFTER = 1e-10, 1e-8  # regularisation of rows, as part of their natural size; where forces depend on multipliers
 SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if they do not fall: where errors of steps
 # are looked at, and where they are not
+CHEAP, DEAR, FEW = 1e-3, 0.1, 12  # rates of the iteration up to which a Jacobian serves on, where it takes few
+# evaluations and where it takes more
 SEEN = np.array([0.0, 0.0, 0.25, 0.6, 0.857])  # places in a step at which guards are seen, behind two that are not
 
 
@@ -99,9 +101,11 @@ class Implicit:
         near = min(0.03, real[ds.RTOL] ** 0.5) if step == 0.0 else 0.01
         real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / real[ds.RTOL], near)
         real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / real[ds.RTOL])
-        real[ds.SOFT] = SOFT
+        real[ds.SOFT] = SOFTER if len(x.pressing) else SOFT
+        real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
         count = np.zeros(ds.COUNTS, np.int64)
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
+        count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P

@@ -62,7 +62,8 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
         For what implicit integrators do not know.
     """
     s = begun.assembly.compiled.structure
-    _refuse_open_loads(begun, method)
+    if method != RADAU:
+        _refuse_open_loads(begun, method)
     if method == VARIATIONAL and wish == "joint":
         raise ModelError(f"method={VARIATIONAL!r} takes absolute coordinates, in which masses do not change: leave "
                          f"coordinates out")  # fmt: skip

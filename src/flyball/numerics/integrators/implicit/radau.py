@@ -32,8 +32,8 @@ from ..clock import (
 )
 from ..loop import shorten
 from ..refusal import afresh
-from .asked import SURE, WIDEST
-from .desk import ASKED, BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RTOL, START, THETA, WIDTH
+from .asked import WIDEST
+from .desk import ASKED, BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RTOL, SERVES, START, THETA, WIDTH
 from .newton import factor
 from .step import MOST, begin, estimate, iterate, predict
 from .whole import iterate_whole
@@ -177,7 +177,7 @@ def enter(K, c, t, h, error, iterations):
     K.real[LAST_H] = h
     K.real[LAST_ERROR] = max(1e-2, error)
     K.count[BEFORE] = 1
-    K.count[FRESH] = 0 if K.real[THETA] <= SURE else -1
+    K.count[FRESH] = 0 if K.real[THETA] <= K.real[SERVES] else -1
     if K.count[FRESH] == 0 and h <= wide <= KEPT * h:
         wide = h
     c.real[WIDE] = max(h, 0.8 * c.real[WIDE])

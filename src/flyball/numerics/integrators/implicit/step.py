@@ -9,7 +9,7 @@ from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
-from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, START, THETA
+from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, SHARED, START, THETA
 from .newton import correct, solve_real
 
 MOST = 7  # iterations
@@ -107,6 +107,23 @@ def integrals(K, h):
 
 
 @formula
+def share(K, h):
+    """Ask for least multipliers where redundant rows leave some open and forces depend on them.
+
+    Rows are as soft as their regularisation: G v - nu + delta D h A lam = 0, which leaves no multiplier open, and what
+    rows give way by the end of the step takes away.
+    """
+    first = K.count[SHARED]
+    if first > 0:
+        nv = K.v.shape[1]
+        for r in range(K.lam.shape[1]):
+            size = h * K.J[START, first + r]
+            for k in range(STAGES):
+                a, b, c = A[k]
+                K.out[k, 2 * nv + r] += size * (a * K.lam[0, r] + b * K.lam[1, r] + c * K.lam[2, r])
+
+
+@formula
 def iterate(residual, S, K, c, h):
     """Find the stage values. Returns (status, factor by which the next width should change)."""
     found = 0
@@ -118,6 +135,7 @@ def iterate(residual, S, K, c, h):
         for k in range(STAGES):
             if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
                 return DIVERGED, 0.5
+        share(K, h)
         size = correct(K, h)
         K.count[ITERATIONS] += 1
         if not size < 1e300:

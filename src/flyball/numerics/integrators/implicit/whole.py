@@ -11,8 +11,8 @@ from ....math.scalar import sqrt
 from ...lu import lu_factor, lu_solve, times
 from ..clock import T
 from .coefficients import GAMMA, INVERSE, C
-from .desk import NEWTON, ROUGH, WHOLE
-from .step import STAGES, account, rates
+from .desk import NEWTON, ROUGH, SHARED, WHOLE
+from .step import STAGES, account, rates, share
 
 MOST = 12
 REFINED = 6  # times that each solve is refined
@@ -44,7 +44,7 @@ def solve_whole(K, h):
     for i in range(n):
         x[1, i] = x[0, i]
     lu_solve(K.whole_P, K.whole_L, K.whole_U, K.whole_D, x[0])
-    for _ in range(REFINED):
+    for _ in range(REFINED if K.count[SHARED] == 0 else 0):
         times(K.whole_P, K.whole_A, x[0], x[2])
         for e in range(K.whole_put.shape[0]):
             if K.whole_put[e, 3] == SOFT:
@@ -93,6 +93,7 @@ def iterate_whole(callbacks, S, K, c, h):
             t = c.real[T] + C[k] * h
             if residual(t, k, S, K, c) != 0 or linearise(t, k, S, K, c) != 0:
                 return 1
+        share(K, h)
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
             for i in range(K.whole_Y.shape[1]):
