@@ -127,3 +127,66 @@ def test_events_that_accumulate_are_named_soon(when, at):
     found = e.value.result.events.t
     assert found == pytest.approx(0.3 - 1 / (2 * np.pi * np.arange(1, len(found) + 1)), abs=1e-11)
     assert len(found) > 8000
+
+
+def kicked(when, kick, **more):
+    """Thrown up at 1 m/s, and kicked up wherever its speed passes zero: each flight is kick / g long."""
+    m = fb.Mechanism("ball", planar=True, gravity=(0, -10))
+    m.add(fb.Body("b", mass=1, inertia=1, velocity=(0, 1)))
+    m.add(fb.Event("e", when, do=[fb.Impulse("b", (0, kick))], **more))
+    return m
+
+
+@pytest.mark.parametrize("on", ["result", "file"])
+@pytest.mark.parametrize(("when", "more"), [("b.vy", {"direction": "falling"}), ("b.vy < 0", {})])
+def test_what_its_own_action_took_off_zero_at_an_end_is_met_again(when, more, on, tmp_path):
+    """Apex n is at 0.1 + 0.05 n s, 0.05 + 0.0125 n m up; the motion is cut at the first one."""
+    m = kicked(when, 0.5, **more)
+    whole = m.simulate(0.98, outputs=2)
+    assert whole.events.t == pytest.approx(0.1 + 0.05 * np.arange(18), abs=1e-12)
+    for later in (0.0, 1e-15, 1e-12, 1e-9):
+        first = m.simulate(float(whole.events.t[0]) + later, outputs=2)
+        first.save(tmp_path / "first.nc")
+        start = first if on == "result" else fb.load_result(tmp_path / "first.nc")
+        second = m.simulate(0.98, start=start, outputs=2)
+        assert len(first.events) == 1
+        assert second.events.t == pytest.approx(0.15 + 0.05 * np.arange(17), abs=1e-10)
+        high = 0.05 + 17 * 0.0125 + 0.5 * 0.03 - 5 * 0.03**2
+        assert second["b.y"][-1] == pytest.approx(high, abs=1e-9)
+
+
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+@pytest.mark.parametrize("when", ["p.vy", "p.vx", "p.x*p.vx"])
+@pytest.mark.parametrize("act", ["set", "blow"])
+def test_what_a_taut_rope_solves_anew_is_done_once(act, when, coordinates):
+    """A pendulum's speeds pass zero where it turns and where it hangs straight, once each: as on a rigid rod."""
+    do = fb.Set("k", "k*2") if act == "set" else fb.Impulse("p", ("g*p.vx", "g*p.vy"))
+    for angle, length in ((-1.035872591088826, 1.297430423353678), (0.7, 1.0), (1.2, 0.45), (-0.3, 1.7)):
+        p = (length * np.sin(angle), -length * np.cos(angle))
+        rope = fb.Rope("tie", ["ground", "p"], at=[(0, 0), p], length=length)
+        told = []
+        for tie in (rope, fb.Distance("tie", "ground", "p", at=[(0, 0), p])):
+            m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81), parameters={"k": 1.0, "g": 0.0})
+            m.add(fb.Body("p", mass=1, inertia=0.01, position=p), tie, fb.Event("e", when, direction="either", do=[do]))
+            told.append(m.simulate(8, coordinates=coordinates, outputs=2).events["e"].t)
+        assert np.diff(told[0]).min() > 0.1
+        assert told[0] == pytest.approx(told[1], abs=1e-5)
+
+
+@pytest.mark.parametrize("do", [fb.Set("k", "k*2"), fb.Impulse("p", ("g*p.vx", 0))], ids=["set", "blow"])
+def test_what_friction_of_a_joint_solves_anew_is_done_once(do):
+    """A slide with dry friction on a spring turns every half period, pi / w, until it sticks: each turn once."""
+    w, d = 5.0, 0.03  # w^2 = k / m; d: friction / k
+    m = fb.Mechanism("slide", planar=True, gravity=(0, -10), parameters={"k": 1.0, "g": 0.0})
+    m.add(
+        fb.Body("p", mass=1, inertia=0.01, position=(0, 0)),
+        fb.Prismatic("S", "ground", "p", at=(0, 0), axis=(1, 0)),
+        fb.JointFriction("B", "S", static=w * w * d / 10, kinetic=w * w * d / 10),
+        fb.Actuator("sp", "S.displacement", force=f"-{w * w}*value"),
+        fb.Initial("S.displacement", value=1.0),
+        fb.Event("e", "p.vx", direction="either", do=[do]),
+    )
+    r = m.simulate(12, outputs=2)
+    turns = 16  # |x| falls by 2 d each: 0.04 after 16, above d; then one to -0.02, where it sticks
+    assert r.events["e"].t[:turns] == pytest.approx(np.pi / w * np.arange(1, turns + 1), abs=1e-6)
+    assert np.diff(r.events["e"].t).min() > 0.1

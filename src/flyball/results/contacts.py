@@ -230,5 +230,12 @@ class Contacts:
         return "\n".join(f"{k:<14} {v}" for k, v in self.lines())
 
 
+def end_to_end(every: Sequence[Contacts], t: np.ndarray) -> Contacts:
+    """Contacts of times that follow one another, as those of all of them."""
+    begin = np.concatenate([[0], *(c.count for c in every)]).cumsum()
+    columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in every]) for name in ARRAYS}
+    return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, **columns)
+
+
 def _texts(names: list[str]) -> np.ndarray:
     return np.array(names, object)

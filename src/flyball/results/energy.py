@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from ..math.vec import dot, load9, mtv, mv
+from ..model.force import Force
 from ..model.quantities import ENERGY, Quantity, quantities
+from ..model.touch import Touch
 from ..tables.system import INERTIA, MASS
-from .booked import GIVEN, jumps
+from .booked import GIVEN, basis
 from .views.base import Named
 
 if TYPE_CHECKING:
@@ -89,14 +91,12 @@ class Energy(Named):
         """
         out = {}
         r = self._result
-        given = jumps(r) if r.pieces else {}
         for name in r.values.structure.states:
             if name.endswith(".work"):
                 element = r[name.removesuffix(".work")]
-                stored = getattr(element, "energy", np.zeros(1))
-                out[element.element.name] = (
-                    element.work + stored - stored[:1].sum() - given.get(element.element.name, 0.0)
-                )
+                own = element.element
+                stored = element.energy - basis(r, own.name) if isinstance(own, Force) else 0.0
+                out[own.name] = element.work + stored
         return out
 
     def _of_pieces(self, name: str) -> np.ndarray:
@@ -108,8 +108,15 @@ class Energy(Named):
         found = self._result.exchanged.get(name)
         return self._result.records.zeros() if found is None else found
 
+    def _friction_loss(self) -> np.ndarray:
+        """Lost in friction of contacts since the start: that of places is a work, integrated with the motion."""
+        r = self._result
+        at = r.values.structure.state_at
+        own = (at.get(f"{e.name}.work") for e in r.values.structure.model.forces if isinstance(e, Touch))
+        return sum((-r.states[:, k] for k in own if k is not None), self.exchanged("friction_loss"))
+
     def _found(self, name: str) -> np.ndarray:
-        return self.exchanged(name)
+        return self._friction_loss() if name == "friction_loss" else self.exchanged(name)
 
     @cached_property
     def balance(self) -> np.ndarray:

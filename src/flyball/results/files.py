@@ -203,6 +203,7 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "parameters": json.dumps(list(result.model.parameters)),
         "wound": json.dumps(result.wound),
         "carried": json.dumps(result.carried),
+        "done": json.dumps(result.begun.done),
     }
     told, more = packed(result)
     happened, states = events_packed(result)
@@ -219,6 +220,8 @@ def _write_solution(result: Result, group: Any, folder: Path) -> None:
         "parameter_values": result.values.system.const[: len(result.model.parameters)],
         "final": np.r_[result.final[0], result.final[1]],
     }
+    if result.begun.y is not None and len(result.begun.y):
+        numbers["begun"] = result.begun.y
     for name, values in numbers.items():
         group.dimensions[f"n_{name}"] = len(values)
         group.create_variable(name, (f"n_{name}",), data=np.array(values, float))

@@ -12,8 +12,7 @@ from ..tables.values import Values, values
 from .booked import booked
 from .bulk import ARRAYS, Bulk
 from .contact_health import ContactHealth
-from .contacts import ARRAYS as COLUMNS
-from .contacts import Contacts
+from .contacts import end_to_end
 from .energy import STORED
 from .events import Happening
 from .health import Health
@@ -44,13 +43,17 @@ def joined(parts: Sequence[Result], times: np.ndarray) -> Result:
     q, v, states, vdot, multipliers = rows
     out = Result(last.model, last.values, t, q, v, states, vdot, multipliers, _health([p.health for p in parts]))
     out.final, out.carried, out.wound = last.final, dict(last.carried), parts[0].wound
+    out.begun = parts[0].begun
     known = Known(last.values)
     out.stretches = _stretches(parts, keep, known)
     out.exchanged = _exchanged(parts, keep)
     if out.stretches is not None:
         out.exchanged |= booked(out)
     if last.contacts is not None:
-        out.contacts = _contacts([p.contacts for p in parts if p.contacts is not None], keep, out.t)
+        taken = [
+            p.contacts.taken(np.flatnonzero(k)) for p, k in zip(parts, keep, strict=True) if p.contacts is not None
+        ]
+        out.contacts = end_to_end(taken, out.t)
     out.bulk = {name: _bulk([p.bulk[name] for p in parts], keep) for name in last.bulk}
     out.events = [_loose(h, known) for p in parts for h in p.events]  # type: ignore[assignment]
     return out
@@ -109,13 +112,6 @@ def _exchanged(parts: Sequence[Result], keep: Sequence[np.ndarray]) -> dict[str,
             before = float(x[-1]) if len(x) else before
         out[name] = np.concatenate(rows)
     return out
-
-
-def _contacts(every: Sequence[Contacts], keep: Sequence[np.ndarray], t: np.ndarray) -> Contacts:
-    taken = [c.taken(np.flatnonzero(k)) for c, k in zip(every, keep, strict=True)]
-    begin = np.concatenate([[0], *(np.diff(c.begin) for c in taken)]).cumsum()
-    columns: dict[str, Any] = {name: np.concatenate([getattr(c, name) for c in taken]) for name in COLUMNS}
-    return Contacts(t=t, sides=every[0].sides, begin=begin, planar=every[0].planar, **columns)
 
 
 def _bulk(every: Sequence[Bulk], keep: Sequence[np.ndarray]) -> Bulk:

@@ -18,6 +18,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..model.model import Model, suggest
+from .booked import Begun
 from .contact_health import ContactHealth
 from .departure import Departure
 from .files import ARRAYS, FORMAT, GROUP, checksum, sealed
@@ -154,6 +155,7 @@ def _rebuilt(stored: dict[str, Any], cls: type[M], where: str) -> Result:
     unpack(stored, result)
     result.wound = json.loads(stored.get("wound", "{}"))
     result.carried = json.loads(stored.get("carried", "{}"))
+    result.begun = Begun(stored.get("begun"), json.loads(stored.get("done", "{}")))
     stretches_unpack(stored, result)
     events_unpack(stored, result)
     return result

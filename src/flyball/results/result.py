@@ -13,6 +13,7 @@ from ..errors import ModelError
 from ..model.model import Model
 from ..model.quantities import ENERGY, MEMBER, one, quantities
 from ..tables.values import Values
+from .booked import Begun
 from .bulk import Bulk
 from .contacts import Contacts
 from .energy import Energy
@@ -30,6 +31,7 @@ from .views.bulk import MemberView, SetView
 from .views.spliced import Spliced
 
 TOLD = 12  # curves in a text
+_NO_WHOLE: Any = None  # else a result and the output times that are a piece of it
 Owed = Callable[[], tuple[np.ndarray, np.ndarray]]
 
 if TYPE_CHECKING:
@@ -62,8 +64,9 @@ class Result:
     events : Events
         What happened at instants, in the order of time: the model's events, impacts, what stuck, locked or let go.
     exchanged : dict
-        Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`: lost in friction and in impacts, given by
-        surfaces that move, given by kicks and changes of parameters.
+        Energy [J] since the start, (n,), by the names of `energy.EXCHANGED`, and given by events.
+    begun : Begun
+        How it began, and what had been exchanged before.
     carried : dict
         What a motion that goes on from it knows besides its end: how often events happened, for instance.
     stretches : Stretches
@@ -83,17 +86,16 @@ class Result:
         health: Health,
     ) -> None:
         self.model, self.values, self.health = model, values, health
-        self.t, self.q, self.v = t, q, v
-        self._vdot, self._multipliers = vdot, multipliers
-        self._turn = Turn()
+        self.t, self.q, self.v, self._vdot, self._multipliers = t, q, v, vdot, multipliers
+        self._turn, self._states = Turn(), states
         self.unsolved: Owed | None = None  # finds accelerations and multipliers that are not there yet
         self.owed: Owed | None = None  # finds works that are not there yet
-        self._states = states
         self._final: tuple[float, np.ndarray] = (float("nan"), np.zeros(0))
         self.wound: dict[str, float] = {}
         self.contacts: Contacts | None = None
         self.bulk: dict[str, Bulk] = {}
         self.exchanged: dict[str, np.ndarray] = {}
+        self.begun, self.within = Begun(), _NO_WHOLE
         self.carried: dict[str, Any] = {}
         self.stretches: Stretches | None = None
         self._events = Events((), self)
@@ -150,8 +152,7 @@ class Result:
         """Say where the motion ended."""
         self._final = value
 
-    def _settle(self) -> None:
-        """Find the works of a motion that was followed, not integrated."""
+    def _settle(self) -> None:  # works of a motion that was followed, not integrated
         with self._turn:
             if (find := self.owed) is not None:  # owed still if it is interrupted
                 self._states, y = find()

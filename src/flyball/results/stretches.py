@@ -112,5 +112,8 @@ def cut_up(result: Any) -> tuple[Any, ...]:
         piece = type(result)(result.model, stretches.all[0].values, *parts, result.health)
         piece.stretches, piece.wound = stretches, result.wound
         piece.exchanged = {k: x[at] for k, x in result.exchanged.items()}
+        piece.begun, piece.within = result.begun, (result, at)
+        if result.contacts is not None:
+            piece.contacts = result.contacts.taken(range(at.start, at.stop))
         out.append(piece)
     return tuple(out)

@@ -11,7 +11,7 @@ from ..math.vec import dot
 from ..model.body import GROUND
 from ..model.touch import Touch
 from ..tables.system import OFF
-from .contacts import Contacts
+from .contacts import Contacts, end_to_end
 from .sides import SLIP, STICK, Sides
 from .terms import term
 
@@ -115,6 +115,11 @@ class Touched:
 
 def contacts(result: Result) -> Contacts | None:
     """Every place that is closed, at every output time; None if the motion was computed without."""
+    if result.pieces:
+        for p in result.pieces:
+            p.contacts = contacts(p)
+        known = [p.contacts for p in result.pieces if p.contacts is not None]
+        return end_to_end(known, result.t) if known else None
     s = result.values.structure
     found = [x for e in s.model.forces if isinstance(e, Touch) and (x := Touched(result, e)).known]
     if not found:

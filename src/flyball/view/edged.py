@@ -74,7 +74,7 @@ def _longer_motion(result: Result, stretches: Stretches, edges: list[_Edge], at:
     more = (t, q, v, z, *unknown)
     t, q, v, z, vdot, lam = (np.insert(a, at, x, axis=0) for a, x in zip(arrays, more, strict=True))
     out = type(result)(result.model, result.values, t, q, v, z, vdot, lam, result.health)
-    out.wound = result.wound
+    out.wound, out.begun = result.wound, result.begun
     out.stretches = _longer(stretches, edges)
     out.exchanged |= booked(out)
     if result.contacts is not None:

@@ -25,7 +25,7 @@ from .options import Integration
 from .part import KEPT
 from .reasons import reason, remarks
 from .residual import acceleration_violation
-from .start import Start
+from .start import Start, begun
 
 
 def outcome(
@@ -70,7 +70,7 @@ def outcome(
     result = Result(model, a.compiled.values, t_out[:, 0], q, v, z, vdot, lam, health)
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved
-    result.wound = start.wound
+    result.wound, result.begun = start.wound, begun(start)
     if here.start.part.open:
         result.carried["open"] = True
     result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}

@@ -11,6 +11,7 @@ from ...equations.velocities import turned_angles
 from ...errors import ModelError
 from ...model.actions import Set
 from ...model.model import Model
+from ...results.booked import Begun, ended
 from ...results.records import wound
 from ...results.result import Result
 from ...tables.branches import bent_laws
@@ -200,6 +201,11 @@ def _base(model: Model, t: float, parameters: Mapping[str, float] | None, before
     for name, more in before.wound.items():
         q[plain.values.system.body_i[plain.structure.place[name], Q0] + 2] -= more
     return Assembly(plain, t, q, v)
+
+
+def begun(start: Start) -> Begun:
+    """How its motion begins; a later part of one counts its own only."""
+    return Begun(start.y.copy(), ended(start.before) if start.before is not None and not start.part.later else {})
 
 
 def _gone_on(before: Result, a: Assembly) -> np.ndarray:

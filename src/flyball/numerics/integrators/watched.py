@@ -13,7 +13,7 @@ from ...compiler.jit import formula
 from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
 from .glance import NOISE
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, write
-from .panels import rounding, side_of
+from .panels import NEAR, rounding, side_of
 from .sought import CUT, first_event
 from .watching import (
     CUTS,
@@ -26,6 +26,7 @@ from .watching import (
     GRAIN_START,
     LATEST,
     LEAST,
+    MARK,
     MOST,
     SIDE,
     START,
@@ -108,15 +109,19 @@ def see(watch, note, S, W, c):
 def known_sides(W, c, h):
     """Sides of guards at the end of a step that ends on an event: 0 of what fired; others are known beyond rounding.
 
-    So what is to fire next, however soon, is not taken for what has just fired.
+    So what is to fire next, however soon, is not taken for what has just fired. W.g[MARK] is what is zero of each.
     """
     for i in range(W.side.shape[0]):
         f, slope = W.g[END, i], (W.g[MOST, i] - W.g[LEAST, i]) / h
+        nothing = rounding(W, c, i, slope, GRAIN_END)
         W.side[i] = UNKNOWN
         if W.fired[i] == 1:
             W.side[i], W.g[FIRED, i] = 0.0, abs(f)
-        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > rounding(W, c, i, slope, GRAIN_END):
+            if abs(f) <= NEAR * max(abs(W.g[LEAST, i]), abs(W.g[MOST, i])):  # it did not jump
+                nothing = max(nothing, NOISE * abs(f))
+        elif W.kept[i] == 0 and f - f == 0.0 and abs(f) > nothing:
             W.side[i] = side_of(f)
+        W.g[MARK, i] = nothing
 
 
 @formula

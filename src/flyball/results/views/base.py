@@ -21,6 +21,12 @@ def stacked(a: tuple, planar: bool) -> np.ndarray:
     return np.stack(a[:2] if planar else a, axis=1)
 
 
+def same_sign(e: np.ndarray) -> np.ndarray:
+    """Unit quaternions (n, 4), each with the sign that is nearer to the one before it."""
+    flips = np.cumprod(np.r_[1.0, np.where((e[1:] * e[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
+    return e * flips[: len(e), None]
+
+
 class Named:
     """Something that has quantities over time, by the names of `flyball.model.quantities`.
 

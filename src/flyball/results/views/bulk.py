@@ -9,7 +9,7 @@ import numpy as np
 
 from ...math.vec import quaternion_matrix
 from ...model.quantities import Quantity, quantities
-from .base import Named
+from .base import Named, same_sign
 
 if TYPE_CHECKING:
     from ..bulk import Bulk
@@ -110,9 +110,7 @@ class MemberView(SetView):
     @property
     def quaternion(self) -> np.ndarray:
         """Unit quaternions, scalar first, world from body, (n, 4); neighbours have the same sign."""
-        e = self._bulk.quaternion[:, self._k]
-        flips = np.cumprod(np.r_[1.0, np.where((e[1:] * e[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
-        return e * flips[:, None]
+        return same_sign(self._bulk.quaternion[:, self._k])
 
     @property
     def rotation(self) -> np.ndarray:

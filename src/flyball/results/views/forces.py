@@ -15,6 +15,7 @@ from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
 from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE
+from ..booked import basis
 from ..records import coordinate_frames, turned
 from .base import Curves, View
 
@@ -186,12 +187,12 @@ class ForceView(View):
 
     @property
     def work(self) -> np.ndarray:
-        """Work given to the bodies since the start [J], integrated with the motion."""
+        """Work given to the bodies since the start [J]: integrated with the motion, or what it stores no more."""
         name = f"{self.element.name}.work"
         states = self._x.structure.state_at
         if name in states:
             return self._result.states[:, states[name]]
-        return self.energy[:1].sum() - self.energy
+        return basis(self._result, self.element.name) - self.energy
 
     @property
     def _whole(self) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ import numpy as np
 from ...math.scalar import atan2
 from ...model.body import Body, Frame
 from ...model.geometry import matrix_to_quaternion
-from .base import View, stacked
+from .base import View, same_sign, stacked
 
 if TYPE_CHECKING:
     from ..result import Result
@@ -50,14 +50,16 @@ class PointView(View):
     @property
     def rotation(self) -> np.ndarray:
         """Rotation matrices, world from frame, (n, 3, 3)."""
-        return np.stack(self._record[1], axis=1).reshape(-1, 3, 3)
+        R = [x + self._result.records.zeros() for x in self._record[1]]  # in the plane some are plain numbers
+        return np.stack(R, axis=1).reshape(-1, 3, 3)
 
     @property
     def quaternion(self) -> np.ndarray:
-        """Unit quaternions, scalar first, (n, 4); neighbours have the same sign."""
-        e = np.array([matrix_to_quaternion(R) for R in self.rotation])
-        flips = np.cumprod(np.r_[1.0, np.where((e[1:] * e[:-1]).sum(axis=1) < 0, -1.0, 1.0)])
-        return e * flips[:, None]
+        """Unit quaternions, scalar first, (n, 4): of the sign of the one before; in the plane of half the angle."""
+        if self._result.planar:
+            half, zero = 0.5 * self.angle, self._result.records.zeros()
+            return np.stack([np.cos(half), zero, zero, np.sin(half)], axis=1)
+        return same_sign(np.array([matrix_to_quaternion(R) for R in self.rotation]).reshape(-1, 4))
 
     @property
     def angle(self) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...model.quantities import Quantity
-from .base import Curves, Named
+from .base import Curves, Named, same_sign
 
 
 class Spliced(Named):
@@ -31,7 +31,12 @@ class Spliced(Named):
     def quantity(self, name: str) -> tuple[str, np.ndarray]:
         """Unit and values over all times."""
         every = [v.quantity(name) for v in self._views]
-        return every[0][0], np.concatenate([x for _, x in every])
+        return every[0][0], self._end_to_end(name, [x for _, x in every])
+
+    @staticmethod
+    def _end_to_end(name: str, every: Sequence[np.ndarray]) -> np.ndarray:
+        values = np.concatenate(every)
+        return same_sign(values) if name == "quaternion" else values
 
     def channels(self) -> Curves:
         """Curves that any piece has."""
@@ -42,6 +47,8 @@ class Spliced(Named):
         """Anything that the views have; methods answer with what those of all pieces do."""
         if name.startswith("_"):  # asked for while it is being unpickled
             raise AttributeError(name)
+        if name in self.names:
+            return self.quantity(name)[1]
         return self._joined([getattr(v, name) for v in self._views])
 
     def __dir__(self) -> list[str]:

@@ -191,13 +191,16 @@ def say_never(here: Here) -> None:
 
 
 def crossed(here: Here, before: Mapping[int, float]) -> np.ndarray:
-    """Guards of events whose expressions went through zero without being followed there, (n,)."""
+    """Guards of events whose expressions went through zero without being followed there, (n,).
+
+    What was zero to rounding, as of what has just fired, has not: velocities that are solved for anew differ by that.
+    """
     out = []
     if before:
         here.evaluate()
     for g, was in before.items():
         now, way = expression(here, g), here.c.system.guard_i[g, GUARD_WAY]
-        most = CLEAR * max(abs(was), abs(now))
+        most = max(CLEAR * max(abs(was), abs(now)), here.nothing.get(g, 0.0))
         rises, falls = was <= -most and now > most, was >= most and now < -most
         if (rises and way >= 0) or (falls and way <= 0):
             out.append(g)

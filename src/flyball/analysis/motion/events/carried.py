@@ -11,11 +11,12 @@ from .rest import Bounces
 
 
 def carried(here: Here) -> dict[str, Any]:
-    """How often events happened, bounces and swings of late; as plain data, by names."""
+    """How often events happened, what they were as they last did, bounces and swings of late; plain data, by names."""
     names = _names(here)
     bounces = [[*names[s], b.count, b.last, b.before] for s, b in here.bounces.items()]
     swings = [[*names[s], *past] for s, past in here.swings.items()]
     every = {"counts": dict(here.counts), "true": list(here.true), "bounces": bounces, "swings": swings}
+    every["zero"] = dict(here.zero)
     return {k: x for k, x in every.items() if x}
 
 
@@ -24,6 +25,7 @@ def take_up(here: Here, before: Mapping[str, Any]) -> None:
     names = {e.name for e in here.structure.model.events}
     known = {name: s for s, name in enumerate(_names(here))}
     here.counts = {k: int(n) for k, n in before.get("counts", {}).items() if k in names}
+    here.zero = {k: float(x) for k, x in before.get("zero", {}).items() if k in names}
     here.true = [k for k in before.get("true", ()) if k in names]
     for element, label, which, count, last, previous in before.get("bounces", ()):
         if (s := known.get((element, label, which))) is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -52,6 +53,10 @@ class Here:
         Events whose comparisons were true as the motion began.
     acted : dict
         What was settled by events at the instant ``acted_at``, and by which action of which.
+    nothing : mapping
+        Guard -> what is zero of it at the instant, where that is known.
+    zero : dict
+        Event -> what its guard was, in size, where it last fired: zero to rounding.
     fresh : bool
         Whether forces or velocities jump at the instant: the next step is then no wider than those of late.
     decider : Instant, optional
@@ -93,6 +98,8 @@ class Here:
     acted_at: float = float("nan")
     crept: frozenset[int] = frozenset()
     true: list[str] = field(default_factory=list)
+    nothing: Mapping[int, float] = field(default_factory=dict)
+    zero: dict[str, float] = field(default_factory=dict)
 
     @property
     def c(self) -> Compiled:

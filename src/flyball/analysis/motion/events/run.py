@@ -21,7 +21,7 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import tableau
-from ....numerics.integrators.watching import AWAY, CHECKS, END, EVENT, FIRED, LOOKS, NODES, STEPS, UNKNOWN
+from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import (
     G_BACK,
     G_CONE,
@@ -43,7 +43,7 @@ from ..options import Integration
 from ..part import WEIGHT
 from ..stiff import EXPLICIT, Pace, on_corner
 from .accumulating import Counts
-from .actions import at_the_seam, expressions, say_never, stepped_over, true_already
+from .actions import expressions, say_never, stepped_over, true_already
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
@@ -51,6 +51,7 @@ from .instant import instant_of
 from .legs import Legs, breaks
 from .sampling import sampling
 from .segments import Segments
+from .zeros import as_fired, as_grains, resume
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
@@ -235,22 +236,10 @@ class Run:
             self.sampling.sample(here.c.system, here.c.work, here.clock)
         begin(here)
         if self.loop is not None and self.guarded and here.start.before is not None:
-            self.resume(self.loop)
+            resume(here, self.loop)
         here.true = true_already(here)
         self.here.fresh = False
         self.turned()
-
-    def resume(self, loop: Loop) -> None:
-        """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
-
-        What did not is ahead, however near.
-        """
-        here, desk = self.here, loop.desk
-        told = at_the_seam(here)
-        values = instant_of(here).guards()
-        for g, e in here.structure.events.items():
-            desk.side[g] = 0.0 if e.name in told else np.sign(values[g]) or UNKNOWN
-            desk.g[END, g], desk.g[FIRED, g] = values[g], abs(values[g])
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
@@ -293,8 +282,10 @@ class Run:
             raise accumulating(instant_of(here), *found)
         if self.loop is not None and self.loop.desk.count[AWAY]:
             here.crept = self.crept(self.loop)
+        if self.loop is not None:
+            as_fired(here, self.loop)
         self.happens(fired)
-        here.crept = frozenset()
+        here.crept, here.nothing = frozenset(), {}
 
     def crept(self, loop: Loop) -> frozenset[int]:
         """Stops that what stood at them has crept past: at the step's begin it hardly moved; what did hits them."""
@@ -336,12 +327,15 @@ class Run:
         ``before``: expressions of events on the other side of that time, across which nothing is followed.
         """
         here = self.here
+        if self.loop is not None:
+            as_grains(here, self.loop)
         values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
         near = REACHED * max(1.0, here.c.values.length)
         at = (np.abs(values) <= near) & np.isin(kinds, (*DISTANCES, G_BACK))
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
+        here.nothing = {}
 
     def stop(self) -> None:
         """The motion, or a part of it, ends here: the last row is written, but where it is already."""

@@ -10,12 +10,14 @@ from ....contact.tables import Movers
 from ....errors import ModelError
 from ....math.vec import quaternion_matrix
 from ....model.model import Model
+from ....results.booked import added, ended
 from ....results.result import Result
 from ....tables.contact import Touching
 from ....tables.system import NQ, NV, Q0, V0
 from ...assemble import assemble
 from ...assembly.start import Assembly
 from ...compiled import compiled
+from ..part import Part
 from ..start import Start, begin, begin_at
 
 
@@ -30,6 +32,14 @@ def base_of(model: Model, t: float, parameters: Mapping[str, float] | None, befo
     if before is None:
         return assemble(model, t=t, parameters=parameters)
     return begin(model, t, parameters, before, "absolute").base
+
+
+def counted(result: Result, before: Result | None, part: Part) -> Result:
+    """A result that counts on what an earlier one exchanged, but for that of a part of a motion."""
+    if before is not None and not part.later:
+        result.begun.done = ended(before)
+        result.exchanged = added(result)
+    return result
 
 
 def part_of(base: Assembly, model: Model, parameters: Mapping[str, float] | None) -> Start:

@@ -25,7 +25,7 @@ from ..part import KEPT, Part, whole
 from .collect import Collected
 from .drawn import as_drawn, moving
 from .ending import INTERRUPTED, REACHED, result_of
-from .going_on import base_of, place_sets
+from .going_on import base_of, counted, place_sets
 from .held import acting_values, held_apart
 from .parts import parts
 from .scene import begin, movers, placed
@@ -85,12 +85,13 @@ def impulse_motion(
     try:
         interrupted = march(stepper, span, times, o, kept, tell, part)
     except NoWay:
-        result = result_of(base, scene, stepper, kept, sides, o, since, "")
+        result = counted(result_of(base, scene, stepper, kept, sides, o, since, ""), before, part)
         t = float(stepper.pace.real[TIME])
         result.health.message = f"{model.name!r} cannot go on at t = {t:.6g} s: {NO_WAY}"
         raise SimulationError(result.health.message, result, t) from None
     message = INTERRUPTED if interrupted else KEPT if part.paused else REACHED
-    return result_of(base, scene, stepper, kept, sides, o, since, message.format(float(stepper.pace.real[TIME])))
+    message = message.format(float(stepper.pace.real[TIME]))
+    return counted(result_of(base, scene, stepper, kept, sides, o, since, message), before, part)
 
 
 def made_ready(scene: Touching, o: Stepping, free: int, mechanism: bool) -> Beside:

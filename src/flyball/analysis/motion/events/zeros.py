@@ -1,0 +1,36 @@
+"""What is zero of events' expressions where the watched loop stops, and where a motion goes on from another."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....equations.watched import Loop
+from ....numerics.integrators.glance import NOISE
+from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, UNKNOWN
+from .actions import at_the_seam
+from .here import Here
+from .instant import instant_of
+
+
+def as_fired(here: Here, loop: Loop) -> None:
+    """Keep what is zero of events' expressions where a step ended on events, and what they were of those that fired."""
+    events, desk = here.structure.events, loop.desk
+    here.nothing = {g: float(desk.g[MARK, g]) for g in events}
+    here.zero |= {events[g].name: float(desk.g[FIRED, g]) for g in loop.fired if g in events}
+
+
+def as_grains(here: Here, loop: Loop) -> None:
+    """Keep what is rounding of events' expressions where a step ended on a time at which forces jump."""
+    here.nothing = {g: NOISE * float(loop.desk.g[GRAIN_END, g]) for g in here.structure.events}
+
+
+def resume(here: Here, loop: Loop) -> None:
+    """Sides of events where a motion goes on: what happened at the very end of the one before has just happened.
+
+    What did not is ahead, however near. What has been taken off zero since is where it is, as within a motion.
+    """
+    desk, told = loop.desk, at_the_seam(here)
+    values = instant_of(here).guards()
+    for g, e in here.structure.events.items():
+        desk.side[g] = 0.0 if e.name in told else np.sign(values[g]) or UNKNOWN
+        desk.g[END, g], desk.g[FIRED, g] = values[g], here.zero.get(e.name, 0.0)
