@@ -74,7 +74,9 @@ def absolute(r, structure):
 
 
 # those have digits of their own; an ideal rope has no tension without a motion
-@pytest.mark.parametrize("family", [f for f in FAMILIES if f not in ("extremes", "ropes", "happenings", "shaken")])
+@pytest.mark.parametrize(
+    "family", [f for f in FAMILIES if f not in ("extremes", "stiff", "ropes", "happenings", "shaken")]
+)
 def test_the_same_at_the_same_state(family):
     compared = 0
     for seed, m, a, tree in cases(family, FEW if family == "crowds" else EACH):

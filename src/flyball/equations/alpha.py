@@ -8,7 +8,7 @@ from ..math.scalar import atan, sqrt
 from ..numerics.integrators.implicit.even import refuse
 from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
 from ..numerics.integrators.implicit.hermite import between
-from .callbacks import inspect
+from .asking import inspect
 from .implicit import PLAN, TURNS, compose, land, linearise, missed, perform, powers, turned
 
 SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series

@@ -29,12 +29,12 @@ from ..tables.system import (
     V0,
     X_SOLVED,
 )
-from .callbacks import ENGINE, OWN, R_, S_, SHEET, W_
+from .asking import ENGINE, OWN, R_, S_, SHEET, W_
 from .tasks import ALONG, GAPS, SOLVE, STEPS
 from .tree import quaternion_at
 
 STEP = 1e-40  # of the parameter
-# places in the tuple of what the loop works with, behind those of `callbacks`
+# places in the tuple of what the loop works with, behind those of `asking`
 RESIDUAL, SC_, WC_, BENCH = range(6, 10)
 # entries of Plan.size
 NQ, NZ, COUNT, POWERS = range(4)

@@ -10,7 +10,8 @@ from ..numerics.integrators.loop import TRY
 from ..numerics.integrators.tableaux import Tableau
 from ..numerics.integrators.watching import STAGE
 from ..tables.system import System, Work
-from .callbacks import OWN, Going, Own, arrive, inspect, meet, put, tangent, through
+from .asking import OWN, arrive, inspect, put, tangent, through
+from .callbacks import Going, Own, meet
 from .tasks import MOTION, WATCH
 
 

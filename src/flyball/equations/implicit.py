@@ -33,8 +33,9 @@ from ..tables.system import (
     System,
     Work,
 )
-from .callbacks import OWN, S_, SHEET, W_, inspect, meet, through
-from .callbacks import arrive as arrive_there
+from .asking import OWN, S_, SHEET, W_, inspect, through
+from .asking import arrive as arrive_there
+from .callbacks import meet
 from .dispatch import progress
 from .residual import Bench
 from .rows import way_of

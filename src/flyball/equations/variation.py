@@ -18,7 +18,7 @@ from ..numerics.integrators.clock import T
 from ..numerics.integrators.explicit import answer
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..tables.system import BODY_LAW
-from .callbacks import OWN, S_, SHEET, W_, inspect, through
+from .asking import OWN, S_, SHEET, W_, inspect, through
 from .changes import COUNT, NQ, NZ, POWERS, change, closed, press, settle_at
 from .tasks import ARRIVE, MOTION, REPORT, TANGENT
 

@@ -17,7 +17,7 @@ from ..numerics.integrators.clock import T
 from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
 from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0
-from .callbacks import OWN, S_, SHEET, W_, inspect, through
+from .asking import OWN, S_, SHEET, W_, inspect, through
 from .implicit import PLAN, compose, land, turned
 from .solve import inverse_mass
 from .tasks import POSITION, RESIDUAL, SOLVE

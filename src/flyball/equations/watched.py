@@ -34,7 +34,8 @@ from ..tables.system import (
     System,
     Work,
 )
-from .callbacks import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, Going, Own, levels, put, report, steps, through
+from .asking import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, put, report, steps, through
+from .callbacks import Going, Own, levels
 from .engine import Sheet, engine
 from .guards import KEPT, grains
 from .guards import watch as guards
