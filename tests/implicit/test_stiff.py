@@ -69,3 +69,23 @@ def test_what_radau_does_not_know_stays_explicit_and_health_says_why():
     r = m.simulate(0.3, outputs=2)
     assert "dop853, though it is stiff" in r.health.method
     assert "Lag 'l'" in r.health.method
+
+
+def test_a_blow_on_an_undamped_spring_swings_on():
+    """Beside what is stiff and damped, which made the motion go over: x = J / sqrt(k m) sin(w (t - t0))."""
+    m = fb.Mechanism("struck", planar=True, gravity=(0, 0))
+    for n in "abd":
+        m.add(fb.Body(n, mass=1, inertia=1), fb.Prismatic(n.upper(), "ground", n, at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("soft", "A.displacement", stiffness=10), fb.Initial("A.displacement", value=0.5))
+    m.add(fb.CoordinateSpring("hard", "B.displacement", stiffness=1e10))
+    m.add(
+        fb.CoordinateSpring("oil", "D.displacement", stiffness=1e5, damping=1e5),
+        fb.Initial("D.displacement", value=0.1),
+    )
+    m.add(fb.Event("blow", "t > 5", do=[fb.Impulse("b", (0.1, 0))]))
+    r = m.simulate(5.3, outputs=np.r_[0, np.linspace(5, 5.3, 301)[1:]])
+    told = r.health.method
+    assert told.index("radau from") < told.index("dop853 from t = 5 s on, as velocities jumped")
+    swing = np.hypot(r["B.displacement"] * 1e5, r["B.displacement_rate"])[1:]
+    assert swing == pytest.approx(0.1, rel=1e-3)
+    assert r["A.displacement"] == pytest.approx(0.5 * np.cos(np.sqrt(10) * r.t), abs=1e-5)

@@ -30,6 +30,8 @@ CALM = 1.2  # h rho of implicit steps that the explicit method could take too
 ROUNDS, LATEST = 14, 8  # of the power method; of these the last count
 SMALL = 1e-7  # differences, as part of the state
 PATIENCE = 8  # times as long it takes to go back to the implicit method once more
+STIFF, NOT_STIFF, STRUCK = "where it is stiff", "where it is not stiff any more", "as velocities jumped"
+TOLD = 5  # changes of the method that are told one by one
 
 
 class Pace:
@@ -86,12 +88,23 @@ class Pace:
             return ""
         return IMPLICIT if now == EXPLICIT else EXPLICIT
 
+    def struck(self, now: str) -> None:
+        """Velocities have jumped: wide implicit steps would damp away what that excites, explicit ones follow it."""
+        if self.mixed and now == IMPLICIT:
+            self.asked = EXPLICIT
+
+    def words(self) -> str:
+        """By what it went from when on."""
+        if len(self.told) <= TOLD + 1:
+            return "; ".join(self.told)
+        return "; ".join([*self.told[:TOLD], f"... {len(self.told) - TOLD - 1} more times ...", self.told[-1]])
+
     def turned(self, clock: ex.Clock, to: str, why: str) -> None:
         """It goes on by that from now on."""
         if not self.told:
             self.told.append(EXPLICIT if to == IMPLICIT else IMPLICIT)
         self.told.append(f"{to} from t = {clock.real[ex.T]:.6g} s on, {why}")
-        again = sum(x.startswith(IMPLICIT) for x in self.told)
+        again = sum(x.endswith(NOT_STIFF) for x in self.told)
         self.every = SELDOM if to == IMPLICIT else EVERY * PATIENCE ** min(again, 6)
         self.row, self.asked = 0, ""
         self._mark(clock)

@@ -41,7 +41,7 @@ from ..implicit.made import implicit
 from ..implicit.suited import IMPLICIT, explicit
 from ..options import Integration
 from ..part import WEIGHT
-from ..stiff import EXPLICIT, Pace, on_corner
+from ..stiff import EXPLICIT, NOT_STIFF, STIFF, STRUCK, Pace, on_corner
 from .accumulating import Counts
 from .actions import expressions, say_never, stepped_over, true_already
 from .failed import accumulating, endless
@@ -159,7 +159,7 @@ class Run:
                 here.watched = told(self.loop)
             if self.loop is not None and here.failed is None:
                 here.failed = self.loop.steps.failed
-            here.method = "; ".join(self.pace.told)
+            here.method = self.pace.words()
         return np.concatenate(self.rows), False
 
     def turn(self, to: str, why: str) -> None:
@@ -191,8 +191,10 @@ class Run:
         elif implicit and pace.mixed and clock.count[ex.STATUS] in FAILED:
             self.turn(EXPLICIT, f"where {self.now} could not go on")
             pace.stays()
-        elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.asked or pace.turns(c, clock, self.now)):
-            self.turn(to, "where it is stiff" if to in IMPLICIT else "where it is not stiff any more")
+        elif pace.asked and clock.count[ex.STATUS] in (ex.RUNNING, EVENT):
+            self.turn(pace.asked, STRUCK)
+        elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.turns(c, clock, self.now)):
+            self.turn(to, STIFF if to in IMPLICIT else NOT_STIFF)
         else:
             return False
         return True
@@ -213,6 +215,7 @@ class Run:
                 return True
             if sharp:
                 self.jumped(before)
+                self.turned()
             return False
         elif status != ex.RUNNING and not engine.hands_over(clock) and not self.turned():
             return True
@@ -301,8 +304,10 @@ class Run:
     def happens(self, fired: Sequence[int]) -> None:
         """What happens where these guards fired."""
         here, clock = self.here, self.here.clock
-        system = here.c.system
+        system, before = here.c.system, here.v.copy()
         happen(here, fired)
+        if np.abs(here.v - before).max(initial=0.0) > self.options.rtol * np.abs(before).max(initial=0.0):
+            self.pace.struck(self.now)
         self.part.decided()
         self.settled = int(clock.count[ex.ACCEPTED])
         clock.count[ex.STARTED] = 0
