@@ -20,7 +20,8 @@ CONTACT = {  # see test_contact_examples
     "tippe_top.py",
     "wrecking_ball.py",
 }
-FILES = [name for name in EVERY if name not in CONTACT]
+STANDS = {"inverted_pendulum.py"}  # until it is held, see test_inverted_pendulum
+FILES = [name for name in EVERY if name not in CONTACT | STANDS]
 EVENTS = {  # see test_events: what holds in them changes at instants, or may
     "bouncing_ball.toml",
     "cam_follower.toml",

@@ -67,7 +67,7 @@ def test_an_interrupted_study_goes_on(tmp_path):
 
 def test_a_killed_study_has_a_file_that_is_whole(tmp_path, monkeypatch):
     """It is written while it runs; a process that dies leaves the last one."""
-    monkeypatch.setattr(module, "EVERY", 0.02)
+    monkeypatch.setattr(module, "EVERY", 0.0)
     file = tmp_path / "s.nc"
 
     class Killed(BaseException):
