@@ -73,7 +73,7 @@ def test_an_instant_and_kinematics():
     m.add(fb.Body("crank", mass=3.0, inertia=0.1, position=("l", 0)), fb.Revolute("A", "ground", "crank", at=(0, 0)))
     m.add(fb.Driver("drive", "A.angle", "w*t"))
     vary = {"l": [0.5, 1.0], "w": [1.0, 2.0, 3.0]}
-    l, w = np.array([[0.5], [1.0]]), np.array([[1.0, 2.0, 3.0]])  # noqa: E741
+    l, w = np.array([[0.5], [1.0]]), np.array([[1.0, 2.0, 3.0]])
     s = m.study(vary, ["crank.ax", "A.fx", "crank.x"], analysis="instant")
     np.testing.assert_allclose(s["crank.ax"], -l * w**2, rtol=1e-12)
     np.testing.assert_allclose(np.abs(s["A.fx"]), 3.0 * l * w**2, rtol=1e-12)
