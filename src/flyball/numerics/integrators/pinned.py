@@ -168,7 +168,8 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
     """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
 
     The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time, before it leaves;
-    ``between``: a width at which it has not left, and the width of the step as it was. It does not where it was on that side nowhere.
+    ``between``: a width at which it has not left, and the width of the step as it was. It does not end there where
+    the guard was on that side nowhere.
     """
     least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
