@@ -68,6 +68,7 @@ class Alpha(Implicit):
     def _desk(self, nz: int, turns: bool) -> Desk:  # type: ignore[override]
         w = super()._desk(nz, turns)
         nv = self.layout.nv
-        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], 0.1)
+        steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
+        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], min(0.1, 1.0 / steps))
         kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
         return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv)), ends=np.zeros((3, nv)))
