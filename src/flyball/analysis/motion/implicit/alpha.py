@@ -9,7 +9,7 @@ import numpy as np
 from ....equations.alpha import alpha_steps
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
-from ....numerics.ldl import Pattern
+from ....numerics.lu import Rows
 from ...compiled import Compiled
 from .loop import Implicit
 
@@ -41,7 +41,7 @@ class Desk(NamedTuple):
     real_U: np.ndarray
     real_D: np.ndarray
     real_Y: np.ndarray
-    P: Pattern
+    P: Rows
     past: np.ndarray  # (4, nv): accelerations that the method remembers
     ends: np.ndarray  # (3, nv): rates at the ends of the step
 

@@ -138,8 +138,6 @@ def factor(K, h):
     status = lu_factor(K.P, A, K.real_L, K.real_U, K.real_D, K.real_Y)
     if status != 0:
         K.real[WIDTH] = 0.0
-        for i in range(K.real_Y.shape[1]):
-            K.real_Y[0, i] = K.real_Y[1, i] = 0.0
     return status
 
 
