@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import inspect
 import time
+from functools import partial
 
 import timing  # isort: skip  (before numpy: it fixes the thread counts)
 import numpy as np
@@ -22,6 +23,7 @@ from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs import lean
 from flyball.analysis.runs.compute import Question
 from flyball.analysis.runs.reading import readings
+from flyball.analysis.runs.single import Motion
 from mechanisms import example
 
 VARIED = {"stiffness": 0.1, "torque": 0.1, "d": 0.001}  # by how much, as part of the model's value
@@ -44,7 +46,9 @@ COLUMNS = {
 def kernel(m: fb.Mechanism, study: fb.Study) -> float:
     """Seconds of the compiled loop of a run, without anything about it."""
     usual = {k: p.default for k, p in inspect.signature(m.simulate).parameters.items()} | study.question(0)
-    question = Question(m.snapshot(), SimulateOptions.asked(usual), study.parameters, readings(m, OF), study.t)
+    model, single = m.snapshot(), Motion()
+    asked = readings(OF, partial(single.named, model))
+    question = Question(model, single, SimulateOptions.asked(usual), study.parameters, asked, study.t)
     desk, call, spent = lean.Desk(lean.shared(question, study.points[0])), lean.motion_kernel, [0.0]
 
     def timed(*arguments: object) -> int:

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from flyball.compiler.jit import kernel
-from flyball.numerics.ldl import analyse
-from flyball.numerics.lu import constrained_order, lu_factor, lu_solve, times
+from flyball.numerics.lu import analyse, constrained_order, lu_factor, lu_solve, times
 
 
 @kernel
@@ -44,17 +43,15 @@ def test_solution_is_that_of_a_dense_solver(dtype):
     groups = np.r_[np.arange(n) // 2, n // 2 + np.arange(rows)]
     order = constrained_order(groups, np.arange(n // 2 + rows) >= n // 2, i, j)
     P, place = analyse(n + rows, i, j, order)
-    half = len(P.Ai)
-    A = np.zeros(2 * half, dtype)
-    A[place[: len(i)] + half * (P.perm[i] > P.perm[j])] = dense[i, j]
-    L, U, D = np.zeros(len(P.Li), dtype), np.zeros(len(P.Li), dtype), np.zeros(n + rows, dtype)
+    A = np.zeros(len(P.Aj), dtype)
+    A[place] = dense[i, j]
+    L, U, D = np.zeros(len(P.Lj), dtype), np.zeros(len(P.Uj), dtype), np.zeros(n + rows, dtype)
     b = np.random.default_rng(1).uniform(-1, 1, n + rows).astype(dtype)
-    x, product, Y = np.zeros(n + rows, dtype), np.zeros(n + rows, dtype), np.zeros((2, n + rows), dtype)
+    x, product, Y = np.zeros(n + rows, dtype), np.zeros(n + rows, dtype), np.full(n + rows, np.nan, dtype)
     x[P.perm] = b
     assert factor_and_solve(P, A, L, U, D, Y, x, product) == 0
     assert np.abs(x[P.perm] - np.linalg.solve(dense, b)).max() < 1e-12
     assert np.abs(product[P.perm] - dense @ b).max() < 1e-13
-    assert not Y.any()
 
 
 def test_what_is_late_comes_after_all_that_it_touches():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -13,6 +15,7 @@ from flyball.analysis.runs.lean import VARIED, Lean
 from flyball.analysis.runs.readable import of_states
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.runner import runner
+from flyball.analysis.runs.single import Motion
 from flyball.analysis.runs.soft import Filling, derived, soft
 from flyball.errors import ModelError
 from flyball.tables.spanning import spanning
@@ -30,7 +33,8 @@ def question(m, names, of, specialize=False, **more):
     usual = {k: p.default for k, p in __import__("inspect").signature(m.simulate).parameters.items()}
     given = usual | {"t_end": 0.01, "outputs": times, "specialize": specialize, "progress": False} | more
     o = SimulateOptions.asked(given)
-    return Question(m.snapshot(), o, tuple(names), readings(m, of), times)
+    single, m = Motion(), m.snapshot()
+    return Question(m, single, o, tuple(names), readings(of, partial(single.named, m)), times)
 
 
 @pytest.mark.parametrize("where", ["space", "plane"])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import inspect
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -30,12 +32,17 @@ from .options import count
 from .progress import shown
 from .runs.compute import Question
 from .runs.designs import DESIGNS, SAMPLED, points
+from .runs.instants import Answers, Instant, Rest, Swings
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
+from .runs.single import Kinematics, Motion, Own, Single
 from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
 USUAL = 501  # output times, where motions are looked at between their ends
+ANALYSES = {x.title: x for x in (Motion(), Kinematics(), Instant(), Rest(), Swings(), Answers())}
+EVERY_STUDY = ("vary", "of", "analysis", "parameters", "design", "samples", "seed", "file", "executor", "threads",
+               "progress")  # fmt: skip
 TRIED = 5  # runs that may fail before it is given up to choose an engine by one
 
 
@@ -45,6 +52,10 @@ class StudyOptions(SimulateOptions):
 
     vary: Mapping[str, Any]
     of: Sequence[str] | Mapping[str, Callable]
+    analysis: str | Callable[[Any, dict[str, float]], Any]
+    t_end: float | None  # type: ignore[assignment]
+    t: float | None
+    about: str | None
     design: str
     samples: int | None
     seed: int | None
@@ -59,6 +70,13 @@ class StudyOptions(SimulateOptions):
             raise ModelError("vary names no parameter; for instance vary={'stiffness': [1e3, 1e4]}")
         if not self.of:
             raise ModelError("of names no quantity; for instance of=['max(slider.x)']")
+        if not callable(self.analysis) and self.analysis not in ANALYSES:
+            named = [*ANALYSES, "a function of the mechanism and its parameters"]
+            raise ModelError(
+                f"unknown analysis {self.analysis!r}{suggest(str(self.analysis), ANALYSES)}; {listing(named)}"
+            )
+        if self.single.timed and self.t_end is None:
+            raise ModelError(f"analysis={self.single.title!r} needs t_end, the time [s] when it ends")
         if self.design not in DESIGNS:
             raise ModelError(f"unknown design {self.design!r}{suggest(self.design, DESIGNS)}; {listing(list(DESIGNS))}")
         if self.design in SAMPLED:
@@ -79,29 +97,62 @@ class StudyOptions(SimulateOptions):
         if both := self.vary.keys() & (self.parameters or {}).keys():
             raise ModelError(f"{', '.join(sorted(both))}: given in parameters, and varied; leave one of them out")
 
+    @property
+    def single(self) -> Single:
+        """What each run is."""
+        return Own(self.analysis) if callable(self.analysis) else ANALYSES[self.analysis]
+
+    def refuse_idle(self, model: Model) -> None:
+        """Refuse options that the analysis does not have: those that are not what the method has them for."""
+        usual = inspect.signature(type(model).study).parameters  # type: ignore[attr-defined]
+        for f in fields(self):
+            if f.name in (*EVERY_STUDY, *self.single.takes):
+                continue
+            if getattr(self, f.name) != usual[f.name].default:
+                raise ModelError(f"{f.name} does nothing with analysis={self.single.title!r}; leave it out")
+
+    def question(self, model: Model) -> Question:
+        """What each run is asked."""
+        single = self.single
+        single.refuse(model)
+        asked = readings(self.of, partial(single.named, model))
+        times = np.array([self.t or 0.0])
+        if single.timed:
+            end = float(self.t_end or 0.0)
+            outputs = self.outputs if self.outputs is not None else [end] if ends_only(asked) else USUAL
+            times = output_times(start_time(self.t_start, self.start), end, outputs)
+        known = {f.name: getattr(self, f.name) for f in fields(self)}
+        return Question(model, single, single.options(known, times, asked), tuple(self.vary), asked, times)
+
 
 def study(model: Model, o: StudyOptions) -> Study:
-    """Run a model at many values of its parameters: see `Mechanism.study`."""
+    """Analyse a model at many values of its parameters: see `Mechanism.study`."""
     started = time.perf_counter()
     model = model.snapshot()
     x, axes = points(model, o.vary, o.design, o.samples, o.seed)
-    asked = readings(model, o.of)
-    outputs = o.outputs if o.outputs is not None else [o.t_end] if ends_only(asked) else USUAL
-    times = output_times(start_time(o.t_start, o.start), o.t_end, outputs)
-    known = {f.name: getattr(o, f.name) for f in fields(SimulateOptions)} | {"outputs": times, "progress": False}
-    question = Question(model, SimulateOptions(**known), tuple(o.vary), asked, times)
+    o.refuse_idle(model)
+    question = o.question(model)
     model.environment(o.parameters)
-    mark = "" if o.file is None else fingerprint(model, x, known, [(r.title, r.function) for r in asked], times)
+    mark = "" if o.file is None else _mark(question, x)
     there = o.file is not None and Path(o.file).exists()
     found = stored(Path(o.file), mark) if o.file is not None and there else _begun(question, o, x, axes, mark)
-    found.start, found.options["method"] = o.start, o.method
+    if found.analysis == "motion":
+        found.start, found.options["method"] = o.start, o.method
     with shown(o.progress, "studying") as tell, warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks of the runs say it
-        _run(_decided(question, found), found, o, tell)
+        _run(_decided(question, found) if found.analysis == "motion" else question, found, o, tell)
     found.seconds += time.perf_counter() - started
     if o.file is not None:
         save_study(found, o.file)
     return found
+
+
+def _mark(question: Question, points: np.ndarray) -> str:
+    """What tells the study from others."""
+    o, asked = question.options, [(r.title, r.function) for r in question.asked]
+    known = {f.name: getattr(o, f.name) for f in fields(o)} | {"analysis": question.single.title}
+    own = getattr(question.single, "function", None)
+    return fingerprint(question.model, points, known, asked + [("analysis", own)] * (own is not None), question.times)
 
 
 def _begun(question: Question, o: StudyOptions, x: np.ndarray, axes: tuple[np.ndarray, ...], mark: str) -> Study:
@@ -122,12 +173,13 @@ def _begun(question: Question, o: StudyOptions, x: np.ndarray, axes: tuple[np.nd
         options=_options(question.options),
         base={name: env[name] for name in question.names},
         mark=mark,
+        analysis=question.single.title,
     )
 
 
-def _options(o: SimulateOptions) -> dict[str, Any]:
-    """Options of `simulate`, but those that the study has by itself."""
-    told = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in ("outputs", "progress", "start")}
+def _options(o: Any) -> dict[str, Any]:
+    """Options of the analysis, but those that the study has by itself."""
+    told = {f.name: getattr(o, f.name) for f in fields(o) if f.name not in ("outputs", "times", "progress", "start")}
     return told | {"parameters": dict(o.parameters or {})}
 
 
@@ -207,6 +259,6 @@ def load_study(path: str | PathLike) -> Study:
     if not isinstance(path, (str, PathLike)):
         raise ModelError(f"the path of a study is a text or a path, not {path!r}")
     found = stored(path)
-    if isinstance(found.options["method"], dict):
+    if isinstance(found.options.get("method"), dict):
         found.options["method"] = Stepping(**found.options["method"])
     return found

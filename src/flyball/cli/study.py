@@ -40,8 +40,13 @@ OWN = {
         help="A parameter and its values, --vary k=1e3:1e5:20 or k=1,2,5; of samples --vary k=1e3:1e5 or "
         "'k=normal(2e3, 100)'. May be repeated.",
     ),
+    "analysis": Flag(
+        type=str, help="What each run is: motion (if not given), kinematics, instant, equilibrium, modes or linearize."
+    ),
     "of": Flag(
-        type=list[str], help="A curve, or a number of one: --of 'max(slider.x)', end, min, mean, rms. May be repeated."
+        type=list[str],
+        help="A curve, or a number of one: --of 'max(slider.x)', end, min, mean, rms; of modes 'frequency[0]'; of "
+        "linearize 'gain(slider.x, push)'. May be repeated.",
     ),
     "file": Flag(type=Path, names=("--file", "-o")),
 }

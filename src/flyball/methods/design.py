@@ -172,9 +172,12 @@ class Design(Model):
         vary: Mapping[str, Any],
         of: Sequence[str] | Mapping[str, Callable[[Any], float]],
         *,
-        t_end: float | str,
+        analysis: str | Callable[[Any, dict[str, float]], Any] = "motion",
+        t_end: float | str | None = None,
         t_start: float | str | None = None,
         outputs: int | Sequence[float] | None = None,
+        t: float | str | None = None,
+        about: str | None = None,
         design: str = "grid",
         samples: int | None = None,
         seed: int | None = None,
@@ -197,10 +200,10 @@ class Design(Model):
         threads: int | None = None,
         progress: bool | Callable[[float], None] = True,
     ) -> Study:
-        """Simulate at many values of parameters, on all cores: grids, samples, Monte Carlo, Sobol' indices.
+        """Analyse at many values of parameters, on all cores: grids, samples, Monte Carlo, Sobol' indices.
 
-        Each run is to the last bit what `simulate` makes of it (``m.simulate(**study.question(k))``). One that fails is
-        left out, and the study says why.
+        Each run is to the last bit what the analysis by itself makes of it (``m.simulate(**study.question(k))``). One
+        that fails is left out, and the study says why.
 
         Parameters
         ----------
@@ -210,13 +213,24 @@ class Design(Model):
             ``"lognormal(median, sd of the logarithm)"``.
         of : sequence of str, or mapping of str to callable
             Curves of a result (``"slider.x"``), or one number of each: ``"end(slider.x)"``, ``max``, ``min``, ``mean``,
-            ``rms``, over the output times. Or name -> function of a `Result` that returns a number.
-        t_end : float or str [s]
-            End of the motions.
+            ``rms``, over the output times. Of an equilibrium also ``"least"`` (its least stiffness) and ``"stable"``
+            (1 or 0); of modes ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and
+            ``"stable"``; of linear models ``"gain(output, input)"``, with an angular frequency [rad/s] as third
+            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s]. Or name -> function of a
+            run's answer that returns a number.
+        analysis : {"motion", "kinematics", "instant", "equilibrium", "modes", "linearize"} or callable
+            What each run is: `simulate`, `kinematics`, `assemble` with accelerations and reactions, `equilibrium`,
+            `modes`, `linearize`; or a function of the mechanism and the values of its parameters, of any other.
+        t_end : float or str [s], optional
+            End of motions and kinematics.
         t_start : float or str [s], optional
             Their start: 0 if not given; where ``start`` ended if that is.
         outputs : int or sequence of float [s], optional
             Output times, as for `simulate`; if not given 501, or the end alone where nothing else is looked at.
+        t : float or str [s], optional
+            Time of an instant, of an equilibrium or of small motions: 0 if not given.
+        about : {"equilibrium"}, optional
+            Of modes and linear models: about the equilibrium; else where the mechanism is drawn.
         design : {"grid", "list", "random", "latin", "sobol", "saltelli"}
             ``grid``: all combinations of the values; ``list``: the first of all, the second of all, and so on.
             ``random``: Monte Carlo; ``latin``: a Latin hypercube; ``sobol``: scrambled points of Sobol; ``saltelli``:
@@ -271,7 +285,8 @@ class Design(Model):
         Raises
         ------
         ModelError
-            If a parameter, quantity, distribution or option does not exist, or the file is of another study.
+            If a parameter, quantity, distribution or option does not exist or does nothing, the analysis does not know
+            something that the mechanism has, or the file is of another study.
         AnalysisError
             If the executor fails.
         """

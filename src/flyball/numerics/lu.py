@@ -1,50 +1,73 @@
-"""Sparse L U of an unsymmetric matrix in a fixed symmetric pattern, real or complex, without pivoting.
+"""Sparse L U of an unsymmetric matrix in a fixed pattern, real or complex, without pivoting.
 
 For matrices of implicit integrators: their own order makes the pivots safe (`constrained_order`), a small part of
-each row's natural size on the diagonal keeps them from zero, and whoever solves takes that out again. Up-looking, as
-`ldl`; row i of U stands where column i of L does, so that one pattern serves both.
+each row's natural size on the diagonal keeps them from zero, and whoever solves takes that out again. Row by row
+(Doolittle), after Davis, *Direct Methods for Sparse Linear Systems* (2006), chapter 6; rows of U with one pattern, as
+the coordinates of a body have, go two at a time.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from ..compiler.jit import formula
+from ..compiler.jit import formula, kernel
 from ..math.scalar import nonzero
+
+
+class Rows(NamedTuple):
+    """Structure of A, L and U by rows, in the order of elimination; columns ascend, diagonals of L and U left out."""
+
+    perm: np.ndarray  # (n,): place of unknown i in the order of elimination
+    Ap: np.ndarray  # (n + 1,)
+    Aj: np.ndarray  # (nA,)
+    Lp: np.ndarray  # (n + 1,)
+    Lj: np.ndarray  # (nL,)
+    Up: np.ndarray  # (n + 1,)
+    Uj: np.ndarray  # (nU,)
+    twin: np.ndarray  # (n,): whether row i of U has i + 1 and then what row i + 1 has
 
 
 @formula
 def lu_factor(P, A, L, U, D, Y):
     """Factor A in place of L (unit diagonal), U and D (inverse diagonal of U). Returns 0, or 1 + the row that fails.
 
-    ``A`` holds the upper triangle with the diagonal, by columns as in ``P.Ai``, then the lower triangle, by rows, at
-    the same places. ``Y`` is scratch, (2, n), zero before and after.
+    ``A`` holds the entries by rows as in ``P.Aj``. ``Y`` is scratch, (n,).
     """
-    n = P.perm.shape[0]
-    half = P.Ai.shape[0]
-    for k in range(n):
-        last = P.Ap[k + 1] - 1
-        d = A[last]
-        for p in range(P.Ap[k], last):
-            i = P.Ai[p]
-            Y[0, i] = A[p]
-            Y[1, i] = A[half + p]
-        for e in range(P.Rp[k], P.Rp[k + 1]):
-            i = P.Ri[e]
-            x = P.Rx[e]
-            u = Y[0, i]
-            l = Y[1, i] * D[i]
-            Y[0, i] = Y[1, i] = 0.0
-            for p in range(P.Lp[i], x):
-                j = P.Li[p]
-                Y[0, j] -= L[p] * u
-                Y[1, j] -= l * U[p]
-            d -= l * u
-            L[x] = l
-            U[x] = u
+    for k in range(P.perm.shape[0]):
+        first, last = P.Lp[k], P.Lp[k + 1]
+        for p in range(first, last):
+            Y[P.Lj[p]] = 0.0
+        for p in range(P.Up[k], P.Up[k + 1]):
+            Y[P.Uj[p]] = 0.0
+        Y[k] = 0.0
+        for p in range(P.Ap[k], P.Ap[k + 1]):
+            Y[P.Aj[p]] = A[p]
+        p = first
+        while p < last:
+            i = P.Lj[p]
+            l = Y[i] * D[i]
+            L[p] = l
+            at = P.Up[i]
+            if P.twin[i] == 1 and p + 1 < last:
+                m = (Y[i + 1] - l * U[at]) * D[i + 1]
+                L[p + 1] = m
+                at += 1
+                shift = P.Up[i + 1] - at
+                for q in range(at, P.Up[i + 1]):
+                    Y[P.Uj[q]] -= l * U[q] + m * U[q + shift]
+                p += 2
+            else:
+                for q in range(at, P.Up[i + 1]):
+                    Y[P.Uj[q]] -= l * U[q]
+                p += 1
+        d = Y[k]
         if not nonzero(d):
             return 1 + k
         D[k] = 1.0 / d
+        for q in range(P.Up[k], P.Up[k + 1]):
+            U[q] = Y[P.Uj[q]]
     return 0
 
 
@@ -55,27 +78,89 @@ def lu_solve(P, L, U, D, x):
     for k in range(n):
         v = x[k]
         for p in range(P.Lp[k], P.Lp[k + 1]):
-            x[P.Li[p]] -= L[p] * v
+            v -= L[p] * x[P.Lj[p]]
+        x[k] = v
     for k in range(n - 1, -1, -1):
         v = x[k]
-        for p in range(P.Lp[k], P.Lp[k + 1]):
-            v -= U[p] * x[P.Li[p]]
+        for p in range(P.Up[k], P.Up[k + 1]):
+            v -= U[p] * x[P.Uj[p]]
         x[k] = v * D[k]
 
 
 @formula
 def times(P, A, x, out):
     """Out = A x, both in the factored order."""
-    n = P.perm.shape[0]
-    half = P.Ai.shape[0]
-    for k in range(n):
-        last = P.Ap[k + 1] - 1
-        s = A[last] * x[k]
-        for p in range(P.Ap[k], last):
-            i = P.Ai[p]
-            s += A[half + p] * x[i]
-            out[i] += A[p] * x[k]
+    for k in range(P.perm.shape[0]):
+        s = 0.0 * x[k]
+        for p in range(P.Ap[k], P.Ap[k + 1]):
+            s += A[p] * x[P.Aj[p]]
         out[k] = s
+
+
+def analyse(n: int, i: np.ndarray, j: np.ndarray, order: np.ndarray) -> tuple[Rows, np.ndarray]:
+    """Pattern of the factors of a matrix with entries (i, j); where each of these goes in ``A``.
+
+    Parameters
+    ----------
+    n : int
+        Order of the matrix. The diagonal is always part of the pattern.
+    i, j : ndarray of int
+        Rows and columns of the entries, repeats allowed.
+    order : (n,) of int
+        Place of every unknown in the order of elimination.
+    """
+    order = np.asarray(order, np.int64)
+    i, j = (order[np.r_[np.asarray(x, np.int64), np.arange(n)]] for x in (i, j))
+    keys, place = np.unique(i * n + j, return_inverse=True)
+    Ap, Aj = pointers(keys // n, n), (keys % n).astype(np.int64)
+    room = 4 * len(Aj) + 64
+    while True:
+        Lp, Up = np.zeros(n + 1, np.int64), np.zeros(n + 1, np.int64)
+        Lj, Uj = np.zeros(room, np.int64), np.zeros(room, np.int64)
+        if fill_in(Ap, Aj, Lp, Lj, Up, Uj, np.zeros(n, np.int64)) == 0:
+            break
+        room *= 2
+    Lj, Uj = Lj[: Lp[n]].copy(), Uj[: Up[n]].copy()
+    twin = np.array([
+        int(Up[k + 1] - Up[k] == Up[k + 2] - Up[k + 1] + 1 and Uj[Up[k]] == k + 1
+            and np.array_equal(Uj[Up[k] + 1 : Up[k + 1]], Uj[Up[k + 1] : Up[k + 2]]))
+        for k in range(n - 1)
+    ] + [0], np.int64)  # fmt: skip
+    return Rows(order, Ap, Aj, Lp, Lj, Up, Uj, twin), place[: len(place) - n].astype(np.int64)
+
+
+def pointers(rows: np.ndarray, n: int) -> np.ndarray:
+    """Where each row begins among entries in the order of rows, (n + 1,)."""
+    return np.r_[0, np.cumsum(np.bincount(rows, minlength=n))].astype(np.int64)
+
+
+@kernel
+def fill_in(Ap, Aj, Lp, Lj, Up, Uj, seen):
+    """Patterns of L and U of rows eliminated in turn. Returns 0, or 1 if there is no room for them."""
+    n = Ap.shape[0] - 1
+    for k in range(n):
+        nl, nu = Lp[k], Up[k]
+        first, last = k, k
+        for p in range(Ap[k], Ap[k + 1]):
+            seen[Aj[p]] = k + 1
+            first, last = min(first, Aj[p]), max(last, Aj[p])
+        if nl + k - first > Lj.shape[0]:
+            return 1
+        for i in range(first, k):
+            if seen[i] == k + 1:
+                Lj[nl] = i
+                nl += 1
+                for q in range(Up[i], Up[i + 1]):
+                    seen[Uj[q]] = k + 1
+                    last = max(last, Uj[q])
+        if nu + last - k > Uj.shape[0]:
+            return 1
+        for j in range(k + 1, last + 1):
+            if seen[j] == k + 1:
+                Uj[nu] = j
+                nu += 1
+        Lp[k + 1], Up[k + 1] = nl, nu
+    return 0
 
 
 def constrained_order(groups: np.ndarray, late: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:

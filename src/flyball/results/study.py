@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 WAITING, DONE, FAILED = 0, 1, 2
+TIMES = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option that its output times are
 TOLD = 6  # reasons in a text
 NO_CROSS = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
 
@@ -37,6 +38,8 @@ class Study:
     design : str
     parameters : tuple of str
         Those that were varied.
+    analysis : str
+        What each run is.
     points : ndarray (runs, parameters)
         Their values in each run, in SI units; of a grid the last one changes first.
     axes : tuple of ndarray
@@ -77,6 +80,7 @@ class Study:
     options: dict[str, Any]
     base: dict[str, float]
     mark: str = ""
+    analysis: str = "motion"
     reasons: dict[int, str] = field(default_factory=dict)
     remarks: dict[int, str] = field(default_factory=dict)
     start: Result | None = None
@@ -133,10 +137,19 @@ class Study:
         return dict(zip(self.parameters, self.points[run].tolist(), strict=True))
 
     def question(self, run: int) -> dict[str, Any]:
-        """What to ask `simulate` for the same motion, to the last bit: ``m.simulate(**study.question(17))``."""
-        told = {k: x for k, x in self.options.items() if x is not None}
+        """What to ask the analysis for the same answer, to the last bit: ``m.simulate(**study.question(17))``.
+
+        Of ``"kinematics"`` and ``"equilibrium"`` what to ask those; of ``"modes"`` and ``"linearize"`` where they are
+        drawn too; about the equilibrium what to ask that one, which then is ``about=``. Of ``"instant"`` the question
+        is for `assemble`, of a function of your own it has ``parameters`` alone.
+        """
+        told = {k: x for k, x in self.options.items() if x not in (None, ()) and k != "about"}
         told["parameters"] = {**self.options["parameters"], **self.at(run)}
-        return told | {"outputs": self.t.copy()} | ({} if self.start is None else {"start": self.start})
+        if self.analysis in TIMES:
+            told[TIMES[self.analysis]] = self.t.copy()
+        if "about" in self.options and self.options["about"] is not None:
+            told = {k: told[k] for k in ("t", "parameters")}
+        return told | ({} if self.start is None else {"start": self.start})
 
     def indices(self, *of: str) -> Indices:
         """Sobol' indices: which part of the variance of each quantity each parameter accounts for.
@@ -178,7 +191,8 @@ class Study:
         """A table for people: what was varied, how the quantities spread, and what failed."""
         done, failed = int(self.done.sum()), int((self.status == FAILED).sum())
         sizes = " x ".join(map(str, self.shape)) if self.axes else f"{len(self)} runs"
-        out = [("study", f"{self.name}, {self.design}, {sizes}")]
+        what = "" if self.analysis == "motion" else f"{self.analysis}, "
+        out = [("study", f"{self.name}, {what}{self.design}, {sizes}")]
         left = len(self) - done - failed
         told = [f"{done} done"] + [f"{n} {what}" for n, what in ((failed, "failed"), (left, "still to be done")) if n]
         out.append(("runs", ", ".join(told) + (f"; {self.message}" if self.message else "")))
@@ -190,7 +204,7 @@ class Study:
             if len(y):
                 text = f"{span(y)} {unit.replace('*', ' ')}".rstrip()
                 out.append((name, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}"))
-        for k, text in list(self.reasons.items())[:TOLD]:
+        for k, text in sorted(self.reasons.items())[:TOLD]:
             out.append(("failed", f"run {k} ({', '.join(f'{n} = {x:.6g}' for n, x in self.at(k).items())}): {text}"))
         if failed > TOLD:
             out.append(("failed", f"and {failed - TOLD} more: study.reasons"))
@@ -204,6 +218,7 @@ class Study:
         """Everything as plain numbers and names."""
         return {
             "name": self.name,
+            "analysis": self.analysis,
             "design": self.design,
             "points": {name: self.points[:, k].tolist() for k, name in enumerate(self.parameters)},
             "t": self.t.tolist(),
@@ -266,4 +281,6 @@ class Study:
         return surface(self, of, x, y, path)
 
     def __repr__(self) -> str:
-        return "\n".join(f"{a:<16} {b}" for a, b in self.lines())
+        lines = self.lines()
+        width = max(16, *(len(a) for a, _ in lines))
+        return "\n".join(f"{a:<{width}} {b}" for a, b in lines)

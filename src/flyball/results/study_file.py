@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 RUN, TIME = "run", "time"
-TOLD = ("name", "design", "parameters", "of", "units", "options", "base", "mark", "seconds", "message")
+TOLD = ("name", "design", "parameters", "of", "units", "options", "base", "mark", "analysis", "seconds", "message")
 
 
 def to_xarray(study: Study) -> xarray.Dataset:

@@ -1,35 +1,36 @@
-"""Some runs of a study, one after the other: each is what `Mechanism.simulate` makes of it, failures by themselves."""
+"""Some runs of a study, one after the other: each is what the analysis makes of it, failures by themselves."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from ...errors import FlyballError, SimulationError
+from ...errors import FlyballError
 from ...model.model import Model
 from ...results.study import DONE, FAILED
-from ..motion.choice import SimulateOptions
-from ..simulate import simulate
-from .reading import CURVE, Reading, read
+from .reading import CURVE, Reading
+from .single import Single
 
 
 @dataclass(frozen=True)
 class Question:
-    """What each run of a study is asked: the options of `simulate`, and what is read of it.
+    """What each run of a study is asked: the analysis and its options, and what is read of it.
 
     ``model`` is a snapshot, ``names`` are the parameters that are varied, ``times`` the output times [s].
     """
 
     model: Model
-    options: SimulateOptions
+    single: Single
+    options: Any
     names: tuple[str, ...]
     asked: tuple[Reading, ...]
     times: np.ndarray
 
-    def at(self, point: np.ndarray) -> SimulateOptions:
+    def at(self, point: np.ndarray) -> Any:
         """The options of the run at a point."""
         values = dict(zip(self.names, point.tolist(), strict=True))
         return replace(self.options, parameters={**(self.options.parameters or {}), **values})
@@ -85,12 +86,12 @@ def guarded(out: Answers, k: int, run: Callable[[], Sequence[np.ndarray]]) -> No
 
 
 def _told(question: Question, point: np.ndarray, out: Answers, k: int) -> list[np.ndarray]:
-    result = simulate(question.model, question.at(point))
-    if not result.health.success:
-        raise SimulationError(result.health.message, result)
-    if result.health.remarks:
-        out.remarks[k] = "; ".join(map(str, result.health.remarks))
-    return read(result, question.asked, question.times)
+    single = question.single
+    found = single.run(question.model, question.at(point))
+    values = single.read(found, question.asked, question.times)
+    if remarks := single.remarks(found):
+        out.remarks[k] = "; ".join(map(str, remarks))
+    return values
 
 
 def _reason(error: Exception) -> str:

@@ -44,7 +44,7 @@ from ..simulate import clock_for
 from .compute import DONE, Answers, Question, alone
 from .firm import Weighing, rests_as_drawn
 from .readable import of_states
-from .reading import FUNCTION, read, reduced
+from .reading import FUNCTION, reduced
 from .soft import Filling, soft
 
 
@@ -239,7 +239,8 @@ class Lean:
             vdot, lam = solved(desk.start, rows)
         result = Result(q.model, x, t[:, 0], p, v, z, vdot, lam, _health())
         result.wound = self.of.begun.wound
-        for i, found in zip(self.alone, read(result, [q.asked[i] for i in self.alone], q.times), strict=True):
+        asked = [q.asked[i] for i in self.alone]
+        for i, found in zip(self.alone, q.single.read(result, asked, q.times), strict=True):
             out.values[i][k] = found
 
     def _read(self, rows: np.ndarray, at: np.ndarray, out: Answers) -> None:

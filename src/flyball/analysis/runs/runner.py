@@ -9,6 +9,7 @@ import numpy as np
 
 from .compute import Answers, Question, compute
 from .lean import Lean, shared
+from .single import Motion
 
 FEW = 3  # runs for which it is not worth while to look for what they share
 Runner = Callable[[np.ndarray, Callable[[], bool]], Answers]
@@ -17,7 +18,7 @@ Runner = Callable[[np.ndarray, Callable[[], bool]], Answers]
 
 def runner(question: Question, points: np.ndarray) -> Runner:
     """What computes the runs of a question, of which some points are given."""
-    if len(points) > FEW:
+    if len(points) > FEW and isinstance(question.single, Motion):
         for k in (0, len(points) // 2, len(points) - 1):  # one may fail
             if (found := shared(question, points[k])) is not None:
                 return Lean(found).compute

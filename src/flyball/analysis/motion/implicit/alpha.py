@@ -9,7 +9,7 @@ import numpy as np
 from ....equations.alpha import alpha_steps
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
-from ....numerics.ldl import Pattern
+from ....numerics.lu import Rows
 from ...compiled import Compiled
 from .loop import Implicit
 
@@ -43,7 +43,7 @@ class Desk(NamedTuple):
     real_U: np.ndarray
     real_D: np.ndarray
     real_Y: np.ndarray
-    P: Pattern
+    P: Rows
     past: np.ndarray  # (4, nv + nx): accelerations that the method remembers, and rates of x
     ends: np.ndarray  # (3, nv): rates at the ends of the step
 
@@ -70,6 +70,7 @@ class Alpha(Implicit):
     def _desk(self, nz: int, turns: bool) -> Desk:  # type: ignore[override]
         w = super()._desk(nz, turns)
         nv, nx = self.layout.nv, self.layout.nx
-        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], 0.1)
+        steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
+        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], min(0.1, 1.0 / steps))
         kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
         return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv + nx)), ends=np.zeros((3, nv)))

@@ -11,8 +11,7 @@ from ....equations.tree import quaternion_at
 from ....numerics.integrators.implicit.step import STAGES
 from ....numerics.integrators.implicit.whole import PLAIN
 from ....numerics.integrators.implicit.whole import SOFT as SOFTENED
-from ....numerics.ldl import Pattern, analyse
-from ....numerics.lu import constrained_order
+from ....numerics.lu import Rows, analyse, constrained_order
 from ....tables.specs import Structure
 from ....tables.system import (
     FORCE_ALONG,
@@ -170,16 +169,29 @@ class Layout:
 
     def _ordered(
         self, n: int, i: np.ndarray, j: np.ndarray, number: np.ndarray, stages: int
-    ) -> tuple[Pattern, np.ndarray]:
-        """Pattern of a matrix with such entries; places of these with the numbers that stand there."""
+    ) -> tuple[Rows, np.ndarray]:
+        """Pattern of a matrix with such entries; places of these with the numbers that stand there.
+
+        Increments come first: only a few of their own stand beside the diagonal, and what is left is half as large.
+        """
         body_i = self.s.tables["body_i"]
         body, bodies = np.repeat(np.arange(len(body_i)), body_i[:, NV]), len(body_i)
         rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
         groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
-        late = np.arange(bodies + self.nr + self.nx) >= bodies
-        P, place = analyse(n, i, j, constrained_order(groups, late, i, j))
-        lower = P.perm[i] > P.perm[j]
-        return P, np.ascontiguousarray(np.column_stack([place[: len(i)] + lower * len(P.Ai), number]))
+        order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
+        one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # d of a quaternion go together
+        first = np.tile(np.arange(n // stages) < self.nv, stages)
+        place = np.empty(n, np.int64)
+        place[np.lexsort((np.arange(n), np.where(first, np.tile(one, stages), order), ~first))] = np.arange(n)
+        P, at = analyse(n, i, j, place)
+        return P, np.ascontiguousarray(np.column_stack([at, number]))
+
+    def _together(self) -> np.ndarray:
+        """Of each velocity the first of those whose increments depend on each other."""
+        out = np.arange(self.nv)
+        for w in self.turns.tolist():
+            out[w : w + 3] = w
+        return out
 
 
 def pressed(S: System) -> np.ndarray:

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...ldl import Pattern
+from ...lu import Rows
 
 # entries of Desk.count: what was done; whether the Jacobian is that of the present state (1), serves (0) or not (-1);
 # whether there is a polynomial of the step before; refinements of each linear solve; iterations of a step at least;
@@ -66,7 +66,7 @@ class Desk(NamedTuple):
     pair_U: np.ndarray
     pair_D: np.ndarray
     pair_Y: np.ndarray
-    P: Pattern
+    P: Rows
     whole_put: np.ndarray  # (entries, 4): place in the matrix of all stages, row of J, number, what it is multiplied by
     whole_x: np.ndarray  # (3, 3 n)
     whole_A: np.ndarray
@@ -74,4 +74,4 @@ class Desk(NamedTuple):
     whole_U: np.ndarray
     whole_D: np.ndarray
     whole_Y: np.ndarray
-    whole_P: Pattern
+    whole_P: Rows

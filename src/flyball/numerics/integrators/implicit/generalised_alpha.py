@@ -11,7 +11,8 @@ mechatronic applications"); of `past` they are the last columns.
 
 a is the acceleration at t + (am - af) h. The spectral radius at infinite frequency, rho, sets am, af, beta and gamma.
 Knows nothing of bodies: given (residual, linearise, compose, arrive, inspect) as `radau` is, and ``turned(d, w, S)``,
-which makes velocities rates of increments in place, and ``straight(d, out, S)``, increments those of constant velocity.
+which makes velocities rates of increments in place, ``straight(d, out, S)``, increments those of constant velocity, and
+an ``arrive`` of what is no end of a step.
 """
 
 from __future__ import annotations
@@ -46,7 +47,7 @@ ALGORITHMIC, TRUE, NEXT_ONE, RATE = range(4)
 AHEAD = 1e-3  # part of a step over which the rate of accelerations is found at a start
 MOST, MOST_WHOLE = 10, 25  # iterations: with one Jacobian, and with that of each
 FALLS = 0.5  # what corrections fall by at least, or each iteration has its own Jacobian
-SERVES = 0.1  # a rate of the iteration below which the Jacobian serves on
+SERVES = 0.02  # a rate of the iteration below which the Jacobian serves on
 DIVERGED = 1
 
 
@@ -62,7 +63,7 @@ def coefficients(rho):
 @formula
 def begin(callbacks, S, K, c):
     """What the method remembers of steps, where it begins anew: accelerations, and their rate."""
-    _, _, compose, arrive = callbacks[:4]
+    compose, arrive = callbacks[2], callbacks[7]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
     ahead = AHEAD * c.real[STEP]
@@ -152,8 +153,6 @@ def factor(K, h):
     status = lu_factor(K.P, A, K.real_L, K.real_U, K.real_D, K.real_Y)
     if status != 0:
         K.real[WIDTH] = 0.0
-        for i in range(K.real_Y.shape[1]):
-            K.real_Y[0, i] = K.real_Y[1, i] = 0.0
     return status
 
 

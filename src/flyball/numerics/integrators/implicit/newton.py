@@ -44,9 +44,6 @@ def factor(K, h):
         status = lu_factor(K.P, K.pair_A, K.pair_L, K.pair_U, K.pair_D, K.pair_Y)
     if status != 0:
         K.real[WIDTH] = 0.0
-        for i in range(K.real_Y.shape[1]):
-            K.real_Y[0, i] = K.real_Y[1, i] = 0.0
-            K.pair_Y[0, i] = K.pair_Y[1, i] = 0.0
     return status
 
 
@@ -62,7 +59,7 @@ def solve(K, x, A, L, U, D, scale):
     for _ in range(K.count[REFINE]):
         times(K.P, A, x[0], x[2])
         for e in range(K.part[1], K.put.shape[0]):  # these stand on the diagonal alone
-            i = K.P.Ai[K.put[e, 0]]
+            i = K.P.Aj[K.put[e, 0]]
             x[2, i] -= back * J[K.put[e, 1]] * x[0, i]
         for i in range(n):
             x[2, i] = x[1, i] - x[2, i]

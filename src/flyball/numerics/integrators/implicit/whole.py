@@ -48,7 +48,7 @@ def solve_whole(K, h):
         times(K.whole_P, K.whole_A, x[0], x[2])
         for e in range(K.whole_put.shape[0]):
             if K.whole_put[e, 3] == SOFT:
-                i = K.whole_P.Ai[K.whole_put[e, 0]]
+                i = K.whole_P.Aj[K.whole_put[e, 0]]
                 x[2, i] -= h / GAMMA * K.J[K.whole_put[e, 1], K.whole_put[e, 2]] * x[0, i]
         for i in range(n):
             x[2, i] = x[1, i] - x[2, i]
@@ -101,8 +101,6 @@ def iterate_whole(callbacks, S, K, c, h):
         share(K, h)
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
-            for i in range(K.whole_Y.shape[1]):
-                K.whole_Y[0, i] = K.whole_Y[1, i] = 0.0
             return 1
         size = correct_whole(K, h)
         K.count[WHOLE] += 1
