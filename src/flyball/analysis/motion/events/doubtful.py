@@ -70,7 +70,7 @@ def _several(n: Instant, found: Decided) -> str:
 def _undetermined(n: Instant, found: Decided) -> str:
     """Friction whose most depends on what redundancy leaves open."""
     held = np.flatnonzero(found.state == EVEN)
-    grips = [i for i in held if found.parts[i].rule == GRIPS and found.gain[i].any()]
+    grips = [i for i in held.tolist() if found.parts[i].rule == GRIPS and found.gain[i].any()]
     if len(held) < 2 or not grips:
         return ""
     d = np.sqrt(found.A.diagonal()[held])
