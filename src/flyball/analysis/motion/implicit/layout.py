@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ....equations.engine import MOTION
@@ -17,7 +15,6 @@ from ....tables.system import (
     FORCE_ALONG,
     FORCE_SWITCH,
     NV,
-    PARENT,
     SCHUR,
     SLIDING,
     SOLVER,
@@ -26,8 +23,8 @@ from ....tables.system import (
     System,
 )
 from ...compiled import Compiled
-from ...linear.derivatives import grouped, grouped_sparsity, pattern
 from ...linear.loads import pressing
+from .parts import Parts
 
 THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
 
@@ -47,8 +44,12 @@ class Layout:
         self.index_3 = index_3
         self.s, self.nv, self.nr = s, s.nv, len(s.rows)
         self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
-        self.touched, self.group = sparsity(s, self.width, S)
-        self.groups = int(self.group.max(initial=-1)) + 1
+        parts = Parts(s, S)
+        self.rows = parts.row[: self.nr]
+        self.terms = parts.terms(parts.all, self.width)
+        self.mass = parts.terms(parts.bodies, self.width)
+        self.places = self.width + parts.size
+        self.groups = self.terms.groups
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
         self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
@@ -59,19 +60,16 @@ class Layout:
         """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""
         nv, nr = self.nv, self.nr
         v, lam, mu = nv, 2 * nv, 2 * nv + nr
-        all_rows, all_columns = self.touched.indices, np.repeat(np.arange(nv), np.diff(self.touched.indptr))
-        r = all_rows < nv
-        n = (all_rows >= nv + nr) & (all_rows < nv + 2 * nr)
+        i, j, x = self.terms.i, self.terms.j, self.terms.pick
+        k = np.repeat(np.arange(nr), [len(d) for d in self.rows])
+        m = np.concatenate([np.zeros(0, np.int64), *self.rows])
+        a, b, c, nG = len(i), len(k), len(self.mass.i), len(self.col_i)
         self.pick = np.concatenate([
-            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
-            np.column_stack([self.group[all_columns[n]], all_rows[n]]),
-            np.column_stack([self.groups + self.group[all_columns[r]], all_rows[r]]),
-            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
+            x,
+            np.column_stack([a + np.arange(b), self.terms.group[m], nv + nr + k]),
+            x + np.array([a + b, self.groups, 0]),
         ]).astype(np.int64)  # fmt: skip
-        i, j = all_rows[r], all_columns[r]
-        k, m = all_rows[n] - nv - nr, all_columns[n]
-        a, b, nG = len(i), len(k), len(self.col_i)
-        first = np.cumsum([1, 2 * a + b, a, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        first = np.cumsum([1, 2 * a + b, c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
@@ -103,7 +101,7 @@ class Layout:
                       rows + np.r_[at(nG)[held], at(nG)[~held]])  # fmt: skip
             one[5] = one[6] = (at(0),) * 3
             one[8] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
-        scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a))]
+        scaled = [(ways, ways, np.zeros(nv, int)), (v + self.mass.i, v + self.mass.j, mass + at(c))]
         valued = np.flatnonzero(self.valued == 1)
         soft = [(lam + at(nr), lam + at(nr), sizes + at(nr))]
         if not self.index_3:
@@ -169,27 +167,6 @@ def pressed(S: System) -> np.ndarray:
     """Rows of gaps of places of contact, whose multipliers the friction there follows."""
     sliding = S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING, FORCE_SWITCH]
     return np.asarray(S.switch_i[S.switch_i[sliding, SWITCH_OTHER], SWITCH_ROW], np.int64)
-
-
-def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
-    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
-
-    In joint coordinates what acts on a body acts along the coordinates of all that it hangs on, and follows them.
-    """
-    if not s.tree:
-        return grouped_sparsity(s, width, S)
-    from scipy.sparse import csc_matrix
-
-    parents = S.body_i[:, PARENT].tolist()
-    above: list[list[int]] = []
-    for b, parent in enumerate(parents):
-        above.append([b, *(above[parent] if parent >= 0 else ())])
-
-    def found() -> tuple[Any, np.ndarray]:
-        touched = csc_matrix(pattern(s, S, above))
-        return touched, grouped(touched)
-
-    return s.kept.get("sparsity by branches", None, 1, found)
 
 
 def layout(s: Structure, S: System, index_3: bool = False) -> Layout:
