@@ -236,3 +236,21 @@ def test_what_a_users_friction_holds_is_hit_and_comes_to_rest_again(restitution)
     assert x == pytest.approx([0.0, 0.0, 3 / 8 * v**2 / slows, v**2 / slows / 2], abs=1e-10)
     assert [h.kind for h in r.events][:3] == ["hold", "impact", "leave"]
     assert [h.t for h in r.events if h.kind == "hold"] == pytest.approx([0.0, t + v / slows], abs=1e-10)
+
+
+def test_two_frictions_on_one_body_that_stick_by_turns():
+    """Coulomb's friction on the ground and on a belt, by signs; the same by elements; to the belt's speed and off it.
+
+    Until pi/2 the ground holds it at x = 1, then the belt carries it, x = 1 + (sin t - 1) / 2, to x = 0 at 3 pi/2, where
+    both speeds are zero; and friction of both drives it on, x'' = -x + .2 at first.
+    """
+    r, x, v = moved(cart("-(value + 1) - .5*sign(rate) - .7*sign(rate - .5*cos(t))"), 20.0)
+    m = cart("-(value + 1)")
+    m.add(fb.Body("belt", mass=1, inertia=1), fb.Prismatic("B", "ground", "belt", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Driver("D", "B.displacement", ".5*sin(t)"), fb.Brake("ground's", "track.displacement", capacity=0.5))
+    m.add(fb.Clutch("belt's", "B.displacement", "track.displacement", capacity=0.7))
+    _, y, w = moved(m, 20.0)
+    assert x == pytest.approx(y, abs=1e-9) and v == pytest.approx(w, abs=1e-9)
+    assert x[2] == pytest.approx((np.sin(4.0) - 1) / 2, abs=1e-9)
+    s = 6.0 - 1.5 * np.pi
+    assert x[3] == pytest.approx(-1 + 0.2 * (1 - np.cos(s)), abs=1e-9)

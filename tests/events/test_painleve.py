@@ -58,3 +58,20 @@ def test_where_there_are_several_it_says_so(coordinates):
     run = rod(3.0, -1.0, spin=4.0).simulate(1e-3, outputs=2, method="dop853", coordinates=coordinates)
     assert any("can go on in several ways (Painleve's paradox)" in r and "floor-rod" in r for r in run.health.remarks)
     assert run["rod.ay"][0] == pytest.approx(-G, rel=1e-9)
+
+
+@BOTH
+def test_a_take_off_is_none_of_these(coordinates):
+    """A ball leaves a shaken plate where A w^2 sin(w t) = g: its force passes zero, nothing slides, one way is open."""
+    m, width, radius = fb.Mechanism("shaker", planar=True, gravity=(0, -G)), 0.02, 0.05
+    m.add(fb.Body("plate", shape=fb.Box(edges=(1, 0.1, 0.1), mass=5.0), position=(0, -0.05)))
+    m.add(fb.Prismatic("J", "ground", "plate", at=(0, -0.05), axis=(0, 1)))
+    m.add(fb.Driver("D", "J.displacement", f"{width}*sin(30*t)"))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=radius, mass=1.0), position=(0, radius)), fb.Contact(friction=0.3))
+    run = m.simulate(0.1, outputs=2, coordinates=coordinates)
+    off = np.arcsin(G / (width * 30**2)) / 30
+    assert [e.t for e in run.events] == pytest.approx([0.0, off], rel=1e-9)  # struck as the plate starts at .6 m/s
+    flight = 0.1 - off
+    height = width * np.sin(30 * off) + width * 30 * np.cos(30 * off) * flight - G * flight**2 / 2
+    assert run["ball.y"][-1] == pytest.approx(radius + height, abs=1e-9)
+    assert run.health.warnings == ()

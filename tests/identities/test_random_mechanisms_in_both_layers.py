@@ -100,14 +100,7 @@ def test_the_same_at_the_same_state(family):
     assert compared > 3
 
 
-LATE = pytest.mark.xfail(
-    reason="trees 7: an elastic rope goes taut 4e-10 s beside the time at which it is", strict=True
-)
-
-
-@pytest.mark.parametrize(
-    "family", ["chains", pytest.param("trees", marks=LATE), "loops", "redundant", "drivers", "couplings", "friction"]
-)
+@pytest.mark.parametrize("family", ["chains", "trees", "loops", "redundant", "drivers", "couplings", "friction"])
 def test_the_same_motion(family):
     """For a twentieth of a second, in the coordinates that the program chooses; joints that rub are rows."""
     compared = 0

@@ -7,7 +7,7 @@
     friction that slides           way * rate
     a freewheel that overruns      rate
     a corner of a law              way * u; where the motion is held on u = 0: 1 - |way|
-    an elastic stop that is open   how far it is, past it -(k d + c ddot)
+    an elastic stop that is open   -d, how far it is, or past it -(d + c ddot / k) where that is more
     one that is pressed            what it pushes with, k d + c ddot
     a place of contact             see `sliding.watched_place`
     a group that shares            see `sharing`, which is asked by itself
@@ -195,7 +195,9 @@ def pressing(S, W, s, kind, way):
         return NOT_WATCHED
     if not told:  # it begins at the side, with nothing that tells where it goes
         return GRAZED * max(1.0, S.glob[LENGTH]) - depth
-    return -push if depth > 0.0 else -depth
+    if depth > 0.0:  # where it goes out faster than it is pushed it is open
+        return max(-depth, -push / S.switch_x[s, SWITCH_STIFFNESS])
+    return -depth
 
 
 @formula

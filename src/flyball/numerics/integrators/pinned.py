@@ -18,6 +18,7 @@ ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
 CLOSE = 1e-13  # part of the step that a bracket is closed to
 FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
+STEEPER = 1.5  # times the slope seen before: a guard that falls so past zero may jump there, and tells no place
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 
 
@@ -166,8 +167,9 @@ def retake(callbacks, S, W, R, c, h):
 def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
     """Take the step again until it ends where guard i leaves side s, near width h: (status, whether it does).
 
-    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time; ``between``: a width at
-    which it has not left, and the width of the step as it was. It does not where it was on that side nowhere.
+    The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time, before it leaves;
+    ``between``: a width at which it has not left, and the width of the step as it was. It does not end there where
+    the guard was on that side nowhere.
     """
     least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
@@ -182,9 +184,12 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
         f = W.g[END, i]
         if status != 0 or f == 0.0 or done:
             break
-        if n > 0 and h != before and f != last:
-            slope = (f - last) / (h - before)
-        way = -f / slope if slope * s < 0.0 else 1e300
+        leap = False
+        if n > 0 and h != before and (f != last or abs(h - before) > near):
+            secant = (f - last) / (h - before)
+            leap = f * last < 0.0 and abs(secant) > STEEPER * abs(slope)
+            slope = secant
+        way = -f / slope if slope * s < 0.0 and not leap else 1e300
         if abs(way) <= near or (n > 2 and abs(way) >= 0.5 * gone and abs(way) < rough):
             break
         if s * f > 0.0:

@@ -34,6 +34,7 @@ from .watching import (
 AT_ONCE = 1e-11  # part of the step within which events are at the same instant
 SKIPPED = 2.0**-20  # part of the step that is gone on by at least, where there was no event after all
 LITTLE = 1e-2  # part of the distance between places between which a guard passes zero over which its slope is found
+SOON = 1e-7  # part of the step before which no slope is found
 LAST = 1e-4  # part of the step over which slopes at its end are found
 OTHERS = 20  # guards that may turn out to be earlier
 HALVES = 44  # times that it is halved where a guard has been left unseen
@@ -203,18 +204,17 @@ def resume(callbacks, S, W, R, c, h, a, x):
 
 @formula
 def expected_slope(callbacks, S, W, R, c, h, x, i):
-    """How fast guard i is expected to change there [1/s]."""
-    d = min(LAST, LITTLE * W.real[BRACKET])
-    a, b = max(0.0, x - d), min(1.0, x + d)
-    f = W.g[START, i]
-    if a > 0.0:
-        glance(callbacks, S, W, R, c, h, a, THERE)
-        f = W.g[THERE, i]
-    g = W.g[END, i]
-    if b < 1.0:
-        glance(callbacks, S, W, R, c, h, b, THERE)
-        g = W.g[THERE, i]
-    return (g - f) / ((b - a) * h)
+    """How fast guard i is expected to change as it gets there [1/s]; 0 where that is so soon that it is rounding.
+
+    Beyond it may be another function: one that jumps, or has a corner.
+    """
+    d = min(LAST, LITTLE * W.real[BRACKET], 0.25 * x)
+    if x < SOON:
+        return 0.0
+    glance(callbacks, S, W, R, c, h, x - 2.0 * d, THERE)
+    f = W.g[THERE, i]
+    glance(callbacks, S, W, R, c, h, x - d, THERE)
+    return (W.g[THERE, i] - f) / (d * h)
 
 
 @formula

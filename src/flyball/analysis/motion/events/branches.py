@@ -40,7 +40,8 @@ SWEEPS = 500
 KEPT = 1e3  # times rounding: where the motion is held on a corner it is still there
 THROWN = 10.0  # times what is left of u where its corner was found: farther off by a jump of velocities
 ALIKE = 1e-6  # of u: what is left of it where the same rate that is taken away was all of it
-AHEAD = 1e-7  # part of the time span by which it is tried where the motion goes
+AHEAD = 1e-7  # part of the time span by which it is tried where the motion goes, at most
+BIT = 1e-3  # part of the width of steps, where that is less
 
 
 class Pushed(NamedTuple):
@@ -192,7 +193,7 @@ class Corners:
         for k in np.flatnonzero(flat & ~found.left):
             self._tried(which, int(k), sides, self.sides[which])
         if len(which) > 1:
-            self._goes_on([s for s, going in zip(which, ~held & ~found.left, strict=True) if going])
+            self._goes_on([s for s, going in zip(which, ~held & ~found.left, strict=True) if going], found)
         n.ask(MOTION)
         return bool(found.B.any())
 
@@ -249,36 +250,39 @@ class Corners:
     def _tried(self, which: list[int], k: int, sides: np.ndarray, old: np.ndarray) -> None:
         """The side on which the motion goes on where u does not change at once: it is tried."""
         n, s = self.n, which[k]
-        y, h = n.here.y.copy(), AHEAD * float(n.here.clock.real[ex.SPAN])
         fits = []
         for side in (1.0, -1.0):
             n.ways()[s] = side
-            n.ask(MOTION)
-            n.here.y[:] = y + 0.5 * h * n.desk.K[0]
-            n.ask(MOTION)
-            n.here.y[:] = y + h * n.desk.K[0]
-            n.ask(MOTION)
-            if side * corner(n.S, n.W, n.here.t, s) > 0.0:
+            if side * self._soon([s])[0][0] > 0.0:
                 fits.append(side)
-            n.here.y[:] = y
         n.ways()[s] = fits[0] if len(fits) == 1 else (np.sign(old[k]) or 1.0)
 
-    def _goes_on(self, which: list[int]) -> None:
-        """Refuse a point where several corners meet and sides lead back at once: none of them is one to go on."""
+    def _soon(self, which: list[int]) -> list[tuple[float, float]]:
+        """The `value` of each of these corners a little later, if sides are as they stand: by the midpoint rule."""
         n = self.n
-        y, h = n.here.y.copy(), AHEAD * float(n.here.clock.real[ex.SPAN])
+        t, y, real = n.here.t, n.here.y.copy(), n.here.clock.real
+        h = min(AHEAD * float(real[ex.SPAN]), BIT * float(real[ex.H]) or np.inf)
         for part in (0.5, 1.0):
             n.ask(MOTION)
-            n.here.y[:] = y + part * h * n.desk.K[0]
+            real[ex.T], n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
         n.ask(MOTION)
-        back = [s for s in which if n.ways()[s] * self.value(s)[0] < -self.value(s)[1]]
-        n.here.y[:] = y
+        out = [self.value(s) for s in which]
+        real[ex.T], n.here.y[:] = t, y
+        return out
+
+    def _goes_on(self, which: list[int], found: Pushed) -> None:
+        """Refuse a point where several corners meet and sides lead back at once: none of them is one to go on."""
+        n = self.n
+        back = [s for s, (u, least) in zip(which, self._soon(which), strict=True) if n.ways()[s] * u < -least]
         if back:
             t = n.here.t
+            higher = any(not found.B[found.which.index(s)].any() for s in back)
+            why = "of which one is a rate of another" if higher else "none of whose sides the motion stays on"
             raise SimulationError(
                 f"at t = {t:.9g} s corners of {' and '.join(dict.fromkeys(n.name(s) for s in back))} meet where their "
-                f"laws push back from every side: how the motion goes on along several such corners, of which one is a "
-                f"rate of another, is not known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x)",
+                f"laws push back from every side: how the motion goes on along several such corners, {why}, is not "
+                f"known here; make one of them smooth: max(-1, min(1, x / width)) for sign(x), or let a Brake, Clutch "
+                f"or JointFriction be the friction",
                 t=t,
             )
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....equations.instant import BLOWS, OF_A_STEP
+from ....equations.instant import BLOWS, GRAIN, OF_A_STEP
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
 from ....tables.system import G_SHARED, SHARED
@@ -54,7 +54,7 @@ def shared(n: Instant, guards: Sequence[int]) -> None:
 def _several(n: Instant, found: Decided) -> str:
     """Other solutions of the problem that was solved last, looked for from the opposite modes."""
     P = n.rooms[len(found.parts)].P
-    size = np.abs(P.b).max()
+    size = max(np.abs(P.b).max(), P.grain.max() / GRAIN)  # at a take-off accelerations are differences of larger ones
     for state in (FREE, EVEN):
         P.state[:] = state
         if n.again(P) == FOUND and np.abs(P.u - found.u).max() > OTHER * size:
