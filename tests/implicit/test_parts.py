@@ -62,15 +62,11 @@ def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
         through_stepped(address(SC, WC, bench), SC, WC, bench, task)
         entry, step, place = terms.pick.T
         found = [out[step + n * terms.groups, place].imag / STEP for n in range(len(kinds))]
-        J = [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=(nv, nv)).toarray() for f in found]
-        return J, out[:, nv + len(s.rows) : nv + 2 * len(s.rows)].imag / STEP
+        size = nv + len(s.rows), nv
+        return [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=size).toarray() for f in found]
 
-    (P, D), rates = by((0, 1), made.terms, PARTS)
-    (M,), _ = by((2,), made.mass, PUSHES)
+    (P, D), (M,) = by((0, 1), made.terms, PARTS), by((2,), made.mass, PUSHES)
     for J, whole in ((P, full.by_position), (D, full.by_velocity), (M, full.by_acceleration)):
-        exact = whole.toarray()[:nv]
-        assert np.abs(J - exact).max() <= 1e-11 * max(1.0, np.abs(exact).max())
-    exact = full.by_position.toarray()[full.at["n"]]
-    for r, known in enumerate(made.rows):
-        assert not exact[r][np.setdiff1d(np.arange(nv), known)].any()
-        assert rates[made.terms.group[known], r] == pytest.approx(exact[r][known], abs=1e-11)
+        exact = whole.toarray()[np.r_[np.arange(nv), np.arange(full.at["n"].start, full.at["n"].stop)]]
+        size = nv if J is M else len(exact)
+        assert np.abs(J - exact)[:size].max() <= 1e-11 * max(1.0, np.abs(exact).max())

@@ -57,8 +57,9 @@ class Bench(NamedTuple):
     state: np.ndarray  # (nq + nv + nz,)
     vdot: np.ndarray  # (nv,)
     lam: np.ndarray  # (nr,)
-    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time
-    out: np.ndarray  # (n, nv + 3 nr + 3 nm)
+    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
+    # behind these, if there are more, of states of controllers
+    out: np.ndarray  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
 
 
 @formula
@@ -73,6 +74,8 @@ def residuals(S, W, bench, task):
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     nr = S.row_i.shape[0]
+    known = nv + 3 * nr + 3 * measured(S)
+    behind = known + bench.steps.shape[1] - (3 * nv + 1)
     a = W.vel[V2]
     p = W.y[0]
     for n in range(bench.steps.shape[0]):
@@ -83,6 +86,8 @@ def residuals(S, W, bench, task):
         for d in range(nv):
             p[nq + d] += bench.steps[n, nv + d]
             a[d] = bench.vdot[d] + bench.steps[n, 2 * nv + d]
+        for c in range(3 * nv + 1, bench.steps.shape[1]):
+            p[nq + c - 2 * nv - 1] += bench.steps[n, c]
         if task == ALONG or task == GAPS:
             prepare(S, W, t, p[:nq], p[nq : nq + nv])
             for b in range(S.body_i.shape[0]):
@@ -98,13 +103,15 @@ def residuals(S, W, bench, task):
             for b in range(S.body_i.shape[0]):
                 pose(S, W, b, p[:nq])
                 accelerated(S, W, b, p[nq : nq + nv], a)
-            pushes(S, W, bench.out[n, nv + 3 * nr + 3 * measured(S) :])
+            pushes(S, W, bench.out[n, behind:])
         else:
             at_once(S, W, t, p, a, task == STEPS or S.mix_i.shape[0] > 0)
             if task == PARTS:
-                missed_by_parts(S, W, t, p, bench.lam, bench.out[n])
+                missed_by_parts(S, W, t, p, bench.lam, bench.out[n], behind)
             else:
                 missed(S, W, t, p, bench.lam, bench.out[n])
+            for c in range(known, behind):
+                bench.out[n, c] = -W.y[1, c - known]
     return 0
 
 
@@ -165,14 +172,14 @@ def missed(S, W, t, p, lam, out):
 
 
 @formula
-def missed_by_parts(S, W, t, p, lam, out):
-    """G v - nu, and the terms of r behind all that `missed` finds."""
+def missed_by_parts(S, W, t, p, lam, out, first):
+    """G v - nu, and from ``first`` on the terms of r."""
     nv, nr = W.vel.shape[1], S.row_i.shape[0]
     v = p[S.kinds[COORDINATES] : S.kinds[COORDINATES] + nv]
     for k in range(nr):
         out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
     told(S, W, t, p, lam)
-    parts(S, W, t, lam, out[nv + 3 * nr + 3 * measured(S) :])
+    parts(S, W, t, lam, out[first:])
 
 
 @formula

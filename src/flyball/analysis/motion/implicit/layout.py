@@ -30,7 +30,7 @@ THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) bel
 
 
 class Layout:
-    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu).
+    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu, x).
 
     Parameters
     ----------
@@ -43,13 +43,15 @@ class Layout:
     def __init__(self, s: Structure, S: System, index_3: bool = False) -> None:
         self.index_3 = index_3
         self.s, self.nv, self.nr = s, s.nv, len(s.rows)
-        self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
-        parts = Parts(s, S)
-        self.rows = parts.row[: self.nr]
-        self.terms = parts.terms(parts.all, self.width)
-        self.mass = parts.terms(parts.bodies, self.width)
-        self.places = self.width + parts.size
-        self.groups = self.terms.groups
+        self.nx = len(s.controls) - len(s.sampled)
+        self.n = 2 * (self.nv + self.nr) + self.nx
+        self.width = self.nv + 3 * self.nr + 3 * len(s.measured) + self.nx
+        parts = Parts(s, S, self.nx)
+        at = np.cumsum([self.width, *(len(equations) for equations, _ in parts.all)])
+        of_states, of_rows = self.width - self.nx + np.arange(self.nx), self.nv + self.nr + np.arange(self.nr)
+        self.terms = parts.terms([*parts.all, *parts.states, *parts.rates], np.r_[at[:-1], of_states, of_rows])
+        self.mass = parts.terms(parts.bodies, at)
+        self.places, self.groups = int(at[-1]), self.terms.groups
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
         self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
@@ -60,29 +62,27 @@ class Layout:
         """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""
         nv, nr = self.nv, self.nr
         v, lam, mu = nv, 2 * nv, 2 * nv + nr
-        i, j, x = self.terms.i, self.terms.j, self.terms.pick
-        k = np.repeat(np.arange(nr), [len(d) for d in self.rows])
-        m = np.concatenate([np.zeros(0, np.int64), *self.rows])
-        a, b, c, nG = len(i), len(k), len(self.mass.i), len(self.col_i)
-        self.pick = np.concatenate([
-            x,
-            np.column_stack([a + np.arange(b), self.terms.group[m], nv + nr + k]),
-            x + np.array([a + b, self.groups, 0]),
-        ]).astype(np.int64)  # fmt: skip
-        first = np.cumsum([1, 2 * a + b, c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        i, j, pick = self.terms.i, self.terms.j, self.terms.pick
+        ways, at, end = np.arange(nv), np.arange, nv + self.nx
+        own = 2 * (nv + nr) + at(self.nx)
+        both = (i < end) & (j < nv)  # what depends on velocities, too; of G v it is known how
+        again = np.cumsum(both) - 1 + len(i)
+        more = pick[both[pick[:, 0]]]
+        self.pick = np.r_[pick, np.column_stack([again[more[:, 0]], self.groups + more[:, 1], more[:, 2]])]
+        rows_at = np.r_[v + ways, own, lam + at(nr)]
+        columns_at = np.r_[ways, own]
+        a, c, nG = len(i), len(self.mass.i), len(self.col_i)
+        first = np.cumsum([1, a + both.sum(), c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
         free = np.flatnonzero(self.valued == 0)
-        ways = np.arange(nv)
-        at = np.arange
         one = [
             (ways, v + ways, None),  # - v: see below
-            (v + i, j, picked + at(a)),
-            (lam + k, m, picked + a + at(b)),
-            (v + i, v + j, picked + a + b + at(a)),
+            (rows_at[i], columns_at[j], picked + at(a)),
+            (rows_at[i[both]], v + j[both], picked + a + at(both.sum())),
             (lam + row, v + self.col_i, rows + at(nG)),
             (self.col_i[held], mu + row[held], metric + at(nG)[held]),
             (mu + row[held], self.col_i[held], valued_rows + at(nG)[held]),
@@ -95,13 +95,14 @@ class Layout:
         for n_th, p in enumerate(self.pressing.tolist()):
             one.append((v + ways, np.full(nv, lam + p), presses + n_th * nv + at(nv)))
         if self.index_3:
-            loose = ~np.isin(k, np.flatnonzero(self.valued == 1))
-            one[2] = tuple(x[loose] for x in one[2])
-            one[4] = (np.r_[lam + row[held], lam + row[~held]], np.r_[self.col_i[held], v + self.col_i[~held]],
+            loose = ~np.isin(i - end, np.flatnonzero(self.valued == 1))
+            one[1] = tuple(x[loose] for x in one[1])
+            one[3] = (np.r_[lam + row[held], lam + row[~held]], np.r_[self.col_i[held], v + self.col_i[~held]],
                       rows + np.r_[at(nG)[held], at(nG)[~held]])  # fmt: skip
-            one[5] = one[6] = (at(0),) * 3
-            one[8] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
-        scaled = [(ways, ways, np.zeros(nv, int)), (v + self.mass.i, v + self.mass.j, mass + at(c))]
+            one[4] = one[5] = (at(0),) * 3
+            one[7] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
+        scaled = [(ways, ways, np.zeros(nv, int)), (v + self.mass.i, v + self.mass.j, mass + at(c)),
+                  (own, own, np.zeros(self.nx, int))]  # fmt: skip
         valued = np.flatnonzero(self.valued == 1)
         soft = [(lam + at(nr), lam + at(nr), sizes + at(nr))]
         if not self.index_3:
@@ -110,12 +111,11 @@ class Layout:
 
     def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
         """Pattern and order of elimination; places of all entries in the matrix."""
-        nv, nr = self.nv, self.nr
-        n = 2 * nv + 2 * nr
+        nv, n = self.nv, self.n
         minus = int(self.first[-1])  # numbers behind the others: -1, and the negative entries of rows
         self.negative = negative
         one[0] = (*one[0][:2], np.full(nv, minus))
-        one[7] = (*one[7][:2], minus + 1 + np.arange(len(negative)))
+        one[6] = (*one[6][:2], minus + 1 + np.arange(len(negative)))
         groups = [one, scaled, soft]
         i, j, number = (np.concatenate([e[k] for g in groups for e in g]).astype(np.int64) for k in range(3))
         count = [sum(len(e[0]) for e in g) for g in groups]
@@ -125,7 +125,7 @@ class Layout:
 
     def _whole(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
         """The same of all three stages at once: what F' has couples them."""
-        n = 2 * (self.nv + self.nr)
+        n = self.n
         own, scaled = np.r_[: count[0], sum(count[:2]) : sum(count)], np.arange(count[0], sum(count[:2]))
         parts = [(own, k, k, np.where(own < count[0], PLAIN, SOFTENED)) for k in range(STAGES)]
         parts += [(scaled, k, m, np.full(len(scaled), m)) for k in range(STAGES) for m in range(STAGES)]
@@ -145,9 +145,9 @@ class Layout:
         """
         body_i = self.s.tables["body_i"]
         body, bodies = np.repeat(np.arange(len(body_i)), body_i[:, NV]), len(body_i)
-        rows = bodies + np.arange(self.nr)
-        groups = np.tile(np.concatenate([body, body, rows, rows]), stages)
-        order = constrained_order(groups, np.arange(bodies + self.nr) >= bodies, i, j)
+        rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
+        groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
+        order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
         one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # d of a quaternion go together
         first = np.tile(np.arange(n // stages) < self.nv, stages)
         place = np.empty(n, np.int64)

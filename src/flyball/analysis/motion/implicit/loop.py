@@ -80,11 +80,13 @@ class Implicit:
 
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
         x = self.layout
-        nv, out = x.nv, []
+        nv, nx, out = x.nv, x.nx, []
         for kinds, terms in (((0, 1), x.terms), ((2,), x.mass), ((), x.mass)):
-            steps = np.zeros((len(kinds) * terms.groups if kinds else 1, 3 * nv + 1), complex)
+            steps = np.zeros((len(kinds) * terms.groups if kinds else 1, 3 * nv + 1 + nx), complex)
             for n, kind in enumerate(kinds):
-                steps[n * terms.groups + terms.group, kind * nv + np.arange(nv)] = 1j * STEP
+                steps[n * terms.groups + terms.group[:nv], kind * nv + np.arange(nv)] = 1j * STEP
+            if 0 in kinds:
+                steps[terms.group[nv:], 3 * nv + 1 + np.arange(nx)] = 1j * STEP
             found = np.zeros((len(steps), x.places), complex)
             t, y, vdot, lam = (np.zeros(m, complex) for m in (1, ny, nv, x.nr))
             out.append(Bench(t, y, vdot, lam, steps, found))
@@ -93,7 +95,8 @@ class Implicit:
     def _desk(self, nz: int, turns: bool) -> Desk:
         x, clock = self.layout, self.clock
         step = float(clock.real[ex.STEP])
-        nv, nr, n, P = x.nv, x.nr, 2 * (x.nv + x.nr), x.P
+        nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
+        n = x.n
         real = np.zeros(ds.REALS)
         rtol = float(clock.real[ex.RTOL])
         real[ds.RTOL] = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
@@ -119,8 +122,8 @@ class Implicit:
         nA, nL, nU = len(P.Aj), len(P.Lj), len(P.Uj)
         return Desk(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(4, nr), z(4, nz), z(4, nz),
-            z(4, n), z(4, nv), z(3, nr), z(2, nv), self._plain(), z(3, n), w(3, n), J, x.put, x.part,
-            z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx), self._plain(), z(3, n), w(3, n), J,
+            x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,8 @@ from ....tables.system import (
 from ...linear.derivatives import grouped
 
 Part = tuple[np.ndarray, np.ndarray]
-"""Equations in which it stands, one after the other; velocities that it depends on, at positions and as they are."""
+"""Equations in which it stands, one after the other; what it depends on: velocities, of which also the positions, and
+states of controllers. Both are numbered so, and behind the equations of the states stand rates of the rows."""
 
 
 class Terms(NamedTuple):
@@ -35,7 +36,7 @@ class Terms(NamedTuple):
     i: np.ndarray  # equations and velocities of its entries
     j: np.ndarray
     pick: np.ndarray  # (n, 3): entry, step, place among what is found: sums of these
-    group: np.ndarray  # (nv,): the step in which each velocity is taken
+    group: np.ndarray  # (nv + nx,): the step in which each velocity and state is taken
 
     @property
     def groups(self) -> int:
@@ -50,10 +51,12 @@ class Parts:
     ----------
     s : Structure
     S : System
+    nx : int
+        States of controllers that are unknowns.
     """
 
-    def __init__(self, s: Structure, S: System) -> None:
-        self.S, self.nv, self.nr = S, s.nv, len(S.row_i)
+    def __init__(self, s: Structure, S: System, nx: int) -> None:
+        self.S, self.nv, self.nr, self.nx = S, s.nv, len(S.row_i), nx
         nm = len(S.row_p) - 1 - self.nr
         self.body = np.repeat(np.arange(len(S.body_i)), S.body_i[:, NV])
         self.chain: list[np.ndarray] = []
@@ -62,12 +65,19 @@ class Parts:
             self.chain.append(np.r_[own, self.chain[row[PARENT]]] if row[PARENT] >= 0 else own)
         self.entries = [S.col_i[S.row_p[k] : S.row_p[k + 1]] for k in range(self.nr + nm)]
         self.row = [self._hung(np.unique(self.body[e])) for e in self.entries]
-        named = sorted({m % nm for m in s.slots.values()}) if s.slots and nm else []
-        self.told = _union([self.row[self.nr + m] for m in named])
+        states = s.nv + np.arange(nx)
+        self.told = np.r_[self._read(s, s.slots, nm), states]
         self.bodies = [(c, np.unique(c)) for c in self.chain]
         self.all = [*self.bodies, *self._between(), *zip(self.entries[: self.nr], self.row[: self.nr], strict=True)]
         self.all += self._along()
-        self.size = sum(len(equations) for equations, _ in self.all)
+        laws = [x.law.names for x in s.controls[:nx]]
+        self.states = [(states[n : n + 1], np.r_[self._read(s, names, nm), states]) for n, names in enumerate(laws)]
+        self.rates = [(np.array([s.nv + nx + k]), row) for k, row in enumerate(self.row[: self.nr])]
+
+    def _read(self, s: Structure, names: Iterable[str], nm: int) -> np.ndarray:
+        """Velocities on which measured quantities depend, by the names that laws have for them."""
+        columns = {s.slots[name] for name in names if name in s.slots}
+        return _union([self.row[self.nr + m % nm] for m in sorted(columns) if m < 2 * nm])
 
     def _hung(self, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
         """Velocities of bodies and of all that they hang on."""
@@ -98,26 +108,26 @@ class Parts:
             out += [(self.entries[n], depends) for n in lines]
         return out
 
-    def terms(self, some: Sequence[Part], first: int) -> Terms:
-        """Derivatives of the sums of some parts, of which the first stands at place ``first`` among what is found."""
+    def terms(self, some: Sequence[Part], first: np.ndarray) -> Terms:
+        """Derivatives of the sums of some parts, which begin at these places among what is found."""
         group = self._groups([depends for _, depends in some])
-        size = np.cumsum([first, *(len(equations) for equations, _ in some)])
         none = np.zeros(0, np.int64)
         i = np.concatenate([none, *(np.repeat(e, len(d)) for e, d in some)])
         j = np.concatenate([none, *(np.tile(d, len(e)) for e, d in some)])
-        places = zip(size[:-1], some, strict=True)
+        places = zip(first.tolist(), some, strict=False)
         at = np.concatenate([none, *(np.repeat(n + np.arange(len(e)), len(d)) for n, (e, d) in places)])
-        keys, entry = np.unique(i * self.nv + j, return_inverse=True)
+        n = max(self.nv + self.nx, 1)
+        keys, entry = np.unique(i * n + j, return_inverse=True)
         pick = np.column_stack([entry, group[j], at])
-        return Terms(keys // max(self.nv, 1), keys % max(self.nv, 1), pick.astype(np.int64), group)
+        return Terms(keys // n, keys % n, pick.astype(np.int64), group)
 
     def _groups(self, together: Sequence[np.ndarray]) -> np.ndarray:
-        """Velocities that no part depends on together have one number, (nv,)."""
+        """What no part depends on together has one number, (nv + nx,)."""
         from scipy.sparse import csc_matrix
 
         part = np.repeat(np.arange(len(together)), [len(d) for d in together])
         velocity = np.concatenate([np.zeros(0, np.int64), *together])
-        touched = csc_matrix((np.ones(len(part), bool), (part, velocity)), shape=(len(together), self.nv))
+        touched = csc_matrix((np.ones(len(part), bool), (part, velocity)), shape=(len(together), self.nv + self.nx))
         return grouped(touched)
 
 

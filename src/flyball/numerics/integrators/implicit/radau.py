@@ -155,6 +155,9 @@ def enter(K, c, t, h, error, iterations):
     for i in range(K.v.shape[1]):
         for k in range(4):
             K.before_v[k, i] = K.v[k, i]
+    for i in range(K.tol_x.shape[0]):
+        for k in range(4):
+            K.before_x[k, i] = K.z[k, i]
     for i in range(K.lam.shape[1]):
         for k in range(3):
             K.before_lam[k, i] = K.lam[k, i]
