@@ -54,6 +54,7 @@ class Desk(NamedTuple):
     x: np.ndarray  # (3, n): solution, right-hand side, product
     w: np.ndarray  # (3, n), complex
     J: np.ndarray  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
+    spring: np.ndarray  # (entries, 5): equation and velocity; numbers of the Jacobian by increment, rate, velocity
     put: np.ndarray  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
     part: np.ndarray  # (2,): ends of the first two groups of these
     real_A: np.ndarray  # the real matrix and its factors

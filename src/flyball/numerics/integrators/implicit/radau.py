@@ -88,7 +88,7 @@ def attempt(callbacks, S, K, c, h):
     compose(c.y[NOW], K.d[2], K.v[2], K.z[2], c.y[NEW], S)
     error = 0.0
     if c.real[STEP] == 0.0:
-        status, error = estimate(residual, S, K, c, h, K.count[BEFORE] == 0 or c.real[GROW] <= 1.0)
+        status, error = estimate(residual, S, K, c, h)
         if status != 0 or not error < 1e300:
             return SINGULAR, 0.0, 0.5
         if error > max(1.0, c.real[PARDON]):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
-from .coefficients import BEND, BENT, BENT_MOST, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
+from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
 from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, SHARED, START, THETA
 from .newton import correct, solve_real
 
@@ -194,8 +194,12 @@ def account(residual, S, K, c, h):
 
 
 @formula
-def estimate(residual, S, K, c, h, again):
-    """Error of the step in units of the tolerance. Returns (status, error)."""
+def estimate(residual, S, K, c, h):
+    """Error of the step in units of the tolerance. Returns (status, error).
+
+    Filtered once, at the start of a motion too: twice (Hairer and Wanner, IV.8.20) would let a step pass over what is
+    fast, whether it is damped or not.
+    """
     nv = K.v.shape[1]
     accounts = unsure(K, c, h)  # rates at the begin are other ones below
     e, f, g = ERROR
@@ -210,16 +214,31 @@ def estimate(residual, S, K, c, h, again):
     for i in range(K.mu.shape[1]):
         K.mu[START, i] = 0.0
     status, size = filtered(residual, S, K, c, c.real[T], h)
-    if status == 0 and again and size >= 1.0:
-        perm = K.P.perm
-        for i in range(nv):
-            K.d[START, i] = K.x[0, perm[i]]
-            K.v[START, i] += K.x[0, perm[nv + i]]
-        for i in range(K.tol_x.shape[0]):
-            K.z[START, i] += K.x[0, perm[perm.shape[0] - K.tol_x.shape[0] + i]]
-        status, size = filtered(residual, S, K, c, c.real[T], h)
-        back(K, c)
-    return status, max(size, accounts)
+    return status, max(size, accounts, springing(K, h) if status == 0 else 0.0)
+
+
+@formula
+def springing(K, h):
+    """Error of the velocities that what is estimated of the increments springs back with, in units of the tolerance.
+
+    A swing that is too fast for the step is all but filtered out of the velocities, while it lasts where nothing damps
+    it: v follows from e K e = v M v. Where there is damping it counts as inertia does, h C / GAMMA.
+    """
+    nv = K.v.shape[1]
+    perm = K.P.perm
+    J, x, force, mass = K.J[START], K.x[0], K.x[1], K.x[2]
+    for i in range(nv):
+        force[i] = mass[i] = 0.0
+    for e in range(K.spring.shape[0]):
+        i, j = K.spring[e, 0], K.spring[e, 1]
+        force[i] += J[K.spring[e, 2]] * x[perm[j]]
+        if i == j:
+            mass[i] = abs(J[K.spring[e, 3]]) + h / GAMMA * abs(J[K.spring[e, 4]])
+    s = 0.0
+    for i in range(nv):
+        if mass[i] > 0.0:
+            s += abs(x[perm[i]] * force[i]) / (mass[i] * K.tol[1, i] * K.tol[1, i])
+    return sqrt(s / max(nv, 1))
 
 
 @formula
