@@ -75,8 +75,9 @@ class Layout:
         first = np.cumsum([1, a + both.sum(), c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
-        self.spring = np.column_stack([i, j, picked + np.arange(a), mass + np.arange(a), picked + a + b + np.arange(a)])
-        self.spring = self.spring.astype(np.int64)
+        own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in their order
+        e = np.flatnonzero((i < nv) & (j < nv))
+        self.spring = np.column_stack([i[e], j[e], picked + e, own_mass[i[e]], picked + again[e]]).astype(np.int64)
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
