@@ -15,6 +15,15 @@ def test_rings_are_named():
         slide(a, b, force="b")
 
 
+def test_rings_in_a_file_are_named_at_their_line(tmp_path):
+    m = slide(fb.Lag("a", of="b", time=1), fb.Lag("b", of="a", time=1), force="a")
+    m.save(tmp_path / "m.toml")
+    text = (tmp_path / "m.toml").read_text().replace("time = 1.0", "time = 1.0\nlead = 0.5")
+    (tmp_path / "m.toml").write_text(text)
+    with pytest.raises(fb.ModelError, match=r"m\.toml: \[\[controllers\]\] 2 'b' \(line \d+\): Lag 'b'.*b\.output -> "):
+        fb.load(tmp_path / "m.toml")
+
+
 @pytest.mark.parametrize(
     ("fields", "said"),
     [
@@ -70,7 +79,7 @@ def test_names():
         lambda m: m.sensitivity(["A.displacement"], ["k"]),
         lambda m: m.root_locus("k", [1, 2]),
         lambda m: m.symbolic(),
-        lambda m: m.simulate(1, method="radau"),
+        lambda m: m.simulate(1, method="variational", step=0.01),
         lambda m: m.simulate(1, method="impulse"),
     ],
 )

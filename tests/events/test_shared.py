@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 import flyball as fb
 
@@ -100,6 +101,33 @@ def test_a_brake_that_helps_a_stop():
     assert np.abs(run["b.x"][run.t < slip.t]).max() < 1e-15
 
 
+DIPS = ["-50 - 51.2*cos(t)", "-200 - 201.05*cos(t)", "-5 - 5*sin(40*t) - 1.5*cos(3*t)", "-1.2 - 3*sin(t)"]
+BACKSTOPS = {
+    "ratchet": lambda: fb.Ratchet("back", "J.angle", pitch=0.25, direction=1),
+    "freewheel": lambda: fb.OneWay("back", "J.angle"),
+    "stop": lambda: fb.Limit("back", "J.angle", lower=0.0),
+}
+
+
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize("back", BACKSTOPS)
+@pytest.mark.parametrize("torque", DIPS)
+def test_a_load_that_lets_go_for_a_moment_is_seen_in_a_wide_step(torque, back, layer):
+    """Friction of 1 N m and what lets nothing go back hold an angle until the torque first passes 1 N m.
+
+    The margin of both is 1 N m until shortly before, whatever the load is.
+    """
+    m = fb.Mechanism("hinge", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1, inertia=0.5), fb.Revolute("J", "ground", "b", at=(0, 0)), BACKSTOPS[back]())
+    m.add(fb.JointFriction("rub", "J", static=0.1, preload=10, radius=1.0), fb.Motor("M", "J", torque=torque))
+    run = m.simulate(5, outputs=2, coordinates=layer)
+    load = lambda t: eval(torque, {"sin": np.sin, "cos": np.cos, "t": t}) - 1.0  # noqa: E731
+    t = np.linspace(0, 5, 20001)
+    k = np.flatnonzero((load(t[:-1]) < 0) & (load(t[1:]) >= 0))[0]
+    assert run.events[0].kind == "slip"
+    assert run.events[0].t == pytest.approx(brentq(load, t[k], t[k + 1], xtol=1e-14), abs=1e-9)
+
+
 def in_space(mu, force=("0", "0", "0"), at=None, torque=None, edges=(0.4, 0.3, 0.2)):
     """A box of 2 kg on a floor, on four corners."""
     m = fb.Mechanism("box", gravity=(0, 0, -G))
@@ -146,6 +174,18 @@ def test_a_tall_box_in_space_tips():
     run = m.simulate(3.4, outputs=3, rtol=1e-9, method="dop853")
     assert run.events[0].t == pytest.approx(10 / 3, abs=1e-9)
     assert run["box.omega_y"][-1] > 1e-3 and abs(run["box.x"][-1]) < 0.01
+
+
+def test_what_tips_slips_on_the_corners_that_are_left():
+    """When it does in the plane, where one corner is left: those that part are no part of what holds."""
+    twin = fb.Mechanism("box", planar=True, gravity=(0, -G))
+    twin.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0.4))
+    twin.add(fb.Body("box", shape=fb.Box(edges=(0.1, 0.3, 0.1), mass=2), position=(0, 0.15)))
+    twin.add(fb.PointForce("push", "box", at=(0, 0.15), force=("2*t", 0)))
+    box = in_space((0.4, 0.4), ("2*t", "0", "0"), edges=(0.1, 0.1, 0.3))
+    runs = [m.simulate(4.1, outputs=3, rtol=1e-9, method="dop853") for m in (twin, box)]
+    assert [[e.kind for e in r.events] for r in runs] == [["part", "slip"]] * 2
+    assert [e.t for e in runs[1].events] == pytest.approx([e.t for e in runs[0].events], abs=1e-9)
 
 
 @pytest.mark.parametrize("layer", LAYERS)

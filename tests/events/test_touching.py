@@ -212,3 +212,38 @@ def test_the_same_by_short_impulses():
         for h in (4e-3, 5e-4)
     ]
     assert miss[1] < 0.3 * miss[0] < 0.01
+
+
+@pytest.mark.parametrize("layer", ["absolute", "joint"])
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 1.0])
+def test_newtons_cradle_whose_struck_balls_leave_together(e, layer):
+    """Of four the three that rest touch: they are struck as one, leave with (1 + e) / 4 of the speed, and swing as one."""
+    m = fb.Mechanism("cradle", planar=True, gravity=(0, -G))
+    for i in range(4):
+        m.add(fb.Body(f"b{i}", position=(0.2 * i, -1), shape=fb.Sphere(radius=0.1), mass=1))
+        m.add(fb.Revolute(f"J{i}", "ground", f"b{i}", at=(0.2 * i, 0)))
+    m.add(fb.Initial("J0.angle", value=-0.5), fb.Contact(friction=0, restitution=e))
+    run = m.simulate(1.4, outputs=15, rtol=1e-9, coordinates=layer)
+    rate, angle = (np.array([run[f"J{i}.{what}"] for i in range(4)]) for what in ("rate", "angle"))
+    height = 0.5 * 1.004 * rate[:, -1] ** 2 / G + 1 - np.cos(angle[:, -1])
+    if 0 < e < 1:
+        share = np.array([1 - 3 * e, 1 + e, 1 + e, 1 + e]) / 4
+        assert height == pytest.approx(share**2 * (1 - np.cos(0.5)), abs=1e-8)
+    assert np.ptp(angle[1:3], axis=0).max() < 1e-9 and len(run.events) < 10 and not run.health.warnings
+
+
+@pytest.mark.parametrize("at", [(0.2, 0.0, 0.0), (0.0, 0.2, 0.0), (0.12, 0.16, 0.0)])
+def test_a_ball_goes_round_another(at):
+    """Pressed by 3 N: N = 3 - m v^2 / (2 r), also where their middles are exactly level."""
+    out = np.array(at) / 0.2
+    along = np.cross((0, 0, 1), out)
+    m = scene(
+        fb.Ground("post", shape=fb.Sphere(radius=0.1)),
+        fb.Body("ball", shape=fb.Sphere(radius=0.1), mass=2, position=at, velocity=tuple(0.4 * along)),
+        fb.PointForce("push", "ball", force=tuple(-3 * out)),
+        friction=0,
+        gravity=(0, 0, 0),
+    )
+    run = m.simulate(0.01, outputs=2, **TIGHT)
+    (place,) = (e.name for e in run.model.forces if e.name != "push")
+    assert run[place].normal[0] == pytest.approx(3 - 2 * 0.4**2 / 0.2, abs=1e-12)

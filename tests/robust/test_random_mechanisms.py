@@ -16,7 +16,7 @@ ONCE = [
     *(("sticking", seed) for seed in (14, 103, 134, 198, 369, 451, 528, 532, 1057, 2022, 2098, 2426)),
     *(("happenings", seed) for seed in (49, 62, 183, 230, 236, 259, 296, 412, 549, 607, 712)),
     *(("sticking", seed) for seed in (2086, 2424)),  # structures: accelerations that are only rounding
-    *(("shaken", seed) for seed in (84, 734)),
+    *(("shaken", seed) for seed in (84, 734, 10082)),
     ("stops", 114),
     ("latches", 2493),
 ]

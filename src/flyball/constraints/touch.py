@@ -31,6 +31,12 @@ def beyond(x, h):
 
 
 @formula
+def within(h, e, w):
+    """What of a rate w turns the normal: none within -h..h. Where h is 0 there is no within, even at e = 0."""
+    return w if e.real != 0.0 or h.real == 0.0 else 0.0 * w
+
+
+@formula
 def face(par, p):
     """The face of the core that p lies farthest beyond, or nearest below: 0 to 5 for +x, -x, +y, -y, +z, -z."""
     best = -1e300
@@ -65,11 +71,7 @@ def nearest(par, F, M):
         distance = sqrt(square)
         n = scale(1.0 / distance, e)
         w = mtv(F[1], sub(sub(M[3], F[3]), cross(F[2], d)))
-        w = (
-            w[0] if e[0].real != 0.0 else o,
-            w[1] if e[1].real != 0.0 else o,
-            w[2] if e[2].real != 0.0 else o,
-        )
+        w = (within(par[0], e[0], w[0]), within(par[1], e[1], w[1]), within(par[2], e[2], w[2]))
         rate = dot(n, w)
         n1 = scale(1.0 / distance, sub(w, scale(rate, n)))
         curved = (dot(w, w) - rate * rate) / distance

@@ -9,11 +9,11 @@ import numpy as np
 from ..compiler.jit import formula
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
-from ..numerics.integrators.watching import Watch
+from ..numerics.integrators.watching import TERMS, Watch
 from ..tables.system import G_SHARED, GUARD_KIND, LAM
 from .asking import GROUP, OWN, S_, SHEET, W_
 from .engine import Sheet
-from .sharing import Sharing, margin
+from .sharing import Sharing, margin, terms
 
 
 class Own(NamedTuple):
@@ -47,11 +47,12 @@ def levels(A, K, at):
 @formula
 def meet(A, K, j):
     """Keep guards and levels at place j of those that are met within a step; the engine has just done WATCH there."""
-    S, last = A[S_], K.met_g.shape[1] - 1
+    S, last = A[S_], K.way.shape[0] - 1
     for i in range(last + 1):
         K.met_g[j, i] = A[SHEET].rows[0, i]
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         K.met_g[j, last] = margin(S, A[W_], A[OWN].real[T], A[GROUP])
+        K.count[TERMS] = terms(A[GROUP], K.met_g[j], last + 1)
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.met[j]:
             levels(A, K, 1 + k)

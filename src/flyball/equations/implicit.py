@@ -106,7 +106,8 @@ def residual(t, k, A, K, c):
 def missed(t, k, A, K, c):
     """The same, but that the first rows are v + D G^T mu, which increments follow. Returns a status.
 
-    Of index 3 only positions are held to the constraints, and mu is none.
+    The last rows are x' - f, x being states of controllers. Of index 3 only positions are held to the constraints, and
+    mu is none.
     """
     S, W, P, own, rows = A[S_], A[W_], A[PLAN], A[OWN], A[SHEET].rows
     nv, nr = K.v.shape[1], K.lam.shape[1]
@@ -133,6 +134,9 @@ def missed(t, k, A, K, c):
             for e in range(S.row_p[r], S.row_p[r + 1]):
                 i = S.col_i[e]
                 out[i] += P.metric[i] * W.G[e] * K.mu[k, r]
+    for n in range(K.tol_x.shape[0]):
+        out[2 * nv + 2 * nr + n] = K.xd[k, n] - W.y[1, n]
+        bad += W.y[1, n] - W.y[1, n]
     return 0 if bad == 0.0 and not far(P, K.d[k]) else 1
 
 
@@ -166,6 +170,8 @@ def powers(A, K, k):
         return
     S, W = A[S_], A[W_]
     rate = K.rate[k]
+    for n in range(S.control_i.shape[0]):
+        rate[n] = W.y[1, n]
     for f in range(S.force_i.shape[0]):
         i = S.force_i[f, FORCE_WORK]
         if i >= 0:

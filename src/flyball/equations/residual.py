@@ -56,8 +56,9 @@ class Bench(NamedTuple):
     state: np.ndarray  # (nq + nv + nz,)
     vdot: np.ndarray  # (nv,)
     lam: np.ndarray  # (nr,)
-    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time
-    out: np.ndarray  # (n, nv + 3 nr + 3 nm)
+    steps: np.ndarray  # (n, 3 nv + 1): of positions (along the velocities), velocities, accelerations, and of time;
+    # behind these, if there are more, of states of controllers
+    out: np.ndarray  # (n, nv + 3 nr + 3 nm), or more: what x' = f misses of these where they do not change
 
 
 @formula
@@ -81,6 +82,8 @@ def residuals(S, W, bench, task):
         for d in range(nv):
             p[nq + d] += bench.steps[n, nv + d]
             a[d] = bench.vdot[d] + bench.steps[n, 2 * nv + d]
+        for c in range(3 * nv + 1, bench.steps.shape[1]):
+            p[nq + c - 2 * nv - 1] += bench.steps[n, c]
         if task != STEPS:
             prepare(S, W, t, p[:nq], p[nq : nq + nv])
             for b in range(S.body_i.shape[0]):
@@ -95,6 +98,9 @@ def residuals(S, W, bench, task):
         else:
             at_once(S, W, t, p, a, task != ALONG or S.mix_i.shape[0] > 0)
             missed(S, W, t, p, bench.lam, bench.out[n])
+            known = nv + 3 * nr + 3 * measured(S)
+            for c in range(known, bench.out.shape[1]):
+                bench.out[n, c] = -W.y[1, c - known]
     return 0
 
 

@@ -117,6 +117,19 @@ def margin(S, W, t, G):
 
 
 @formula
+def terms(G, out, first):
+    """What `margin` just came from, from a place on: q, a, b of every cell, which are smooth. Returns how many."""
+    if G.Q.count[OPEN] == 0:
+        return 0
+    n = 0
+    for c in range(G.Q.count[CELLS]):
+        for i in range(3):
+            out[first + n] = G.Q.D[c, i, 0]
+            n += 1
+    return n
+
+
+@formula
 def renewed(address, S, W, R, own, sheet, G):
     """The null vectors at the state last evaluated: what is not in balance any more is taken from them."""
     out, nr = sheet.rows, S.row_i.shape[0]

@@ -19,7 +19,7 @@ from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, watching
+from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, TERMS, watching
 from ..tables.system import (
     BIAS,
     G_SHARED,
@@ -40,20 +40,20 @@ from .engine import Sheet, engine
 from .guards import KEPT, grains
 from .guards import watch as guards
 from .rows import measured
-from .sharing import GRAIN, Sharing, margin, renewed
+from .sharing import GRAIN, Sharing, margin, renewed, terms
 from .tasks import MOTION
 
 EXPECTED = 7
 
 
 @formula
-def all_guards(A, W, t, out):
-    """Guards by what stands in W, that of the group last."""
-    S = A[S_]
+def all_guards(A, W, t, K, row):
+    """Guards by what stands in W, that of the group last, to a row; then its terms."""
+    S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
     guards(S, W, t, out)
-    last = out.shape[0] - 1
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         out[last] = margin(S, W, t, A[GROUP])
+        K.count[TERMS] = terms(A[GROUP], out, last + 1)
 
 
 @formula
@@ -70,7 +70,7 @@ def watch(t, y, A, K, row):
     status = through(A, MOTION)
     if status == 0:
         balanced(A)
-    all_guards(A, A[W_], t, K.g[row])
+    all_guards(A, A[W_], t, K, row)
     return status
 
 
@@ -87,7 +87,7 @@ def note(A, K, row):
         K.moving[end, 0, m], K.moving[end, 1, m], K.moving[end, 2, m] = W.sensed[VALUE, m], W.sensed[RATE, m], a
     levels(A, K, 0 if row == START else K.levels.shape[0] - 1)
     balanced(A)
-    all_guards(A, W, A[OWN].real[T], K.g[row])
+    all_guards(A, W, A[OWN].real[T], K, row)
     grain = GRAIN_START if row == START else GRAIN_END
     grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.g[grain])
     last = K.grain.shape[0] - 1
@@ -101,7 +101,7 @@ def note(A, K, row):
 def look(t, h, x, A, K, row):
     """Guards expected at a part x of the step that begins at t."""
     expect(K, x, h)
-    all_guards(A, A[EXPECTED], t + x * h, K.g[row])
+    all_guards(A, A[EXPECTED], t + x * h, K, row)
 
 
 @kernel
@@ -157,7 +157,9 @@ class Loop:
         self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
         there = self.expected.sensed, self.expected.row[LAM]
         guarded = S.guard_i[:, GUARD_WAY], np.isin(S.guard_i[:, GUARD_KIND], KEPT)
-        self.desk = watching(*guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there)
+        self.desk = watching(
+            *guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i)
+        )
         ny = clock.y.shape[1]
         own = Clock(
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,

@@ -7,6 +7,7 @@ value. A sampled controller holds its signals from one instant to the next: to l
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, NamedTuple
@@ -36,7 +37,7 @@ class ControlState(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Controller(Element):
+class Controller(Element, ABC):
     """A controller: what laws of forces and motors, and expressions of events, may name.
 
     ``pid`` is the output of the controller of that name, ``pid.error`` another signal, ``pid.integral`` a state.
@@ -69,17 +70,17 @@ class Controller(Element):
         if n.period is None and n.offset != 0.0:
             raise ModelError(f"{self.title}: offset does nothing without period; leave it out")
 
+    @abstractmethod
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""
-        raise NotImplementedError
 
+    @abstractmethod
     def signals(self) -> dict[str, str]:
         """Name of each signal -> its formula, outputs first."""
-        raise NotImplementedError
 
+    @abstractmethod
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """Its states; ``n`` holds the resolved fields."""
-        raise NotImplementedError
 
 
 def numbered(letter: str, count: int) -> tuple[str, ...]:

@@ -7,7 +7,6 @@ call tables by name, and a Python function may stand in place of a law (`model.f
 
 from __future__ import annotations
 
-import keyword
 import operator
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
@@ -206,35 +205,6 @@ def law_expression(
     return Expression.constant(number(value, {}, dimension, where, {"t", *names, *tables}))
 
 
-def resolve_parameters(parameters: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of named parameters, which may be numbers, quantities, or expressions of each other in any order.
-
-    Raises
-    ------
-    ExpressionError
-        If parameters depend on each other in a circle, or a name is not allowed or not known.
-    UnitError
-        If a quantity has no known unit.
-    """
-    for name in parameters:
-        _check_parameter_name(name)
-    formulas: dict[str, Expression] = {}
-    values: dict[str, Any] = {}
-    for name, value in parameters.items():
-        if isinstance(value, Expression) or (isinstance(value, str) and split_quantity(value) is None):
-            formulas[name] = law_expression(value, None, f"parameter '{name}'")
-        else:
-            values[name] = number(value, {}, None, f"parameter '{name}'", parameters.keys())
-    for name, formula in formulas.items():
-        try:
-            formula.require(parameters.keys())
-        except ExpressionError as error:
-            raise ExpressionError(f"parameter '{name}': {error}") from None
-    for name in _in_order(formulas):
-        values[name] = number(formulas[name], values, None, f"parameter '{name}'")
-    return {name: values[name] for name in parameters}
-
-
 def folded(node: Node, text: str) -> Node:
     """The tree with parts made of literals replaced by their value; `ExpressionError` if one is not finite."""
     args = tuple(folded(arg, text) for arg in node.args)
@@ -283,34 +253,6 @@ def _number(value: Any, env: Mapping[str, Any], dimension: str | None, names: Co
         return to_si(value, dimension)
     except UnitError as error:
         raise UnitError(f"{error}{remedy(*parts)}") from None
-
-
-def _in_order(formulas: Mapping[str, Expression]) -> list[str]:
-    """Names sorted so that each comes after those it uses."""
-    order: dict[str, None] = {}
-    for first in formulas:
-        path = [first]
-        while path:
-            missing = sorted(n for n in formulas[path[-1]].names if n in formulas and n not in order)
-            if not missing:
-                order[path.pop()] = None
-            elif missing[0] in path:
-                circle = " -> ".join([*path[path.index(missing[0]) :], missing[0]])
-                raise ExpressionError(
-                    f"parameters depend on each other in a circle: {circle}; give one of them a value"
-                )
-            else:
-                path.append(missing[0])
-    return list(order)
-
-
-def _check_parameter_name(name: Any) -> None:
-    if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
-        reason = "is a word of the expression language" if keyword.iskeyword(name) else "is not a plain name"
-        raise ExpressionError(f"parameter {name!r}: {reason}; use letters, digits and _, e.g. 'spring_rate'")
-    kind = "a function" if name in FUNCTIONS else "a constant" if name in CONSTANTS else "time"
-    if name in FUNCTIONS or name in CONSTANTS or name == "t":
-        raise ExpressionError(f"parameter '{name}': the name is taken, it means {kind}; rename it, e.g. '{name}_0'")
 
 
 def _evaluate(node: Node, env: Mapping[str, Any], tables: Mapping[str, Table]) -> Any:

@@ -237,18 +237,24 @@ def _add_all(model: Model, entries: list[Entry]) -> None:
 
 
 def _together(model: Model, entries: list[Entry]) -> bool:
-    """Add controllers that name one another all at once, if that is what they wait for; whether it was."""
+    """Add controllers that name one another all at once, if there are any; whether there were.
+
+    Raises
+    ------
+    ModelError
+        If one of them is wrong with the others there, too: a name that nothing has, or a ring at one instant.
+    """
+    twins = [entry for entry in entries if entry[0] == TWINS]
     before = len(model.controllers)
+    made = [_made(*entry) for entry in twins]
     try:
-        made = [
-            _kind(c, fields, where)(**fields) for c, table, where in entries for fields in [dict(table)] if c == TWINS
-        ]
         model.add(*made)
-    except Exception:
+    except ModelError as error:
         for e in model.controllers[before:]:
             model.by_name.pop(e.name)
         del model.controllers[before:]
-        return False
+        at = [where for e, (_, _, where) in zip(made, twins, strict=True) if e.title in str(error)]
+        _refuse(error, [*at, twins[0][2]][0])
     return bool(made)
 
 
@@ -299,12 +305,21 @@ def _header_lines(text: str) -> dict[str, list[int]]:
 
 
 def _add(model: Model, category: str, table: Mapping[str, Any], where: str) -> None:
+    made = _made(category, table, where)
+    try:
+        model.add(made)
+    except Exception as error:
+        _refuse(error, where)
+
+
+def _made(category: str, table: Mapping[str, Any], where: str) -> Element:
+    """The element that a table describes."""
     fields = dict(table)
     cls = ONE_KIND[category] if category in ONE_KIND else _kind(category, fields, where)
     if "name" not in fields and category not in NAMELESS:
         raise ModelError(f'{where}: it has no name; add name = "..."')
     try:
-        model.add(cls(**fields))
+        return cls(**fields)
     except Exception as error:
         _refuse(error, where)
 

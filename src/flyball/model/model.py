@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from numbers import Real
 from typing import Any, ClassVar
 
 import numpy as np
@@ -19,7 +20,7 @@ from .coupling import Coupling
 from .element import Element, LawOf, Number, field_with, fields_with, plain, resolve
 from .event import Event
 from .examine import but_is, carriers, check_units, measured
-from .expressions import number, resolve_parameters
+from .expressions import Expression, number
 from .force import Force
 from .geometry import vector
 from .ground import Ground
@@ -28,6 +29,7 @@ from .kept import Kept
 from .lawful import law_of
 from .limit import Unilateral
 from .material import Material, MaterialPair
+from .parameters import parameter_formulas, resolve_changed, resolve_parameters
 from .references import check_references
 from .sensor import IMU, Sensor
 from .summary import summary
@@ -69,7 +71,7 @@ class Model:
             raise ModelError(f"the name of a mechanism is a text, not {name!r}")
         self.name = name
         self.planar = bool(planar)
-        self._resolved: tuple[dict, dict[str, float]] | None = None
+        self._resolved: tuple[dict, dict[str, float], dict[str, Expression]] | None = None
         if not isinstance(parameters, Mapping | None):
             raise ModelError(
                 f"parameters of {name!r} maps names to values, for instance {{'mass': 2}}, not {parameters!r}"
@@ -117,11 +119,16 @@ class Model:
             old = self.parameters[name]
             if isinstance(old, str) and isinstance(value, str):
                 same_kind(old, value, f"parameter {name!r} of {self.name!r}")
-        if changed:
-            return resolve_parameters({**self.parameters, **changed})
+        if not all(isinstance(value, Real) for value in (changed or {}).values()):
+            return resolve_parameters({**self.parameters, **(changed or {})})
         if self._resolved is None or not same_values(self._resolved[0], self.parameters):
-            vars(self)["_resolved"] = dict(self.parameters), resolve_parameters(self.parameters)
-        return dict(self._resolved[1])  # type: ignore[index]
+            try:
+                values = resolve_parameters(self.parameters)
+            except ModelError:  # what is changed may be what is wrong
+                return resolve_parameters({**self.parameters, **(changed or {})})
+            vars(self)["_resolved"] = dict(self.parameters), values, parameter_formulas(self.parameters)
+        _, values, formulas = self._resolved  # type: ignore[misc]
+        return resolve_changed(values, formulas, changed or {})
 
     def copy(self) -> Any:
         """A mechanism of the same parts, to be changed without changing this one."""

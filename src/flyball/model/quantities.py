@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .model import Model
 
 ENERGY = "energy"  # the name under which a result has the energies of all
+MOST = 256  # parts whose tables are kept
 MEMBER = re.compile(r"(.*)\[(\d+)\]")  # of a set of bodies: "balls[17]"
 
 
@@ -57,7 +58,12 @@ Table = dict[str, Quantity]
 
 
 def quantities(model: Model, name: str) -> Table:
-    """Everything that a result says of a part (or of ``"energy"``), by name."""
+    """Everything that a result says of a part (or of ``"energy"``), by name; not to be changed."""
+    kept = getattr(model, "kept", None)  # of a snapshot
+    return _told(model, name) if kept is None else kept.get("quantities", name, MOST, lambda: _told(model, name))
+
+
+def _told(model: Model, name: str) -> Table:
     axes = "xy" if model.planar else "xyz"
     touching = bool(getattr(model, "contacts", ()))
     if name == ENERGY:

@@ -121,9 +121,10 @@ def chosen(model: Model, o: SimulateOptions) -> Way:
     if o.method == AUTO:
         return _suitable(model, o)
     touch = bool(model.contacts or model.bulk)
-    if o.method in IMPLICIT and model.controllers:
+    if o.method == VARIATIONAL and model.controllers:
         raise ModelError(
-            f"method={o.method!r} does not know {model.controllers[0].title}; the explicit methods do: leave method out"
+            f"method={o.method!r} is for motions that keep their energy, with works of second order at most, and does "
+            f"not know {model.controllers[0].title}: leave method out, or give method='radau'"
         )
     if not isinstance(o.method, Stepping) and o.method != IMPULSE:
         if model.bulk:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ...errors import AnalysisError, ModelError
 from ...results.doubts import open_loads
 from ...tables.cost import cost, least
 from ...tables.spanning import spanning
+from ...tables.specs import Structure
 from ...tables.system import COUPLED, MASS, NV, POINT, SEMIDEFINITE, SOLVER, TREE, V0
 from ..assembly.start import Assembly
 from ..compiled import Compiled, compiled
@@ -52,12 +54,12 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
                 f"{a.compiled.structure.model.name!r} has no motion of its own in joint coordinates: {why}"
             )
         return a, f"absolute: {why}"
-    here = cost(a.compiled.structure)
+    here = _cost(a.compiled.structure)
     c, why = _forest(a, parameters, here if wish == "auto" else np.inf)
     if c is None:
         return a, f"absolute: {why}"
     if wish == "auto":
-        there = cost(c.structure)
+        there = _cost(c.structure)
         if here <= there:
             return a, f"absolute: {_counts(a.compiled)} cost less than {_counts(c)} in joint coordinates"
         why = f"{_counts(c)} cost less than {_counts(a.compiled)} in absolute coordinates"
@@ -65,6 +67,10 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
         why = "as asked for"
     q, v = c.take(a.compiled, a.t, a.q, a.v)
     return replace(a, compiled=c, q=q, v=v), f"joint: {why}{_cuts(c)}"
+
+
+def _cost(s: Structure) -> float:
+    return s.kept.get("cost", None, 1, partial(cost, s))
 
 
 def _open_loads(a: Assembly) -> str:
@@ -112,7 +118,7 @@ def _forest(a: Assembly, parameters: Mapping[str, float] | None, most: float = n
         if not tree:
             what = " that has inertia along its coordinates" if avoided else ""
             return None, f"no joint{what} can be a tree joint"
-        if least(model, tree) > most:
+        if model.kept.get("least", tree, MOST, partial(least, model, tree)) > most:
             return None, f"{_counts(a.compiled)} cost less than the mass matrix alone in joint coordinates"
         c = compiled(model, parameters=parameters, tree=tree)
         bad = _unsound(c, a)

@@ -129,7 +129,9 @@ class Pace:
 
 
 def spectral_radius(c: Compiled, clock: ex.Clock) -> float:
-    """Of the derivatives of (q, v)' by (q, v) at the state of a motion, its modes being what they are [1/s].
+    """Of the derivatives of (q, v, x)' by these at the state of a motion, its modes being what they are [1/s].
+
+    x are states of controllers.
 
     About: within some tenths. Nothing of the motion's own scratch is touched.
     """
@@ -137,7 +139,7 @@ def spectral_radius(c: Compiled, clock: ex.Clock) -> float:
     other = c.again()
     other.work.switch[:], other.work.option[:] = c.work.switch, c.work.option
     other.work.sensed[VALUE] = c.work.sensed[VALUE]
-    n = s.nq + s.nv
+    n = s.nq + s.nv + len(s.controls) - len(s.sampled)
 
     def rates(x: np.ndarray) -> np.ndarray:
         status, dy = evaluate(other.values.system, other.work, t, x, MOTION)

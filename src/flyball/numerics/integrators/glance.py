@@ -8,14 +8,11 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import BETWEEN, PART, T
+from .concave import BLURRED, FAR, NOISE, ODD, borne_out
 from .loop import WITHIN
-from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, THERE, TRUE, TRULY
+from .watching import END, LEAST, LOOKS, LOST, MISS, MOST, PLAIN, SOUGHT, START, TERMS, THERE, TRUE, TRULY
 
-ODD = 1e-2  # part of its change over a step by which a guard may differ from what is expected
-FAR = 0.05  # part of its least distance from zero by which it may
-BLURRED = 1e-9  # part of its size that is nothing
 SHORT = 1e-7  # part of the time span: in steps so short there is nothing but rounding to be found
-NOISE = 4.0  # times what is rounding of a guard
 
 
 @formula
@@ -58,13 +55,14 @@ def compare(look, S, W, t, h, span):
     ng = W.way.shape[0]
     W.count[SOUGHT] = W.count[LOST] = 0
     W.count[PLAIN] = 1
-    for i in range(ng):
+    every = ng + W.count[TERMS]
+    for i in range(every):
         W.g[LEAST, i] = min(W.g[START, i], W.g[END, i])
         W.g[MOST, i] = max(W.g[START, i], W.g[END, i])
         W.g[MISS, i] = 0.0
     for j in range(W.met.shape[0]):
         look(t, h, W.met_at[j], S, W, THERE)
-        for i in range(ng):
+        for i in range(every):
             f, g = W.met_g[j, i], W.g[THERE, i]
             if f == g or (f != f and g != g):
                 continue
@@ -82,4 +80,6 @@ def compare(look, S, W, t, h, span):
             continue
         if miss < FAR * low or miss < -FAR * high:
             continue
+        W.count[PLAIN] = 0
+    if not borne_out(W):
         W.count[PLAIN] = 0

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import LARGEST, ULP, T
-from .glance import NOISE, glance
+from .concave import BLURRED, NOISE, ODD, bent
+from .glance import glance
 from .watching import (
     AWAY,
     CHECKS,
@@ -30,6 +31,7 @@ from .watching import (
     SIDE,
     SOUGHT,
     START,
+    TERMS,
     THERE,
     WIDTH,
 )
@@ -39,10 +41,8 @@ DEARLY = 1000  # of those with the equations, before the step is cut where it wa
 ALONG = 0.1  # part of a step below which it is not cut but taken as it is
 OFTEN = 8  # times that a step is cut before it is taken as it is
 NARROWEST = 2.0**-14  # part of a step that a panel is not narrower than
-ODD = 1e-2  # part of a guard's change over a panel by which it may differ from the polynomial
 CLOSELY = 1e-6  # the same, where it might be zero between two places that are looked at, at slopes seen in the panel
 REACH = 1.5  # times the steepest of these that its slope may be between them
-BLURRED = 1e-9  # part of its size that is nothing
 QUIET = 0.3  # a guard that stays farther from zero than this part of its change has nothing to hide
 NOTHING = 1e-200  # a guard that is no larger is zero
 GRAZE = 2e-2  # part of its change within which an extremum is looked at with the equations
@@ -98,7 +98,7 @@ def fill(callbacks, S, W, R, c, h, a, w):
         x = a + w * W.nodes[j]
         row = NODE + j
         if x <= 0.0 or x >= 1.0:
-            for i in range(W.way.shape[0]):
+            for i in range(W.way.shape[0] + W.count[TERMS]):
                 W.g[row, i] = W.g[START if x <= 0.0 else END, i]
         else:
             glance(callbacks, S, W, R, c, h, x, row)
@@ -123,7 +123,7 @@ def resolved(W):
                 f -= W.checks[j, k] * W.g[NODE + k, i]
             if not abs(f) <= allowed:
                 return False
-    return True
+    return not bent(W)
 
 
 @formula

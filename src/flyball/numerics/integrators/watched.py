@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
-from .glance import NOISE
+from .concave import NOISE
 from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, write
 from .panels import NEAR, rounding, side_of
 from .sought import CUT, first_event
@@ -31,6 +31,7 @@ from .watching import (
     SIDE,
     START,
     STEPS,
+    TERMS,
     UNKNOWN,
 )
 
@@ -131,6 +132,8 @@ def settled(W):
     for i in range(W.way.shape[0]):
         W.side[i] = 0.0 if W.kept[i] == 1 and abs(W.g[END, i]) <= NOISE * W.grain[i] else W.g[SIDE, i]
         W.g[START, i], W.g[GRAIN_START, i] = W.g[END, i], W.g[GRAIN_END, i]
+    for i in range(W.way.shape[0], W.way.shape[0] + W.count[TERMS]):
+        W.g[START, i] = W.g[END, i]
     for k in range(W.moving.shape[1]):
         for m in range(W.moving.shape[2]):
             W.moving[0, k, m] = W.moving[1, k, m]

@@ -23,8 +23,9 @@ PANEL, WIDTH, SAME, DONE_TO, BEYOND, BRACKET, LATEST, REAL = range(8)
 # entries of Watch.count: calls of the right-hand side since the step began; whether the side of guards near zero is to
 # be found; steps watched; places looked at; steps taken again; events; whether what is expected within it is borne
 # out; places looked at with the equations since it was taken, and in all; whether they could not be evaluated at one;
-# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep
-STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, COUNT = range(13)
+# times that a step was cut since it could not be looked through; whether a guard leaves the side that it has to keep;
+# terms of the last guard, that of a group: see `concave`
+STAGE, FRESH, STEPS, LOOKS, AGAIN, EVENTS, PLAIN, SOUGHT, TRULY, LOST, CUTS, AWAY, TERMS, COUNT = range(14)
 UNKNOWN = 2.0  # a side that follows from the value where the next step begins
 EVENT = 6  # a status beside those of the clock: the step ends on events, told in Watch.fired
 
@@ -37,7 +38,7 @@ class Watch(NamedTuple):
     grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
     side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
-    g: np.ndarray  # (GUARDS, ng)
+    g: np.ndarray  # (GUARDS, ng + terms of a group)
     poly: np.ndarray  # (NODES,): a guard over a panel, in powers
     basis: np.ndarray  # (NODES, NODES): powers from values at the nodes
     nodes: np.ndarray  # (NODES + CHECKS,): places in a panel
@@ -47,7 +48,7 @@ class Watch(NamedTuple):
     stages: np.ndarray  # of a step, where levels are kept
     met: np.ndarray  # of a step, at which guards are kept
     met_at: np.ndarray  # where in the step these are
-    met_g: np.ndarray  # (met, ng): guards there
+    met_g: np.ndarray  # (met, ng + terms): guards there
     moving: np.ndarray  # (2, 3, nm): measured quantities, rates, accelerations, at the start and the end
     levels: np.ndarray  # (2 + stages, rows + spots): what has no known rate: multipliers, loads
     places: np.ndarray  # (2 + stages,): where in the step these were seen
@@ -98,6 +99,7 @@ def watching(
     rows: np.ndarray,
     spots: np.ndarray,
     expected: tuple[np.ndarray, np.ndarray],
+    terms: int = 0,
 ) -> Watch:
     """What a watched integration keeps, empty.
 
@@ -119,11 +121,13 @@ def watching(
         Rows and columns of what else is sensed.
     expected : tuple of ndarray
         Where expected values of what is sensed, and of multipliers, are written.
+    terms : int, optional
+        Room for terms of the guard of a group.
     """
     ng = len(way)
     kept, met = (np.array(x, np.int64) for x in kept_stages(c, stages))
     spots = np.asarray(spots, np.int64).reshape(-1, 2)
-    g = np.full((GUARDS, ng), np.nan)
+    g = np.full((GUARDS, ng + terms), np.nan)
     g[GRAIN_START : GRAIN_END + 1] = 0.0
     return Watch(
         way=np.array(way, np.int64),
@@ -141,7 +145,7 @@ def watching(
         stages=kept,
         met=met,
         met_at=c[met],
-        met_g=np.full((len(met), ng), np.nan),
+        met_g=np.full((len(met), ng + terms), np.nan),
         moving=np.zeros((2, 3, measured)),
         levels=np.zeros((2 + len(kept), len(rows) + len(spots))),
         places=np.r_[0.0, c[kept], 1.0],

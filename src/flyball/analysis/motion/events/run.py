@@ -192,7 +192,7 @@ class Run:
             self.turn(EXPLICIT, f"where {self.now} could not go on")
             pace.stays()
         elif pace.asked and clock.count[ex.STATUS] in (ex.RUNNING, EVENT):
-            self.turn(pace.asked, STRUCK)
+            self.turn(pace.asked, STIFF if pace.asked in IMPLICIT else STRUCK)
         elif clock.count[ex.STATUS] == ex.RUNNING and (to := pace.turns(c, clock, self.now)):
             self.turn(to, STIFF if to in IMPLICIT else NOT_STIFF)
         else:

@@ -16,7 +16,7 @@ from ....equations.instant import FORCES
 from ....equations.sharing import GRAIN
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, HOLDS, OUT, PUSHES, TURNS, WITH, Dense
 from ....numerics.cone.shares import CELLS, OPEN, best_kernel, room
-from ....tables.system import G_SHARED, SHARED, SWITCH_ROW, SWITCH_SLIDING
+from ....tables.system import G_SHARED, MODE, OFF, SHARED, SWITCH_ROW, SWITCH_SLIDING
 from .instant import Instant, Part
 from .yielding import accelerations
 
@@ -234,7 +234,8 @@ def write_group(n: Instant, parts: list[Part], found: tuple[np.ndarray, ...]) ->
         return
     (state, A, gain), G, B = found, n.here.group, n.rooms[len(parts)].B
     n.W.switch[SHARED], G.Q.count[OPEN] = 0.0, 0
-    rows = np.flatnonzero(state == EVEN)
+    on = n.W.switch[MODE, [p.switch for p in parts]] != OFF  # slips of a gap that is let go are no rows
+    rows = np.flatnonzero((state == EVEN) & on)
     rules = np.array([p.rule for p in parts])
     if not np.isin(rules[rows], (GRIPS, TURNS)).any():
         return

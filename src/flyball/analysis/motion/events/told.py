@@ -91,7 +91,7 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
         elif n.kind[s] == ELASTIC and ways[s] != n.ways()[s] != 0.0 and not ways[s] == 0.0 < n.ways()[s] == FROZEN:
             kind, said = words(n, s, n.ways()[s] != FROZEN)
             told.setdefault(kind, []).append((s, said))
-        elif was != now and s not in hits and not (was and _parted(n, s)):
+        elif was != now and s not in hits and not (n.kind[s] == SLIP and _is_open(n, s)):
             kind, said = words(n, s, now)
             if kind:
                 told.setdefault(kind, []).append((s, said))
@@ -102,9 +102,9 @@ def tell_modes(n: Instant, old: tuple[np.ndarray, np.ndarray], before: np.ndarra
         record(n, names, kind, tuple(dict.fromkeys(said for _, said in all_of)), None, {}, before)
 
 
-def _parted(n: Instant, s: int) -> bool:
-    """Whether a switch is a tangent of a place of contact that is none any more: nothing slides there."""
-    return bool(n.kind[s] == SLIP and n.W.switch[MODE, n.S.switch_i[s, SWITCH_OTHER]] == OFF)
+def _is_open(n: Instant, s: int) -> bool:
+    """Whether the place of a slip parted: it does not slide either."""
+    return bool(n.W.switch[MODE, n.S.switch_i[s, SWITCH_OTHER]] == OFF)
 
 
 def _goes_both_ways(n: Instant, s: int) -> bool:

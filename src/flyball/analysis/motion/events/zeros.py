@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ....equations.watched import Loop
-from ....numerics.integrators.glance import NOISE
+from ....numerics.integrators.concave import NOISE
 from ....numerics.integrators.watching import END, FIRED, GRAIN_END, MARK, UNKNOWN
 from .actions import at_the_seam
 from .here import Here

@@ -29,8 +29,10 @@ class Desk(NamedTuple):
     mu: np.ndarray
     z: np.ndarray
     rate: np.ndarray
+    xd: np.ndarray
     out: np.ndarray
     tol: np.ndarray
+    tol_x: np.ndarray
     place: np.ndarray
     x: np.ndarray
     J: np.ndarray
@@ -42,7 +44,7 @@ class Desk(NamedTuple):
     real_D: np.ndarray
     real_Y: np.ndarray
     P: Rows
-    past: np.ndarray  # (4, nv): accelerations that the method remembers
+    past: np.ndarray  # (4, nv + nx): accelerations that the method remembers, and rates of x
     ends: np.ndarray  # (3, nv): rates at the ends of the step
 
 
@@ -67,8 +69,8 @@ class Alpha(Implicit):
 
     def _desk(self, nz: int, turns: bool) -> Desk:  # type: ignore[override]
         w = super()._desk(nz, turns)
-        nv = self.layout.nv
+        nv, nx = self.layout.nv, self.layout.nx
         steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
         w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], min(0.1, 1.0 / steps))
         kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
-        return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv)), ends=np.zeros((3, nv)))
+        return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv + nx)), ends=np.zeros((3, nv)))

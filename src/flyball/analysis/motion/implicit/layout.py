@@ -33,7 +33,7 @@ THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) bel
 
 
 class Layout:
-    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu).
+    """Which numbers the Jacobian has and where they go in the matrix of one stage, (d, v, lam, mu, x).
 
     Parameters
     ----------
@@ -46,8 +46,10 @@ class Layout:
     def __init__(self, s: Structure, S: System, index_3: bool = False) -> None:
         self.index_3 = index_3
         self.s, self.nv, self.nr = s, s.nv, len(s.rows)
-        self.width = self.nv + 3 * self.nr + 3 * len(s.measured)
-        self.touched, self.group = sparsity(s, self.width, S)
+        self.nx = len(s.controls) - len(s.sampled)
+        self.n = 2 * (self.nv + self.nr) + self.nx
+        self.width = self.nv + 3 * self.nr + 3 * len(s.measured) + self.nx
+        self.touched, self.group = sparsity(s, self.width - self.nx, S)
         self.groups = int(self.group.max(initial=-1)) + 1
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
@@ -66,14 +68,17 @@ class Layout:
             np.column_stack([self.group[all_columns[r]], all_rows[r]]),
             np.column_stack([self.group[all_columns[n]], all_rows[n]]),
             np.column_stack([self.groups + self.group[all_columns[r]], all_rows[r]]),
+            *self._picked(all_rows, all_columns),
             np.column_stack([self.group[all_columns[r]], all_rows[r]]),
         ]).astype(np.int64)  # fmt: skip
         i, j = all_rows[r], all_columns[r]
         k, m = all_rows[n] - nv - nr, all_columns[n]
         a, b, nG = len(i), len(k), len(self.col_i)
-        first = np.cumsum([1, 2 * a + b, a, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        first = np.cumsum([1, len(self.pick) - a, a, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
+        self.spring = np.column_stack([i, j, picked + np.arange(a), mass + np.arange(a), picked + a + b + np.arange(a)])
+        self.spring = self.spring.astype(np.int64)
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
@@ -90,6 +95,7 @@ class Layout:
             (mu + row[held], self.col_i[held], valued_rows + at(nG)[held]),
             (v + self.col_i[~pressed], lam + row[~pressed], None),
             (mu + free, mu + free, np.zeros(len(free), int)),
+            *self._of_states(all_rows, all_columns, picked + 2 * a + b),
         ]
         for n_th, w in enumerate(self.turns.tolist()):
             x, y = np.meshgrid(at(3), at(3))
@@ -103,17 +109,42 @@ class Layout:
                       rows + np.r_[at(nG)[held], at(nG)[~held]])  # fmt: skip
             one[5] = one[6] = (at(0),) * 3
             one[8] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
-        scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a))]
+        own = 2 * (nv + nr) + at(self.nx)
+        scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a)), (own, own, np.zeros(self.nx, int))]
         valued = np.flatnonzero(self.valued == 1)
         soft = [(lam + at(nr), lam + at(nr), sizes + at(nr))]
         if not self.index_3:
             soft.append((mu + valued, mu + valued, sizes + valued))
         self._place(one, scaled, soft, rows + at(nG)[~pressed])
 
+    def _picked(self, rows: np.ndarray, columns: np.ndarray) -> list[np.ndarray]:
+        """Step and residual of numbers that states x have: x' - f by d, by v; r by x; x' - f by x."""
+        end, nx = self.width - self.nx, self.nx
+        f = rows >= end
+        own = 2 * self.groups + np.arange(nx)
+        return [
+            np.column_stack([self.group[columns[f]], rows[f]]),
+            np.column_stack([self.groups + self.group[columns[f]], rows[f]]),
+            np.column_stack([np.repeat(own, self.nv), np.tile(np.arange(self.nv), nx)]),
+            np.column_stack([np.repeat(own, nx), np.tile(end + np.arange(nx), nx)]),
+        ]
+
+    def _of_states(self, rows: np.ndarray, columns: np.ndarray, first: int) -> list[tuple[np.ndarray, ...]]:
+        """Entries of the same, in that order; their first number."""
+        nv, nx, x, at = self.nv, self.nx, 2 * (self.nv + self.nr), np.arange
+        f = rows >= self.width - nx
+        i, j = x + rows[f] - (self.width - nx), columns[f]
+        c, begin = len(i), first + 2 * len(i)
+        return [
+            (i, j, first + at(c)),
+            (i, nv + j, first + c + at(c)),
+            (np.tile(nv + at(nv), nx), x + np.repeat(at(nx), nv), begin + at(nx * nv)),
+            (np.tile(x + at(nx), nx), x + np.repeat(at(nx), nx), begin + nx * nv + at(nx * nx)),
+        ]
+
     def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
         """Pattern and order of elimination; places of all entries in the matrix."""
-        nv, nr = self.nv, self.nr
-        n = 2 * nv + 2 * nr
+        nv, n = self.nv, self.n
         minus = int(self.first[-1])  # numbers behind the others: -1, and the negative entries of rows
         self.negative = negative
         one[0] = (*one[0][:2], np.full(nv, minus))
@@ -127,7 +158,7 @@ class Layout:
 
     def _whole(self, i: np.ndarray, j: np.ndarray, number: np.ndarray, count: list[int]) -> None:
         """The same of all three stages at once: what F' has couples them."""
-        n = 2 * (self.nv + self.nr)
+        n = self.n
         own, scaled = np.r_[: count[0], sum(count[:2]) : sum(count)], np.arange(count[0], sum(count[:2]))
         parts = [(own, k, k, np.where(own < count[0], PLAIN, SOFTENED)) for k in range(STAGES)]
         parts += [(scaled, k, m, np.full(len(scaled), m)) for k in range(STAGES) for m in range(STAGES)]
@@ -147,9 +178,9 @@ class Layout:
         """
         body_i = self.s.tables["body_i"]
         body, bodies = np.repeat(np.arange(len(body_i)), body_i[:, NV]), len(body_i)
-        rows = bodies + np.arange(self.nr)
-        groups = np.tile(np.concatenate([body, body, rows, rows]), stages)
-        order = constrained_order(groups, np.arange(bodies + self.nr) >= bodies, i, j)
+        rows, states = bodies + np.arange(self.nr), bodies + self.nr + np.arange(self.nx)
+        groups = np.tile(np.concatenate([body, body, rows, rows, states]), stages)
+        order = constrained_order(groups, np.arange(bodies + self.nr + self.nx) >= bodies, i, j)
         one = np.r_[self._together(), self.nv + np.arange(n // stages - self.nv)]  # d of a quaternion go together
         first = np.tile(np.arange(n // stages) < self.nv, stages)
         place = np.empty(n, np.int64)
@@ -175,21 +206,26 @@ def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
     """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
 
     In joint coordinates what acts on a body acts along the coordinates of all that it hangs on, and follows them.
+    Behind the residuals stand the rates of controllers' states.
     """
-    if not s.tree:
+    if not s.tree and len(s.controls) == len(s.sampled):
         return grouped_sparsity(s, width, S)
-    from scipy.sparse import csc_matrix
+    from scipy.sparse import csc_matrix, vstack
 
-    parents = S.body_i[:, PARENT].tolist()
     above: list[list[int]] = []
-    for b, parent in enumerate(parents):
+    for b, parent in enumerate(S.body_i[:, PARENT].tolist() if s.tree else []):
         above.append([b, *(above[parent] if parent >= 0 else ())])
 
     def found() -> tuple[Any, np.ndarray]:
         touched = csc_matrix(pattern(s, S, above))
+        nm = len(s.measured)
+        for x in s.controls[: len(s.controls) - len(s.sampled)]:
+            read = sorted({s.slots[k] % nm for k in x.law.names if s.slots.get(k, 2 * nm) < 2 * nm})
+            looks = touched[width - 3 * nm + np.array(read, np.int64)].sum(axis=0) > 0
+            touched = csc_matrix(vstack([touched, csc_matrix(looks)]), dtype=bool)
         return touched, grouped(touched)
 
-    return s.kept.get("sparsity by branches", None, 1, found)
+    return s.kept.get("sparsity of implicit methods", None, 1, found)
 
 
 def layout(s: Structure, S: System, index_3: bool = False) -> Layout:

@@ -80,11 +80,13 @@ class Implicit:
 
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
         x = self.layout
-        nv, out = x.nv, []
+        nv, nx, out = x.nv, x.nx, []
         for kinds in ((0, 1), (2,), ()):
-            steps = np.zeros((max(len(kinds) * x.groups, 0) if kinds else 1, 3 * nv + 1), complex)
+            more = nx if 0 in kinds else 0
+            steps = np.zeros((len(kinds) * x.groups + more if kinds else 1, 3 * nv + 1 + nx), complex)
             for n, kind in enumerate(kinds):
                 steps[n * x.groups + x.group, kind * nv + np.arange(nv)] = 1j * STEP
+            steps[len(kinds) * x.groups + np.arange(more), 3 * nv + 1 + np.arange(more)] = 1j * STEP
             found = np.zeros((len(steps), x.width), complex)
             t, y, vdot, lam = (np.zeros(m, complex) for m in (1, ny, nv, x.nr))
             out.append(Bench(t, y, vdot, lam, steps, found))
@@ -93,7 +95,8 @@ class Implicit:
     def _desk(self, nz: int, turns: bool) -> Desk:
         x, clock = self.layout, self.clock
         step = float(clock.real[ex.STEP])
-        nv, nr, n, P = x.nv, x.nr, 2 * (x.nv + x.nr), x.P
+        nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
+        n = x.n
         real = np.zeros(ds.REALS)
         rtol = float(clock.real[ex.RTOL])
         real[ds.RTOL] = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
@@ -119,8 +122,8 @@ class Implicit:
         nA, nL, nU = len(P.Aj), len(P.Lj), len(P.Uj)
         return Desk(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(4, nr), z(4, nz), z(4, nz),
-            z(4, n), z(4, nv), z(3, nr), z(2, nv), self._plain(), z(3, n), w(3, n), J, x.put, x.part,
-            z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx), self._plain(), z(3, n), w(3, n), J,
+            x.spring, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 

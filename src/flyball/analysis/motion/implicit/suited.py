@@ -90,8 +90,6 @@ def suited(begun: Start, method: str, wish: str, parameters: Mapping[str, float]
 def unsuited(begun: Start) -> str:
     """Why a motion in those coordinates cannot go on by an implicit method, in words; empty: it can."""
     s = begun.assembly.compiled.structure
-    if s.model.controllers:
-        return f"method='radau' does not know {s.model.controllers[0].title}"
     try:
         refuse_functions(s)
         _refuse_open_loads(begun, RADAU)

@@ -2,9 +2,10 @@
 
 The equations are those of the second order on a manifold, with constraints (Gear, Gupta and Leimkuhler 1985):
 
-    d' = T(d) (v + D G^T mu),  r(t, q0 (+) d, v, v', lam) = 0,  G v = nu,  g = 0
+    d' = T(d) (v + D G^T mu),  r(t, q0 (+) d, v, v', lam, x) = 0,  G v = nu,  g = 0,  x' = f(t, q0 (+) d, v, x)
 
-d is the increment from the state at which a step begins. Unknowns are ordered d, v, lam, mu, equations as written.
+d is the increment from the state at which a step begins; x, states of the first order, are the first of the integrals.
+Unknowns are ordered d, v, lam, mu, x, equations as written.
 """
 
 from __future__ import annotations
@@ -40,16 +41,20 @@ class Desk(NamedTuple):
     lam: np.ndarray  # (4, nr): multipliers; last: at the begin of the step
     found: np.ndarray  # (nr,): multipliers at the state last arrived at
     mu: np.ndarray  # (4, nr): of the stabilisation
-    z: np.ndarray  # (4, nz): integrals of the motion at the stages; last: at the begin of the step
-    rate: np.ndarray  # (4, nz): their rates
-    out: np.ndarray  # (4, 2 nv + 2 nr): what the equations miss
+    z: np.ndarray  # (4, nz): x and integrals of the motion at the stages; last: at the begin of the step
+    rate: np.ndarray  # (4, nz): their rates, as the equations say
+    xd: np.ndarray  # (4, nx): rates of x as stage values say
+    out: np.ndarray  # (4, n): what the equations miss
     before_v: np.ndarray  # (4, nv): of the step before: stages, and where it began
     before_lam: np.ndarray  # (3, nr)
+    before_x: np.ndarray  # (4, nx)
     tol: np.ndarray  # (2, nv): tolerances of d and v in this step
+    tol_x: np.ndarray  # (nx,): and of x
     place: np.ndarray  # (nv,): component of the state that a velocity is the rate of, or -1: a turn
     x: np.ndarray  # (3, n): solution, right-hand side, product
     w: np.ndarray  # (3, n), complex
     J: np.ndarray  # (4, n): numbers of the Jacobian at the stages and where the step begins; the first is 1
+    spring: np.ndarray  # (entries, 5): equation and velocity; numbers of the Jacobian by increment, rate, velocity
     put: np.ndarray  # (entries, 2): place in the matrix, number of the Jacobian: times 1, h-scale, its inverse
     part: np.ndarray  # (2,): ends of the first two groups of these
     real_A: np.ndarray  # the real matrix and its factors

@@ -6,6 +6,9 @@ by Arnold, Cardona and Bruels (2015), "A Lie algebra approach to Lie group time 
     q1 = q0 exp(h (v0 + (1/2 - beta) h a0 + beta h a1 + D G^T mu)),  v1 = v0 + (1 - gamma) h a0 + gamma h a1,
     (1 - am) a1 + am a0 = (1 - af) v1' + af v0',  r(t1, q1, v1, v1', lam1) = 0,  G v1 = nu,  g = 0
 
+States of the first order, x' = f, go as velocities do (Bruels and Golinval 2006, "The generalized-alpha method in
+mechatronic applications"); of `past` they are the last columns.
+
 a is the acceleration at t + (am - af) h. The spectral radius at infinite frequency, rho, sets am, af, beta and gamma.
 Knows nothing of bodies: given (residual, linearise, compose, arrive, inspect) as `radau` is, and ``turned(d, w, S)``,
 which makes velocities rates of increments in place, ``straight(d, out, S)``, increments those of constant velocity, and
@@ -68,10 +71,10 @@ def begin(callbacks, S, K, c):
         K.d[START, i] = ahead * c.y[NOW, at + i]
         K.v[START, i] = c.y[NOW, at + i] + ahead * c.K[0, at + i]
     for i in range(K.z.shape[1]):
-        K.z[START, i] = c.y[NOW, at + nv + i]
+        K.z[START, i] = c.y[NOW, at + nv + i] + (ahead * c.K[0, at + nv + i] if i < K.tol_x.shape[0] else 0.0)
     compose(c.y[NOW], K.d[START], K.v[START], K.z[START], c.y[ASIDE], S)
     status, _ = arrive(c.real[T] + ahead, c.y[ASIDE], c.y[ASIDE_RATE], S, K)
-    for i in range(nv):
+    for i in range(nv + K.tol_x.shape[0]):  # x stands behind the velocities
         K.past[TRUE, i] = c.K[0, at + i]
         K.past[RATE, i] = (c.y[ASIDE_RATE, at + i] - c.K[0, at + i]) / ahead if status == 0 else 0.0
 
@@ -80,13 +83,17 @@ def begin(callbacks, S, K, c):
 def place(K, h):
     """Accelerations a where the step begins, for its width, into K.a[START]; they keep their rate if h changes."""
     am, af, _, _ = coefficients(K.rho[0])
-    for i in range(K.v.shape[1]):
+    nv = K.v.shape[1]
+    for i in range(nv + K.tol_x.shape[0]):
         a = K.past[ALGORITHMIC, i]
         if K.count[BEFORE] == 0:
             a = K.past[TRUE, i] + (am - af) * h * K.past[RATE, i]
         elif h != K.real[LAST_H]:
             a = K.past[TRUE, i] + (a - K.past[TRUE, i]) * (h / K.real[LAST_H])
-        K.a[START, i] = a
+        if i < nv:
+            K.a[START, i] = a
+        else:
+            K.xd[START, i - nv] = a
 
 
 @formula
@@ -101,7 +108,13 @@ def ends(callbacks, S, K, h):
         K.past[NEXT_ONE, i] = a1
         K.a[END, i] = ((1.0 - am) * a1 + am * a0 - af * K.past[TRUE, i]) / (1.0 - af)
         K.dd[END, i] = gamma / beta * (K.dd[END, i] / h - v0 - h * (0.5 - beta / gamma) * a0) + v0
-    for i in range(K.z.shape[1]):
+    nv, nx = K.v.shape[1], K.tol_x.shape[0]
+    for i in range(nx):
+        w0 = K.xd[START, i]
+        w1 = (K.z[END, i] - K.z[START, i]) / (gamma * h) - (1.0 - gamma) / gamma * w0
+        K.past[NEXT_ONE, nv + i] = w1
+        K.xd[END, i] = ((1.0 - am) * w1 + am * w0 - af * K.past[TRUE, nv + i]) / (1.0 - af)
+    for i in range(nx, K.z.shape[1]):
         K.z[END, i] = K.z[START, i] + 0.5 * h * (K.rate[START, i] + K.rate[END, i])
 
 
@@ -116,6 +129,8 @@ def predict(K, h):
         K.mu[END, r] = 0.0
     for i in range(K.z.shape[1]):
         K.rate[END, i] = K.rate[START, i]
+    for i in range(K.tol_x.shape[0]):
+        K.z[END, i] = K.z[START, i] + h * K.xd[START, i]
 
 
 @formula
@@ -160,7 +175,13 @@ def correct(K, h):
     for r in range(nr):
         K.lam[END, r] += K.x[0, perm[2 * nv + r]]
         K.mu[END, r] += K.x[0, perm[2 * nv + nr + r]]
-    return sqrt(s / max(2 * nv, 1))
+    nx = K.tol_x.shape[0]
+    for i in range(nx):
+        x = K.x[0, perm[2 * nv + 2 * nr + i]]
+        K.z[END, i] += x
+        x /= K.tol_x[i]
+        s += x * x
+    return sqrt(s / max(2 * nv + nx, 1))
 
 
 @formula
@@ -254,6 +275,10 @@ def enter(K, c, t, h, error, asked):
     for i in range(K.v.shape[1]):
         K.past[ALGORITHMIC, i] = K.past[NEXT_ONE, i]
         K.past[TRUE, i] = K.ends[V_RATE_END, i]
+    nv = K.v.shape[1]
+    for i in range(K.tol_x.shape[0]):
+        K.past[ALGORITHMIC, nv + i] = K.past[NEXT_ONE, nv + i]
+        K.past[TRUE, nv + i] = K.xd[END, i]
     for r in range(K.lam.shape[1]):
         K.lam[START, r] = K.lam[END, r]
     K.count[BEFORE], K.real[LAST_H] = 1, h

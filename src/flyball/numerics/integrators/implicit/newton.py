@@ -113,4 +113,10 @@ def correct(K, h):
     for i in range(nr):
         put_part(K, i, perm[2 * nv + i], K.lam)
         put_part(K, i, perm[2 * nv + nr + i], K.mu)
-    return sqrt(s / max(6 * nv, 1))
+    nx = K.tol_x.shape[0]
+    for i in range(nx):
+        j = perm[2 * nv + 2 * nr + i]
+        x, p = K.x[0, j] / K.tol_x[i], K.w[0, j] / K.tol_x[i]
+        s += x * x + p.real * p.real + p.imag * p.imag
+        put_part(K, i, j, K.z)
+    return sqrt(s / max(6 * nv + 3 * nx, 1))

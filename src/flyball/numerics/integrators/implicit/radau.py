@@ -88,7 +88,7 @@ def attempt(callbacks, S, K, c, h):
     compose(c.y[NOW], K.d[2], K.v[2], K.z[2], c.y[NEW], S)
     error = 0.0
     if c.real[STEP] == 0.0:
-        status, error = estimate(residual, S, K, c, h, K.count[BEFORE] == 0 or c.real[GROW] <= 1.0)
+        status, error = estimate(residual, S, K, c, h)
         if status != 0 or not error < 1e300:
             return SINGULAR, 0.0, 0.5
         if error > max(1.0, c.real[PARDON]):
@@ -155,6 +155,9 @@ def enter(K, c, t, h, error, iterations):
     for i in range(K.v.shape[1]):
         for k in range(4):
             K.before_v[k, i] = K.v[k, i]
+    for i in range(K.tol_x.shape[0]):
+        for k in range(4):
+            K.before_x[k, i] = K.z[k, i]
     for i in range(K.lam.shape[1]):
         for k in range(3):
             K.before_lam[k, i] = K.lam[k, i]

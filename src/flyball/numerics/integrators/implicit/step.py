@@ -8,7 +8,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
-from .coefficients import BEND, BENT, BENT_MOST, ERROR, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
+from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
 from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, SHARED, START, THETA
 from .newton import correct, solve_real
 
@@ -37,6 +37,8 @@ def begin(c, K):
     for i in range(K.z.shape[1]):
         K.z[START, i] = y[nq + nv + i]
         K.rate[START, i] = c.K[0, nq + nv + i]
+    for i in range(K.tol_x.shape[0]):
+        K.tol_x[i] = K.real[ATOL] + K.real[RTOL] * abs(K.z[START, i])
 
 
 @formula
@@ -64,6 +66,14 @@ def predict(K, h):
     for i in range(K.z.shape[1]):
         for k in range(STAGES):
             K.rate[k, i] = K.rate[START, i]
+    for i in range(K.tol_x.shape[0]):
+        for k in range(STAGES):
+            K.z[k, i] = K.z[START, i]
+        if K.count[BEFORE] == 1:
+            b1, b2, b3 = coefficients(K.before_x, i, K.before_x[START, i])
+            for k in range(STAGES):
+                x = 1.0 + C[k] * h / K.real[LAST_H]
+                K.z[k, i] = K.before_x[START, i] + x * (b1 + x * (b2 + x * b3))
 
 
 @formula
@@ -87,13 +97,16 @@ def at_stages(stages, i, x):
 
 @formula
 def rates(K, h):
-    """Rates of increments and velocities at the stages, and integrals there, by the stage values."""
+    """Rates of increments, velocities and x at the stages, and integrals there, by the stage values."""
     for k in range(STAGES):
         a, b, c = INVERSE[k]
         for i in range(K.v.shape[1]):
             v0 = K.v[START, i]
             K.dd[k, i] = (a * K.d[0, i] + b * K.d[1, i] + c * K.d[2, i]) / h
             K.a[k, i] = (a * (K.v[0, i] - v0) + b * (K.v[1, i] - v0) + c * (K.v[2, i] - v0)) / h
+        for i in range(K.tol_x.shape[0]):
+            x0 = K.z[START, i]
+            K.xd[k, i] = (a * (K.z[0, i] - x0) + b * (K.z[1, i] - x0) + c * (K.z[2, i] - x0)) / h
     integrals(K, h)
 
 
@@ -102,7 +115,7 @@ def integrals(K, h):
     """Integrals of the motion at the stages by their rates there."""
     for k in range(STAGES):
         p, q, r = A[k]
-        for i in range(K.z.shape[1]):
+        for i in range(K.tol_x.shape[0], K.z.shape[1]):
             K.z[k, i] = K.z[START, i] + h * (p * K.rate[0, i] + q * K.rate[1, i] + r * K.rate[2, i])
 
 
@@ -170,7 +183,7 @@ def iterate(residual, S, K, c, h):
 @formula
 def account(residual, S, K, c, h):
     """Integrals of the motion by their rates at the stage values found. Returns a status."""
-    if K.z.shape[1] == 0:
+    if K.z.shape[1] == K.tol_x.shape[0]:
         return 0
     rates(K, h)
     for k in range(STAGES):
@@ -181,8 +194,12 @@ def account(residual, S, K, c, h):
 
 
 @formula
-def estimate(residual, S, K, c, h, again):
-    """Error of the step in units of the tolerance. Returns (status, error)."""
+def estimate(residual, S, K, c, h):
+    """Error of the step in units of the tolerance. Returns (status, error).
+
+    Filtered once, at the start of a motion too: twice (Hairer and Wanner, IV.8.20) would let a step pass over what is
+    fast, whether it is damped or not.
+    """
     nv = K.v.shape[1]
     accounts = unsure(K, c, h)  # rates at the begin are other ones below
     e, f, g = ERROR
@@ -191,18 +208,37 @@ def estimate(residual, S, K, c, h, again):
         K.d[START, i] = 0.0
         K.dd[START, i] = -(e * K.d[0, i] + f * K.d[1, i] + g * K.d[2, i]) / h
         K.a[START, i] = -(e * (K.v[0, i] - v0) + f * (K.v[1, i] - v0) + g * (K.v[2, i] - v0)) / h
+    for i in range(K.tol_x.shape[0]):
+        x0 = K.z[START, i]
+        K.xd[START, i] = -(e * (K.z[0, i] - x0) + f * (K.z[1, i] - x0) + g * (K.z[2, i] - x0)) / h
     for i in range(K.mu.shape[1]):
         K.mu[START, i] = 0.0
     status, size = filtered(residual, S, K, c, c.real[T], h)
-    if status == 0 and again and size >= 1.0:
-        perm = K.P.perm
-        for i in range(nv):
-            K.d[START, i] = K.x[0, perm[i]]
-            K.v[START, i] += K.x[0, perm[nv + i]]
-        status, size = filtered(residual, S, K, c, c.real[T], h)
-        for i in range(nv):
-            K.v[START, i] = c.y[NOW, c.y.shape[1] - K.z.shape[1] - nv + i]
-    return status, max(size, accounts)
+    return status, max(size, accounts, springing(K, h) if status == 0 else 0.0)
+
+
+@formula
+def springing(K, h):
+    """Error of the velocities that what is estimated of the increments springs back with, in units of the tolerance.
+
+    A swing that is too fast for the step is all but filtered out of the velocities, while it lasts where nothing damps
+    it: v follows from e K e = v M v. Where there is damping it counts as inertia does, h C / GAMMA.
+    """
+    nv = K.v.shape[1]
+    perm = K.P.perm
+    J, x, force, mass = K.J[START], K.x[0], K.x[1], K.x[2]
+    for i in range(nv):
+        force[i] = mass[i] = 0.0
+    for e in range(K.spring.shape[0]):
+        i, j = K.spring[e, 0], K.spring[e, 1]
+        force[i] += J[K.spring[e, 2]] * x[perm[j]]
+        if i == j:
+            mass[i] = abs(J[K.spring[e, 3]]) + h / GAMMA * abs(J[K.spring[e, 4]])
+    s = 0.0
+    for i in range(nv):
+        if mass[i] > 0.0:
+            s += abs(x[perm[i]] * force[i]) / (mass[i] * K.tol[1, i] * K.tol[1, i])
+    return sqrt(s / max(nv, 1))
 
 
 @formula
@@ -211,7 +247,7 @@ def filtered(residual, S, K, c, t, h):
     if residual(t, START, S, K, c) != 0:
         return 1, 0.0
     perm = K.P.perm
-    nv = K.v.shape[1]
+    nv, nx = K.v.shape[1], K.tol_x.shape[0]
     for i in range(perm.shape[0]):
         K.x[0, perm[i]] = -K.out[START, i]
     solve_real(K, h)
@@ -219,7 +255,20 @@ def filtered(residual, S, K, c, t, h):
     for i in range(nv):
         x, y = K.x[0, perm[i]] / K.tol[0, i], K.x[0, perm[nv + i]] / K.tol[1, i]
         s += x * x + y * y
-    return 0, sqrt(s / max(2 * nv, 1))
+    for i in range(nx):
+        x = K.x[0, perm[perm.shape[0] - nx + i]] / K.tol_x[i]
+        s += x * x
+    return 0, sqrt(s / max(2 * nv + nx, 1))
+
+
+@formula
+def back(K, c):
+    """Velocities and x of the begin of the step into their place again."""
+    nv, nz = K.v.shape[1], K.z.shape[1]
+    for i in range(nv):
+        K.v[START, i] = c.y[NOW, c.y.shape[1] - nz - nv + i]
+    for i in range(K.tol_x.shape[0]):
+        K.z[START, i] = c.y[NOW, c.y.shape[1] - nz + i]
 
 
 @formula
@@ -263,11 +312,14 @@ def defect(residual, S, K, c, h, x):
         b1, b2, b3 = coefficients(K.v, i, v0)
         K.v[START, i] = v0 + x * (b1 + x * (b2 + x * b3))
         K.a[START, i] = (b1 + x * (2.0 * b2 + x * 3.0 * b3)) / h
+    for i in range(K.tol_x.shape[0]):
+        b1, b2, b3 = coefficients(K.z, i, K.z[START, i])
+        K.z[START, i] += x * (b1 + x * (b2 + x * b3))
+        K.xd[START, i] = (b1 + x * (2.0 * b2 + x * 3.0 * b3)) / h
     for r in range(K.mu.shape[1]):
         K.lam[START, r] = at_stages(K.lam, r, x)
     status, size = filtered(residual, S, K, c, c.real[T] + x * h, h)
-    for i in range(nv):
-        K.v[START, i] = c.y[NOW, c.y.shape[1] - K.z.shape[1] - nv + i]
+    back(K, c)
     return size if status == 0 else 1e300
 
 
@@ -285,7 +337,11 @@ def between(K, x, h, d, v, z):
         v[i] = v0 + x * (b1 + x * (b2 + x * b3))
     p, q, r = THROUGH_STAGES
     more = x * (BENT[0] + x * (BENT[1] + x * (BENT[2] + x * BENT[3])))
-    for i in range(z.shape[0]):
+    nx = K.tol_x.shape[0]
+    for i in range(nx):
+        b1, b2, b3 = coefficients(K.z, i, K.z[START, i])
+        z[i] = K.z[START, i] + x * (b1 + x * (b2 + x * b3))
+    for i in range(nx, z.shape[0]):
         a, b, c = K.rate[0, i], K.rate[1, i], K.rate[2, i]
         s = p[0] * a + p[1] * b + p[2] * c
         s += x / 2.0 * (q[0] * a + q[1] * b + q[2] * c) + x * x / 3.0 * (r[0] * a + r[1] * b + r[2] * c)

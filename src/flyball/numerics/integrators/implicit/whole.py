@@ -60,8 +60,8 @@ def solve_whole(K, h):
 @formula
 def correct_whole(K, h):
     """One correction of all stage values. Returns its size in units of the tolerance."""
-    nv, nr = K.d.shape[1], K.lam.shape[1]
-    n = 2 * nv + 2 * nr
+    nv, nr, nx = K.d.shape[1], K.lam.shape[1], K.tol_x.shape[0]
+    n = 2 * nv + 2 * nr + nx
     perm = K.whole_P.perm
     for k in range(STAGES):
         for i in range(n):
@@ -79,7 +79,12 @@ def correct_whole(K, h):
         for i in range(nr):
             K.lam[k, i] += K.whole_x[0, perm[k * n + 2 * nv + i]]
             K.mu[k, i] += K.whole_x[0, perm[k * n + 2 * nv + nr + i]]
-    return sqrt(s / max(6 * nv, 1))
+        for i in range(nx):
+            x = K.whole_x[0, perm[k * n + 2 * nv + 2 * nr + i]]
+            K.z[k, i] += x
+            x /= K.tol_x[i]
+            s += x * x
+    return sqrt(s / max(6 * nv + 3 * nx, 1))
 
 
 @formula
