@@ -198,9 +198,7 @@ def _reference(job: _Task) -> tuple[Result | None, str]:
             if not why:
                 return result, f"projection at rtol = {rtol:g}"
     bent = ", ".join(e.title for e in bent_laws(job.model))
-    note = (
-        f" compare knows no corners of laws ({bent}), at which such a motion may stick; simulate does" if bent else ""
-    )
+    note = f" compare knows no corners of laws ({bent}), at which a motion may stick; simulate does" if bent else ""
     return None, f"none: {why}{note}"
 
 

@@ -200,8 +200,8 @@ def _surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> 
     else:
         known = np.isfinite(found.values[name])
         px, py, z = found.points[known, i], found.points[known, j], found.values[name][known]
-        others = [p for k, p in enumerate(found.parameters) if k not in (i, j) and np.ptp(found.points[known, k]) > 0.0]
-        drawn = _over_samples(ax, px, py, z, bool(others))
+        varied = any(np.ptp(x) > 0.0 for k, x in enumerate(found.points[known].T) if k not in (i, j))
+        drawn = _over_samples(ax, px, py, z, varied)
     drawing.colorbar(drawn, ax=ax, label=_label(found, name))
     ax.set_xlabel(x)
     ax.set_ylabel(y)
