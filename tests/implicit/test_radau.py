@@ -6,9 +6,6 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 import flyball as fb
-from flyball.analysis.linear.derivatives import Equations, State
-from flyball.analysis.motion.implicit.layout import sparsity
-from flyball.analysis.motion.start import begin
 from tests.layers import both_layers
 from tests.mechanisms import example, free_body, spatial_four_bar
 
@@ -307,22 +304,3 @@ def test_many_windows_go_through_singular_positions():
     assert r.health.coordinates.startswith("joint")
     assert np.abs(r["post 0"].position - e["post 0"].position).max() < 1e-4
     assert r.health.energy_drift < 1e-3
-
-
-BRANCHES = ("andrews.toml", "bricard.toml", "car_axis.toml", "governor.toml", "peaucellier.toml", "rolling_race.toml")
-
-
-@pytest.mark.parametrize("name", [*BRANCHES, "n_four_bar.py"])
-def test_patterns_of_branches_leave_nothing_out(name):
-    """Sparse Jacobians in joint coordinates against full ones, at random velocities, accelerations, multipliers."""
-    start = begin(example(name).snapshot(), 0.0, None, None, "joint")
-    c = start.assembly.compiled
-    s, rng = c.structure, np.random.default_rng(0)
-    x = State.moving(c, 0.1, start.y[: s.nq], start.y[s.nq : s.nq + s.nv] + rng.normal(size=s.nv))
-    x.vdot, x.lam = rng.normal(size=s.nv), rng.normal(size=len(s.rows))
-    full = Equations(x)
-    touched = sparsity(s, full.width, c.system)[0].toarray()
-    rows = np.r_[np.arange(s.nv), np.arange(full.at["n"].start, full.at["n"].stop)]
-    for J in (full.by_position, full.by_velocity, full.by_acceleration):
-        size = np.abs(J.toarray())
-        assert not ((size > 1e-11 * size.max()) & ~touched)[rows].any()

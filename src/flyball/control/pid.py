@@ -80,6 +80,7 @@ class PID(Controller):
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse what has no effect, and what is missing."""
+        super().check(n)
         if self.kp == 0.0 and self.ki == 0.0 and self.kd == 0.0:
             raise ModelError(f"{self.title}: it has no gains; give at least one of kp, ki, kd")
         if self.kd != 0.0 and self.filter is None:

@@ -39,7 +39,7 @@ from .callbacks import meet
 from .dispatch import progress
 from .residual import Bench
 from .rows import way_of
-from .tasks import POSITION, RESIDUAL, STEPS, WATCH
+from .tasks import PARTS, POSITION, PUSHES, RESIDUAL, STEPS, WATCH
 from .tree import retract
 
 STEP = 1e-40
@@ -53,7 +53,8 @@ class Plan(NamedTuple):
     """Where the numbers of the Jacobian come from."""
 
     first: np.ndarray  # (END + 1,)
-    pick: np.ndarray  # (n, 2): by positions and velocities, then by accelerations: step, residual
+    pick: np.ndarray  # (n, 3): by positions and velocities: number, step, place in what is found; sums of these
+    mass: np.ndarray  # (n, 3): the same by accelerations
     metric: np.ndarray  # (nv,): D
     holonomic: np.ndarray  # (nr,): whether a row restrains positions
     valued: np.ndarray  # (nr,): and does so in its present mode
@@ -191,11 +192,11 @@ def linearise(t, k, A, K, c):
     lay(own.y[0], k, A, A[MOVED], K)
     through(A, POSITION)
     rows_of(S, W, K, P, k)
-    status = differentiate(A, K, A[MOVED], k, 0)
     first, last = P.first[PICKED_MASS], P.first[ROWS]
+    status = differentiate(A, A[MOVED], PARTS, P.pick, K.J[k, P.first[PICKED] : first])
     if P.fixed[0] == 0 or K.count[JACOBIANS] == 0:
         lay(own.y[0], k, A, A[PUSHED], K)
-        status += differentiate(A, K, A[PUSHED], k, first - P.first[PICKED])
+        status += differentiate(A, A[PUSHED], PUSHES, P.mass, K.J[k, first:last])
     elif k != START:
         for e in range(first, last):
             K.J[k, e] = K.J[START, e]
@@ -246,16 +247,17 @@ def lay(y, k, A, B, K):
 
 
 @formula
-def differentiate(A, K, B, k, begin):
-    """Numbers from pick ``begin`` on, by the steps on that bench. Returns a status."""
-    P = A[PLAN]
-    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, STEPS)
-    end = P.first[PICKED_MASS] - P.first[PICKED] if begin == 0 else P.pick.shape[0]
+def differentiate(A, B, task, pick, numbers):
+    """Numbers of the Jacobian, by the steps on that bench. Returns a status."""
+    enter(A[RESIDUALS], A[SC_], A[WC_], B, B, B, task)
+    for e in range(numbers.shape[0]):
+        numbers[e] = 0.0
+    for e in range(pick.shape[0]):
+        numbers[pick[e, 0]] += B.out[pick[e, 1], pick[e, 2]].imag
     bad = 0.0
-    for e in range(begin, end):
-        x = B.out[P.pick[e, 0], P.pick[e, 1]].imag / STEP
-        K.J[k, P.first[PICKED] + e] = x
-        bad += x - x
+    for e in range(numbers.shape[0]):
+        numbers[e] /= STEP
+        bad += numbers[e] - numbers[e]
     return 0 if bad == 0.0 else 1
 
 

@@ -107,20 +107,27 @@ def wide(T, k):
 
 
 @formula
+def acting(S, W, t, k):
+    """Records of frames F and M of force k between frames, and its wrench on M about M's origin."""
+    kind = S.force_i[k, FORCE_KIND]
+    F = load(W.FK, S.force_i[k, FORCE_F])
+    M = load(W.FK, S.force_i[k, FORCE_M])
+    par = wide(S.force_x, k)
+    a, b = inputs(kind, par, F, M)
+    x = (t + 0.0 * a, a, b)
+    force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
+    return F, M, force, torque
+
+
+@formula
 def forces(S, W, t, work):
     """Apply every force between frames to its bodies; the power of accounted ones goes to their work state."""
     for k in range(S.force_i.shape[0]):
         if S.force_i[k, FORCE_ALONG] != BETWEEN:
             continue
-        kind = S.force_i[k, FORCE_KIND]
         i = S.force_i[k, FORCE_F]
         j = S.force_i[k, FORCE_M]
-        F = load(W.FK, i)
-        M = load(W.FK, j)
-        par = wide(S.force_x, k)
-        a, b = inputs(kind, par, F, M)
-        x = (t + 0.0 * a, a, b)
-        force, torque = wrench(kind, par, F, M, (law(S, W, k, 0, x), law(S, W, k, 1, x), law(S, W, k, 2, x)), (a, b))
+        F, M, force, torque = acting(S, W, t, k)
         if S.frame_i[j] >= 0:
             act(W, S.frame_i[j], 1.0, force, torque, M[0])
         if S.frame_i[i] >= 0:
@@ -149,6 +156,18 @@ def way(S, W, k, rate):
 
 
 @formula
+def effort_of(S, W, t, k):
+    """Force k along a measured quantity, and the rate of that."""
+    m = S.force_i[k, FORCE_F]
+    x = W.sensed[VALUE, m]
+    rate = W.sensed[RATE, m]
+    o = 0.0 * x
+    pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
+    laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
+    return effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed), rate
+
+
+@formula
 def efforts(S, W, t, work, f):
     """Add every force along a measured quantity to the generalised forces ``f``; accounted ones as in ``forces``."""
     for k in range(S.force_i.shape[0]):
@@ -156,14 +175,8 @@ def efforts(S, W, t, work, f):
             if S.force_i[k, FORCE_ALONG] == SLIDING:
                 slide(S, W, k, work, f)
             continue
-        m = S.force_i[k, FORCE_F]
-        x = W.sensed[VALUE, m]
-        rate = W.sensed[RATE, m]
-        o = 0.0 * x
-        pressed = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]] if S.force_i[k, FORCE_LOAD] >= 0 else o
-        laws = (law(S, W, k, 0, (t + o, x, rate)), o, way(S, W, k, rate))
-        s = effort(S.force_i[k, FORCE_KIND], wide(S.force_x, k), x, rate, laws, pressed)
-        r = S.row_i.shape[0] + m
+        s, rate = effort_of(S, W, t, k)
+        r = S.row_i.shape[0] + S.force_i[k, FORCE_F]
         for e in range(S.row_p[r], S.row_p[r + 1]):
             f[S.col_i[e]] += s * W.G[e]
         if S.force_i[k, FORCE_WORK] >= 0:

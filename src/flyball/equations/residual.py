@@ -43,9 +43,10 @@ from .dispatch import row_biases, row_values, whole_rows
 from .friction import loads_end, reaction_loads
 from .kinematics import frame_motions, frames, poses
 from .loads import efforts, forces, gather, inertial
+from .parts import parts, pushes
 from .prescribed import prepare
 from .rows import measured, row_times
-from .tasks import ALONG, GAPS, STEPS
+from .tasks import ALONG, GAPS, PARTS, PUSHES, STEPS
 from .tree import column, motion, pose, retract
 
 
@@ -67,11 +68,14 @@ def residuals(S, W, bench, task):
 
     ``bench.out`` is filled with r, g, G v - nu, G vdot - gamma; then value, rate and acceleration of every measured
     quantity. With STEPS steps are taken as they are. With ALONG what drivers prescribe of tree joints is as their laws
-    say, whatever the steps are; with GAPS also, and only g and G v - nu are found.
+    say, whatever the steps are; with GAPS also, and only g and G v - nu are found. With PARTS the terms of r stand
+    behind all others in place of r (`parts`), with PUSHES those of the bodies alone.
     """
     nq = S.kinds[COORDINATES]
     nv = W.vel.shape[1]
     nr = S.row_i.shape[0]
+    known = nv + 3 * nr + 3 * measured(S)
+    behind = known + bench.steps.shape[1] - (3 * nv + 1)
     a = W.vel[V2]
     p = W.y[0]
     for n in range(bench.steps.shape[0]):
@@ -84,7 +88,7 @@ def residuals(S, W, bench, task):
             a[d] = bench.vdot[d] + bench.steps[n, 2 * nv + d]
         for c in range(3 * nv + 1, bench.steps.shape[1]):
             p[nq + c - 2 * nv - 1] += bench.steps[n, c]
-        if task != STEPS:
+        if task == ALONG or task == GAPS:
             prepare(S, W, t, p[:nq], p[nq : nq + nv])
             for b in range(S.body_i.shape[0]):
                 if S.body_i[b, BODY_LAW] >= 0:
@@ -95,11 +99,18 @@ def residuals(S, W, bench, task):
             for k in range(nr):
                 bench.out[n, nv + k] = W.row[G_VALUE, k]
                 bench.out[n, nv + nr + k] = row_times(S, W, k, p[nq : nq + nv]) - W.row[NU, k]
+        elif task == PUSHES:
+            for b in range(S.body_i.shape[0]):
+                pose(S, W, b, p[:nq])
+                accelerated(S, W, b, p[nq : nq + nv], a)
+            pushes(S, W, bench.out[n, behind:])
         else:
-            at_once(S, W, t, p, a, task != ALONG or S.mix_i.shape[0] > 0)
-            missed(S, W, t, p, bench.lam, bench.out[n])
-            known = nv + 3 * nr + 3 * measured(S)
-            for c in range(known, bench.out.shape[1]):
+            at_once(S, W, t, p, a, task == STEPS or S.mix_i.shape[0] > 0)
+            if task == PARTS:
+                missed_by_parts(S, W, t, p, bench.lam, bench.out[n], behind)
+            else:
+                missed(S, W, t, p, bench.lam, bench.out[n])
+            for c in range(known, behind):
                 bench.out[n, c] = -W.y[1, c - known]
     return 0
 
@@ -139,7 +150,6 @@ def missed(S, W, t, p, lam, out):
     nr = S.row_i.shape[0]
     v = p[nq : nq + nv]
     for k in range(nr):
-        W.row[LAM, k] = lam[k]
         out[nv + k] = W.row[G_VALUE, k]
         out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
         out[nv + 2 * nr + k] = -W.row[GAMMA, k]
@@ -148,11 +158,8 @@ def missed(S, W, t, p, lam, out):
         out[nv + 3 * nr + m] = W.sensed[VALUE, m]
         out[nv + 3 * nr + nm + m] = W.sensed[RATE, m]
         out[nv + 3 * nr + 2 * nm + m] = W.sensed[BIAS, m]
-    reaction_loads(S, W)
-    for n in range(2 * nm, loads_end(S, W)):
-        W.sensed[LOAD, n] = W.sensed[RETURNED, n]
     f = W.vel[F_APPLIED]
-    control(S, W, t, p[S.kinds[COORDINATES] + nv :], W.y[1])
+    told(S, W, t, p, lam)
     inertial(S, W)
     forces(S, W, t, W.y[1])
     gather(S, W, f)
@@ -162,6 +169,28 @@ def missed(S, W, t, p, lam, out):
     for k in range(nr):
         for e in range(S.row_p[k], S.row_p[k + 1]):
             out[S.col_i[e]] -= W.G[e] * lam[k]
+
+
+@formula
+def missed_by_parts(S, W, t, p, lam, out, first):
+    """G v - nu, and from ``first`` on the terms of r."""
+    nv, nr = W.vel.shape[1], S.row_i.shape[0]
+    v = p[S.kinds[COORDINATES] : S.kinds[COORDINATES] + nv]
+    for k in range(nr):
+        out[nv + nr + k] = row_times(S, W, k, v) - W.row[NU, k]
+    told(S, W, t, p, lam)
+    parts(S, W, t, lam, out[first:])
+
+
+@formula
+def told(S, W, t, p, lam):
+    """What forces are told besides motions: multipliers, loads of joints, states of controllers."""
+    for k in range(S.row_i.shape[0]):
+        W.row[LAM, k] = lam[k]
+    reaction_loads(S, W)
+    for n in range(2 * measured(S), loads_end(S, W)):
+        W.sensed[LOAD, n] = W.sensed[RETURNED, n]
+    control(S, W, t, p[S.kinds[COORDINATES] + W.vel.shape[1] :], W.y[1])
 
 
 @formula

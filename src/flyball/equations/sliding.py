@@ -83,24 +83,31 @@ def begins(S, way, velocity, square):
 
 @formula
 def slide(S, W, k, work, f):
-    """Add the friction -mu N d of a place of contact that slides along d; N is its load, the multiplier of its gap."""
-    s = S.force_i[k, FORCE_SWITCH]
-    work[S.force_i[k, FORCE_WORK]] = 0.0
-    if not slides(S, W, s):
-        return
-    d, e, speed = heading(S, W, W.sensed, s)
-    pressed, mu = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]], S.switch_x[s, SWITCH_SLIDING]
-    if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
-        mu = 1.0 + 0.0 * mu
-    push = -mu * pressed
+    """Add the friction of a place of contact to the generalised forces ``f``, and its power to its work."""
+    a, b, power = friction(S, W, k)
+    work[S.force_i[k, FORCE_WORK]] = power
     for side in range(2):
         m = S.force_i[k, FORCE_F] if side == 0 else S.force_i[k, FORCE_M]
         if m < 0:
             continue
         r = S.row_i.shape[0] + m
         for j in range(S.row_p[r], S.row_p[r + 1]):
-            f[S.col_i[j]] += push * (d if side == 0 else e) * W.G[j]
-    work[S.force_i[k, FORCE_WORK]] = push * speed
+            f[S.col_i[j]] += (a if side == 0 else b) * W.G[j]
+
+
+@formula
+def friction(S, W, k):
+    """-mu N d of a place of contact that slides along d, on each tangent, and its power; N is its gap's multiplier."""
+    s = S.force_i[k, FORCE_SWITCH]
+    if not slides(S, W, s):
+        o = 0.0 * W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]
+        return o, o, o
+    d, e, speed = heading(S, W, W.sensed, s)
+    pressed, mu = W.sensed[LOAD, S.force_i[k, FORCE_LOAD]], S.switch_x[s, SWITCH_SLIDING]
+    if pressed.real < 0.0 and mu.real > 1.0:  # past where it opens, to the end of the step: it must not run away
+        mu = 1.0 + 0.0 * mu
+    push = -mu * pressed
+    return push * d, push * e, push * speed
 
 
 @formula

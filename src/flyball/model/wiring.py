@@ -122,7 +122,6 @@ def _ringed(waiting: dict[str, Wired]) -> str:
 
 def check(model: Model, e: Controller) -> None:
     """Refuse a controller whose laws name what is not there, or depend on themselves."""
-    e.check_period(resolve(e, model.environment()))
     own = wiring_of(model, e)
     refuse_equal(e, own)
     for name, law in e.given().items():

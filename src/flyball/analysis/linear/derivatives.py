@@ -8,7 +8,6 @@ nothing in them is solved. Directions that no equation sees together are taken i
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -262,11 +261,8 @@ def refuse_functions(s: Structure) -> None:
         )
 
 
-def pattern(s: Structure, S: System, above: Sequence[Sequence[int]] = ()) -> Any:
-    """Which residuals can depend on which velocity's coordinate; sparse (width, nv).
-
-    In joint coordinates ``above`` are the bodies that each hangs on, itself included: what acts on it acts along the
-    coordinates of all these, and follows them.
+def pattern(s: Structure, S: System) -> Any:
+    """Which residuals can depend on which velocity's coordinate, in absolute coordinates; sparse (width, nv).
 
     An element's equations and the equations of motion of the bodies it acts on depend on the bodies that it touches;
     elements with laws that name sensors also on what these measure.
@@ -301,10 +297,6 @@ def pattern(s: Structure, S: System, above: Sequence[Sequence[int]] = ()) -> Any
         shape=(nr + nm, nb),
     )
     expand = sp.csr_matrix((np.ones(len(body)), (body, np.arange(len(body)))), shape=(nb, len(body)))
-    if above:
-        hangs = np.repeat(np.arange(nb), [len(x) for x in above]), np.concatenate([np.array(x) for x in above])
-        on = sp.csr_matrix((np.ones(len(hangs[0])), hangs), shape=(nb, nb))
-        bodies, lines = on.T @ bodies @ on, lines @ on
     sensed, rows = lines[nr:], lines[:nr]
     return sp.vstack([expand.T @ bodies @ expand, *(rows @ expand,) * 3, *(sensed @ expand,) * 3]).astype(bool)
 

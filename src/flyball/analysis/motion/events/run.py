@@ -87,7 +87,8 @@ class Run:
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
+        self.end = float(clock.real[ex.T_END])  # of the motion; the clock's own goes from leg to leg
+        self.first, self.span = here.t, self.end - here.t or 1.0
         self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
@@ -99,12 +100,11 @@ class Run:
         self.sampling = self._sampling(here.t)
 
     def _sampling(self, t: float) -> Sampling | None:
-        span, rows = (t, float(self.here.clock.real[ex.T_END])), (self.width, len(self.buffer))
-        return sampling(self.here.c, self.method, span, rows)
+        return sampling(self.here.c, self.method, (t, self.end), (self.width, len(self.buffer)))
 
     def _instant(self) -> float:
         """Until when the watched loop may run: the next instant of a sampled controller."""
-        return math.inf if self.sampling is None or self.loop is None else self.sampling.next()
+        return math.inf if self.sampling is None or self.loop is None else self.sampling.next(self.here.clock.times)
 
     def sampled(self) -> bool:
         """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ....equations.engine import MOTION
@@ -17,7 +15,6 @@ from ....tables.system import (
     FORCE_ALONG,
     FORCE_SWITCH,
     NV,
-    PARENT,
     SCHUR,
     SLIDING,
     SOLVER,
@@ -26,8 +23,8 @@ from ....tables.system import (
     System,
 )
 from ...compiled import Compiled
-from ...linear.derivatives import grouped, grouped_sparsity, pattern
 from ...linear.loads import pressing
+from .parts import Parts
 
 THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
 
@@ -49,8 +46,12 @@ class Layout:
         self.nx = len(s.controls) - len(s.sampled)
         self.n = 2 * (self.nv + self.nr) + self.nx
         self.width = self.nv + 3 * self.nr + 3 * len(s.measured) + self.nx
-        self.touched, self.group = sparsity(s, self.width - self.nx, S)
-        self.groups = int(self.group.max(initial=-1)) + 1
+        parts = Parts(s, S, self.nx)
+        at = np.cumsum([self.width, *(len(equations) for equations, _ in parts.all)])
+        of_states, of_rows = self.width - self.nx + np.arange(self.nx), self.nv + self.nr + np.arange(self.nr)
+        self.terms = parts.terms([*parts.all, *parts.states, *parts.rates], np.r_[at[:-1], of_states, of_rows])
+        self.mass = parts.terms(parts.bodies, at)
+        self.places, self.groups = int(at[-1]), self.terms.groups
         self.pressing = np.union1d(pressing(s), pressed(S)).astype(np.int64)
         self.valued = np.array([r.holonomic for r in s.rows], np.int64).reshape(self.nr)
         self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
@@ -61,41 +62,35 @@ class Layout:
         """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""
         nv, nr = self.nv, self.nr
         v, lam, mu = nv, 2 * nv, 2 * nv + nr
-        all_rows, all_columns = self.touched.indices, np.repeat(np.arange(nv), np.diff(self.touched.indptr))
-        r = all_rows < nv
-        n = (all_rows >= nv + nr) & (all_rows < nv + 2 * nr)
-        self.pick = np.concatenate([
-            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
-            np.column_stack([self.group[all_columns[n]], all_rows[n]]),
-            np.column_stack([self.groups + self.group[all_columns[r]], all_rows[r]]),
-            *self._picked(all_rows, all_columns),
-            np.column_stack([self.group[all_columns[r]], all_rows[r]]),
-        ]).astype(np.int64)  # fmt: skip
-        i, j = all_rows[r], all_columns[r]
-        k, m = all_rows[n] - nv - nr, all_columns[n]
-        a, b, nG = len(i), len(k), len(self.col_i)
-        first = np.cumsum([1, len(self.pick) - a, a, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
+        i, j, pick = self.terms.i, self.terms.j, self.terms.pick
+        ways, at, end = np.arange(nv), np.arange, nv + self.nx
+        own = 2 * (nv + nr) + at(self.nx)
+        both = (i < end) & (j < nv)  # what depends on velocities, too; of G v it is known how
+        again = np.cumsum(both) - 1 + len(i)
+        more = pick[both[pick[:, 0]]]
+        self.pick = np.r_[pick, np.column_stack([again[more[:, 0]], self.groups + more[:, 1], more[:, 2]])]
+        rows_at = np.r_[v + ways, own, lam + at(nr)]
+        columns_at = np.r_[ways, own]
+        a, c, nG = len(i), len(self.mass.i), len(self.col_i)
+        first = np.cumsum([1, a + both.sum(), c, nG, nG, nG, nr, 9 * len(self.turns), nv * len(self.pressing)])
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
-        self.spring = np.column_stack([i, j, picked + np.arange(a), mass + np.arange(a), picked + a + b + np.arange(a)])
-        self.spring = self.spring.astype(np.int64)
+        own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in their order
+        e = np.flatnonzero((i < nv) & (j < nv))
+        self.spring = np.column_stack([i[e], j[e], picked + e, own_mass[i[e]], picked + again[e]]).astype(np.int64)
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
         held = self.valued[row] == 1
         pressed = np.isin(row, self.pressing)
         free = np.flatnonzero(self.valued == 0)
-        ways = np.arange(nv)
-        at = np.arange
         one = [
             (ways, v + ways, None),  # - v: see below
-            (v + i, j, picked + at(a)),
-            (lam + k, m, picked + a + at(b)),
-            (v + i, v + j, picked + a + b + at(a)),
+            (rows_at[i], columns_at[j], picked + at(a)),
+            (rows_at[i[both]], v + j[both], picked + a + at(both.sum())),
             (lam + row, v + self.col_i, rows + at(nG)),
             (self.col_i[held], mu + row[held], metric + at(nG)[held]),
             (mu + row[held], self.col_i[held], valued_rows + at(nG)[held]),
             (v + self.col_i[~pressed], lam + row[~pressed], None),
             (mu + free, mu + free, np.zeros(len(free), int)),
-            *self._of_states(all_rows, all_columns, picked + 2 * a + b),
         ]
         for n_th, w in enumerate(self.turns.tolist()):
             x, y = np.meshgrid(at(3), at(3))
@@ -103,44 +98,19 @@ class Layout:
         for n_th, p in enumerate(self.pressing.tolist()):
             one.append((v + ways, np.full(nv, lam + p), presses + n_th * nv + at(nv)))
         if self.index_3:
-            loose = ~np.isin(k, np.flatnonzero(self.valued == 1))
-            one[2] = tuple(x[loose] for x in one[2])
-            one[4] = (np.r_[lam + row[held], lam + row[~held]], np.r_[self.col_i[held], v + self.col_i[~held]],
+            loose = ~np.isin(i - end, np.flatnonzero(self.valued == 1))
+            one[1] = tuple(x[loose] for x in one[1])
+            one[3] = (np.r_[lam + row[held], lam + row[~held]], np.r_[self.col_i[held], v + self.col_i[~held]],
                       rows + np.r_[at(nG)[held], at(nG)[~held]])  # fmt: skip
-            one[5] = one[6] = (at(0),) * 3
-            one[8] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
-        own = 2 * (nv + nr) + at(self.nx)
-        scaled = [(ways, ways, np.zeros(nv, int)), (v + i, v + j, mass + at(a)), (own, own, np.zeros(self.nx, int))]
+            one[4] = one[5] = (at(0),) * 3
+            one[7] = (mu + at(nr), mu + at(nr), np.zeros(nr, int))
+        scaled = [(ways, ways, np.zeros(nv, int)), (v + self.mass.i, v + self.mass.j, mass + at(c)),
+                  (own, own, np.zeros(self.nx, int))]  # fmt: skip
         valued = np.flatnonzero(self.valued == 1)
         soft = [(lam + at(nr), lam + at(nr), sizes + at(nr))]
         if not self.index_3:
             soft.append((mu + valued, mu + valued, sizes + valued))
         self._place(one, scaled, soft, rows + at(nG)[~pressed])
-
-    def _picked(self, rows: np.ndarray, columns: np.ndarray) -> list[np.ndarray]:
-        """Step and residual of numbers that states x have: x' - f by d, by v; r by x; x' - f by x."""
-        end, nx = self.width - self.nx, self.nx
-        f = rows >= end
-        own = 2 * self.groups + np.arange(nx)
-        return [
-            np.column_stack([self.group[columns[f]], rows[f]]),
-            np.column_stack([self.groups + self.group[columns[f]], rows[f]]),
-            np.column_stack([np.repeat(own, self.nv), np.tile(np.arange(self.nv), nx)]),
-            np.column_stack([np.repeat(own, nx), np.tile(end + np.arange(nx), nx)]),
-        ]
-
-    def _of_states(self, rows: np.ndarray, columns: np.ndarray, first: int) -> list[tuple[np.ndarray, ...]]:
-        """Entries of the same, in that order; their first number."""
-        nv, nx, x, at = self.nv, self.nx, 2 * (self.nv + self.nr), np.arange
-        f = rows >= self.width - nx
-        i, j = x + rows[f] - (self.width - nx), columns[f]
-        c, begin = len(i), first + 2 * len(i)
-        return [
-            (i, j, first + at(c)),
-            (i, nv + j, first + c + at(c)),
-            (np.tile(nv + at(nv), nx), x + np.repeat(at(nx), nv), begin + at(nx * nv)),
-            (np.tile(x + at(nx), nx), x + np.repeat(at(nx), nx), begin + nx * nv + at(nx * nx)),
-        ]
 
     def _place(self, one: list, scaled: list, soft: list, negative: np.ndarray) -> None:
         """Pattern and order of elimination; places of all entries in the matrix."""
@@ -148,7 +118,7 @@ class Layout:
         minus = int(self.first[-1])  # numbers behind the others: -1, and the negative entries of rows
         self.negative = negative
         one[0] = (*one[0][:2], np.full(nv, minus))
-        one[7] = (*one[7][:2], minus + 1 + np.arange(len(negative)))
+        one[6] = (*one[6][:2], minus + 1 + np.arange(len(negative)))
         groups = [one, scaled, soft]
         i, j, number = (np.concatenate([e[k] for g in groups for e in g]).astype(np.int64) for k in range(3))
         count = [sum(len(e[0]) for e in g) for g in groups]
@@ -200,32 +170,6 @@ def pressed(S: System) -> np.ndarray:
     """Rows of gaps of places of contact, whose multipliers the friction there follows."""
     sliding = S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING, FORCE_SWITCH]
     return np.asarray(S.switch_i[S.switch_i[sliding, SWITCH_OTHER], SWITCH_ROW], np.int64)
-
-
-def sparsity(s: Structure, width: int, S: System) -> tuple[Any, np.ndarray]:
-    """What each velocity can change, sparse (width, nv), and groups of velocities that change nothing together, (nv,).
-
-    In joint coordinates what acts on a body acts along the coordinates of all that it hangs on, and follows them.
-    Behind the residuals stand the rates of controllers' states.
-    """
-    if not s.tree and len(s.controls) == len(s.sampled):
-        return grouped_sparsity(s, width, S)
-    from scipy.sparse import csc_matrix, vstack
-
-    above: list[list[int]] = []
-    for b, parent in enumerate(S.body_i[:, PARENT].tolist() if s.tree else []):
-        above.append([b, *(above[parent] if parent >= 0 else ())])
-
-    def found() -> tuple[Any, np.ndarray]:
-        touched = csc_matrix(pattern(s, S, above))
-        nm = len(s.measured)
-        for x in s.controls[: len(s.controls) - len(s.sampled)]:
-            read = sorted({s.slots[k] % nm for k in x.law.names if s.slots.get(k, 2 * nm) < 2 * nm})
-            looks = touched[width - 3 * nm + np.array(read, np.int64)].sum(axis=0) > 0
-            touched = csc_matrix(vstack([touched, csc_matrix(looks)]), dtype=bool)
-        return touched, grouped(touched)
-
-    return s.kept.get("sparsity of implicit methods", None, 1, found)
 
 
 def layout(s: Structure, S: System, index_3: bool = False) -> Layout:

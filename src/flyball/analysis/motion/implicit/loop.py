@@ -51,8 +51,8 @@ class Implicit:
         y = clock.y[ex.NOW].copy()
         SC, WC = complex_tables(c)
         plan = Plan(
-            x.first, x.pick, metric(c, float(clock.real[ex.T]), y), x.valued, x.valued.copy(), x.turns, x.pressing,
-            np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative,
+            x.first, x.pick, x.mass.pick, metric(c, float(clock.real[ex.T]), y), x.valued, x.valued.copy(), x.turns,
+            x.pressing, np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative,
         )  # fmt: skip
         desk = self._desk(len(s.states), len(S.angle_i) > 0)
         self.means = Means(SC, WC, *self._benches(clock.y.shape[1]), plan, desk)
@@ -81,13 +81,13 @@ class Implicit:
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
         x = self.layout
         nv, nx, out = x.nv, x.nx, []
-        for kinds in ((0, 1), (2,), ()):
-            more = nx if 0 in kinds else 0
-            steps = np.zeros((len(kinds) * x.groups + more if kinds else 1, 3 * nv + 1 + nx), complex)
+        for kinds, terms in (((0, 1), x.terms), ((2,), x.mass), ((), x.mass)):
+            steps = np.zeros((len(kinds) * terms.groups if kinds else 1, 3 * nv + 1 + nx), complex)
             for n, kind in enumerate(kinds):
-                steps[n * x.groups + x.group, kind * nv + np.arange(nv)] = 1j * STEP
-            steps[len(kinds) * x.groups + np.arange(more), 3 * nv + 1 + np.arange(more)] = 1j * STEP
-            found = np.zeros((len(steps), x.width), complex)
+                steps[n * terms.groups + terms.group[:nv], kind * nv + np.arange(nv)] = 1j * STEP
+            if 0 in kinds:
+                steps[terms.group[nv:], 3 * nv + 1 + np.arange(nx)] = 1j * STEP
+            found = np.zeros((len(steps), x.places), complex)
             t, y, vdot, lam = (np.zeros(m, complex) for m in (1, ny, nv, x.nr))
             out.append(Bench(t, y, vdot, lam, steps, found))
         return out[0], out[1], out[2]

@@ -12,7 +12,7 @@ from ...linear.derivatives import refuse_functions
 from ...mobility import mobility
 from ..start import Start, begin_at
 from ..stiff import EXPLICIT
-from .layout import sparsity
+from .layout import layout
 
 RADAU, ALPHA, VARIATIONAL = "radau", "generalised-alpha", "variational"
 IMPLICIT = (RADAU, ALPHA, VARIATIONAL)
@@ -119,5 +119,4 @@ def _refuse_open_loads(begun: Start, method: str) -> None:
 def _groups(begun: Start) -> int:
     """How many evaluations a Jacobian takes in joint coordinates."""
     c = begun.assembly.compiled
-    nr, nm = len(c.structure.rows), len(c.structure.measured)
-    return int(sparsity(c.structure, c.structure.nv + 3 * nr + 3 * nm, c.system)[1].max(initial=-1)) + 1
+    return layout(c.structure, c.system).groups

@@ -1,0 +1,135 @@
+"""Which velocities each part of the equations depends on, and in which equations it stands: patterns of Jacobians."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from ....tables.specs import Structure
+from ....tables.system import (
+    ALONG,
+    BETWEEN,
+    FORCE_ALONG,
+    FORCE_F,
+    FORCE_LAW,
+    FORCE_LOAD,
+    FORCE_M,
+    NV,
+    PARENT,
+    SLIDING,
+    TERM_ROW,
+    V0,
+    System,
+)
+from ...linear.derivatives import grouped
+
+Part = tuple[np.ndarray, np.ndarray]
+"""Equations in which it stands, one after the other; what it depends on: velocities, of which also the positions, and
+states of controllers. Both are numbered so, and behind the equations of the states stand rates of the rows."""
+
+
+class Terms(NamedTuple):
+    """A sparse matrix of derivatives as sums of what steps of velocities change."""
+
+    i: np.ndarray  # equations and velocities of its entries
+    j: np.ndarray
+    pick: np.ndarray  # (n, 3): entry, step, place among what is found: sums of these
+    group: np.ndarray  # (nv + nx,): the step in which each velocity and state is taken
+
+    @property
+    def groups(self) -> int:
+        """How many steps there are."""
+        return int(self.group.max(initial=-1)) + 1
+
+
+class Parts:
+    """Parts of a mechanism in the order in which `equations/parts.py` writes them.
+
+    Parameters
+    ----------
+    s : Structure
+    S : System
+    nx : int
+        States of controllers that are unknowns.
+    """
+
+    def __init__(self, s: Structure, S: System, nx: int) -> None:
+        self.S, self.nv, self.nr, self.nx = S, s.nv, len(S.row_i), nx
+        nm = len(S.row_p) - 1 - self.nr
+        self.body = np.repeat(np.arange(len(S.body_i)), S.body_i[:, NV])
+        self.chain: list[np.ndarray] = []
+        for row in S.body_i:
+            own = np.arange(row[V0], row[V0] + row[NV])
+            self.chain.append(np.r_[own, self.chain[row[PARENT]]] if row[PARENT] >= 0 else own)
+        self.entries = [S.col_i[S.row_p[k] : S.row_p[k + 1]] for k in range(self.nr + nm)]
+        self.row = [self._hung(np.unique(self.body[e])) for e in self.entries]
+        states = s.nv + np.arange(nx)
+        self.told = np.r_[self._read(s, s.slots, nm), states]
+        self.bodies = [(c, np.unique(c)) for c in self.chain]
+        self.all = [*self.bodies, *self._between(), *zip(self.entries[: self.nr], self.row[: self.nr], strict=True)]
+        self.all += self._along()
+        laws = [x.law.names for x in s.controls[:nx]]
+        self.states = [(states[n : n + 1], np.r_[self._read(s, names, nm), states]) for n, names in enumerate(laws)]
+        self.rates = [(np.array([s.nv + nx + k]), row) for k, row in enumerate(self.row[: self.nr])]
+
+    def _read(self, s: Structure, names: Iterable[str], nm: int) -> np.ndarray:
+        """Velocities on which measured quantities depend, by the names that laws have for them."""
+        columns = {s.slots[name] for name in names if name in s.slots}
+        return _union([self.row[self.nr + m % nm] for m in sorted(columns) if m < 2 * nm])
+
+    def _hung(self, bodies: Sequence[int] | np.ndarray) -> np.ndarray:
+        """Velocities of bodies and of all that they hang on."""
+        return _union([self.chain[b] for b in bodies])
+
+    def _law(self, force: np.ndarray, own: np.ndarray) -> np.ndarray:
+        """With what its laws are told."""
+        return np.union1d(own, self.told) if (force[FORCE_LAW : FORCE_LAW + 3] >= 0).any() else own
+
+    def _between(self) -> list[Part]:
+        out = []
+        for force in self.S.force_i:
+            if force[FORCE_ALONG] == BETWEEN:
+                ends = [b for b in self.S.frame_i[force[[FORCE_M, FORCE_F]]] if b >= 0]
+                depends = self._law(force, self._hung(ends))
+                out += [(self.chain[b], depends) for b in ends]
+        return out
+
+    def _along(self) -> list[Part]:
+        out = []
+        for force in self.S.force_i:
+            if force[FORCE_ALONG] not in (ALONG, SLIDING):
+                continue
+            columns = [FORCE_F, FORCE_M] if force[FORCE_ALONG] == SLIDING else [FORCE_F]
+            lines = [self.nr + m for m in force[columns] if m >= 0]
+            loading = [self.S.term_i[x, TERM_ROW] for n, x in self.S.load_i if n == force[FORCE_LOAD] and x >= 0]
+            depends = self._law(force, _union([self.row[n] for n in [*lines, *loading]]))
+            out += [(self.entries[n], depends) for n in lines]
+        return out
+
+    def terms(self, some: Sequence[Part], first: np.ndarray) -> Terms:
+        """Derivatives of the sums of some parts, which begin at these places among what is found."""
+        group = self._groups([depends for _, depends in some])
+        none = np.zeros(0, np.int64)
+        i = np.concatenate([none, *(np.repeat(e, len(d)) for e, d in some)])
+        j = np.concatenate([none, *(np.tile(d, len(e)) for e, d in some)])
+        places = zip(first.tolist(), some, strict=False)
+        at = np.concatenate([none, *(np.repeat(n + np.arange(len(e)), len(d)) for n, (e, d) in places)])
+        n = max(self.nv + self.nx, 1)
+        keys, entry = np.unique(i * n + j, return_inverse=True)
+        pick = np.column_stack([entry, group[j], at])
+        return Terms(keys // n, keys % n, pick.astype(np.int64), group)
+
+    def _groups(self, together: Sequence[np.ndarray]) -> np.ndarray:
+        """What no part depends on together has one number, (nv + nx,)."""
+        from scipy.sparse import csc_matrix
+
+        part = np.repeat(np.arange(len(together)), [len(d) for d in together])
+        velocity = np.concatenate([np.zeros(0, np.int64), *together])
+        touched = csc_matrix((np.ones(len(part), bool), (part, velocity)), shape=(len(together), self.nv + self.nx))
+        return grouped(touched)
+
+
+def _union(some: Sequence[np.ndarray]) -> np.ndarray:
+    return np.unique(np.concatenate([np.zeros(0, np.int64), *some]))

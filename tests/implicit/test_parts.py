@@ -1,0 +1,72 @@
+"""Jacobians put together from the parts of the equations, against steps of one velocity at a time through the whole."""
+
+import numpy as np
+import pytest
+from scipy.sparse import csr_matrix
+
+import flyball as fb
+from flyball.analysis.linear.derivatives import Equations, State
+from flyball.analysis.linear.loads import STEP
+from flyball.analysis.motion.implicit.layout import layout
+from flyball.analysis.motion.start import begin
+from flyball.analysis.motion.touches import with_places
+from flyball.equations.residual import Bench, address, through_stepped
+from flyball.equations.tasks import PARTS, PUSHES
+from flyball.tables.system import FORCE_ALONG, FORCE_SWITCH, HELD, MODE, OFF, SLIDING, SWITCH_OTHER
+from tests.contract.test_everything import everything
+from tests.contract.zoo import joined
+from tests.mechanisms import example
+
+EXAMPLES = ("andrews.toml", "bricard.toml", "car_axis.toml", "governor.toml", "rolling_race.toml", "n_four_bar.py")
+JOINTS = ("Cam", "Cylindrical", "KnifeEdge", "RollingDisk", "Screw", "Universal")
+
+
+def sledge():
+    """A ball that slides on the floor, and a joint with friction that its reaction presses."""
+    m = fb.Mechanism("sledge", gravity=(0, 0, -9.81))
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 0, 1))), fb.Contact(friction=0.3))
+    m.add(fb.Body("a", shape=fb.Sphere(radius=0.1), density=200, position=(0, 0, 0.1), velocity=(1, 0.5, 0)))
+    m.add(fb.Body("b", mass=0.5, inertia=(0.1, 0.2, 0.3), position=(0.3, 0, 0.4), orientation=(0.1, 0.2, 0.3)))
+    m.add(fb.Revolute("pin", "a", "b", at=(0.1, 0, 0.2), axis=(1, 2, 0)))
+    m.add(fb.JointFriction("rubs", "pin", radius=0.02, kinetic=0.3, static=0.3, stick_speed=0.05))
+    return m
+
+
+MODELS = {n: lambda n=n: example(n) for n in EXAMPLES} | {n: lambda n=n: joined("space", n) for n in JOINTS}
+MODELS |= {"everything": everything, "sledge": sledge}
+
+
+@pytest.mark.parametrize("coordinates", ["absolute", "joint"])
+@pytest.mark.parametrize("name", MODELS)
+def test_jacobians_from_parts_are_those_of_the_whole(name, coordinates):
+    """At random velocities, accelerations and multipliers."""
+    start = begin(with_places(MODELS[name]().snapshot(), None), 0.0, None, None, coordinates, switches=True)
+    c = start.assembly.compiled
+    s, S, rng = c.structure, c.system, np.random.default_rng(0)
+    x = State.moving(c, 0.1, start.y[: s.nq], start.y[s.nq : s.nq + s.nv] + rng.normal(size=s.nv))
+    x.vdot, x.lam = rng.normal(size=s.nv), rng.normal(size=len(s.rows))
+    full = Equations(x)
+    SC, WC = full.complex_tables
+    for force in S.force_i[S.force_i[:, FORCE_ALONG] == SLIDING]:
+        slip = force[FORCE_SWITCH]
+        WC.switch[MODE, slip], WC.switch[MODE, S.switch_i[slip, SWITCH_OTHER]] = OFF, HELD
+    made, nv = layout(s, S), s.nv
+
+    def by(kinds, terms, task):
+        steps = np.zeros((len(kinds) * terms.groups, 3 * nv + 1), complex)
+        for n, kind in enumerate(kinds):
+            steps[n * terms.groups + terms.group, kind * nv + np.arange(nv)] = 1j * STEP
+        out = np.zeros((len(steps), made.places), complex)
+        t, y, vdot, lam = np.array([x.t + 0j]), x.y.astype(complex), x.vdot.astype(complex), x.lam.astype(complex)
+        bench = Bench(t, y, vdot, lam, steps, out)
+        through_stepped(address(SC, WC, bench), SC, WC, bench, task)
+        entry, step, place = terms.pick.T
+        found = [out[step + n * terms.groups, place].imag / STEP for n in range(len(kinds))]
+        size = nv + len(s.rows), nv
+        return [csr_matrix((f, (terms.i[entry], terms.j[entry])), shape=size).toarray() for f in found]
+
+    (P, D), (M,) = by((0, 1), made.terms, PARTS), by((2,), made.mass, PUSHES)
+    for J, whole in ((P, full.by_position), (D, full.by_velocity), (M, full.by_acceleration)):
+        exact = whole.toarray()[np.r_[np.arange(nv), np.arange(full.at["n"].start, full.at["n"].stop)]]
+        size = nv if J is M else len(exact)
+        assert np.abs(J - exact)[:size].max() <= 1e-11 * max(1.0, np.abs(exact).max())
