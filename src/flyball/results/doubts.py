@@ -117,17 +117,18 @@ def _stretches(result: Result) -> Iterable[tuple[int, int]]:
 def _rest(result: Result) -> float:
     """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
 
-    Where works are done, some of it perhaps between two rows, also what they are looked at by: to move all by the
-    mechanism's length in the time there is.
+    Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
+    rows have them.
     """
     rounding = 1e-12 * float(np.abs(result.energy.potential).max(initial=0.0))
-    S, length = result.values.system, result.values.length
-    mass = float(S.body_x[:, MASS].sum())
-    creep = mass * (AT_REST * length) ** 2
+    S, r = result.values.system, result.records
+    mass = S.body_x[:, MASS]
+    least = rounding + float(mass.sum()) * (AT_REST * result.values.length) ** 2
     span = float(np.ptp(result.t)) if len(result.t) else 0.0
     if not result.energy.work or not span > 0.0:
-        return rounding + creep
-    return rounding + creep + balanced(result) * mass * min(length / span, 1e150) ** 2
+        return least
+    went = (mass[b] * sum(np.ptp(x) ** 2 for x in r.body(b)[0]) for b in range(len(mass)))
+    return least + balanced(result) * float(sum(went)) / max(span, 1e-150) ** 2
 
 
 def _violation(result: Result) -> str:
