@@ -14,6 +14,7 @@ import numpy as np
 from ..compiler.bound import Bound
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
+from ..math.scalar import magnitude
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -22,6 +23,7 @@ from ..numerics.integrators.watched import begun, onward
 from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, TERMS, watching
 from ..tables.system import (
     BIAS,
+    G_BACK,
     G_SHARED,
     GUARD_KIND,
     GUARD_WAY,
@@ -44,6 +46,7 @@ from .sharing import GRAIN, Sharing, margin, renewed, terms
 from .tasks import MOTION
 
 EXPECTED = 7
+LEFT = 1e-10  # of `Watch.tied`, of the fastest rate: what rows that hold leave of others
 
 
 @formula
@@ -51,9 +54,25 @@ def all_guards(A, W, t, K, row):
     """Guards by what stands in W, that of the group last, to a row; then its terms."""
     S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
     guards(S, W, t, out)
+    kept_at_zero(S, W, K, out)
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         out[last] = margin(S, W, t, A[GROUP])
         K.count[TERMS] = terms(A[GROUP], out, last + 1)
+
+
+@formula
+def kept_at_zero(S, W, K, out):
+    """Take from guards that what holds keeps at zero what it leaves of them."""
+    fastest = -1.0
+    for i in range(K.tied.shape[0]):
+        if K.tied[i] > 0.0:
+            least = LEFT * K.tied[i]
+            if S.guard_i[i, GUARD_KIND] == G_BACK:
+                if fastest < 0.0:
+                    for m in range(measured(S)):
+                        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+                least = LEFT * max(fastest, K.tied[i])
+            out[i] -= min(max(out[i], -least), least)
 
 
 @formula

@@ -36,6 +36,7 @@ class Watch(NamedTuple):
     way: np.ndarray  # (ng,): which passing of zero is an event
     kept: np.ndarray  # (ng,): 1 of those that are above zero by what holds now
     grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    tied: np.ndarray  # (ng,): size of what those are of that others keep at zero; 0 of the rest
     side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
     g: np.ndarray  # (GUARDS, ng + terms of a group)
@@ -133,6 +134,7 @@ def watching(
         way=np.array(way, np.int64),
         kept=np.array(holding, np.int64),
         grain=np.zeros(ng),
+        tied=np.zeros(ng),
         side=np.full(ng, UNKNOWN),
         fired=np.zeros(ng, np.int64),
         g=g,

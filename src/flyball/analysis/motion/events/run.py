@@ -47,6 +47,7 @@ from .actions import expressions, say_never, stepped_over, true_already
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
+from .idle import tie
 from .instant import instant_of
 from .legs import Legs, breaks
 from .sampling import sampling
@@ -246,7 +247,7 @@ class Run:
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
-        c, clock = self.here.c, self.here.clock
+        here, c, clock = self.here, self.here.c, self.here.clock
         before = time.perf_counter()
         weight = WEIGHT if self.now in IMPLICIT else 1.0
         clock.count[ex.QUOTA] = self.part.most(self.pace.limited(clock, self.quota), weight)
@@ -257,6 +258,7 @@ class Run:
             elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
+                tie(here, self.loop)
                 used = self.loop.go_on(c.system, c.work, self.buffer)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
