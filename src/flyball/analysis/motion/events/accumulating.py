@@ -11,10 +11,16 @@ import math
 from collections.abc import Iterable
 from itertools import pairwise
 
+import numpy as np
+
+from ....tables.system import VALUE
+from .here import Here
+
 MANY = 8192  # times that one has happened, at least
 RATIOS = 4  # of these that are the same
 STEADY = 1.25  # largest of them by the least
 LESS = 0.95  # a ratio of a series with an end
+EMPTY = 500  # events in a row of which nothing comes
 
 
 class Counts:
@@ -22,6 +28,8 @@ class Counts:
 
     def __init__(self) -> None:
         self.times: dict[int, tuple[int, list[float]]] = {}
+        self.empty = 0
+        self._before: tuple[np.ndarray, np.ndarray, int] | None = None
 
     def add(self, fired: Iterable[int], t: float) -> None:
         """Count guards that fire at t [s]."""
@@ -31,6 +39,15 @@ class Counts:
             if n & (n - 1) == 0:
                 past.append(t)
             self.times[g] = n, past
+
+    def nothing(self, here: Here) -> bool:
+        """Whether nothing came of the last events, one after the other: no mode, no way, nothing to tell."""
+        W = here.c.work
+        now = W.switch.copy(), W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :].copy(), len(here.records)
+        old, self._before = self._before, now
+        same = old is not None and old[2] == now[2] and all(np.array_equal(a, b) for a, b in zip(old[:2], now[:2], strict=True))
+        self.empty = self.empty + 1 if same else 0
+        return self.empty >= EMPTY
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:
         """One of these that never gets to ``until`` [s]: its guard, how often it has fired, where it accumulates."""
