@@ -30,7 +30,8 @@ def pair(kind: str) -> fb.Mechanism:
 def changes() -> list[float]:
     """When the force between the masses changes its sign: f1 / 2 = f0."""
     return [
-        brentq(lambda t: (np.cos(2 * t) + 0.3) / 2 + 0.2 * np.cos(3 * t), *x) for x in ((0.6, 1), (1.8, 2.2), (4, 4.6), (5.2, 5.8))
+        brentq(lambda t: (np.cos(2 * t) + 0.3) / 2 + 0.2 * np.cos(3 * t), *x)
+        for x in ((0.6, 1), (1.8, 2.2), (4, 4.6), (5.2, 5.8))
     ]
 
 
@@ -54,13 +55,18 @@ def test_a_freewheel_at_the_end_of_its_play_locks(kind: str, kw: dict) -> None:
 def test_a_brake_lets_go_the_way_that_is_free(other: str, static: float, kw: dict) -> None:
     m = fb.Mechanism("braked", planar=True, gravity=(0, 0))
     m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("s", "ground", "b", at=(0, 0), axis=(1, 0)))
-    m.add(fb.Actuator("a", "s.displacement", force="-2*sin(t)"), fb.Brake("br", "s.displacement", capacity=1, static=static))
+    m.add(
+        fb.Actuator("a", "s.displacement", force="-2*sin(t)"),
+        fb.Brake("br", "s.displacement", capacity=1, static=static),
+    )
     m.add(fb.OneWay("o", "s.displacement") if other == "oneway" else fb.Limit("o", "s.displacement", lower=0.0))
     r = m.simulate(4, outputs=3, progress=False, **kw)
     t0 = np.pi + np.arcsin(static / 2)
     s = 4 - t0
     assert r.events[0].t == pytest.approx(t0, abs=1e-9)
-    assert r["s.displacement"][-1] == pytest.approx(2 * (np.sin(4) - np.sin(t0)) - 2 * np.cos(t0) * s - s * s / 2, abs=1e-9)
+    assert r["s.displacement"][-1] == pytest.approx(
+        2 * (np.sin(4) - np.sin(t0)) - 2 * np.cos(t0) * s - s * s / 2, abs=1e-9
+    )
 
 
 def test_what_begins_with_no_force_is_no_impact() -> None:

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from ....numerics.integrators.clock import SPAN
 from ....tables.system import VALUE
 from .here import Here
 
@@ -21,6 +22,7 @@ RATIOS = 4  # of these that are the same
 STEADY = 1.25  # largest of them by the least
 LESS = 0.95  # a ratio of a series with an end
 EMPTY = 500  # events in a row of which nothing comes
+NOWHERE = 1e-3  # of the time span, within which they are without end
 
 
 class Counts:
@@ -29,7 +31,8 @@ class Counts:
     def __init__(self) -> None:
         self.times: dict[int, tuple[int, list[float]]] = {}
         self.empty = 0
-        self._before: tuple[np.ndarray, np.ndarray, int] | None = None
+        self._since = 0.0
+        self._before: tuple[np.ndarray, int] | None = None
 
     def add(self, fired: Iterable[int], t: float) -> None:
         """Count guards that fire at t [s]."""
@@ -43,11 +46,14 @@ class Counts:
     def nothing(self, here: Here) -> bool:
         """Whether nothing came of the last events, one after the other: no mode, no way, nothing to tell."""
         W = here.c.work
-        now = W.switch.copy(), W.sensed[VALUE, W.sensed.shape[1] - W.switch.shape[1] :].copy(), len(here.records)
+        first = W.sensed.shape[1] - W.switch.shape[1]
+        now = np.vstack((W.switch, W.sensed[VALUE, first:])), len(here.records)
         old, self._before = self._before, now
-        same = old is not None and old[2] == now[2] and all(np.array_equal(a, b) for a, b in zip(old[:2], now[:2], strict=True))
-        self.empty = self.empty + 1 if same else 0
-        return self.empty >= EMPTY
+        same = old is not None and old[1] == now[1] and np.array_equal(old[0], now[0])
+        if not same or self.empty == 0:
+            self.empty, self._since = 0, here.t
+        self.empty += 1
+        return self.empty >= EMPTY and here.t - self._since < NOWHERE * here.clock.real[SPAN]
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:
         """One of these that never gets to ``until`` [s]: its guard, how often it has fired, where it accumulates."""
