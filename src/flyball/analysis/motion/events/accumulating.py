@@ -43,8 +43,11 @@ class Counts:
                 past.append(t)
             self.times[g] = n, past
 
-    def nothing(self, here: Here) -> bool:
-        """Whether nothing came of the last events, one after the other: no mode, no way, nothing to tell."""
+    def nothing(self, here: Here) -> tuple[int, float] | None:
+        """How many events nothing came of, one after the other, and within which time [s], where these have no end.
+
+        No mode, no way, nothing to tell.
+        """
         W = here.c.work
         first = W.sensed.shape[1] - W.switch.shape[1]
         now = np.vstack((W.switch, W.sensed[VALUE, first:])), len(here.records)
@@ -53,7 +56,9 @@ class Counts:
         if not same or self.empty == 0:
             self.empty, self._since = 0, here.t
         self.empty += 1
-        return self.empty >= EMPTY and here.t - self._since < NOWHERE * here.clock.real[SPAN]
+        within = here.t - self._since
+        endless = self.empty >= EMPTY and within < NOWHERE * here.clock.real[SPAN]
+        return (self.empty, within) if endless else None
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:
         """One of these that never gets to ``until`` [s]: its guard, how often it has fired, where it accumulates."""

@@ -280,9 +280,9 @@ class Run:
         fired = self.loop.fired if self.loop else ()
         self.recent.append(here.t)
         self.latest.append(fired)
-        since = self.recent[-1] - self.recent[0]
-        if (len(self.recent) == ENDLESS and since < AT_ONCE * self.span) or self.counts.nothing(here):
-            raise endless(instant_of(here), self.latest, len(self.recent), since)
+        many, since = len(self.recent), self.recent[-1] - self.recent[0]
+        if often := (many, since) if many == ENDLESS and since < AT_ONCE * self.span else self.counts.nothing(here):
+            raise endless(instant_of(here), self.latest, *often)
         self.counts.add(fired, here.t)
         if found := self.counts.accumulate(fired, self.legs.end):
             raise accumulating(instant_of(here), *found)
