@@ -334,9 +334,9 @@ class Run:
         here = self.here
         if self.loop is not None:
             as_grains(here, self.loop)
-        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
-        near = REACHED * max(1.0, here.c.values.length)
-        at = (np.abs(values) <= near) & np.isin(kinds, (*DISTANCES, G_BACK))
+        n, (kinds, of) = instant_of(here), here.c.system.guard_i[:, [GUARD_KIND, GUARD_OF]].T
+        values, sides = n.guards(), np.isin(kinds, (*DISTANCES, G_BACK))
+        at = sides & (np.abs(values) <= REACHED * n.unit[np.where(sides, of, 0)]) if sides.any() else sides
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)
