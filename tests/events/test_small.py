@@ -42,6 +42,20 @@ def test_it_comes_to_rest_on_the_floor(size, restitution, inertia, own):
     assert [x.t for x in r.events if x.kind == "rest"] == pytest.approx([over], rel=1e-8)
 
 
+def test_far_from_the_origin():
+    """A block of 2 mm a hundred metres away, where places are known to 1e-14 m, comes to rest too."""
+    at, e, over = 100.0, 0.6, 4 * np.sqrt(2 * HEIGHT * 1e-2 / 9.81)
+    m = fb.Mechanism("far", planar=True, gravity=(0, -9.81))
+    slab = fb.Box(edges=(0.2, 0.01, 0.01), looks=True, contact=True)
+    m.add(fb.Ground("floor", position=(at, at - 0.005), shape=slab), fb.Contact(friction=0.3, restitution=e))
+    box = fb.Box(edges=(EDGE * 1e-2,) * 3, looks=True, contact=True)
+    m.add(fb.Body("b", mass=1, inertia=1e-5, position=(at, at + (0.5 * EDGE + HEIGHT) * 1e-2), shape=box))
+    r = m.simulate(2 * over, outputs=2, method="dop853")
+    assert r["b.y"][-1] - at == pytest.approx(0.5 * EDGE * 1e-2, abs=1e-11)
+    assert len(r.events) < 50
+    assert min(x.t for x in r.events if x.kind == "rest") == pytest.approx(over, rel=1e-4)
+
+
 def test_what_begins_beneath_sinks_no_deeper():
     """A ball that begins at -1e-9 going up at 1e-5, and is thrown back where it is told of: never deeper than that."""
 
