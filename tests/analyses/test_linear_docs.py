@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import doctest
 import re
 from pathlib import Path
 
 import pytest
 
 from flyball.cli import app
+from tests.pages import assert_examples_run, page
 
-PAGE = (Path(__file__).parents[2] / "docs" / "linear.md").read_text(encoding="utf-8")
+PAGE = page("linear.md")
 
 
 def test_examples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    code = re.sub(r"^```\w*$", "", PAGE, flags=re.M)
-    code = re.sub(r"^>>> (\w+\.add\()", r">>> _ = \1", code, flags=re.M)  # it returns the last element
-    test = doctest.DocTestParser().get_doctest(code, {}, "linear.md", None, 0)
-    assert len(test.examples) > 25
-    said: list[str] = []
-    failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
-    assert failed == 0, "".join(said)
+    assert_examples_run("linear.md", 26)
     written = ["bode.png", "eigenvalues.png", "locus.png", "modes.html", "over_k.png", "pendulum.png"]
     assert sorted(p.name for p in tmp_path.iterdir()) == written
 

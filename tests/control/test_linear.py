@@ -93,9 +93,6 @@ def test_what_is_not_at_rest_is_refused():
     m = slide(fb.Integrator("sum", of="1"), force="0.0*sum")
     with pytest.raises(fb.AnalysisError, match="sum"):
         m.linearize()
-    sampled = slide(fb.PID("pid", setpoint="0", measured="A.displacement", kp=1, period=0.1))
-    with pytest.raises(fb.ModelError, match="PID 'pid', sampled"):
-        sampled.linearize()
 
 
 def test_equilibrium_has_what_the_integral_must_carry():
@@ -148,3 +145,29 @@ def test_sensitivity_of_a_motion_is_that_of_the_exponential():
         for i, what in enumerate(of):
             assert s[what, name] == pytest.approx(d[:, i], rel=1e-6, abs=1e-6 * np.abs(d[:, i]).max())
     assert s.values[:, 1] == pytest.approx(exact(*at)[:, 1].real, rel=1e-7, abs=1e-7)
+
+
+def test_modes_are_those_of_the_closed_loop():
+    """Two masses on slides, a spring between them, a PD with a lag: eigenvalues of the linear model, shapes of bodies."""
+    m = fb.Mechanism("two", planar=True)
+    for n in "ab":
+        m.add(fb.Body(n, mass=1.0, inertia=1.0), fb.Prismatic(n.upper(), "ground", n, at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("weak", "A.displacement", stiffness=10))
+    m.add(fb.Sensor("a_at", "A.displacement"), fb.Sensor("b_at", "B.displacement"))
+    m.add(fb.Lag("slow", of="B.displacement", time=0.1))
+    m.add(fb.Actuator("left", coordinate="A.displacement", force="50*(b_at - a_at) - 20*slow"))
+    m.add(fb.Actuator("right", coordinate="B.displacement", force="50*(a_at - b_at)"))
+    found = m.modes()
+    A = np.zeros((5, 5))  # a, b, a', b', slow
+    A[:2, 2:4] = np.eye(2)
+    A[2], A[3], A[4] = (-60, 50, 0, 0, -20), (50, -50, 0, 0, 0), (0, 10, 0, 0, -10)
+    w, v = np.linalg.eig(A)
+    assert found.eigenvalues == pytest.approx(sorted(w[w.imag >= 0], key=abs), rel=1e-9)
+    assert m.linearize().eigenvalues.size == 5
+    assert all(name.startswith(("A.", "B.")) for name in found.names)
+    for k, one in enumerate(found.eigenvalues):
+        exact = v[:2, np.argmin(np.abs(w - one))]
+        ratio = found.shapes[:, k] / exact
+        assert ratio == pytest.approx([ratio[0]] * 2, rel=1e-7)
+    with pytest.raises(fb.ModelError, match="PID 'pid', sampled, and modes is about continuous time"):
+        slide(pid(period=0.01), r=0.0).modes()

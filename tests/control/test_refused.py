@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 import flyball as fb
 from tests.control.slide import slide
 
 
-def test_rings_are_named():
-    a = fb.Lag("a", of="b", time=1, lead=0.5)
-    b = fb.PID("b", setpoint="a", measured="A.displacement", kp=2)
-    with pytest.raises(fb.ModelError, match=r"b\.output -> .*a\.output -> a\.input -> b\.output"):
-        slide(a, b, force="b")
-
-
 def test_rings_in_a_file_are_named_at_their_line(tmp_path):
-    m = slide(fb.Lag("a", of="b", time=1), fb.Lag("b", of="a", time=1), force="a")
+    m = slide(fb.Lag("a", of="b", time=1), fb.Lag("b", of="a*a", time=1), force="a")
     m.save(tmp_path / "m.toml")
     text = (tmp_path / "m.toml").read_text().replace("time = 1.0", "time = 1.0\nlead = 0.5")
     (tmp_path / "m.toml").write_text(text)
@@ -70,10 +65,28 @@ def test_names():
         m.add(fb.Transfer("D", of="1", num=[1, 0], den=[1]))
 
 
+def test_values_of_parameters_that_make_no_sense():
+    """Those of a single run are looked at as those of the model are."""
+    m = slide(fb.Lag("lag", of="1", time="T"), fb.State("x", next="x", period="P"), force="lag + x", T=1.0, P=0.1)
+    for name, value, said in (("T", -1.0, "Lag 'lag': time is -1 s"), ("P", 0.0, "State 'x': period is 0 s")):
+        with pytest.raises(fb.ModelError, match=said):
+            m.simulate(1, parameters={name: value})
+    with pytest.raises(fb.ModelError, match="num has no coefficients"):
+        m.add(fb.Transfer("none", of="1", num=[], den=[1, 1]))
+    with pytest.raises(fb.ModelError, match="its matrices are complex"):
+        fb.StateSpace.from_control("c", SimpleNamespace(A=[[1j]], B=[[1]], C=[[1]], D=[[0]]), inputs="1")
+
+
+def test_friction_of_a_negative_coefficient_in_a_single_run():
+    m = slide(fb.Lag("lag", of="1", time=1), force="lag", mu=0.1)
+    m.add(fb.JointFriction("dry", joint="A", static="mu"))
+    with pytest.raises(fb.ModelError, match="static is -1; it must be zero or greater"):
+        m.simulate(1, parameters={"mu": -1.0})
+
+
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda m: m.modes(),
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
         lambda m: m.sensitivity(["A.displacement"], ["k"]),

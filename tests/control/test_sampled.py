@@ -178,6 +178,26 @@ def test_periods_are_parameters():
     assert m.simulate(1.06)["count.output"][-1] == 11
 
 
+def test_an_event_sets_a_period():
+    """From then on it acts at multiples of the new one, to the end of the motion."""
+    m = slide(fb.State("count", next="count + 1", period="T"), force="0.0*count", T=0.1)
+    m.add(fb.Event("faster", "t - 0.52", do=fb.Set("T", 0.05)))
+    r = m.simulate(1, outputs=[0.5, 0.54, 0.55, 0.6, 0.99])
+    assert r["count.output"].tolist() == [6, 6, 7, 8, 15]
+    m.replace(fb.Event("faster", "t - 0.52", do=fb.Set("T", 0.0)))
+    with pytest.raises(fb.SimulationError, match="period is 0 s; it must be greater than 0"):
+        m.simulate(1)
+
+
+def test_an_instant_and_a_time_of_output_that_rounding_parts_are_one():
+    """51 * 0.1 is a unit in the last place behind 5.1: the row there is that of what is held from then on."""
+    for more in ([], [fb.Event("never", "A.displacement - 5")]):
+        m = slide(fb.State("count", next="count + 1", period=0.1), force="0.0*count")
+        m.add(*more)
+        r = m.simulate(6, t_start=5.0, outputs=11)
+        assert r["count.output"].tolist() == [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 10]
+
+
 @pytest.mark.parametrize(
     ("make", "said"),
     [
@@ -195,3 +215,5 @@ def test_refused(make, said):
         fb.StateSpace.from_control("b", ct.ss([[0.5]], [[1]], [[1]], [[0]], True), inputs="1")
     with pytest.raises(fb.ModelError, match="the system is continuous; sample it"):
         fb.StateSpace.from_control("b", ct.ss([[0.5]], [[1]], [[1]], [[0]]), inputs="1", period=T)
+    with pytest.raises(fb.ModelError, match=r"own period is 0\.1 s, and period=0\.2 is given"):
+        fb.StateSpace.from_control("b", ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1), inputs="1", period=0.2)

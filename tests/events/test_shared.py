@@ -200,3 +200,24 @@ def test_a_ball_rolls_in_a_groove(layer):
     assert run["ball.omega_x"][-1] == pytest.approx(-run["ball.vy"][-1] / (0.1 / np.sqrt(2)), rel=1e-9)
     assert not run.health.warnings and len(run.events) <= 1
     within_cones(run, 0.5)
+
+
+@pytest.mark.parametrize("rtol", [1e-5, 1e-7, 1e-10])
+@pytest.mark.parametrize("layer", LAYERS)
+@pytest.mark.parametrize(("e", "x"), [(0.0, 0.0), (0.5, 0.0), (0.5, 0.01)])
+def test_a_ball_at_rest_in_a_groove_needs_no_friction(e, x, layer, rtol):
+    """So nothing is open there, whatever its two places share; a torque turns it when both are at their cones.
+
+    N1 + N2 = 2 W cos 45 / (1 + mu^2) then, the torque mu r (N1 + N2).
+    """
+    m = fb.Mechanism("groove", planar=True, gravity=(0, -G))
+    m.add(fb.Ground("left", shape=fb.Plane(normal=(1, 1))), fb.Ground("right", shape=fb.Plane(normal=(-1, 1))))
+    m.add(fb.Body("ball", shape=fb.Sphere(radius=0.1, mass=1), position=(x, 0.1 * np.sqrt(2) + 0.5)))
+    m.add(fb.Contact(friction=0.3, restitution=e))
+    m.add(fb.PointTorque("turn", "ball", torque="where(t < 1.2, 0, t - 1.2)"))
+    run = m.simulate(2.0, outputs=[0, 1.1, 1.5, 2], rtol=rtol, coordinates=layer)
+    assert run["ball.y"][2] == pytest.approx(0.1 * np.sqrt(2), abs=1e-9) and not run.health.warnings
+    slip = next(v for v in run.events if v.kind == "slip" and v.t > 1.2)
+    assert slip.t == pytest.approx(1.2 + 0.3 * 0.1 * 2 * G * np.sqrt(0.5) / 1.09, abs=1e-8)
+    assert run["ball.angle"][2] == pytest.approx(run["ball.angle"][1], abs=1e-12)
+    assert run["ball.angle"][3] > run["ball.angle"][2] + 1

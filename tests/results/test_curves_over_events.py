@@ -136,3 +136,23 @@ def test_what_a_spring_gives_is_not_what_a_change_of_it_stores():
 def test_a_planar_body_has_a_quaternion():
     r = slide().simulate(0.1, outputs=2)
     assert r["b.quaternion"] == pytest.approx(np.array([[1, 0, 0, 0]] * 2))
+
+
+def test_just_before_and_after_works_are_what_they_are():
+    """A spring: work 1 - E before k is doubled and after it, at a half; event_work is what the change stored."""
+    m = slide(fb.CoordinateSpring("s", "P.displacement", stiffness="idle"))
+    m.add(
+        fb.Event("half", "t > 0.3", do=[fb.Set("idle", 20.0)]), fb.Event("kick", "t > .6", do=[fb.Impulse("b", (1, 0))])
+    )
+    whole = m.simulate(1.0, outputs=3, **HOW)
+    first = m.simulate(0.5, outputs=2, **HOW)
+    later = m.simulate(1.0, start=first, outputs=2, **HOW)
+    for r, e in ((whole, whole.events[0]), (whole, whole.events[1]), (later, later.events[0])):
+        given = e.after["energy.kinetic"] - e.before["energy.kinetic"]  # by the blow
+        stored = e.after["s.energy"] - e.before["s.energy"]  # by the change of k
+        assert e.before["s.work"] == pytest.approx(e.before["energy.kinetic"] - 0.5, abs=1e-8)
+        assert e.after["s.work"] == pytest.approx(e.before["s.work"], abs=1e-12)
+        assert e.after["energy.event_work"] - e.before["energy.event_work"] == pytest.approx(given + stored, abs=1e-9)
+        assert e.after["energy.total"] - e.after["energy.event_work"] == pytest.approx(
+            r.energy.total[-1] - r.energy.event_work[-1], abs=1e-7
+        )

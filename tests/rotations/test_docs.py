@@ -4,21 +4,15 @@ from __future__ import annotations
 
 import doctest
 import re
-from pathlib import Path
 
 from flyball import rotations
+from tests.pages import assert_examples_run, page
 
-PAGE = (Path(__file__).parents[2] / "docs" / "rotations.md").read_text(encoding="utf-8")
+PAGE = page("rotations.md")
 
 
 def test_examples():
-    code = re.sub(r"^```\w*$", "", PAGE, flags=re.M)
-    test = doctest.DocTestParser().get_doctest(code, {}, "rotations.md", None, 0)
-    assert len(test.examples) > 20
-    said = []
-    options = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
-    failed, _ = doctest.DocTestRunner(optionflags=options, verbose=False).run(test, out=said.append)
-    assert failed == 0, "".join(said)
+    assert_examples_run("rotations.md", 21, doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE)
 
 
 def test_every_function_is_named():

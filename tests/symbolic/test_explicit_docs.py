@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-import doctest
-import re
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 from flyball.model.touching import has_contact
 from tests.examples.test_examples import EVENTS
 from tests.mechanisms import EXAMPLES, example
+from tests.pages import assert_examples_run
 from tests.symbolic.explicit_made import engine, whole
 
-DOCS = Path(__file__).parents[2] / "docs"
 NAMES = sorted(p.name for p in EXAMPLES.iterdir() if p.suffix in (".toml", ".py"))
 
 
 @pytest.mark.parametrize(("page", "least"), [("explicit.md", 16), ("symbolic.md", 16)])
 def test_page(page, least) -> None:
-    code = re.sub(r"^```\w*$", "", (DOCS / page).read_text(encoding="utf-8"), flags=re.M)
-    code = re.sub(r"^>>> (\w+\.add\()", r">>> _ = \1", code, flags=re.M)  # it returns the last element
-    test = doctest.DocTestParser().get_doctest(code, {}, page, None, 0)
-    assert len(test.examples) >= least
-    said: list[str] = []
-    failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
-    assert failed == 0, "".join(said)
+    assert_examples_run(page, least)
 
 
 @pytest.mark.parametrize("name", NAMES)

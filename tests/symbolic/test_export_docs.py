@@ -2,18 +2,8 @@
 
 from __future__ import annotations
 
-import doctest
-import re
-from pathlib import Path
-
-PAGE = (Path(__file__).parents[2] / "docs" / "export.md").read_text(encoding="utf-8")
+from tests.pages import assert_examples_run
 
 
 def test_examples() -> None:
-    code = re.sub(r"^```\w*$", "", PAGE, flags=re.M)
-    code = re.sub(r"^>>> (\w+\.add\()", r">>> _ = \1", code, flags=re.M)  # it returns the last element
-    test = doctest.DocTestParser().get_doctest(code, {}, "export.md", None, 0)
-    assert len(test.examples) > 8
-    said: list[str] = []
-    failed, _ = doctest.DocTestRunner(verbose=False).run(test, out=said.append)
-    assert failed == 0, "".join(said)
+    assert_examples_run("export.md", 9)

@@ -36,6 +36,7 @@ from .simulate import clock_for, run_clock, width
 from .untouched import refuse_contact
 
 FINE = (1e-12, 1e-11, 1e-10, 1e-9)  # relative tolerances of the reference: the first that gets through
+REFERENCE = 300_000  # steps after which a reference is given up: where a law chatters there is none
 LIMIT = 20  # times the steps of the reference: what takes more is given up
 BUDGET = 2.0  # seconds of runs of one formulation after which it is not run once more
 
@@ -141,7 +142,7 @@ class _Task:
     span: tuple[float, float]
     times: np.ndarray
     base: Start
-    max_steps: int = MOST
+    max_steps: int = REFERENCE
 
 
 def compare(model: Model, o: CompareOptions) -> Comparison:

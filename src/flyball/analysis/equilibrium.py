@@ -20,7 +20,7 @@ from .linear.found import finished
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.search import LONGEST, descent, failure, newton, pushed
-from .linear.sliders import STRIDE, places, refuse_sampled, slid, there
+from .linear.sliders import STRIDE, places, slid, there
 from .linear.stability import GROWTH, stability
 from .linear.turning import turning as turn
 from .linearize import LinearizeOptions, linearize, without_inputs
@@ -88,7 +88,6 @@ def equilibrium(model: Model, o: EquilibriumOptions) -> Equilibrium:
 
 def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
     """Where a mechanism rests with its controllers: no state of theirs changes. Its stability is that of the motion."""
-    refuse_sampled(model, "equilibrium")
     for name in ("stable", "preload", "turning"):
         if getattr(o, name):
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
@@ -109,8 +108,11 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
     q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
     c.z[: len(names)] = [old[name] + STRIDE * at for name, at in zip(names, places(other, found), strict=True)]
     out = finished(Rest.at(c, a.t, q), {}, "Newton's method")
-    w = linearize(model, LinearizeOptions(about=out, **ABOUT)).eigenvalues
+    small = linearize(model, LinearizeOptions(about=out, **ABOUT))
+    w = small.eigenvalues
     grows = w.real.max(initial=-1.0) / max(np.abs(w).max(initial=0.0), 1e-300)
+    if small.period is not None:  # what is multiplied by more than 1 from instant to instant grows
+        grows = np.abs(w).max(initial=0.0) - 1.0
     out.stability = UNSTABLE if grows > GROWTH else MARGINAL if grows > -GROWTH else STABLE
     return out
 

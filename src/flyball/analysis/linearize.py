@@ -23,6 +23,7 @@ from ..results.linear import LinearModel, StateSpace
 from ..results.result import Result
 from .compiled import compiled
 from .linear.curves import slopes, snapshot
+from .linear.cycles import Sample, over_a_cycle, refuse_unsettled
 from .linear.derivatives import Equations, State
 from .linear.descriptor import descriptor, descriptor_of_large
 from .linear.effects import effects, stepped
@@ -33,7 +34,7 @@ from .linear.instant import instant
 from .linear.kinks import refuse_kinks
 from .linear.large import DENSE, Large, is_large
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.sliders import refuse_sampled, slid, there, without_places
+from .linear.sliders import Slid, slid, there, without_places
 from .linear.spectrum import spectrum
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
@@ -110,32 +111,61 @@ def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
 
 
 def _controlled(model: Model, o: LinearizeOptions) -> LinearModel:
-    """Of a mechanism with controllers: of one that has bodies in their place."""
-    refuse_sampled(model, "linearize")
-    here = o.state(model)
-    c = here.c.structure
-    other = slid(model, {x.name: repr(z) for x, z in zip(c.controls, here.z.tolist(), strict=False)}, o.outputs)
-    if holds_at_times(other.model):
-        raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and linearize knows only one of the two; "
-            f"leave what holds out, m.changed({{...: None}}), or put joints in its place"
-        )
-    asked = replace(o, outputs=tuple(other.outputs.get(name, name) for name in o.outputs))
-    x, named = _with(there(other, here, o.coordinates), o.inputs)
+    """Of a mechanism with controllers: of one that has bodies in their place; with sampled ones over a cycle."""
+    here, other, x = in_bodies(model, o, o.outputs)
+    asked = replace(o, outputs=(*(other.outputs.get(name, name) for name in o.outputs), *other.laws.values()))
+    x, named = _with(x, o.inputs)
     found = _small(x, asked, named)
-    space = without_places(found.dense, other.slides)
-    units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=True)]
+    space, cycle = without_places(found.dense, other.slides), None
+    if other.laws:
+        samples = _samples(here, list(other.laws), len(o.outputs))
+        at = dict(zip((x.name for x in here.c.structure.controls), here.z.tolist(), strict=False))
+        refuse_unsettled(
+            samples, np.array([at[s.name] for s in samples]), found.output_values[len(o.outputs) :], model.name
+        )
+        space, cycle = over_a_cycle(space, samples, len(o.outputs))
+    units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=False)]
     return LinearModel(
         model.name,
         list(zip(found.inputs, found.input_units, strict=True)),
         list(zip(o.outputs, units, strict=True)),
-        found.output_values,
+        found.output_values[: len(o.outputs)],
         snapshot(here),
         replace(space, eigenvalues=_sorted(space.eigenvalues)),
         lambda: found.descriptor,
         found.turning,
         found.seen_from,
+        cycle,
     )
+
+
+def in_bodies(model: Model, o: InstantOptions, outputs: Sequence[str] = ()) -> tuple[State, Slid, State]:
+    """The state, the copy with bodies in place of controllers, and the state of this copy.
+
+    Raises
+    ------
+    ModelError
+        If something holds at times, too.
+    """
+    here = o.state(model)
+    now = zip(here.c.structure.controls, here.z.tolist(), strict=False)
+    other = slid(model, {x.name: repr(z) for x, z in now}, outputs)
+    if holds_at_times(other.model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and small motions know only one of the two; "
+            f"leave what holds out, m.changed({{...: None}}), or put joints in its place"
+        )
+    return here, other, there(other, here, o.coordinates)
+
+
+def _samples(here: State, names: Sequence[str], first: int) -> list[Sample]:
+    """What is sampled, in the order in which it is; its laws are the outputs from ``first`` on."""
+    numbers, known = here.c.values.numbers, {x.name: x for x in here.c.structure.controls}
+    out = []
+    for k, name in enumerate(names):
+        n = numbers[known[name].controller.name]
+        out.append(Sample(name, first + k, (float(n.period), float(n.offset)), known[name].signal))
+    return out
 
 
 def _small(x: State, o: LinearizeOptions, named: list[Input]) -> LinearModel:

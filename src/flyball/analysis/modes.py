@@ -14,11 +14,11 @@ from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import State
 from .linear.large import DENSE, Large, is_large
+from .linear.sliders import of_slides, refuse_sampled
 from .linear.spectrum import EQUAL, spectrum
-from .linearize import InstantOptions, without_inputs
+from .linearize import InstantOptions, in_bodies, without_inputs
 from .options import count as at_least
 from .resting.instant import closed_instant
-from .untouched import refuse_controllers
 
 FEW = 10
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
@@ -39,7 +39,8 @@ class ModesOptions(InstantOptions):
 
 def modes(model: Model, o: ModesOptions) -> Modes:
     """Natural motions about an equilibrium or a steady motion: see `Mechanism.modes`."""
-    refuse_controllers(model, "modes")
+    if model.controllers:
+        return _controlled(model, o)
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "modes")
         return replace(_modes(joined, there), notes=notes)
@@ -69,10 +70,31 @@ def _modes(model: Model, o: ModesOptions) -> Modes:
     return found
 
 
-def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float) -> Modes:
-    """Modes whose largest part is 1, seen from the ground."""
-    names = velocity_names(x.c.structure)
-    length = (x.c.values.length / x.c.sizes)[:, None]
+def _controlled(model: Model, o: ModesOptions) -> Modes:
+    """Of a mechanism with continuous controllers: of one that has bodies in their place, less these."""
+    refuse_sampled(model, "modes")
+    here, other, x = in_bodies(model, o)
+    f, frame, r = without_inputs(x, o.frozen)
+    names = [f.names[d].name for d in f.chosen], [f.names[d].name for d in f.chosen_v]
+    left = [k for k, name in enumerate(names[0]) if not of_slides(name, other.slides)]
+    left += range(len(names[0]), len(r.A))
+    w, vectors = np.linalg.eig(r.A[np.ix_(left, left)])
+    one = np.flatnonzero(w.imag >= 0.0)
+    one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
+    shapes = r.position[:, left] @ vectors[:, one[: o.count]]
+    own = np.array([not of_slides(n.name, other.slides) for n in velocity_names(x.c.structure)])
+    found = _made(x, w[one[: o.count]], shapes, float(np.abs(w).max(initial=0.0)), own)
+    found.turning, found.seen_from, found.point = frame.turning, frame.told, snapshot(here)
+    rest = w[one[o.count :]] if o.count is not None else w[:0]
+    found.growing = bool((rest.real > GROWS * np.abs(rest)).any())
+    return found
+
+
+def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float, own: np.ndarray | None = None) -> Modes:
+    """Modes whose largest part is 1, seen from the ground; of the velocities ``own`` only, if given."""
+    own = np.ones(len(shapes), bool) if own is None else own
+    names = [n for n, mine in zip(velocity_names(x.c.structure), own, strict=True) if mine]
+    length, shapes = (x.c.values.length / x.c.sizes)[own, None], shapes[own]
     size = length * np.abs(shapes)
     for k in range(shapes.shape[1]):
         if size[:, k].max(initial=0.0) > 0.0:

@@ -43,6 +43,7 @@ class Lag(Controller):
 
     def check(self, n: SimpleNamespace) -> None:
         """Times have a sign."""
+        super().check(n)
         positive(self, n, "time", why="What follows at once needs no Lag")
         nonnegative(self, n, "lead")
 

@@ -80,6 +80,7 @@ class PID(Controller):
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse what has no effect, and what is missing."""
+        super().check(n)
         if self.kp == 0.0 and self.ki == 0.0 and self.kd == 0.0:
             raise ModelError(f"{self.title}: it has no gains; give at least one of kp, ki, kd")
         if self.kd != 0.0 and self.filter is None:
@@ -90,12 +91,12 @@ class PID(Controller):
         positive(self, n, "filter", "tracking")
         for name, needs, there in (
             ("filter", "kd", self.kd != 0.0),
-            ("derivative_weight", "kd", self.kd != 0.0 or self.derivative_weight == 0.0),
-            ("setpoint_weight", "kp", self.kp != 0.0 or self.setpoint_weight == 1.0),
+            ("derivative_weight", "kd", self.kd != 0.0 or n.derivative_weight == 0.0),
+            ("setpoint_weight", "kp", self.kp != 0.0 or n.setpoint_weight == 1.0),
             ("anti_windup", "limits and ki", self._limited and self.ki != 0.0),
             ("tracking", f"anti_windup={BACK!r}", self.windup == BACK),
-            ("initial", "ki", self.ki != 0.0 or self.initial == 0.0),
-            ("initial_measured", "kd", self.kd != 0.0 or self.initial_measured == 0.0),
+            ("initial", "ki", self.ki != 0.0 or n.initial == 0.0),
+            ("initial_measured", "kd", self.kd != 0.0 or n.initial_measured == 0.0),
         ):
             if getattr(self, name) is not None and not there:
                 raise ModelError(f"{self.title}: {name} does nothing without {needs}; leave it out")

@@ -36,6 +36,7 @@ class State(Controller):
 
     def check(self, n: SimpleNamespace) -> None:
         """A rate, or a period and what is next."""
+        super().check(n)
         wanted, other = ("next", "rate") if self.sampled else ("rate", "next")
         if getattr(self, wanted) is None or getattr(self, other) is not None:
             raise ModelError(f"{self.title}: with a period give next=, without one rate=, and not the other")

@@ -89,6 +89,12 @@ class StateSpace(Controller):
             raise ModelError(f"{cls.__name__} {name!r}: the system is discrete without a period; give period=...")
         if "period" in fields and "period" not in given and getattr(system, "dt", None) is not True:
             raise ModelError(f"{cls.__name__} {name!r}: the system is continuous; sample it: system.sample(period)")
+        asked = fields.get("period", given.get("period"))
+        if asked != given.get("period", asked):
+            raise ModelError(
+                f"{cls.__name__} {name!r}: the system's own period is {given['period']:g} s, and period={asked!r} is "
+                f"given; leave period out, or sample the system anew"
+            )
         return cls(name, inputs=inputs, **(fields | given))
 
     @property
@@ -98,6 +104,7 @@ class StateSpace(Controller):
 
     def check(self, n: SimpleNamespace) -> None:
         """Refuse matrices whose sizes do not fit."""
+        super().check(n)
         states, inputs, outputs = self.sizes
         if not outputs or not inputs:
             raise ModelError(f"{self.title}: it has no {'outputs' if inputs else 'inputs'}; give C or D, and inputs")

@@ -46,6 +46,8 @@ def matrices(system: Any, name: str) -> dict[str, Any]:
     """
     whose = f"StateSpace {name!r}"
     if all(hasattr(system, k) for k in "ABCD"):
+        if any(np.iscomplexobj(getattr(system, k)) for k in "ABCD"):
+            raise ModelError(f"{whose}: its matrices are complex; take another basis of its states")
         found = [np.atleast_2d(np.asarray(getattr(system, k), float)) for k in "ABCD"]
         states = 0 if found[0].size == 0 else len(found[0])
         A, B, C, D = (M.tolist() if states or k == "D" else [] for k, M in zip("ABCD", found, strict=True))

@@ -40,7 +40,6 @@ from ..tables.system import (
     GUARD_KIND,
     GUARD_OF,
     LAM,
-    LENGTH,
     LOWER,
     MODE,
     OFF,
@@ -54,6 +53,7 @@ from ..tables.system import (
     SWITCH_MEASURED,
     SWITCH_ROW,
     SWITCH_STIFFNESS,
+    UNIT,
     UPPER,
     VALUE,
 )
@@ -63,7 +63,7 @@ from .rows import measured, way_of
 from .sliding import watched_place
 
 NOT_WATCHED = float("nan")
-GRAIN = 2e-15  # of the mechanism's length, or a metre or radian: a distance that is none
+GRAIN = 2e-15  # of the mechanism's length, or a radian: a distance that is none
 NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
 KEPT = (
     G_LOWER,
@@ -107,15 +107,16 @@ def watched(S, W, t, kind, s):
     x, rate = W.sensed[VALUE, m], W.sensed[RATE, m]
     if W.switch[MODE, s] == OFF:
         if kind == G_LOWER:
-            return distance(S, x - W.switch[LOWER, s], rate)
+            return distance(S, m, x - W.switch[LOWER, s], rate)
         if kind == G_UPPER:
-            return distance(S, W.switch[UPPER, s] - x, -rate)
+            return distance(S, m, W.switch[UPPER, s] - x, -rate)
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return NOT_WATCHED
-            return way * moving(S, rate) + (TURN if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0)
+            late = TURN * S.glob[UNIT + m] if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0
+            return way * moving(S, m, rate) + late
         if kind == G_BACK:
-            return moving(S, rate)
+            return moving(S, m, rate)
         return NOT_WATCHED
     if kind == G_PULL:
         return way * W.row[LAM, k]
@@ -125,15 +126,15 @@ def watched(S, W, t, kind, s):
 
 
 @formula
-def moving(S, rate):
-    """A rate; none where that is rounding, as of what nothing moves, or what something else holds."""
-    return 0.0 if magnitude(rate) <= CREEP * max(1.0, S.glob[LENGTH]) else rate
+def moving(S, m, rate):
+    """The rate of quantity m; none where that is rounding, as of what nothing moves, or what something else holds."""
+    return 0.0 if magnitude(rate) <= CREEP * S.glob[UNIT + m] else rate
 
 
 @formula
-def distance(S, x, rate):
-    """How far something is from a stop; none where that is rounding, as where it parts with no speed."""
-    size = max(1.0, S.glob[LENGTH])
+def distance(S, m, x, rate):
+    """How far quantity m is from a stop; none where that is rounding, as where it parts with no speed."""
+    size = S.glob[UNIT + m]
     return 0.0 if magnitude(x) <= GRAIN * size and rate >= -RESTING * size else x
 
 
@@ -152,10 +153,10 @@ def grains(S, W, t, trial, out):
         kind, of = S.guard_i[g, GUARD_KIND], S.guard_i[g, GUARD_OF]
         out[g] = 0.0
         if kind == G_LOWER or kind == G_UPPER:
-            x = W.sensed[VALUE, S.switch_i[of, SWITCH_MEASURED]]
-            out[g] = GRAIN * max(1.0, S.glob[LENGTH], magnitude(x))
+            m = S.switch_i[of, SWITCH_MEASURED]
+            out[g] = GRAIN * max(S.glob[UNIT + m], magnitude(W.sensed[VALUE, m]))
         elif kind == G_SLIDES or kind == G_BACK:
-            out[g] = max(NOISE * fastest, GRAIN * max(1.0, S.glob[LENGTH]))
+            out[g] = max(NOISE * fastest, GRAIN * S.glob[UNIT + S.switch_i[of, SWITCH_MEASURED]])
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
@@ -165,7 +166,7 @@ def grains(S, W, t, trial, out):
 @formula
 def law_grain(S, W, t, at, trial, fastest):
     """By how much a law changes with the last places of what it is asked with; ``fastest``: the largest rate."""
-    size, nm = max(1.0, S.glob[LENGTH]), measured(S)
+    nm = measured(S)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
     most = GRAIN * magnitude(f)
     for n in range(3):  # all up; of two, and of four, one half up and the other down
@@ -173,7 +174,7 @@ def law_grain(S, W, t, at, trial, fastest):
             x = W.sensed[VALUE, m]
             if m < 2 * nm:
                 way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
-                x += way * GRAIN * max(magnitude(x), size if m < nm else fastest)
+                x += way * GRAIN * max(magnitude(x), S.glob[UNIT + m] if m < nm else fastest)
             trial[VALUE, m] = x
         g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
         if g - g == 0.0:
@@ -194,7 +195,7 @@ def pressing(S, W, s, kind, way):
     if told and way * side < -0.5:
         return NOT_WATCHED
     if not told:  # it begins at the side, with nothing that tells where it goes
-        return GRAZED * max(1.0, S.glob[LENGTH]) - depth
+        return GRAZED * S.glob[UNIT + m] - depth
     if depth > 0.0:  # where it goes out faster than it is pushed it is open
         return max(-depth, -push / S.switch_x[s, SWITCH_STIFFNESS])
     return -depth

@@ -74,6 +74,22 @@ def coming(P):
 
 
 @formula
+def beside(P, times, at):
+    """The output time that is an instant but for rounding, if there is one; else that instant."""
+    near = np.inf
+    for k in range(P.next.shape[0]):
+        near = min(near, NEAR * P.clock[k, PERIOD])
+    low, high = 0, times.shape[0]
+    while low < high and at < np.inf:
+        mid = (low + high) // 2
+        if times[mid] < at - near:
+            low = mid + 1
+        else:
+            high = mid
+    return times[low] if low < times.shape[0] and abs(times[low] - at) <= near else at
+
+
+@formula
 def due(P, k, t):
     """Whether clock k samples at t."""
     near = NEAR * P.clock[k, PERIOD]
@@ -139,7 +155,7 @@ def advance(A, clock, sheet, P, out):
         if reached(P, clock.real[T]) and sample(A) != 0:
             clock.count[STATUS] = STUCK
             break
-        at = min(coming(P), end)
+        at = min(beside(P, clock.times, coming(P)), end)
         clock.real[T_END] = at
         n = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)
         clock.real[T_END] = end
@@ -188,9 +204,9 @@ class Sampling:
         """Whether something is sampled at t."""
         return bool(reached(self.plan, t))
 
-    def next(self) -> float:
-        """The next instant; infinite if there is none."""
-        return float(coming(self.plan))
+    def next(self, times: np.ndarray) -> float:
+        """The next instant; infinite if there is none. ``times`` are those of output."""
+        return float(beside(self.plan, times, coming(self.plan)))
 
     def sample(self, S: System, W: Work, clock: Clock) -> int:
         """Sample what is due now. Returns the status of the evaluation there."""

@@ -64,7 +64,7 @@ class Controller(Element, ABC):
         """It has no frame."""
         return {}
 
-    def check_period(self, n: SimpleNamespace) -> None:
+    def check(self, n: SimpleNamespace) -> None:
         """Refuse instants that are none."""
         positive(self, n, "period")
         if n.period is None and n.offset != 0.0:

@@ -47,11 +47,20 @@ def basis(result: Any, name: str) -> np.ndarray:
     Less what it stores now, that is what it gave the bodies since the start.
     """
     whole, at = result.within or (result, slice(None))
+    if isinstance(at, int):  # a moment of that stretch
+        return np.full(len(result.t), _jumps(whole, name)[at] + _first(whole, name))
     known = whole.__dict__.setdefault("_basis", {})
     if name not in known:
         jumped = _over(whole, _jumps(whole, name)) if whole.stretches is not None else 0.0
         known[name] = jumped + _first(whole, name) + np.zeros(len(whole.t))
     return known[name][at]
+
+
+def at_stretch(result: Any, k: int) -> dict[str, np.ndarray]:
+    """As `booked`, at a moment of stretch k of a result."""
+    done, x = result.begun.done, result.stretches.all[k]
+    given = x.given + done.get(GIVEN, 0.0) + _jumps(result, ALL)[k]
+    return {"impact_loss": np.array([x.lost + done.get("impact_loss", 0.0)]), GIVEN: np.array([given])}
 
 
 def ended(before: Any) -> dict[str, float]:

@@ -192,12 +192,15 @@ class Events(Sequence):
 def bound(happened: list[Happening], result: Result) -> Iterator[Happening]:
     """With states that can be read by name, by the parameters of their time."""
     now = next((h.tables[0] for h in happened if h.tables is not None), result.values)
+    since, came = np.nan, None
     for h in happened:
+        if h.t != since:
+            since, came = h.t, h.before if isinstance(h.before, np.ndarray) else None
         both = h.tables or (now, now)
         now = both[1]
         before, after = (
-            Moment(result, x, h.t, y) if isinstance(y, np.ndarray) else y
-            for x, y in zip(both, (h.before, h.after), strict=True)
+            Moment(result, x, h.t, y, None if came is None else (came, k)) if isinstance(y, np.ndarray) else y
+            for k, (x, y) in enumerate(zip(both, (h.before, h.after), strict=True))
         )
         impulses = h.impulses
         if isinstance(impulses, Struck) and isinstance(before, Moment) and isinstance(after, Moment):

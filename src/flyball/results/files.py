@@ -126,13 +126,14 @@ def _write(result: Result, path: Path, whole: bool) -> None:
         for name, labels in coordinates(result).items():
             file.dimensions[name] = len(labels)
             file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
-        shown = list(labelled(result, MOST)) if whole else []
-        if all(x.name.startswith(f"{ENERGY}.") for x in shown):
-            what = "too many parts to list" if whole else "a motion that is not at its end"
-            file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
-        for x in shown:
+        listed = False
+        for x in labelled(result, MOST) if whole else ():  # one after the other: all at once are much memory
             made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
             made.attrs.update(_attributes(x.unit, x.note))
+            listed = listed or not x.name.startswith(f"{ENERGY}.")
+        if not listed:
+            what = "too many parts to list" if whole else "a motion that is not at its end"
+            file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
         _write_solution(result, file.create_group(GROUP), path.parent)
 
 

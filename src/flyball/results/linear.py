@@ -1,4 +1,4 @@
-"""A linear model: x' = A x + B u, y = C x + D u, with names and units for everything."""
+"""A linear model: x' = A x + B u, y = C x + D u, with names and units for everything; or from instant to instant."""
 
 from __future__ import annotations
 
@@ -62,6 +62,10 @@ class LinearModel:
         Whether there are so many velocities that what is dense is made when asked for.
     notes : tuple of str
         What holds for one side only: closed contacts that are about to part.
+    period : float, optional [s]
+        With sampled controllers: the equations are x(t + period) = A x(t) + B u, y = C x + D u, t being an instant of
+        the first of them, x the state just before it, y outputs from it on, u inputs that are held until the next. The
+        eigenvalues are multipliers: what they do not exceed 1 in size dies out.
     """
 
     def __init__(
@@ -75,7 +79,9 @@ class LinearModel:
         sparse: Descriptor | Callable[[], Descriptor],
         turning: np.ndarray,
         seen_from: str = "",
+        period: float | None = None,
     ) -> None:
+        self.period = period
         self.name, self.point, self.t = name, point, float(point.t[0])
         self.notes: tuple[str, ...] = ()
         self.inputs, self.input_units = (tuple(x[k] for x in inputs) for k in range(2))
@@ -164,7 +170,8 @@ class LinearModel:
         """
         control = optional("control", "control")
         names = {k: [_plain(name) for name in getattr(self, k)] for k in ("states", "inputs", "outputs")}
-        return control.ss(self.A, self.B, self.C, self.D, name=_plain(self.name), **names)
+        dt = 0 if self.period is None else self.period
+        return control.ss(self.A, self.B, self.C, self.D, dt, name=_plain(self.name), **names)
 
     def transfer(self, input: str | None = None, output: str | None = None) -> tuple[np.ndarray, np.ndarray, float]:
         """Zeros, poles [1/s] and gain of a transfer function; the only input and output if not named.
@@ -192,7 +199,7 @@ class LinearModel:
     def response(self, omega: Sequence[float], input: str | None = None, output: str | None = None) -> np.ndarray:
         """Frequency response G(i omega) of an input and an output at angular frequencies [rad/s]; complex, (n,).
 
-        At an undamped pole it is infinite.
+        At an undamped pole it is infinite. With sampled controllers G(exp(i omega period)).
         """
         i, k = self.input_index(input), self.output_index(output)
         if self.large:
@@ -202,7 +209,8 @@ class LinearModel:
 
         def at(w: float) -> complex:
             try:
-                return c @ np.linalg.solve(1j * w * one - self.A, b) + d
+                s = 1j * w if self.period is None else np.exp(1j * w * self.period)
+                return c @ np.linalg.solve(s * one - self.A, b) + d
             except np.linalg.LinAlgError:
                 return complex(np.inf)
 
@@ -264,11 +272,14 @@ class LinearModel:
         if self.large:
             slow = self.descriptor.nearest(SHOWN)
             return out + [("slowest", f"{_written(w)} 1/s") for w in slow if w.imag >= 0.0]
-        out += [("eigenvalues", f"{_written(w)} 1/s") for w in self.eigenvalues if w.imag >= 0.0]
+        unit, s = (" 1/s", "s") if self.period is None else ("", "z")
+        if self.period is not None:
+            out.append(("period", f"{self.period:.6g} s: eigenvalues are multipliers from one to the next"))
+        out += [("eigenvalues", f"{_written(w)}{unit}") for w in self.eigenvalues if w.imag >= 0.0]
         if len(self.inputs) == len(self.outputs) == 1:
             zeros, _, gain = self.transfer()
-            out += [("zeros", f"{_written(w)} 1/s") for w in zeros if w.imag >= 0.0]
-            out.append(("gain", f"{gain:.6g}: G(s) = gain prod(s - zeros) / prod(s - eigenvalues)"))
+            out += [("zeros", f"{_written(w)}{unit}") for w in zeros if w.imag >= 0.0]
+            out.append(("gain", f"{gain:.6g}: G({s}) = gain prod({s} - zeros) / prod({s} - eigenvalues)"))
         return out
 
     def as_dict(self) -> dict[str, Any]:
@@ -279,6 +290,8 @@ class LinearModel:
             "turning": self.turning.tolist(),
             "seen_from": self.seen_from,
         }
+        if self.period is not None:
+            out["period"] = self.period
         for what in ("inputs", "outputs") if self.large else ("states", "inputs", "outputs"):
             units = getattr(self, f"{what[:-1]}_units")
             out[what] = [{"name": n, "unit": u} for n, u in zip(getattr(self, what), units, strict=True)]

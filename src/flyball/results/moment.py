@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from .booked import at_stretch
 
 if TYPE_CHECKING:
     from ..tables.values import Values
@@ -26,10 +27,24 @@ class Moment:
         State vector: coordinates, velocities, turns and works.
     values : Values
         The mechanism with the parameters of that time.
+    came : tuple of (ndarray, int)
+        The state that the motion came to the instant with, and whether this is before (0) or after (1) it.
     """
 
-    def __init__(self, result: Result, values: Values, t: float, y: np.ndarray) -> None:
-        self._of, self.values, self.t, self.y = result, values, float(t), y
+    def __init__(
+        self, result: Result, values: Values, t: float, y: np.ndarray, came: tuple[np.ndarray, int] | None = None
+    ) -> None:
+        self._of, self.values, self.t, self.y, self.came = result, values, float(t), y, came
+
+    @cached_property
+    def stretch(self) -> int:
+        """Which stretch of the motion it ends or begins; -1 where that is not known, as at the start."""
+        every = self._of.stretches.all if self._of.stretches is not None else ()
+        if self.came is None:
+            return -1
+        y, after = self.came
+        found = next((k for k, x in enumerate(every) if np.array_equal(x.end, y)), -1)
+        return found if found < 0 else min(found + after, len(every) - 1)
 
     @cached_property
     def alone(self) -> Result:
@@ -40,6 +55,10 @@ class Moment:
         unknown = np.full((1, s.nv), np.nan), np.full((1, len(s.rows) + len(s.prescribed)), np.nan)
         made = type(r)(r.model, self.values, np.array([self.t]), q, v, z, *unknown, r.health)
         made.wound = r.wound
+        if self.stretch >= 0 and r.stretches is not None:
+            made.begun, made.within = r.begun, (r, self.stretch)
+            made.exchanged |= at_stretch(r, self.stretch)
+            made.stretches = r.stretches.moment(self.stretch)
         return made
 
     def __getitem__(self, name: str) -> Any:

@@ -85,6 +85,12 @@ class Stretches:
             first = last
         return out
 
+    def moment(self, k: int) -> Stretches | None:
+        """Stretch k as that of one time; None where ways change within it and none is known."""
+        x = self.all[k]
+        ways = x.ways[:, -1] if x.ways.shape[1] else None
+        return None if ways is None else Stretches((replace(x, rows=1, sigma=ways),))
+
     def cut(self, rows: int) -> Stretches:
         """Those of the first so many output times."""
         out, left = list[Stretch](), rows

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..model.body import GROUND, Body
-from ..model.element import resolve
+from ..model.element import Element, resolve
 from ..model.expressions import Expression
 from ..model.geometry import vector
 from ..model.inertia import mass_properties
@@ -87,7 +87,7 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
     named = model.kept.get("named", None, 1, lambda: _named(model))
     other = {k for k, x in env.items() if not _same(x, first.env[k])}
     changed = [e for e in model.elements() if e.name in named and not other.isdisjoint(named[e.name])]
-    of = {**first.of, **{e.name: resolve(e, env) for e in changed}}
+    of = {**first.of, **{e.name: _checked(e, env) for e in changed}}
     bodies = {
         **first.bodies,
         **{e.name: _body(e, of[e.name], env, model.planar) for e in changed if isinstance(e, Body)},
@@ -98,11 +98,19 @@ def _found(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
 
 
 def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
-    of = {e.name: resolve(e, env) for e in model.elements()}
+    of = {e.name: _checked(e, env) for e in model.elements()}
     bodies = {GROUND: SimpleNamespace(p=np.zeros(3), R=np.eye(3), com=np.zeros(3), c=np.zeros(3))}
     for b in model.bodies:
         bodies[b.name] = _body(b, of[b.name], env, model.planar)
     return Numbers(env, of, bodies, key, {}, Kept())
+
+
+def _checked(e: Element, env: Mapping[str, Any]) -> SimpleNamespace:
+    """The fields of an element in numbers, which make sense at these values of the parameters."""
+    n = resolve(e, env)
+    if kind_of(env.values()) is float:  # a complex step is none to be compared
+        e.check(n)
+    return n
 
 
 def _same(a: Any, b: Any) -> bool:

@@ -31,6 +31,7 @@ from .poses import Poses
 from .specs import Structure, TermSpec
 from .system import EXCESS, EXCESS_MASS, FLAT, System
 
+NO_LENGTH = 1e-9  # of coordinates: a distance that is their rounding
 MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
 
@@ -114,7 +115,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
     switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks, pose.apart)
     semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
-    glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length], dtype)
+    glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length, *_units(s, length)], dtype)
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],
@@ -144,14 +145,35 @@ def _check_points(s: Structure, frame_x: np.ndarray, length: Any, new: Afresh) -
 
 
 def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamespace]) -> Any:
-    """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all."""
-    centres = np.array([b.c for k, b in bodies.items() if k != GROUND])
-    if not len(centres):
+    """A typical length: the largest way from a centre of mass to a frame, or from one body to the mean of all.
+
+    Where there is none: of bodies and places on the ground about their mean, or what bodies' inertia is the square of.
+    """
+    moving = [b for k, b in bodies.items() if k != GROUND]
+    if not moving:
         return 1.0
-    ways = np.concatenate([frame_x[s.tables["frame_i"] >= 0, :3], centres - centres.mean(axis=0)])
-    longest = ways[np.argmax((real_parts(ways) ** 2).sum(axis=1))]
-    length = np.sqrt((longest**2).sum())
+    centres, on_body = np.array([b.c for b in moving]), s.tables["frame_i"] >= 0
+    places = np.concatenate([frame_x[~on_body, :3], centres])
+    nothing = NO_LENGTH * np.abs(real_parts(places)).max(initial=0.0)
+    if (length := _longest([frame_x[on_body, :3], centres - centres.mean(axis=0)])).real > nothing:
+        return length
+    if (length := _longest([places - places.mean(axis=0)])).real > nothing:
+        return length
+    spin = [np.trace(b.inertia) / b.mass for b in moving if b.mass.real > 0.0]
+    length = np.sqrt(max(spin, key=lambda x: x.real, default=0.0))
     return length if length.real > 0.0 else 1.0
+
+
+def _units(s: Structure, length: Any) -> list[Any]:
+    """Of every measured quantity what it is compared with: the mechanism's length, or a radian."""
+    metric = {t.row - len(s.rows) for t in s.terms if t.measured and t.formula.measure == "m"}
+    return [length if m in metric else 1.0 for m in range(len(s.measured))]
+
+
+def _longest(ways: list[np.ndarray]) -> Any:
+    every = np.concatenate(ways)
+    longest = every[np.argmax((real_parts(every) ** 2).sum(axis=1))]
+    return np.sqrt((longest**2).sum())
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:

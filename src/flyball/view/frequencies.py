@@ -24,6 +24,8 @@ def frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndar
         roots = model.descriptor.nearest(SLOWEST)
     else:
         roots = np.concatenate([np.concatenate(roots_of(model, *pair)) for pair in pairs])
+    if model.period is not None:  # z = exp(s period)
+        roots = np.log(roots[np.abs(roots) > NONE].astype(complex)) / model.period
     size = np.abs(roots)
     roots = roots[size > NONE * size.max(initial=0.0)]
     size = np.abs(roots) if len(roots) else np.ones(1)
@@ -36,7 +38,8 @@ def frequencies(model: LinearModel, pairs: Sequence[tuple[str, str]]) -> np.ndar
     near = [abs(r) * (1.0 + max(abs(r.real) / abs(r), SHARPEST) * u) for r in resonant]
     tops = [np.array([r.imag]) for r in resonant if abs(r.real) > SHARPEST * abs(r)]
     every = np.concatenate([even, *near, *tops])
-    return np.unique(every[(every >= even[0]) & (every <= even[-1])])
+    most = np.inf if model.period is None else np.pi / model.period  # beyond it nothing new is seen
+    return np.unique(np.minimum(every[(every >= even[0]) & (every <= even[-1])], most))
 
 
 def roots_of(model: LinearModel, input: str, output: str) -> tuple[np.ndarray, np.ndarray]:

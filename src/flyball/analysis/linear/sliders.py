@@ -21,13 +21,13 @@ from ...errors import ModelError
 from ...forces.coordinate_spring import pushing
 from ...joints.prismatic import slide
 from ...model.body import Body
-from ...model.controller import Controller
+from ...model.controller import OUTPUT, Controller
 from ...model.element import LawOf, fields_with, resolve
 from ...model.expressions import Expression, is_number_text
 from ...model.model import Model
 from ...model.sensor import Sensor
 from ...model.texts import text_of
-from ...model.wiring import signal, wired, wiring_of
+from ...model.wiring import Wired, signal, wired, wiring_of
 from ...results.linear import StateSpace
 from ...tables.coordinates import BodyState, positions
 from ..assembly.start import Assembly
@@ -48,11 +48,14 @@ class Slid:
         Name of the body of each state -> the state's name.
     outputs : dict
         Signal that was asked for -> curve of the copy that it is.
+    laws : dict
+        State or signal that is sampled -> curve of the copy that its value from the next instant on is.
     """
 
     model: Model
     slides: dict[str, str]
     outputs: dict[str, str]
+    laws: dict[str, str]
 
 
 def refuse_sampled(model: Model, analysis: str) -> None:
@@ -66,9 +69,8 @@ def refuse_sampled(model: Model, analysis: str) -> None:
     held = [e.title for e in model.controllers if e.sampled]
     if held:
         raise ModelError(
-            f"{model.name!r} has {', '.join(held)}, sampled, and {analysis} is about continuous time: ask it of a "
-            f"copy without them, m.changed({{...: None}}), and sample what it gives: "
-            f"linearize(...).to_control().sample(period)"
+            f"{model.name!r} has {', '.join(held)}, sampled, and {analysis} is about continuous time; linearize gives "
+            f"the equations from one instant to the next, and their eigenvalues"
         )
 
 
@@ -107,7 +109,7 @@ class _Sliding:
     """A copy in the making."""
 
     def __init__(self, model: Model, at: Mapping[str, float | str], places: bool) -> None:
-        self.old, self.what = model, "displacement" if places else "displacement_rate"
+        self.old, self.what, self.places = model, "displacement" if places else "displacement_rate", places
         self.new = model.copy()
         self.new.controllers, self.new.events = [], []
         self.new.by_name = {k: e for k, e in model.by_name.items() if e.category not in ("controllers", "events")}
@@ -133,12 +135,20 @@ class _Sliding:
                 Sensor(f"{body}_now", f"{body}_slide.{self.what}"),
             )
         for x, body in zip(self.states, self.body.values(), strict=True):
-            force = f"{self.text(x.law)}{self._held()}"
+            force = f"{self._push(x)}{self._held()}"
             self.new.add(pushing(f"{body}_push", f"{body}_slide.displacement", force))
         self._laws()
         found = {name: self._output(name, k) for k, name in enumerate(outputs) if self._own(name)}
+        sampled = [] if self.places else [x for x in self.states if x.controller.sampled]
+        laws = {x.name: self._curve(f"law_{k}_", self.text(x.law)) for k, x in enumerate(sampled)}
         self.new.sensors = [e for e in self.new.sensors if not self._own(getattr(e, "of", ""))]
-        return Slid(self.new, {b: name for name, b in self.body.items()}, found)
+        return Slid(self.new, {b: name for name, b in self.body.items()}, found, laws)
+
+    def _push(self, x: Wired) -> str:
+        """The force on a state's body: its rate. What is held stays, and rests where a sample changes nothing."""
+        if not x.controller.sampled:
+            return self.text(x.law)
+        return f"({self.text(x.law)}) - {self.known[x.name]}" if self.places else "0"
 
     def _place(self) -> Any:
         """Where bodies are drawn: where one is already, so that the mechanism is as large as before."""
@@ -190,16 +200,20 @@ class _Sliding:
         return isinstance(e, Controller)
 
     def _output(self, name: str, k: int) -> str:
-        """A curve of the copy for a signal: a force that another one takes away again."""
+        """A curve of the copy for a signal."""
         e = self.old.find(name.partition(".")[0])
         if isinstance(e, Sensor):
             return self._output(e.of, k)
         assert isinstance(e, Controller)
-        owner, _, what = name.partition(".")
+        owner, dot, what = name.partition(".")
+        what = what if dot else OUTPUT
         if what not in wiring_of(self.old, e):
             raise ModelError(f"{owner!r} has no signal {what!r}; it has {', '.join(wiring_of(self.old, e))}")
-        text = self.text(signal(self.old, e, what))
-        told, along = self._free(f"output_{k}_"), f"{self.old.bodies[0].name}.x"
+        return self._curve(f"output_{k}_", self.text(signal(self.old, e, what)))
+
+    def _curve(self, name: str, text: str) -> str:
+        """A formula as a curve of the copy: a force that another one takes away again."""
+        told, along = self._free(name), f"{self.old.bodies[0].name}.x"
         self.new.add(pushing(told, along, text), pushing(f"{told}back", along, f"-{text}"))
         return f"{told}.force"
 
@@ -246,6 +260,11 @@ def without_places(dense: StateSpace, slides: Mapping[str, str]) -> StateSpace:
         eigenvalues=np.linalg.eigvals(A),
         motion=dense.motion[:, left],
     )
+
+
+def of_slides(name: str, slides: Mapping[str, str]) -> bool:
+    """Whether a velocity of the copy is of a body that stands for a state."""
+    return any(_of(name, body) for body in slides)
 
 
 def _of(name: str, body: str) -> bool:

@@ -139,7 +139,7 @@ class Desk:
         if of.made is not None:
             c.run_on(of.made)
         self.start = replace(of.begun, assembly=replace(a, compiled=c))
-        self.method = tableau(of.options.method)
+        self.method, self.call = tableau(of.options.method), motion_kernel
         times, o = of.question.times, of.options
         sampled = sampled_laws(c, NO_BREAKS)
         self.clock = clock_for(self.start, self.start.base.t, float(o.t_end), times, o, sampled)
@@ -178,7 +178,7 @@ class Desk:
         pace = Pace(float(of.options.t_end), of.asked, partial(unsuited, of.begun))
         while clock.count[ex.STATUS] == ex.RUNNING:
             clock.count[ex.QUOTA] = pace.limited(clock, LONGEST)
-            used += motion_kernel(c.system, c.work, self.method, clock, self.rows[used:], INTEGRATE)
+            used += self.call(c.system, c.work, self.method, clock, self.rows[used:], INTEGRATE)
             if clock.count[ex.STATUS] == ex.RUNNING and pace.turns(c, clock, EXPLICIT):
                 return False  # it is stiff: by itself it goes on by another method
         return bool(clock.count[ex.STATUS] == ex.DONE and used == len(clock.times))

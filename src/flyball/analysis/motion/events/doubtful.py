@@ -11,6 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ....constraints.modes import SLIP
 from ....equations.instant import BLOWS, GRAIN, OF_A_STEP
 from ....model.touch import Touch
 from ....numerics.cone.dense.problem import EVEN, FOUND, FREE, GRIPS
@@ -69,7 +70,7 @@ def _several(n: Instant, found: Decided) -> str:
 def _undetermined(n: Instant, found: Decided) -> str:
     """Friction whose most depends on what redundancy leaves open."""
     held = np.flatnonzero(found.state == EVEN)
-    grips = [i for i in held if found.parts[i].rule == GRIPS and found.gain[i].any()]
+    grips = [i for i in held.tolist() if found.parts[i].rule == GRIPS and found.gain[i].any()]
     if len(held) < 2 or not grips:
         return ""
     d = np.sqrt(found.A.diagonal()[held])
@@ -77,13 +78,23 @@ def _undetermined(n: Instant, found: Decided) -> str:
     size, Z = np.linalg.eigh(found.A[np.ix_(held, held)] / np.outer(d, d))
     Z = Z[:, size < OPEN * size.max()] / d[:, None]
     open_ = [i for i in grips if (np.abs(found.gain[i][held] @ Z) > OTHER * np.abs(found.gain[i][held]).max()).any()]
-    if not open_:
+    if not open_ or _needless(n, found, open_):
         return ""
     who = " and ".join(elements(n, [found.parts[i] for i in open_]))
     return (
         f"whether {who} holds is not determined: the most that it holds follows reactions that redundancy leaves open; "
         f"taken: those whose sum of squares, each by the mass that it moves, is least"
     )
+
+
+def _needless(n: Instant, found: Decided, rows: list[int]) -> bool:
+    """Whether these are places of contact without whose friction nothing moves either: a ball at rest in a groove."""
+    if any(n.kind[found.parts[i].switch] != SLIP for i in rows):
+        return False
+    P = n.rooms[len(found.parts)].P
+    P.const[rows], P.gain[rows], P.state[:] = 0.0, 0.0, found.state
+    size = max(np.abs(P.b).max(), P.grain.max() / GRAIN)
+    return n.again(P) == FOUND and bool(np.abs(P.u - found.u).max() <= OTHER * size)
 
 
 def shock(n: Instant, parts: list[Part], held: float) -> Jump | None:

@@ -33,7 +33,7 @@ from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
 from .modes import Decided, come_to_rest, decide
 from .parts import at_rest, of_velocities, sides
-from .rest import coming_to_rest, note_bounces
+from .rest import coming_to_rest, note_bounces, settle_down
 from .sides import pressed, teeth, turned
 from .slips import stop_slips
 from .told import tell_jump, tell_modes
@@ -214,7 +214,7 @@ def decided(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fir
     found = decide(n, at, still, fired)
     if found.ended == FOUND and (over := coming_to_rest(n, at, still)).any():
         still |= over
-        n.bared()
+        settle_down(n, np.flatnonzero(over).tolist(), still)
         found = decide(n, at, still, fired)
     if found.ended == FOUND:
         doubt(n, found)

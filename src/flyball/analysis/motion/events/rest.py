@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ....equations.tasks import MOTION
+from ....numerics.cone.dense.problem import HOLDS
 from ....tables.system import BIAS, COORDINATES
-from .instant import Instant
+from .instant import Instant, Part
 from .jump import Jump
 
 LOW = 1e-13  # of the mechanism's length or a radian: a flight that is none
@@ -57,3 +58,11 @@ def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarr
             past = n.here.t - (b.before if b.last == n.here.t else b.last)
             b.over = n.here.t + (flight / (1.0 - flight / past) if flight < past < np.inf else flight)
     return over
+
+
+def settle_down(n: Instant, over: list[int], still: np.ndarray) -> None:
+    """Take their rates from what bounces no more; friction that moved by these alone is at rest, into ``still``."""
+    B, P, _ = n.problem([Part(s, HOLDS) for s in over])
+    n.here.v[:] -= np.linalg.lstsq(P.A, n.rate[over], rcond=1e-12)[0] @ B.Y
+    n.look_again()
+    still |= np.abs(n.rate) <= n.still

@@ -87,7 +87,8 @@ class Run:
         clock = here.clock
         self.buffer = np.zeros((max(2, min(len(clock.times), 1_000_000 // width + 1)), width))
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
-        self.first, self.span = here.t, float(clock.real[ex.T_END] - clock.real[ex.T]) or 1.0
+        self.end = float(clock.real[ex.T_END])  # of the motion; the clock's own goes from leg to leg
+        self.first, self.span = here.t, self.end - here.t or 1.0
         self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
@@ -99,12 +100,11 @@ class Run:
         self.sampling = self._sampling(here.t)
 
     def _sampling(self, t: float) -> Sampling | None:
-        span, rows = (t, float(self.here.clock.real[ex.T_END])), (self.width, len(self.buffer))
-        return sampling(self.here.c, self.method, span, rows)
+        return sampling(self.here.c, self.method, (t, self.end), (self.width, len(self.buffer)))
 
     def _instant(self) -> float:
         """Until when the watched loop may run: the next instant of a sampled controller."""
-        return math.inf if self.sampling is None or self.loop is None else self.sampling.next()
+        return math.inf if self.sampling is None or self.loop is None else self.sampling.next(self.here.clock.times)
 
     def sampled(self) -> bool:
         """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
@@ -334,9 +334,9 @@ class Run:
         here = self.here
         if self.loop is not None:
             as_grains(here, self.loop)
-        values, kinds = instant_of(here).guards(), here.c.system.guard_i[:, GUARD_KIND]
-        near = REACHED * max(1.0, here.c.values.length)
-        at = (np.abs(values) <= near) & np.isin(kinds, (*DISTANCES, G_BACK))
+        n, (kinds, of) = instant_of(here), here.c.system.guard_i[:, [GUARD_KIND, GUARD_OF]].T
+        values, sides = n.guards(), np.isin(kinds, (*DISTANCES, G_BACK))
+        at = sides & (np.abs(values) <= REACHED * n.unit[np.where(sides, of, 0)]) if sides.any() else sides
         against = np.flatnonzero(((values < 0.0) & np.isin(kinds, HOLDING)) | at)
         if fired := [*against.tolist(), *stepped_over(here, before)]:
             self.happens(fired)

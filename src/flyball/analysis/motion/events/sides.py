@@ -55,7 +55,8 @@ def turned(n: Instant, hit: Collection[int]) -> None:
     for s in n.of(RATCHET):
         if n.W.switch[MODE, s] != OFF:
             continue
-        if n.mode[s] != OFF or s in hit or (abs(n.rate[s]) <= 2.0 * TURN and _acceleration(n, s) > SLOW * n.unit[s]):
+        slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s]
+        if n.mode[s] != OFF or s in hit or (slow and _acceleration(n, s) > SLOW * n.unit[s]):
             _goes_on(n, s)
         else:
             n.ways()[s] = n.way[s]

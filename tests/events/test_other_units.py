@@ -1,0 +1,101 @@
+"""The same mechanism a million times smaller, lighter, faster: the same events, and all in proportion."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import flyball as fb
+
+G = 9.81
+ALONG = {"at": (0, 0), "axis": (1, 0)}
+
+
+def scaled(length, mass, time):
+    """Units of what is built: lengths, masses, times, speeds, accelerations, forces, stiffness, damping, inertia."""
+    L, M, T = length, mass, time
+    return SimpleNamespace(L=L, M=M, T=T, v=L / T, g=L / T**2, F=M * L / T**2, k=M / T**2, c=M / T, I=M * L**2)
+
+
+def begun(u, inertia, position=(0, 0), velocity=(0, 0), gravity=1.0, **more):
+    m = fb.Mechanism("scaled", planar=True, gravity=(0, -G * gravity * u.g))
+    at, v = (np.array(position) * u.L).tolist(), (np.array(velocity) * u.v).tolist()
+    m.add(fb.Body("b", mass=u.M, inertia=inertia * u.I, position=at, velocity=v, **more))
+    return m
+
+
+def ball(u):
+    """Bounces, and where it is highest."""
+    m = begun(u, 0.1, position=(0, 1))
+    m.add(fb.Prismatic("P", "ground", "b", at=(0, 0), axis=(0, 1), displacement=u.L))
+    m.add(fb.Limit("stop", "P.displacement", lower=0, restitution=0.7), fb.Event("top", "P.rate"))
+    return m
+
+
+def belt(u):
+    """Stick and slip."""
+    m = begun(u, 1.0)
+    m.add(fb.Body("belt", mass=u.M, inertia=u.I), fb.Prismatic("B", "ground", "belt", **ALONG))
+    m.add(fb.Prismatic("P", "belt", "b", **ALONG), fb.Driver("D", "B.displacement", f"{0.1 * u.v!r}*t"))
+    m.add(fb.CoordinateSpring("k", "b.x", stiffness=30 * u.k), fb.JointFriction("f", "P", static=0.3, kinetic=0.2))
+    return m
+
+
+def rope(u):
+    """A pendulum on a rope that goes slack and taut; an event that its velocities solved anew are about zero at."""
+    m = begun(u, 0.01, position=(0, -0.8), velocity=(np.sqrt(3.7 * G * 0.8), 0))
+    at = ((0, 0), (0, -0.8 * u.L))
+    m.add(fb.Rope("rope", ("ground", "b"), at=at), fb.Event("low", "b.vy", direction="either"))
+    return m
+
+
+def elastic(u):
+    """An elastic rope with damping."""
+    m, at = begun(u, 0.01, position=(0.3, 0.2), velocity=(1, 0)), ((0, 0), (0.3 * u.L, 0.2 * u.L))
+    push = {"length": 0.8 * u.L, "stiffness": 400 * u.k, "damping": u.c}
+    m.add(fb.Rope("rope", ("ground", "b"), at=at, **push))
+    return m
+
+
+def thrown(u):
+    """A ball on a floor, to the end of its bounces, and rolling."""
+    look = fb.Sphere(radius=0.1 * u.L)
+    m = begun(u, 0.004, position=(0, 0.5), velocity=(1, 0), shape=look)
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0.3, restitution=0.5))
+    return m
+
+
+def sign(u):
+    """A user's law that holds."""
+    m = begun(u, 1.0, gravity=0.0)
+    m.add(fb.Prismatic("P", "ground", "b", **ALONG), fb.Initial("P.displacement", value=u.L))
+    m.add(fb.Actuator("A", "P.displacement", force=f"-{4 * u.k!r}*value-{0.3 * u.F!r}*sign(rate)"))
+    return m
+
+
+def pushed(u):
+    """To and fro with friction in a joint, in an elastic play."""
+    m = begun(u, 1.0)
+    m.add(fb.Prismatic("P", "ground", "b", **ALONG), fb.JointFriction("f", "P", static=0.3, kinetic=0.2))
+    m.add(fb.Actuator("p", "P.displacement", force=f"{5 * u.F!r}*sin(2*t/{u.T!r})"))
+    m.add(fb.Backlash("play", ["P.displacement"], gap=0.2 * u.L, stiffness=1e3 * u.k))
+    return m
+
+
+SCALES = ((1e-6, 1, 1), (1e6, 1, 1), (1, 1e-6, 1), (1, 1, 1e-6), (1e-6, 1e-6, 1e-3))
+
+
+@pytest.mark.parametrize("made", [ball, belt, rope, elastic, thrown, sign, pushed])
+def test_it_is_the_same(made):
+    first = None
+    for scale in ((1, 1, 1), *SCALES):
+        u = scaled(*map(float, scale))
+        fine = {"rtol": 1e-9, "atol": 1e-12 * u.L * min(1.0, 1 / u.T)}
+        r = made(u).simulate(2.4 * u.T, outputs=4, **fine)
+        told = [(e.name, e.kind) for e in r.events]
+        found = np.concatenate([[e.t / u.T for e in r.events], r["b"].position[:, :2].ravel() / u.L])
+        first = first or (told, found.tolist())
+        assert told == first[0], (made.__name__, scale)
+        assert found == pytest.approx(first[1], abs=1e-8), (made.__name__, scale)
