@@ -25,11 +25,14 @@ from ..tables.system import (
     BIAS,
     G_BACK,
     G_SHARED,
+    G_TURNS,
     GUARD_KIND,
+    GUARD_OF,
     GUARD_WAY,
     LAM,
     RATE,
     RETURNED,
+    SWITCH_PARTNER,
     SWITCH_ROW,
     VALUE,
     X_SOLVED,
@@ -39,7 +42,7 @@ from ..tables.system import (
 from .asking import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, put, report, steps, through
 from .callbacks import Going, Own, levels
 from .engine import Sheet, engine
-from .guards import KEPT, grains
+from .guards import FIRM, KEPT, grains
 from .guards import watch as guards
 from .rows import measured
 from .sharing import GRAIN, Sharing, margin, renewed, terms
@@ -151,6 +154,18 @@ class Steps(Protocol):
         """The door with these tuples bound to it."""
 
 
+def keeps(S: System) -> np.ndarray:
+    """1 for guards that are above zero as long as modes are right, 2 for those of distances and rates, (ng,).
+
+    A slip in the plane is one of them: what begins at rest goes its way. One in space turns where it likes.
+    """
+    kinds, of = S.guard_i[:, GUARD_KIND], S.guard_i[:, GUARD_OF]
+    slips = np.flatnonzero(kinds == G_TURNS)
+    kept = np.isin(kinds, KEPT)
+    kept[slips[S.switch_i[of[slips], SWITCH_PARTNER] < 0]] = True
+    return np.where(kept, np.where(np.isin(kinds, FIRM), 2, 1), 0)
+
+
 class Loop:
     """A motion by steps of a method: the compiled loop and what it keeps; watched where there are guards.
 
@@ -175,7 +190,7 @@ class Loop:
         spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
         self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
         there = self.expected.sensed, self.expected.row[LAM]
-        guarded = S.guard_i[:, GUARD_WAY], np.isin(S.guard_i[:, GUARD_KIND], KEPT)
+        guarded = S.guard_i[:, GUARD_WAY], keeps(S)
         self.desk = watching(
             *guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i)
         )
