@@ -141,8 +141,8 @@ def share(K, h):
 def lead(K, pass_):
     """What rows give way beyond in `share`: nothing at first, then what they carried. Returns whether there is more.
 
-    Of all that redundant rows may carry the least is taken by the first pass. It is soft, though: what friction makes of
-    the rows' giving way is no rounding (a wedge on a wedge multiplies it by 1e3). Each pass beyond what the last one
+    Of all that redundant rows may carry the least is taken by the first pass. It is soft, though: what friction makes
+    of the rows' giving way is no rounding (a wedge on a wedge multiplies it by 1e3). Each pass beyond what the last one
     found (proximal point: Rockafellar 1976; iterated regularisation: Hanke and Groetsch 1998) leaves of this its next
     power, and self-stress as it was.
     """
