@@ -331,3 +331,13 @@ def test_command(tmp_path):
     out = CliRunner().invoke(app, [*arguments, "--only", "euler"])
     assert out.exit_code == 2
     assert "there is no formulation 'euler'" in out.output
+
+
+def test_a_law_that_sticks_at_its_corner_has_no_reference_and_says_so():
+    """Dry friction that a user writes: from rest to rest it slips, then sticks, which only events know."""
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -G))
+    m.add(planar_rod("rod", (0, 0), (1, 0)), fb.Revolute("A", "ground", "rod", at=(0, 0)))
+    m.add(fb.Actuator("dry", "A.angle", force="-3*sign(rate)"))
+    found = m.compare(3.0, outputs=3, repeats=0, max_steps=300, formulations=["projection"])
+    assert "compare knows no corners of laws (Actuator 'dry')" in found.reference
+    assert not found["projection"].success

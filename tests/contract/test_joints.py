@@ -27,7 +27,8 @@ from tests.contract.zoo import (
 )
 from tests.layers import both_layers, started
 
-pytestmark = both_layers
+# The random starts of these tests are no consistent ones, and being told so is not what they ask about.
+pytestmark = [both_layers, pytest.mark.filterwarnings("ignore::flyball.errors.StartWarning")]
 
 every = pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
 

@@ -10,15 +10,8 @@ import flyball as fb
 from tests.control.slide import slide
 
 
-def test_rings_are_named():
-    a = fb.Lag("a", of="b", time=1, lead=0.5)
-    b = fb.PID("b", setpoint="a", measured="A.displacement", kp=2)
-    with pytest.raises(fb.ModelError, match=r"b\.output -> .*a\.output -> a\.input -> b\.output"):
-        slide(a, b, force="b")
-
-
 def test_rings_in_a_file_are_named_at_their_line(tmp_path):
-    m = slide(fb.Lag("a", of="b", time=1), fb.Lag("b", of="a", time=1), force="a")
+    m = slide(fb.Lag("a", of="b", time=1), fb.Lag("b", of="a*a", time=1), force="a")
     m.save(tmp_path / "m.toml")
     text = (tmp_path / "m.toml").read_text().replace("time = 1.0", "time = 1.0\nlead = 0.5")
     (tmp_path / "m.toml").write_text(text)

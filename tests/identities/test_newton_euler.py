@@ -22,7 +22,8 @@ from tests.mechanisms import G, bricard, four_bar
 from tests.results.at_states import assembled
 from tests.verification.test_reactions import actuated
 
-pytestmark = both_layers
+# The random starts of these tests are no consistent ones, and being told so is not what they ask about.
+pytestmark = [both_layers, pytest.mark.filterwarnings("ignore::flyball.errors.StartWarning")]
 
 
 def residual(r):

@@ -57,3 +57,34 @@ def test_sound_motions_are_not_doubted(name, rtol):
     """At a rough tolerance a rough balance is what was asked for."""
     m = example(name)
     assert not m.simulate(0.5, outputs=11, rtol=rtol).health.doubtful
+
+
+def struck(k: float) -> fb.Mechanism:
+    """Of three bodies on slides one creeps to rest from 0.1 m, 5000 J, before another one is hit, 5e-3 J."""
+    m = fb.Mechanism("struck", planar=True, gravity=(0, 0))
+    for n in "abd":
+        m.add(fb.Body(n, mass=1, inertia=1), fb.Prismatic(n.upper(), "ground", n, at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("soft", "A.displacement", stiffness=10), fb.Initial("A.displacement", value=0.1))
+    m.add(fb.CoordinateSpring("hard", "B.displacement", stiffness=k))
+    m.add(fb.CoordinateSpring("oil", "D.displacement", stiffness=1e6, damping=1e5))
+    m.add(fb.Initial("D.displacement", value=0.1), fb.Event("blow", "t > 1", do=[fb.Impulse("b", (0.1, 0))]))
+    return m
+
+
+def test_what_was_dissipated_before_excuses_nothing():
+    """Steps of 0.2 ms damp a swing of 1e4 rad/s away; 5e-3 J are nothing beside 5000 J, and much of what moves then."""
+    r = struck(1e8).simulate(2.0, outputs=101, method="radau", step=2e-4)
+    assert np.abs(r["B.displacement"][-25:]).max() < 1e-9
+    (text,) = r.health.doubtful
+    assert "between t = " in text
+    assert not struck(1e4).simulate(2.0, outputs=101, method="radau", step=2e-4).health.doubtful
+
+
+def test_what_moves_between_two_rows_only_is_not_nothing():
+    """From rest to rest by a relay: what was moved stands in no row."""
+    m = fb.Mechanism("relay", planar=True)
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.Actuator("f", "A.displacement", force="-2*value - 0.5*sign(rate)"), fb.Initial("A.displacement", value=1))
+    r = m.simulate(20.0, outputs=3)
+    assert np.abs(r["A.displacement_rate"]).max() < 1e-9
+    assert not r.health.doubtful

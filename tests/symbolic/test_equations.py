@@ -53,7 +53,6 @@ def test_quantities_of_joints(where, name, coordinates):
 
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
-@pytest.mark.filterwarnings("ignore:invalid value")  # nan of a bushing that has turned by more than half a turn
 @pytest.mark.parametrize("make", [lambda: with_forces("plane"), lambda: with_forces("space")])
 def test_quantities_of_forces(make, coordinates):
     try:

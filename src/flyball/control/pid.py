@@ -91,12 +91,12 @@ class PID(Controller):
         positive(self, n, "filter", "tracking")
         for name, needs, there in (
             ("filter", "kd", self.kd != 0.0),
-            ("derivative_weight", "kd", self.kd != 0.0 or self.derivative_weight == 0.0),
-            ("setpoint_weight", "kp", self.kp != 0.0 or self.setpoint_weight == 1.0),
+            ("derivative_weight", "kd", self.kd != 0.0 or n.derivative_weight == 0.0),
+            ("setpoint_weight", "kp", self.kp != 0.0 or n.setpoint_weight == 1.0),
             ("anti_windup", "limits and ki", self._limited and self.ki != 0.0),
             ("tracking", f"anti_windup={BACK!r}", self.windup == BACK),
-            ("initial", "ki", self.ki != 0.0 or self.initial == 0.0),
-            ("initial_measured", "kd", self.kd != 0.0 or self.initial_measured == 0.0),
+            ("initial", "ki", self.ki != 0.0 or n.initial == 0.0),
+            ("initial_measured", "kd", self.kd != 0.0 or n.initial_measured == 0.0),
         ):
             if getattr(self, name) is not None and not there:
                 raise ModelError(f"{self.title}: {name} does nothing without {needs}; leave it out")

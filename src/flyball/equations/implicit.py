@@ -62,6 +62,8 @@ class Plan(NamedTuple):
     pressing: np.ndarray  # rows whose multipliers some friction depends on
     fixed: np.ndarray  # (1,): whether the mass matrix does not change
     negative: np.ndarray  # numbers whose negatives stand behind all others and a -1
+    light: np.ndarray  # (nv,): inertia that bodies without any have in the Jacobian, or nothing
+    own_mass: np.ndarray  # (nv,): numbers of the inertia of each velocity alone
 
 
 class Means(NamedTuple):
@@ -197,6 +199,8 @@ def linearise(t, k, A, K, c):
     if P.fixed[0] == 0 or K.count[JACOBIANS] == 0:
         lay(own.y[0], k, A, A[PUSHED], K)
         status += differentiate(A, A[PUSHED], PUSHES, P.mass, K.J[k, first:last])
+        for i in range(P.light.shape[0]):
+            K.J[k, P.own_mass[i]] += P.light[i]
     elif k != START:
         for e in range(first, last):
             K.J[k, e] = K.J[START, e]

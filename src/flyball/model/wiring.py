@@ -15,6 +15,7 @@ from .controller import OUTPUT, Controller, refuse_equal
 from .element import LawOf, resolve
 from .expressions import Expression
 from .grammar import Node
+from .rings import solved
 from .words import suggest
 
 if TYPE_CHECKING:
@@ -151,13 +152,14 @@ class _Wiring:
         self.model, self.all = model, controllers(model)
         self.known: dict[tuple[str, str], Node] = {}
         self.way: list[str] = []
+        self.rings: dict[str, str] = {}
         self.states = {name: e.states(resolve(e, model.environment())) for name, e in self.all.items()}
         self.own = {name: (*e.signals(), *(x.name for x in self.states[name])) for name, e in self.all.items()}
         self.names = {f"{name}.{k}" for name, own in self.own.items() for k in own}
         self.names |= {name for name, own in self.own.items() if OUTPUT in own}
 
     def signal(self, e: Controller, name: str) -> Node:
-        """A signal as an expression; refused if it depends on itself."""
+        """A signal as an expression; solved for where it depends on itself, or refused."""
         key = e.name, name
         if key in self.known:
             return self.known[key]
@@ -165,15 +167,16 @@ class _Wiring:
             return Node("name", (), f"{e.name}.{name}")
         told = f"{e.name}.{name}"
         if told in self.way:
-            ring = " -> ".join([*self.way[self.way.index(told) :], told])
-            raise ModelError(
-                f"{e.title}: its {name} depends on itself at the same instant: {ring}. Have one of them go through a "
-                f"state, as a Lag or an Integrator has, or sample one of the controllers (period=...)"
-            )
+            self.rings.setdefault(told, " -> ".join([*self.way[self.way.index(told) :], told]))
+            return Node("name", (), told)
         self.way.append(told)
-        self.known[key] = self.template(e, e.signals()[name])
+        tree = self.template(e, e.signals()[name])
         self.way.pop()
-        return self.known[key]
+        if told in self.rings:
+            tree = solved(tree, told, e.title, self.rings[told])
+        if all(n.kind != "name" or n.value not in self.way for n in tree.walk()):  # of a ring it is known with the rest
+            self.known[key] = tree
+        return tree
 
     def template(self, e: Controller, text: str) -> Node:
         """A formula of a controller's own, of its signals, its states, and what it is given."""

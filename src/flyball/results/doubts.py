@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ FEW, EACH = (
 )  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
+PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
 AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
@@ -63,28 +65,70 @@ def energy_moved(result: Result) -> float:
 
     The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
     """
-    if not len(result.t):
+    return _moved(result, 0, len(result.t))
+
+
+def _moved(result: Result, begin: int, end: int) -> float:
+    """The same between two rows of output, the last not counted."""
+    if end <= begin:
         return 0.0
     e = result.energy
-    return float(e.kinetic.max() + sum(np.ptp(x) for x in (e.gravity, e.elastic, *e.work.values())))
+    ranges = sum(np.ptp(x[begin:end]) for x in (e.gravity, e.elastic, *e.work.values()))
+    return float(e.kinetic[begin:end].max() + ranges)
 
 
 def _balance(result: Result) -> str:
-    moved, drift = energy_moved(result), result.health.energy_drift
-    allowed = balanced(result) * moved + _rest(result)
-    if drift <= allowed:
-        return ""
+    part, moved, least = balanced(result), energy_moved(result), _rest(result)
+    drift = result.health.energy_drift
+    if drift > part * moved + least:
+        return _off(result, "", drift, moved, part * moved + least)
+    for begin, end in _stretches(result):
+        lost = float(np.ptp(result.energy.balance[begin:end]))
+        if lost <= least or lost <= part * (moved * float(result.energy.kinetic[begin:end].max())) ** 0.5:
+            continue
+        # velocities v are as far off as those of what moves most, u: by m v du
+        there = _moved(result, begin, end)
+        allowed = part * (moved * there) ** 0.5 + least
+        if lost > allowed:
+            when = f" between t = {result.t[begin]:.6g} and {result.t[end - 1]:.6g} s"
+            return _off(result, when, lost, there, allowed)
+    return ""
+
+
+def _off(result: Result, when: str, drift: float, moved: float, allowed: float) -> str:
     finer = "shorter step" if result.health.options.get("step") else "smaller rtol"
     return (
-        f"the energy balance is off by {drift:.3g} J where {moved:.3g} J were moved and {allowed:.1g} J are to be "
-        f"expected; a {finer} may tell whether the motion can be trusted"
+        f"the energy balance is off by {drift:.3g} J{when} where {moved:.3g} J were moved and {allowed:.1g} J are to "
+        f"be expected; a {finer} may tell whether the motion can be trusted"
     )
 
 
+def _stretches(result: Result) -> Iterable[tuple[int, int]]:
+    """Halves, quarters and so on of the rows of a motion that was integrated: what something else dissipated before,
+    or moves after, does not speak for what happens in one.
+    """
+    rows, pieces = len(result.t), 2
+    while result.health.options.get("rtol") is not None and pieces <= PIECES and rows >= ROWS * pieces:
+        edges = [k * (rows - 1) // pieces for k in range(pieces + 1)]
+        yield from ((a, b + 1) for a, b in itertools.pairwise(edges))
+        pieces *= 2
+
+
 def _rest(result: Result) -> float:
-    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies."""
+    """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
+
+    Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
+    rows have them.
+    """
     rounding = 1e-12 * float(np.abs(result.energy.potential).max(initial=0.0))
-    return rounding + float(result.values.system.body_x[:, MASS].sum()) * (AT_REST * result.values.length) ** 2
+    S, r = result.values.system, result.records
+    mass = S.body_x[:, MASS]
+    least = rounding + float(mass.sum()) * (AT_REST * result.values.length) ** 2
+    span = float(np.ptp(result.t)) if len(result.t) else 0.0
+    if not result.energy.work or not span > 0.0:
+        return least
+    went = (mass[b] * sum(np.ptp(x) ** 2 for x in r.body(b)[0]) for b in range(len(mass)))
+    return least + balanced(result) * float(sum(went)) / max(span, 1e-150) ** 2
 
 
 def _violation(result: Result) -> str:

@@ -8,11 +8,13 @@ then not come back. A program that writes the file anew drops that one and keeps
 
 from __future__ import annotations
 
+import copy
 import csv
 import hashlib
 import json
 import os
 from collections.abc import Callable, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -127,7 +129,7 @@ def _write(result: Result, path: Path, whole: bool) -> None:
             file.dimensions[name] = len(labels)
             file.create_variable(name, (name,), dtype=text_type(), data=np.array(labels, object))
         listed = False
-        for x in labelled(result, MOST) if whole else ():  # one after the other: all at once are much memory
+        for x in labelled(_unread(result), MOST, forget=True) if whole else ():
             made = file.create_variable(_safe(x.name), x.dims, data=np.ascontiguousarray(x.values))
             made.attrs.update(_attributes(x.unit, x.note))
             listed = listed or not x.name.startswith(f"{ENERGY}.")
@@ -135,6 +137,16 @@ def _write(result: Result, path: Path, whole: bool) -> None:
             what = "too many parts to list" if whole else "a motion that is not at its end"
             file.attrs["comment"] = f"{what}: read this file with flyball.load_result"
         _write_solution(result, file.create_group(GROUP), path.parent)
+
+
+def _unread(result: Result) -> Result:
+    """The same, of which nothing was worked out yet: what is worked out of it to be written goes with it."""
+    out = copy.copy(result)
+    for name, x in vars(type(result)).items():
+        if isinstance(x, cached_property):
+            vars(out).pop(name, None)
+    vars(out).pop("_views", None)
+    return out
 
 
 def text_type() -> Any:

@@ -36,10 +36,11 @@ def coordinates(result: Result) -> dict[str, list[str]]:
     return axes if result.planar else axes | {QUATERNION: list("wxyz")}
 
 
-def labelled(result: Result, most: float = np.inf) -> Iterator[Labelled]:
+def labelled(result: Result, most: float = np.inf, forget: bool = False) -> Iterator[Labelled]:
     """Every quantity of the result: ``"crank.position"``, ``"A.force"``, ``"energy.total"`` and so on.
 
-    Energies only, where the mechanism has so many parts that there would be more than ``most`` quantities.
+    Energies only, where the mechanism has so many parts that there would be more than ``most`` quantities. With
+    ``forget`` the result does not keep what was worked out for a part: of all parts at once that is much memory.
     """
     tables = {name: quantities(result.model, name) for name in result.parts()}
     count = sum(x.array for table in tables.values() for x in table.values())
@@ -52,6 +53,12 @@ def labelled(result: Result, most: float = np.inf) -> Iterator[Labelled]:
                 values = view.quantity(what)[1]
                 dims = _of_members(name, what, values) if name in result.bulk else _dims(what, values)
                 yield Labelled(f"{name}.{what}", dims, x.unit, values, _note(view, what))
+                del values
+        if forget:
+            del view
+            vars(result).pop("_views", None)
+            if (records := vars(result).get("records")) is not None:
+                records.forget()
 
 
 def _dims(what: str, values: np.ndarray) -> tuple[str, ...]:

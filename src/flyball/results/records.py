@@ -88,6 +88,10 @@ class Records:
             self._frames[k] = self.carried(b, offset, turn)
         return self._frames[k]
 
+    def forget(self) -> None:
+        """Keep no frames; they are found again when they are asked for."""
+        self._frames.clear()
+
     def carried(self, b: int, offset: tuple, turn: tuple) -> Record:
         """Record of a point and axes carried by body b (-1: ground)."""
         if b >= 0:

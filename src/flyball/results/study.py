@@ -204,14 +204,24 @@ class Study:
             if len(y):
                 text = f"{span(y)} {unit.replace('*', ' ')}".rstrip()
                 out.append((name, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}"))
-        for k, text in sorted(self.reasons.items())[:TOLD]:
-            out.append(("failed", f"run {k} ({', '.join(f'{n} = {x:.6g}' for n, x in self.at(k).items())}): {text}"))
-        if failed > TOLD:
-            out.append(("failed", f"and {failed - TOLD} more: study.reasons"))
-        seen = list(dict.fromkeys(self.remarks.values()))
-        for text in seen[:TOLD]:
-            first = next(k for k, x in self.remarks.items() if x == text)
-            out.append(("remark", f"{list(self.remarks.values()).count(text)} runs, first {first}: {text}"))
+        told_of = self._told_of(self.reasons)
+        out += [("failed", text) for text in told_of[:TOLD]]
+        if len(told_of) > TOLD:
+            out.append(("failed", f"and {len(told_of) - TOLD} other reasons: study.reasons"))
+        return out + [("remark", text) for text in self._told_of(self.remarks)[:TOLD]]
+
+    def _told_of(self, texts: dict[int, str]) -> list[str]:
+        """Each text once, with the first run that has it and how many there are."""
+        first: dict[str, int] = {}
+        count: dict[str, int] = {}
+        for k, text in sorted(texts.items()):
+            first.setdefault(text, k)
+            count[text] = count.get(text, 0) + 1
+        out = []
+        for text, k in first.items():
+            at = ", ".join(f"{n} = {x:.6g}" for n, x in self.at(k).items())
+            which = f"run {k}" if count[text] == 1 else f"{count[text]} runs, first {k}"
+            out.append(f"{which} ({at}): {text}")
         return out
 
     def as_dict(self) -> dict[str, Any]:

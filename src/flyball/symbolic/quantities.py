@@ -40,14 +40,16 @@ class Quantities:
         if what == "power" and (found := self._power(owner)) is not None:
             return found
         try:
-            unit, values = self.result.channel(f"{owner}.{what}")
+            with np.errstate(invalid="ignore"):  # formulas say nan where something has no value, and mean it
+                unit, values = self.result.channel(f"{owner}.{what}")
         except Undecided as error:
             raise AnalysisError(f"{name!r} has no expression: {error}") from error
         return self._of(values, unit)
 
     def reaction(self, joint: str, axes: str, on: str | None) -> tuple[Expressions, Expressions]:
         """Force and torque of a joint."""
-        force, torque = self.result[joint].reaction(axes=axes, on=on)
+        with np.errstate(invalid="ignore"):  # formulas say nan where something has no value, and mean it
+            force, torque = self.result[joint].reaction(axes=axes, on=on)
         return self._of(force, "N"), self._of(torque, "N*m")
 
     def _of(self, values: Any, unit: str) -> Expressions:

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import ModelError
 from .drawing import BESIDE, PALETTE, PRETTY, handed_out, headed, new_figure, styled
+from .smoothing import surface_of_means
 
 if TYPE_CHECKING:
     from ..results.indices import Indices
@@ -166,8 +167,27 @@ def _scattered(row: Any, found: Study, name: str) -> None:
             ax.sharey(row[0])
 
 
+def _over_samples(ax: Any, x: np.ndarray, y: np.ndarray, z: np.ndarray, scattered: bool) -> Any:
+    """By triangles between samples; the smooth mean where others vary too; by their colours if they lie on a line."""
+    from scipy.spatial import Delaunay, QhullError
+
+    if len(z) < 3:
+        return ax.scatter(x, y, c=z)
+    try:
+        triangles = Delaunay(np.column_stack([(v - v.mean()) / (np.ptp(v) or 1.0) for v in (x, y)])).simplices
+    except (QhullError, ValueError):
+        return ax.scatter(x, y, c=z)
+    if scattered:
+        a, b, mean = surface_of_means(x, y, z)
+        drawn = ax.contourf(a, b, np.ma.masked_invalid(mean), LEVELS)
+    else:
+        drawn = ax.tricontourf(x, y, triangles, z, LEVELS)
+    ax.plot(x, y, ".", color="#222222", markersize=1.5, alpha=0.5)
+    return drawn
+
+
 def _surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> None:
-    """Over a grid as it is, the mean over its other axes; over samples by triangles between them."""
+    """Over a grid as it is, the mean over its other axes; over samples what lies between them."""
     i, j = found.parameters.index(x), found.parameters.index(y)
     values = found[name]
     if found.axes and min(len(found.axes[i]), len(found.axes[j])) > 1:
@@ -180,11 +200,8 @@ def _surface(drawing: Any, ax: Any, found: Study, name: str, x: str, y: str) -> 
     else:
         known = np.isfinite(found.values[name])
         px, py, z = found.points[known, i], found.points[known, j], found.values[name][known]
-        if len(z) < 3 or np.ptp(px) == 0.0 or np.ptp(py) == 0.0:
-            drawn = ax.scatter(px, py, c=z)
-        else:
-            drawn = ax.tricontourf(px, py, z, LEVELS)
-            ax.plot(px, py, ".", color="#222222", markersize=1.5, alpha=0.5)
+        varied = any(np.ptp(x) > 0.0 for k, x in enumerate(found.points[known].T) if k not in (i, j))
+        drawn = _over_samples(ax, px, py, z, varied)
     drawing.colorbar(drawn, ax=ax, label=_label(found, name))
     ax.set_xlabel(x)
     ax.set_ylabel(y)

@@ -14,18 +14,22 @@ from ....tables.specs import Structure
 from ....tables.system import (
     FORCE_ALONG,
     FORCE_SWITCH,
+    INERTIA,
+    MASS,
     NV,
     SCHUR,
     SLIDING,
     SOLVER,
     SWITCH_OTHER,
     SWITCH_ROW,
+    V0,
     System,
 )
 from ...compiled import Compiled
 from ...linear.loads import pressing
 from .parts import Parts
 
+NONE, SLIGHT = 1e-14, 1e-8  # part of a body's largest inertia that is none, and what is put in its place
 THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
 
 
@@ -76,6 +80,7 @@ class Layout:
         self.first = first.astype(np.int64)
         picked, mass, rows, metric, valued_rows, sizes, turns, presses, _ = first.tolist()
         own_mass = mass + np.flatnonzero(self.mass.i == self.mass.j)  # one for each velocity, in their order
+        self.own_mass = own_mass.astype(np.int64)
         e = np.flatnonzero((i < nv) & (j < nv))
         self.spring = np.column_stack([i[e], j[e], picked + e, own_mass[i[e]], picked + again[e]]).astype(np.int64)
         row = np.repeat(np.arange(nr), np.diff(self.row_p))
@@ -191,3 +196,26 @@ def metric(c: Compiled, t: float, y: np.ndarray) -> np.ndarray:
         inertia[S.mass_i[own, 0]] = W.M[own]
     size = c.sizes**2
     return 1.0 / (size * np.maximum(inertia / size, THIN * (inertia / size).max(initial=0.0)))
+
+
+def light(c: Compiled) -> np.ndarray:
+    """Inertias that bodies without any about some axis are given in Jacobians, (nv,); nothing where none is without.
+
+    Bodies are eliminated before the rows that hold them, without pivots; Newton's iteration takes out again what this
+    part of the body's own mass, at the mechanism's length, does.
+    """
+    S, out = c.system, np.zeros(c.structure.nv)
+    if S.kinds[SOLVER] != SCHUR:  # moving masses are those of what hangs on each other
+        return out[:0]
+    inertia, mass = S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3), S.body_x[:, MASS]
+    if c.structure.model.planar:
+        inertia = inertia[:, 2:, 2:]
+    own = np.linalg.eigvalsh(inertia)
+    missing = (own[:, 0] <= NONE * own[:, -1]) | (mass == 0.0)
+    if not missing.any():
+        return out[:0]
+    least = mass[mass > 0.0].min(initial=1.0)
+    for b in np.flatnonzero(missing):
+        at = slice(S.body_i[b, V0], S.body_i[b, V0] + S.body_i[b, NV])
+        out[at] = SLIGHT * max(mass[b], least) * (c.values.length / c.sizes[at]) ** 2
+    return out

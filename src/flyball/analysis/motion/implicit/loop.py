@@ -17,7 +17,7 @@ from ....tables.system import FREE, NV, Q0, SCHUR, SOLVER, SPHERICAL, TREE, V0, 
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
 from ...linear.loads import STEP, as_complex, complex_tables
-from .layout import layout, metric
+from .layout import layout, light, metric
 
 SOFT, SOFTER = 1e-10, 1e-8  # regularisation of rows, as part of their natural size; where forces depend on multipliers
 SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if they do not fall: where errors of steps
@@ -52,8 +52,9 @@ class Implicit:
         SC, WC = complex_tables(c)
         plan = Plan(
             x.first, x.pick, x.mass.pick, metric(c, float(clock.real[ex.T]), y), x.valued, x.valued.copy(), x.turns,
-            x.pressing, np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative,
+            x.pressing, np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative, light(c), x.own_mass,
         )  # fmt: skip
+        self.springy = x.spring[plan.light[x.spring[:, 0]] == 0.0] if len(plan.light) else x.spring
         desk = self._desk(len(s.states), len(S.angle_i) > 0)
         self.means = Means(SC, WC, *self._benches(clock.y.shape[1]), plan, desk)
 
@@ -123,7 +124,7 @@ class Implicit:
         return Desk(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(4, nr), z(4, nz), z(4, nz),
             z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx), self._plain(), z(3, n), w(3, n), J,
-            x.spring, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            self.springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 

@@ -1,0 +1,53 @@
+"""What the table of docs/controllers.md says: controllers in studies, contact, files, and motions that go on."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flyball as fb
+from tests.control.slide import TIGHT, slide
+
+WAYS = ({}, {"method": "radau"}, {"method": "generalised-alpha", "step": 1e-3})
+
+
+def loop(**fields):
+    given = {"setpoint": "1", "measured": "A.displacement", "kp": "kp", "ki": 60, "kd": 12, "filter": 0.02}
+    m = slide(fb.PID("pid", **(given | fields)), fb.Lag("act", of="pid", time=0.01), force="act", kp=80.0)
+    return m
+
+
+@pytest.mark.parametrize("period", [None, 0.01])
+@pytest.mark.parametrize("way", WAYS, ids=["auto", "radau", "alpha"])
+def test_going_on_from_a_file_is_the_same_motion(way, period, tmp_path):
+    how = way if "step" in way else way | TIGHT
+    m = loop(period=period)
+    whole = m.simulate(0.8, outputs=5, **how)
+    m.simulate(0.43, outputs=3, **how).save(tmp_path / "first.nc")
+    rest = m.simulate(0.8, outputs=3, start=fb.load_result(tmp_path / "first.nc"), **how)
+    near = 1e-4 if "step" in way else 1e-8
+    for name in ("A.displacement", "pid.integral", "act.value"):
+        assert rest[name][-1] == pytest.approx(whole[name][-1], abs=near)
+
+
+@pytest.mark.parametrize("period", [None, 0.01])
+def test_each_run_of_a_study_is_the_single_run(period):
+    m = loop(period=period)
+    found = m.study({"kp": [20.0, 80.0, 200.0]}, of=["A.displacement", "pid.output"], t_end=0.5, outputs=6)
+    for k, kp in enumerate((20.0, 80.0, 200.0)):
+        r = m.simulate(0.5, outputs=6, parameters={"kp": kp})
+        for name in ("A.displacement", "pid.output"):
+            assert np.array_equal(np.asarray(found[name])[k], r[name])
+
+
+@pytest.mark.parametrize("period", [None, 0.01])
+def test_a_stop_behind_the_set_point(period):
+    """It strikes the stop and lies there while the integral comes down by ki e, then returns to its set point: 10 N."""
+    m = loop(period=period, ki=600, upper=50, lower=-50)
+    m.add(fb.Limit("stop", "A.displacement", upper=1.02, restitution=0.5))
+    r = m.simulate(8, outputs=[0.5, 1.0, 2.0, 4.0, 8.0])
+    assert r["A.displacement"].max() <= 1.02 + 1e-9
+    assert r["A.displacement"][1:3] == pytest.approx([1.02, 1.02], abs=1e-9)
+    assert r["pid.output"][1] - r["pid.output"][2] == pytest.approx(600 * 0.02, abs=1e-6)
+    assert r["A.displacement"][-1] == pytest.approx(1.0, abs=1e-4)
+    assert r["pid.output"][-1] == pytest.approx(10.0, abs=2e-3)
