@@ -1,8 +1,9 @@
-"""Andrews' squeezing mechanism for 0.03 s to 1e-5 rad in every angle at the end: flyball, MuJoCo and Exudyn in one run.
+"""Andrews' squeezing mechanism for 0.03 s to 1e-5 rad in every angle at the end: flyball and others in one run.
 
 Schiehlen, Multibody Systems Handbook (1990); problem II-13 of the Test Set for IVP Solvers. The end is that of an
 80-bit extrapolation of the test set's equations; the test set's own digits differ by 2e-9.
-Usage: ``python andrews.py``.
+SUNDIALS and SciPy have equations derived by hand (`peer_by_hand.py`), the others the mechanism.
+Usage: ``python andrews.py [--target RAD]``.
 """
 
 from __future__ import annotations
@@ -46,6 +47,7 @@ PEERS = (
     ("exudyn", "trapezoidal, index 2", 4000),
     ("exudyn", "trapezoidal, index 2, full Newton", 4000),
 )
+BY_HAND = ("IDA", "CVODE, Adams", "DOP853")
 
 
 def turned(angle: float, x: float, y: float, origin: tuple[float, float] = (0.0, 0.0)) -> tuple[float, float]:
@@ -114,10 +116,20 @@ def mujoco_end(p: Planar, setting: str, steps: float, samples: int) -> tuple[Any
     return (None if motion is None else angles(planar_motion(p, tree, motion)[0][:, :, 2])), seconds
 
 
+def end_by_hand(setting: str, rtol: float, samples: int) -> tuple[Any, float]:
+    """Angles at the end."""
+    from peer_by_hand import solve
+
+    motion, seconds = solve(np.array(START), T_END, rtol, setting, samples)
+    return (None if motion is None else motion[-1, :7]), seconds
+
+
 def main() -> None:
     """Command line."""
-    arguments = contest.parser(__doc__).parse_args()
-    one = Contest("andrews", T_END, accuracy, "end_error", TARGET, SAMPLES)
+    parser = contest.parser(__doc__)
+    parser.add_argument("--target", type=float, default=TARGET, help="largest error of an angle [rad] (1e-5)")
+    arguments = parser.parse_args()
+    one = Contest(f"andrews, {arguments.target:g}", T_END, accuracy, "end_error", arguments.target, SAMPLES)
     model, p = example("andrews.toml"), squeezer()
 
     def end(run: Any) -> np.ndarray:
@@ -126,6 +138,7 @@ def main() -> None:
     ours = [Flyball(model, end, method, arguments.coordinates) for method in ("dop853", "rk45", "radau")]
     ends = {"mujoco": mujoco_end, "exudyn": exudyn_end}
     peers = [Peer(name, setting, partial(ends[name], p, setting), first) for name, setting, first in PEERS]
+    peers += [Peer("by hand", setting, partial(end_by_hand, setting), 1e-7) for setting in BY_HAND]
     rows = contest.run(one, ours, peers)
     print(contest.show(rows, ACCURACY))
     timing.write_json(arguments.json, rows)

@@ -21,7 +21,7 @@ from typing import Any
 for _variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
     os.environ[_variable] = "1"
 
-PACKAGES = ("numpy", "scipy", "numba", "exudyn", "mujoco", "pin", "drake")
+PACKAGES = ("numpy", "scipy", "numba", "exudyn", "mujoco", "pin", "drake", "scikit-sundae")
 
 
 def cpu(work: Callable[[], Any]) -> float:

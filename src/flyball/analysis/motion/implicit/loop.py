@@ -9,6 +9,7 @@ from ....equations import residual
 from ....equations.callbacks import Going, Own
 from ....equations.implicit import SIZES, Means, Plan, radau_steps
 from ....equations.residual import Bench
+from ....equations.scratch import work
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
@@ -16,7 +17,7 @@ from ....numerics.integrators.implicit.desk import Desk
 from ....tables.system import FREE, NV, Q0, SCHUR, SOLVER, SPHERICAL, TREE, V0, System, Work
 from ...compiled import Compiled
 from ...linear.derivatives import refuse_functions
-from ...linear.loads import STEP, as_complex, complex_tables
+from ...linear.loads import STEP, as_complex
 from .layout import layout, light, metric
 
 SOFT, SOFTER = 1e-10, 1e-8  # regularisation of rows, as part of their natural size; where forces depend on multipliers
@@ -24,6 +25,7 @@ SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if
 # are looked at, and where they are not
 CHEAP, DEAR, FEW = 1e-3, 0.1, 12  # rates of the iteration up to which a Jacobian serves on, where it takes few
 # evaluations and where it takes more
+MANY = 50  # products of a factor, by unknowns, from which on it costs more than a step
 SEEN = np.array([0.0, 0.0, 0.25, 0.6, 0.857])  # places in a step at which guards are seen, behind two that are not
 
 
@@ -49,7 +51,8 @@ class Implicit:
         self.layout = x = layout(s, S, index_3)
         self.width, self.system = x.width, S
         y = clock.y[ex.NOW].copy()
-        SC, WC = complex_tables(c)
+        SC = self._tables(S)[1].fields
+        WC = work(s, SC, complex)
         plan = Plan(
             x.first, x.pick, x.mass.pick, metric(c, float(clock.real[ex.T]), y), x.valued, x.valued.copy(), x.turns,
             x.pressing, np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative, light(c), x.own_mass,
@@ -61,11 +64,17 @@ class Implicit:
     def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
         """The door with these tuples bound to it."""
         if S is not self.system:  # other values of parameters: masses too, perhaps
-            self.system, self.means = S, self.means._replace(SC=as_complex(S))
+            self.system, self.means = S, self.means._replace(SC=self._tables(S)[1].fields)
             self.means.desk.count[ds.JACOBIANS] = 0
         M = self.means
         own.doors[1] = residual.address(M.SC, M.WC, M.moved)
-        return Bound(self.door, *map(Written, (S, W, M, own, going)))
+        real, stepped = self._tables(S)
+        return Bound(self.door, real, Written(W), Written(M, stepped), Written(own), Written(going))
+
+    def _tables(self, S: System) -> tuple[Written, Written]:
+        """The same for every run with them: tables, and these in complex numbers, as compiled code has them."""
+        kept = self.layout.s.kept
+        return kept.get("written", id(S), 2, lambda: (Written(S), Written(as_complex(S))))
 
     @property
     def failed(self) -> SimulationError | None:
@@ -107,6 +116,8 @@ class Implicit:
         real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / real[ds.RTOL])
         real[ds.SOFT] = SOFTER if len(x.pressing) else SOFT
         real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
+        dear = (np.diff(P.Up)[P.Lj]).sum() > MANY * n
+        real[ds.STAYS] = 2.0 if dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count = np.zeros(ds.COUNTS, np.int64)
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
         count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0

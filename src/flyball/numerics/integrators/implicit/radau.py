@@ -33,14 +33,13 @@ from ..clock import (
 from ..loop import shorten
 from ..refusal import afresh
 from .asked import WIDEST
-from .desk import ASKED, BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RTOL, SERVES, START, THETA, WIDTH
+from .desk import ASKED, BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RTOL, SERVES, START, STAYS, THETA, WIDTH
 from .newton import factor
 from .step import MOST, begin, estimate, iterate, predict
 from .whole import iterate_whole
 
 SAFETY = 0.9
 NARROWEST = 0.2  # what the width becomes at least
-KEPT = 1.2  # a step that could be wider by this is not: the factors serve on
 WALKED = 1e-3  # part of the widest step of late below which narrower ones lead into a singular position
 FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is so much narrower, if it is no rounding
 SLIGHT = 10.0  # an error from rounding that is accepted where no step of another width is found
@@ -63,7 +62,7 @@ def attempt(callbacks, S, K, c, h):
     """One step of width h into c.y[NEW]. Returns (status, error, factor that a failed iteration asks for)."""
     residual, linearise, compose, arrive = callbacks[:4]
     begin(c, K)
-    if c.real[GROW] <= 1.0 and K.count[FRESH] == 0:
+    if c.real[GROW] <= 1.0 and K.count[FRESH] == 0 and (c.count[TROUBLE] != 0 or K.real[THETA] > K.real[SERVES]):
         K.count[FRESH] = -1
     if K.count[FRESH] < 1 and not (K.count[FRESH] == 0 and K.real[WIDTH] > 0.0):
         rest(K, c)
@@ -181,7 +180,7 @@ def enter(K, c, t, h, error, iterations):
     K.real[LAST_ERROR] = max(1e-2, error)
     K.count[BEFORE] = 1
     K.count[FRESH] = 0 if K.real[THETA] <= K.real[SERVES] else -1
-    if K.count[FRESH] == 0 and h <= wide <= KEPT * h:
+    if K.count[FRESH] == 0 and h <= wide <= K.real[STAYS] * h:
         wide = h
     c.real[WIDE] = max(h, 0.8 * c.real[WIDE])
     c.real[H] = wide if c.real[STEP] == 0.0 else c.real[STEP]
