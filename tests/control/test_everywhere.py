@@ -51,3 +51,19 @@ def test_a_stop_behind_the_set_point(period):
     assert r["pid.output"][1] - r["pid.output"][2] == pytest.approx(600 * 0.02, abs=1e-6)
     assert r["A.displacement"][-1] == pytest.approx(1.0, abs=1e-4)
     assert r["pid.output"][-1] == pytest.approx(10.0, abs=2e-3)
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=["auto", "radau"])
+def test_events_reset_states(way):
+    """An integral goes back whenever it reaches 0.3; a limited PID's integral at an instant, and its output jumps."""
+    m = slide(fb.Integrator("sum", of="1"), force="0.0*sum")
+    m.add(fb.Event("full", "sum - 0.3", do=fb.Set("sum.value", "sum - 0.2")))
+    r = m.simulate(1, outputs=[0.2, 0.4, 0.6, 0.85], **way)
+    assert r["sum.output"] == pytest.approx([0.2, 0.2, 0.2, 0.25], abs=1e-9)
+    assert r.events[0].done == ("sum.value = 0.1, was 0.3",)
+    m = slide(fb.PID("pid", setpoint="1", measured="A.displacement", ki="60", upper=6, tracking=0.5), force="pid")
+    m.add(fb.Event("anew", "t - 0.5", do=fb.Set("pid.integral", -1)))
+    r = m.simulate(0.6, outputs=[0.4999, 0.5001], **way)
+    assert r["pid.output"] == pytest.approx([6, -1 + 60 * 1e-4 * (1 - r["A.displacement"][1])], abs=1e-3)
+    with pytest.raises(fb.ModelError, match=r"has no parameter 'pid\.output'"):
+        m.add(fb.Event("no", "t - 0.1", do=fb.Set("pid.output", 1)))

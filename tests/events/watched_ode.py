@@ -76,13 +76,20 @@ def ask(own, S, W, R, c, task):
     return answer(own, S, W, R, c, task)
 
 
-def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", most=10_000, h_max=np.inf):
+def run(f, g, y, t_end, way, act=None, times=(), rtol=1e-10, method="dop853", most=10_000, h_max=np.inf, kept=()):
     """Events (t, fired, y before) of y'' = f(t, q, v), rows of output; ``act(t, y, fired)`` changes y, True: stop."""
     R, y = tableau(method), np.array(y, float)
     n = len(y) // 2
     S = Equations(f, lambda *a: np.asarray(g(*a), float), [0.0, y])
     W: Watch = watching(
-        np.array(way), np.zeros(len(way)), R.c, R.order_i[1], n, [], [], (np.zeros((2, 2 * n)), np.zeros(0))
+        np.array(way),
+        np.array(kept or [0] * len(way)),
+        R.c,
+        R.order_i[1],
+        n,
+        [],
+        [],
+        (np.zeros((2, 2 * n)), np.zeros(0)),
     )
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
     real[[ex.T_END, ex.RTOL, ex.ATOL, ex.SPAN, ex.SCALE, ex.LARGEST]] = t_end, rtol, 1e-2 * rtol, t_end, 1.0, t_end

@@ -36,6 +36,7 @@ from ..tables.system import (
     G_PULL,
     G_SHARED,
     G_SLIDES,
+    G_TURNS,
     G_UPPER,
     GUARD_KIND,
     GUARD_OF,
@@ -51,6 +52,7 @@ from ..tables.system import (
     SWITCH_KIND,
     SWITCH_LAW,
     SWITCH_MEASURED,
+    SWITCH_PARTNER,
     SWITCH_ROW,
     SWITCH_STIFFNESS,
     UNIT,
@@ -60,11 +62,12 @@ from ..tables.system import (
 from .dispatch import effort
 from .loads import law, wide
 from .rows import measured, way_of
-from .sliding import watched_place
+from .sliding import slides, watched_place
 
 NOT_WATCHED = float("nan")
 GRAIN = 2e-15  # of the mechanism's length, or a radian: a distance that is none
 NOISE = 1e-13  # part of the fastest rate, of the strongest force, that is rounding of another
+FIRM = (G_LOWER, G_UPPER, G_SLIDES, G_BACK, G_TURNS)  # of where something is, and how fast it goes
 KEPT = (
     G_LOWER,
     G_UPPER,
@@ -101,6 +104,9 @@ def watched(S, W, t, kind, s):
         return way * corner(S, W, t, s) if W.switch[MODE, s] == OFF else 1.0 - magnitude(way)
     if kind == G_PRESS_LOWER or kind == G_PRESS_UPPER:
         return pressing(S, W, s, kind, way - FROZEN)
+    if kind == G_TURNS and S.switch_i[s, SWITCH_PARTNER] < 0 and slides(S, W, s):
+        m = S.switch_i[s, SWITCH_MEASURED]
+        return way * moving(S, m, W.sensed[RATE, m])
     if kind >= G_CONE:
         return watched_place(S, W, W.sensed, W.row[LAM], kind, s)
     m, k = S.switch_i[s, SWITCH_MEASURED], S.switch_i[s, SWITCH_ROW]
@@ -155,7 +161,7 @@ def grains(S, W, t, trial, out):
         if kind == G_LOWER or kind == G_UPPER:
             m = S.switch_i[of, SWITCH_MEASURED]
             out[g] = GRAIN * max(S.glob[UNIT + m], magnitude(W.sensed[VALUE, m]))
-        elif kind == G_SLIDES or kind == G_BACK:
+        elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switch_i[of, SWITCH_PARTNER] < 0):
             out[g] = max(NOISE * fastest, GRAIN * S.glob[UNIT + S.switch_i[of, SWITCH_MEASURED]])
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest

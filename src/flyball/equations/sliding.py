@@ -127,8 +127,6 @@ def watched_place(S, W, sensed, lam, kind, s):
     if not slides(S, W, s):
         return NOT_WATCHED
     u = sensed[RATE, S.switch_i[s, SWITCH_MEASURED]]
-    if other < 0:
-        return sensed[VALUE, way_of(S, W, s)] * u
     v = sensed[RATE, S.switch_i[other, SWITCH_MEASURED]]
     way, side = sensed[VALUE, way_of(S, W, s)], sensed[VALUE, way_of(S, W, other)]
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)

@@ -14,6 +14,7 @@ import numpy as np
 from ..compiler.bound import Bound
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
+from ..math.scalar import magnitude
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
@@ -22,12 +23,16 @@ from ..numerics.integrators.watched import begun, onward
 from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, TERMS, watching
 from ..tables.system import (
     BIAS,
+    G_BACK,
     G_SHARED,
+    G_TURNS,
     GUARD_KIND,
+    GUARD_OF,
     GUARD_WAY,
     LAM,
     RATE,
     RETURNED,
+    SWITCH_PARTNER,
     SWITCH_ROW,
     VALUE,
     X_SOLVED,
@@ -37,13 +42,14 @@ from ..tables.system import (
 from .asking import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, put, report, steps, through
 from .callbacks import Going, Own, levels
 from .engine import Sheet, engine
-from .guards import KEPT, grains
+from .guards import FIRM, KEPT, grains
 from .guards import watch as guards
 from .rows import measured
 from .sharing import GRAIN, Sharing, margin, renewed, terms
 from .tasks import MOTION
 
 EXPECTED = 7
+LEFT = 1e-10  # of `Watch.tied`, of the fastest rate: what rows that hold leave of others
 
 
 @formula
@@ -51,9 +57,25 @@ def all_guards(A, W, t, K, row):
     """Guards by what stands in W, that of the group last, to a row; then its terms."""
     S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
     guards(S, W, t, out)
+    kept_at_zero(S, W, K, out)
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         out[last] = margin(S, W, t, A[GROUP])
         K.count[TERMS] = terms(A[GROUP], out, last + 1)
+
+
+@formula
+def kept_at_zero(S, W, K, out):
+    """Take from guards that what holds keeps at zero what it leaves of them."""
+    fastest = -1.0
+    for i in range(K.tied.shape[0]):
+        if K.tied[i] > 0.0:
+            least = LEFT * K.tied[i]
+            if S.guard_i[i, GUARD_KIND] == G_BACK:
+                if fastest < 0.0:
+                    for m in range(measured(S)):
+                        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+                least = LEFT * max(fastest, K.tied[i])
+            out[i] -= min(max(out[i], -least), least)
 
 
 @formula
@@ -132,6 +154,18 @@ class Steps(Protocol):
         """The door with these tuples bound to it."""
 
 
+def keeps(S: System) -> np.ndarray:
+    """1 for guards that are above zero as long as modes are right, 2 for those of distances and rates, (ng,).
+
+    A slip in the plane is one of them: what begins at rest goes its way. One in space turns where it likes.
+    """
+    kinds, of = S.guard_i[:, GUARD_KIND], S.guard_i[:, GUARD_OF]
+    slips = np.flatnonzero(kinds == G_TURNS)
+    kept = np.isin(kinds, KEPT)
+    kept[slips[S.switch_i[of[slips], SWITCH_PARTNER] < 0]] = True
+    return np.where(kept, np.where(np.isin(kinds, FIRM), 2, 1), 0)
+
+
 class Loop:
     """A motion by steps of a method: the compiled loop and what it keeps; watched where there are guards.
 
@@ -156,7 +190,7 @@ class Loop:
         spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
         self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
         there = self.expected.sensed, self.expected.row[LAM]
-        guarded = S.guard_i[:, GUARD_WAY], np.isin(S.guard_i[:, GUARD_KIND], KEPT)
+        guarded = S.guard_i[:, GUARD_WAY], keeps(S)
         self.desk = watching(
             *guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i)
         )

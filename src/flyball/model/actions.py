@@ -62,13 +62,14 @@ class Note(Action):
 
 @element
 class Set(Action):
-    """A parameter has another value from then on, and all that is written with it.
+    """A parameter has another value from then on, and all that is written with it; or a state of a controller has.
 
     It may change forces, laws and masses, but not where anything is: a length that bodies hang on cannot jump.
 
     Parameters
     ----------
     parameter : str
+        Or a state of a controller, which goes on from that value: ``"pid.integral"``.
     value : number, or an expression of parameters, ``t``, sensors and curves such as ``A.angle``
         Its value from then on, reckoned at the instant, all parameters as they were before: ``"2*k"`` doubles k.
     """

@@ -14,6 +14,7 @@ from .held import held_by
 from .joint import Joint
 from .quantities import quantities
 from .units import same_kind
+from .wiring import wired
 from .words import listing, suggest
 
 if TYPE_CHECKING:
@@ -66,8 +67,12 @@ def _refuse_unlike(model: Model, e: Event) -> None:
 
 def _check_action(model: Model, e: Event, a: Action) -> None:
     if isinstance(a, Set):
+        states = [x.name for x in wired(model) if not x.signal] if model.controllers else []
+        if a.parameter in states:
+            model.law(a.value, e.of, f"value of {a.title} in {e.title}")
+            return
         if a.parameter not in model.parameters:
-            known = list(model.parameters)
+            known = [*model.parameters, *states]
             raise ModelError(
                 f"{e.title}: {a.title}: {model.name!r} has no parameter {a.parameter!r}"
                 f"{suggest(a.parameter, known)}; {listing(known)}"

@@ -16,6 +16,7 @@ from ...laws.functions import fault
 from ...laws.opcodes import BY_TIME
 from ...model.body import Driver
 from ...model.force import CoordinateForce
+from ...model.touch import Touch
 from ...numerics.integrators import clock as ex
 from ...tables.system import (
     BODY_LAW,
@@ -233,6 +234,10 @@ def broken_force(c: Compiled, t: float) -> str:
     forces: list[Any] = list(s.forces)
     with np.errstate(all="ignore"):
         for k, e in enumerate(forces):
+            if isinstance(e, Touch):
+                if not math.isfinite(W.sensed[LOAD, S.force_i[k, FORCE_LOAD]]):
+                    return f"what {e.title} presses with is no number"
+                continue
             F, M, par = load(W.FK, S.force_i[k, FORCE_F]), load(W.FK, S.force_i[k, FORCE_M]), wide(S.force_x, k)
             along = isinstance(e, CoordinateForce)
             m = S.force_i[k, FORCE_F]

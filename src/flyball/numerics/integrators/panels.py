@@ -329,7 +329,7 @@ def begins_near(callbacks, S, W, R, c, h):
             nothing = max(rounding(W, c, i, slope, GRAIN_START), NOISE * W.g[FIRED, i] if just else 0.0)
         if finite(low, high) and (below or now <= max((NEAR if just else ROUNDING) * size, nothing)):
             W.g[SIDE, i] = 0.0
-            mark = NOISE * now if just or below else ROUNDING * size
+            mark = deeper(W, i) * now if just or below else ROUNDING * size
             W.g[MARK, i] = max(mark, W.kept[i] * NOISE * W.grain[i], nothing)
             near = True
     return near
@@ -376,4 +376,13 @@ def undecided(W):
 def band(W, i):
     """How far below zero a guard that has to stay above may be by rounding."""
     size = max(abs(W.g[LEAST, i]), abs(W.g[MOST, i]))
-    return max(W.g[MARK, i], ROUNDING * size, NOISE * W.grain[i], NOISE * -W.g[START, i])
+    return max(W.g[MARK, i], ROUNDING * size, NOISE * W.grain[i], deeper(W, i) * -W.g[START, i])
+
+
+@formula
+def deeper(W, i):
+    """How many times as far below zero as it begins a guard may be by rounding: no farther where it is firm.
+
+    What bounces beneath a stop would sink by that factor from bounce to bounce.
+    """
+    return 1.0 if W.firm[i] == 1 else NOISE

@@ -32,7 +32,7 @@ def crossing(callbacks, S, W, R, c, h, i, a, b, s):
     W.real[BEYOND] = 0.0
     first, last = a, b
     status, fa = true_guard(callbacks, S, W, R, c, h, a, i)
-    wide = b - a
+    wide = max(b - a, CLOSE)  # a place may be told twice
     while status == 0 and not s * fa > 0.0 and a > 0.0:  # earlier than expected
         b = a
         a = max(0.0, a - wide)

@@ -35,7 +35,9 @@ class Watch(NamedTuple):
 
     way: np.ndarray  # (ng,): which passing of zero is an event
     kept: np.ndarray  # (ng,): 1 of those that are above zero by what holds now
+    firm: np.ndarray  # (ng,): 1 of those that get no farther below zero by rounding than they begin
     grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
+    tied: np.ndarray  # (ng,): size of what those are of that others keep at zero; 0 of the rest
     side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
     g: np.ndarray  # (GUARDS, ng + terms of a group)
@@ -108,7 +110,8 @@ def watching(
     way : ndarray (ng,)
         Of the guards.
     holding : ndarray (ng,)
-        1 for those that are above zero as long as what holds now is right.
+        1 for those that are above zero as long as what holds now is right, 2 for those of them that get no
+        farther below by rounding than they begin: distances, rates.
     c : ndarray
         Where in a step a method's stages are.
     stages : int
@@ -131,8 +134,10 @@ def watching(
     g[GRAIN_START : GRAIN_END + 1] = 0.0
     return Watch(
         way=np.array(way, np.int64),
-        kept=np.array(holding, np.int64),
+        kept=(np.asarray(holding) > 0).astype(np.int64),
+        firm=(np.asarray(holding) > 1).astype(np.int64),
         grain=np.zeros(ng),
+        tied=np.zeros(ng),
         side=np.full(ng, UNKNOWN),
         fired=np.zeros(ng, np.int64),
         g=g,

@@ -11,10 +11,18 @@ import math
 from collections.abc import Iterable
 from itertools import pairwise
 
+import numpy as np
+
+from ....numerics.integrators.clock import SPAN
+from ....tables.system import VALUE
+from .here import Here
+
 MANY = 8192  # times that one has happened, at least
 RATIOS = 4  # of these that are the same
 STEADY = 1.25  # largest of them by the least
 LESS = 0.95  # a ratio of a series with an end
+EMPTY = 500  # events in a row of which nothing comes
+NOWHERE = 1e-3  # of the time span, within which they are without end
 
 
 class Counts:
@@ -22,6 +30,9 @@ class Counts:
 
     def __init__(self) -> None:
         self.times: dict[int, tuple[int, list[float]]] = {}
+        self.empty = 0
+        self._since = 0.0
+        self._before: tuple[np.ndarray, int] | None = None
 
     def add(self, fired: Iterable[int], t: float) -> None:
         """Count guards that fire at t [s]."""
@@ -31,6 +42,23 @@ class Counts:
             if n & (n - 1) == 0:
                 past.append(t)
             self.times[g] = n, past
+
+    def nothing(self, here: Here) -> tuple[int, float] | None:
+        """How many events nothing came of, one after the other, and within which time [s], where these have no end.
+
+        No mode, no way, nothing to tell.
+        """
+        W = here.c.work
+        first = W.sensed.shape[1] - W.switch.shape[1]
+        now = np.vstack((W.switch, W.sensed[VALUE, first:])), len(here.records)
+        old, self._before = self._before, now
+        same = old is not None and old[1] == now[1] and np.array_equal(old[0], now[0])
+        if not same or self.empty == 0:
+            self.empty, self._since = 0, here.t
+        self.empty += 1
+        within = here.t - self._since
+        endless = self.empty >= EMPTY and within < NOWHERE * here.clock.real[SPAN]
+        return (self.empty, within) if endless else None
 
     def accumulate(self, fired: Iterable[int], until: float) -> tuple[int, int, float] | None:
         """One of these that never gets to ``until`` [s]: its guard, how often it has fired, where it accumulates."""

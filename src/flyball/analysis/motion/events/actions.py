@@ -265,8 +265,16 @@ Found = Sequence[tuple[Event, Any, list[float]]]
 
 def _set(here: Here, found: Found) -> Done:
     old = dict(here.c.values.env)
-    who = " and ".join(f"{a.title} in {e.title}" for e, a, _ in found)
-    set_parameters(here, {a.parameter: x[0] for _, a, x in found}, who)
+    first = here.structure.nq + here.structure.nv
+    place = {x.name: first + k for k, x in enumerate(here.structure.controls)}
+    old |= {a.parameter: float(here.y[place[a.parameter]]) for _, a, _ in found if a.parameter in place}
+    for _, a, x in found:
+        if a.parameter in place:
+            here.y[place[a.parameter]] = x[0]
+    new = {a.parameter: x[0] for _, a, x in found if a.parameter not in place}
+    if new:
+        who = " and ".join(f"{a.title} in {e.title}" for e, a, _ in found if a.parameter in new)
+        set_parameters(here, new, who)
     return [(e, f"{a.parameter} = {x[0]:g}, was {old[a.parameter]:g}") for e, a, x in found]
 
 

@@ -83,6 +83,17 @@ def beyond(n: Instant, s: int) -> ModelError:
     return ModelError(f"{e.title}: the motion begins beyond it: {said}; change the start or the limit")
 
 
+def sunk(n: Instant, s: int, past: float) -> Unresolved:
+    """What is open is past its bound: no motion of rigid bodies leads there."""
+    e = n.here.structure.switches[s].element
+    what = f"{bodies(e)} are in each other" if isinstance(e, Touch) else f"{quantity(n, s)} is beyond it"
+    return Unresolved(
+        f"at t = {n.here.t:.9g} s {e.title}: {what} by {past:.3g} {n.units[s]}: where they met was not seen. Follow "
+        f"it more closely (max_step=, a smaller rtol)",
+        t=n.here.t,
+    )
+
+
 def endless(n: Instant, recent: Iterable[Sequence[int]], many: int, within: float) -> Unresolved:
     """Events that come ever closer; ``recent``: the guards that fired at the last of them."""
     names = guard_names(n, (g for fired in recent for g in fired))

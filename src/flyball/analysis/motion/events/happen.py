@@ -21,13 +21,14 @@ from ....tables.system import (
     LOWER,
     MODE,
     OFF,
+    TOL_G,
     UPPER,
 )
 from .actions import act, act_at_start
 from .apart import put_apart
 from .branches import Corners
 from .doubtful import doubt, shared, shock
-from .failed import beyond, guard_names, no_end, no_forces, no_impulses
+from .failed import beyond, guard_names, no_end, no_forces, no_impulses, sunk
 from .here import Here
 from .instant import Instant, instant_of
 from .jump import Jump, jump, must_jump
@@ -41,8 +42,10 @@ from .told import tell_jump, tell_modes
 ROUNDS = 100
 AGAIN = 5  # times that ways of sliding are decided again for the same modes
 RATES = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
+HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
+SUNK = 1e-7  # of the same: what is open and past its bound has gone through it
 
 
 def begin(here: Here) -> None:
@@ -106,10 +109,11 @@ def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) 
     by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
     if not len(fired) or by_rows:
         resolve(n, np.array(by_rows, np.int64), told)
+    let_go = np.array([g for g in by_rows if n.guarded[g][0] in HOLDING], np.int64)
     for _ in range(ROUNDS):
         if not corners.settle() or not n.decided:
             return
-        resolve(n, fired[:0], told)
+        resolve(n, let_go, told)
     raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
@@ -122,6 +126,14 @@ def refuse_violated(n: Instant) -> None:
             raise beyond(n, s)
 
 
+def refuse_sunk(n: Instant) -> None:
+    """Refuse to go on from where what is open is past its bound, by more than what is closed may be."""
+    for s in n.of(STOP):
+        past = max(n.W.switch[LOWER, s] - n.x[s], n.x[s] - n.W.switch[UPPER, s])
+        if n.mode[s] == OFF and past > SUNK * n.unit[s] + n.W.option[TOL_G]:
+            raise sunk(n, s, past)
+
+
 def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     """Jumps and modes at the instant, until nothing is against its rule; those that a motion begins in are no news."""
     here = n.here
@@ -132,6 +144,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
     again = 0
     for _ in range(ROUNDS):
         n.look()
+        refuse_sunk(n)
         stop_slips(n, fired)
         still = at_rest(n, fired)
         still[calm] = True

@@ -71,6 +71,8 @@ class Here:
         Switches that were at a side and left it the wrong way, with no speed: they close there without a bounce.
     sharing : Sharing, optional
         What holds together and shares its forces (`equations.sharing`).
+    tied : frozenset of tuple
+        Guards (kind, switch) of what is at its end and is kept there by others (`events.idle`).
     seen : Segments, optional
         What held at the rows of output so far (`events.segments`).
     """
@@ -91,6 +93,7 @@ class Here:
     doubts: list[str] = field(default_factory=list)
     bounces: dict[int, Any] = field(default_factory=dict)
     swings: dict[int, list[float]] = field(default_factory=dict)
+    tied: frozenset[tuple[int, int]] = frozenset()
     seen: Any = None
     sharing: Any = None
     counts: dict[str, int] = field(default_factory=dict)

@@ -15,6 +15,7 @@ from ....equations.friction import FORGOTTEN
 from ....equations.instant import FORCES
 from ....numerics.cone.dense.problem import DRIVEN, EVEN, FOUND, GRIPS, LOW, OUT, PUSHES
 from ....tables.system import G_HOLDS, G_PULL, HELD, HOLD, LEARNT, LOAD, LOWER, MODE, OFF, UPPER
+from .idle import take_over, tied
 from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
 from .shares import give_way, rests, slides, write_group
@@ -67,6 +68,8 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
             found = other
         let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
     if found.ended == FOUND:
+        take_over(n, found)
+        n.here.tied = tied(n, found)
         write(n, found, still)
     return found
 

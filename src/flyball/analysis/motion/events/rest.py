@@ -17,6 +17,7 @@ from .instant import Instant, Part
 from .jump import Jump
 
 LOW = 1e-13  # of the mechanism's length or a radian: a flight that is none
+ROUNDED = 2e-14  # of how far the mechanism is from the origin: the same, since places there are known no better
 
 
 @dataclass
@@ -48,9 +49,10 @@ def coming_to_rest(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarr
     n.ask(MOTION)
     nq = n.S.kinds[COORDINATES]
     a = n.gradients(np.array(leaving)) @ n.desk.K[0, nq : nq + n.here.structure.nv] + n.W.sensed[BIAS, n.m[leaving]]
+    far = ROUNDED * np.abs(n.W.FK[:, :3]).max(initial=0.0)
     for s, acceleration in zip(leaving, a.tolist(), strict=True):
         u, back = at[s][0] * n.rate[s], -at[s][0] * acceleration
-        if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * LOW * n.unit[s]:
+        if u > 0.0 and back > 0.0 and u * u <= 2.0 * back * max(LOW * n.unit[s], far * (n.units[s] == "m")):
             over[s] = True
             if s not in n.here.bounces:  # it did not close before: let go by rounding only
                 continue

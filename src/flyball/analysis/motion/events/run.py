@@ -47,6 +47,7 @@ from .actions import expressions, say_never, stepped_over, true_already
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
+from .idle import tie
 from .instant import instant_of
 from .legs import Legs, breaks
 from .sampling import sampling
@@ -246,7 +247,7 @@ class Run:
 
     def integrate(self) -> None:
         """Call the compiled loop once."""
-        c, clock = self.here.c, self.here.clock
+        here, c, clock = self.here, self.here.c, self.here.clock
         before = time.perf_counter()
         weight = WEIGHT if self.now in IMPLICIT else 1.0
         clock.count[ex.QUOTA] = self.part.most(self.pace.limited(clock, self.quota), weight)
@@ -257,6 +258,7 @@ class Run:
             elif self.loop is None:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
+                tie(here, self.loop)
                 used = self.loop.go_on(c.system, c.work, self.buffer)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
@@ -278,8 +280,9 @@ class Run:
         fired = self.loop.fired if self.loop else ()
         self.recent.append(here.t)
         self.latest.append(fired)
-        if len(self.recent) == ENDLESS and self.recent[-1] - self.recent[0] < AT_ONCE * self.span:
-            raise endless(instant_of(here), self.latest, ENDLESS, self.recent[-1] - self.recent[0])
+        many, since = len(self.recent), self.recent[-1] - self.recent[0]
+        if often := (many, since) if many == ENDLESS and since < AT_ONCE * self.span else self.counts.nothing(here):
+            raise endless(instant_of(here), self.latest, *often)
         self.counts.add(fired, here.t)
         if found := self.counts.accumulate(fired, self.legs.end):
             raise accumulating(instant_of(here), *found)
