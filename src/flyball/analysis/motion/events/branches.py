@@ -89,7 +89,7 @@ class Corners:
                 self.at.add(s)  # it goes on
                 continue
             self.n.ways()[s] = 1.0 if u >= 0.0 else -1.0
-            if abs(u) <= least:
+            if abs(u) <= self._nothing(s, u, least):
                 self.at.add(s)
         self.n.ask(MOTION)
 
@@ -115,8 +115,10 @@ class Corners:
                     self.at.add(s)
                     continue
                 n.W.switch[MODE, s] = OFF
-            if abs(u) > least:
+            if abs(u) > self._nothing(s, u, least):
                 ways[s] = np.sign(u)
+            else:  # as of a rate that something has held: its side is rounding, where it goes now is not
+                self.at.add(s)
         jumps = self.decide() if self.at else False
         moved = bool((np.abs(ways[self.all] - before) > 1e-6).any())
         jumps = (moved and (jumps or self._not_at(before))) or (jumps and (n.W.switch[MODE, self.all] != modes).any())
@@ -149,6 +151,12 @@ class Corners:
             size += abs(W.sensed[VALUE, m] * jet(self.n, s, m)[1])
         return float(corner(S, W, t, s)), ROUNDING * float(size)
 
+    def _nothing(self, s: int, u: float, least: float) -> float:
+        """What of u is no side: of a rate, which something may hold, what is rounding of it there, too."""
+        if abs(u) <= least or not (found := seen(self.n, s)).rates:
+            return least
+        return max(least, found.still)
+
     def rates(self, which: list[int], sides: np.ndarray, second: list[int]) -> np.ndarray:
         """How fast u of these corners changes with these sides; of the second ones, how fast the rate of u does."""
         n = self.n
@@ -162,9 +170,9 @@ class Corners:
     def pushed(self, which: list[int], second: list[int]) -> Pushed:
         """What sides do to these corners."""
         d = self.rates(which, np.zeros(len(which)), second)
-        B = np.column_stack([self.rates(which, e, second) - d for e in np.eye(len(which))])
+        B = self._effects(which, d, second)
         size = np.abs(d) + np.abs(B).sum(axis=1)
-        B[np.abs(B) <= LEVEL * size[:, None]] = 0.0
+        B[np.abs(B) <= np.maximum(LEVEL * size[:, None], self._of_rounding(which, second, B))] = 0.0
         old = self.sides[which]
         left = np.array([self.old[s] != OFF for s in which]) & (np.abs(np.abs(old) - 1.0) <= REACHED)
         sides = _sides(d, B, old)
@@ -178,6 +186,24 @@ class Corners:
         held = np.abs(sides) < 1.0
         return Pushed(which, second, d, B, size, sides, held, left)
 
+    def _effects(self, which: list[int], d: np.ndarray, second: list[int]) -> np.ndarray:
+        """What each side does to each rate beyond d."""
+        return np.column_stack([self.rates(which, e, second) - d for e in np.eye(len(which))])
+
+    def _of_rounding(self, which: list[int], second: list[int], B: np.ndarray) -> np.ndarray:
+        """What of B is made by what is left of u: a side of abs(u) does nothing where u is zero."""
+        n, out, v = self.n, np.zeros_like(B), self.n.here.v.copy()
+        n.ask(MOTION)
+        held = [(s, at) for s in which if (at := seen(n, s)).rates and abs(self.value(s)[0]) <= at.still]
+        for _, at in held:
+            n.here.v[:] = v
+            n.ask(MOTION)
+            halt(n, at.row[None], np.array([-KEPT * at.still]))
+            other = self._effects(which, self.rates(which, np.zeros(len(which)), second), second)
+            out += np.abs(other - B) / KEPT
+        n.here.v[:] = v
+        return out
+
     def decide(self) -> bool:
         """Sides of the corners that the motion is at. Returns whether forces depend on them."""
         n, W = self.n, self.n.W
@@ -187,7 +213,9 @@ class Corners:
         found = self.ended(self.pushed(which, []))
         which, sides, held = found.which, found.sides, found.held
         n.ways()[which] = sides
-        flat = ~held & (np.abs(found.d + found.B @ sides) <= LEVEL * found.size)
+        at = [seen(n, s) for s in which]
+        slow = np.array([KEPT * x.still * x.rates for x in at]) / float(n.here.clock.real[ex.SPAN])
+        flat = ~held & (np.abs(found.d + found.B @ sides) <= np.maximum(LEVEL * found.size, slow))
         if held.any():
             self._hold([s for s, h in zip(which, held, strict=True) if h], found)
         for k in np.flatnonzero(flat & ~found.left):

@@ -42,6 +42,7 @@ from .told import tell_jump, tell_modes
 ROUNDS = 100
 AGAIN = 5  # times that ways of sliding are decided again for the same modes
 RATES = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
+HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
 VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
 SUNK = 1e-7  # of the same: what is open and past its bound has gone through it
@@ -108,10 +109,11 @@ def settled(n: Instant, corners: Corners, fired: np.ndarray, told: bool = True) 
     by_rows = [g for g in fired.tolist() if n.guarded[g][0] != G_CORNER]
     if not len(fired) or by_rows:
         resolve(n, np.array(by_rows, np.int64), told)
+    let_go = np.array([g for g in by_rows if n.guarded[g][0] in HOLDING], np.int64)
     for _ in range(ROUNDS):
         if not corners.settle() or not n.decided:
             return
-        resolve(n, fired[:0], told)
+        resolve(n, let_go, told)
     raise no_end(n.here.t, [n.name(s) for s in sorted(corners.at)], ROUNDS)
 
 
