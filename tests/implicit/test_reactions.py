@@ -80,3 +80,17 @@ def test_a_box_slips_in_a_gripper_and_is_caught(rtol):
     assert [at["slip"], at["stick"]] == pytest.approx([begin, ends], abs=1e-8)
     assert "turn" not in at
     assert r["box"].position[-1, 1] == pytest.approx(2.5 + behind, abs=1e-9)
+
+
+@pytest.mark.parametrize("rtol", [1e-9, 1e-10])
+def test_a_door_on_two_rough_hinges_at_narrow_tolerances(rtol):
+    """What rounding makes of multipliers that redundant rows leave open stops no step."""
+    m = fb.Mechanism("door", gravity=(0, 0, -G))
+    m.add(fb.Body("leaf", mass=10.0, inertia=(1, 1, 1), position=(0.5, 0, 1)))
+    for name, z in (("upper", 2.0), ("lower", 0.0)):
+        m.add(fb.Revolute(name, "ground", "leaf", at=(0, 0, z), axis=(0, 0, 1)))
+    m.add(fb.JointFriction("f", "upper", radius=0.1, kinetic=0.3, static=0.3, thrust_factor=1.0))
+    m.add(fb.Initial("upper.angle", rate=3.0))
+    e = m.simulate(0.3, rtol=1e-11, outputs=4, method="dop853")
+    r = m.simulate(0.3, rtol=rtol, outputs=4, method="radau")
+    assert np.abs(r["upper"].rate - e["upper"].rate).max() < 1e-5

@@ -9,7 +9,7 @@ from ....compiler.jit import formula
 from ....math.scalar import sqrt
 from ..clock import LEDGER, NOW, SCALE, T
 from .coefficients import BEND, BENT, BENT_MOST, ERROR, GAMMA, INVERSE, THROUGH_STAGES, THROUGH_START, A, C
-from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, SHARED, START, THETA
+from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, ROUGH, RTOL, SHARED, START, THETA
 from .newton import correct, solve_real
 
 MOST = 7  # iterations
@@ -162,8 +162,10 @@ def iterate(residual, S, K, c, h):
         pass_ += 1
         more = lead(K, pass_)
         status, again, moved = settle(residual, S, K, c, h)
-        if status != 0:
+        if status != 0 and not moved <= K.real[ROUGH]:
             return status, again
+        if status != 0:  # what rounding makes of multipliers that redundant rows leave open
+            status, more = 0, False
     return account(residual, S, K, c, h) if status == 0 else status, asked
 
 
