@@ -41,6 +41,7 @@ class Desk(NamedTuple):
     a: np.ndarray  # (4, nv)
     lam: np.ndarray  # (4, nr): multipliers; last: at the begin of the step
     found: np.ndarray  # (nr,): multipliers at the state last arrived at
+    led: np.ndarray  # (3, nr): multipliers that rows, where they are soft, give way beyond (`share`)
     mu: np.ndarray  # (4, nr): of the stabilisation
     z: np.ndarray  # (4, nz): x and integrals of the motion at the stages; last: at the begin of the step
     rate: np.ndarray  # (4, nz): their rates, as the equations say

@@ -13,6 +13,7 @@ from .desk import ATOL, BEFORE, ITERATIONS, LAST_H, LEAST, NEWTON, RATE, RTOL, S
 from .newton import correct, solve_real
 
 MOST = 7  # iterations
+PASSES = 4  # of these, each beyond the multipliers of the last (`lead`)
 STAGES = 3
 SURE = 0.99  # what corrections fall by at least
 WILD = 1e3  # what the second one may be larger by than the first
@@ -123,37 +124,72 @@ def integrals(K, h):
 def share(K, h):
     """Ask for least multipliers where redundant rows leave some open and forces depend on them.
 
-    Rows are as soft as their regularisation: G v - nu + delta D h A lam = 0, which leaves no multiplier open, and what
-    rows give way by the end of the step takes away.
+    Rows are as soft as their regularisation: G v - nu + delta D h A (lam - led) = 0, which leaves no multiplier open.
     """
     first = K.count[SHARED]
     if first > 0:
         nv = K.v.shape[1]
         for r in range(K.lam.shape[1]):
             size = h * K.J[START, first + r]
+            x, y, z = K.lam[0, r] - K.led[0, r], K.lam[1, r] - K.led[1, r], K.lam[2, r] - K.led[2, r]
             for k in range(STAGES):
                 a, b, c = A[k]
-                K.out[k, 2 * nv + r] += size * (a * K.lam[0, r] + b * K.lam[1, r] + c * K.lam[2, r])
+                K.out[k, 2 * nv + r] += size * (a * x + b * y + c * z)
+
+
+@formula
+def lead(K, pass_):
+    """What rows give way beyond in `share`: nothing at first, then what they carried. Returns whether there is more.
+
+    Of all that redundant rows may carry the least is taken by the first pass. It is soft, though: what friction makes
+    of the rows' giving way is no rounding (a wedge on a wedge multiplies it by 1e3). Each pass beyond what the last one
+    found (proximal point: Rockafellar 1976; iterated regularisation: Hanke and Groetsch 1998) leaves of this its next
+    power, and self-stress as it was.
+    """
+    for r in range(K.lam.shape[1] if K.count[SHARED] > 0 else 0):
+        for k in range(STAGES):
+            K.led[k, r] = K.lam[k, r] if pass_ > 0 else 0.0
+    return K.count[SHARED] > 0 and pass_ < PASSES
 
 
 @formula
 def iterate(residual, S, K, c, h):
     """Find the stage values. Returns (status, factor by which the next width should change)."""
+    more = lead(K, 0)
+    status, asked, moved = settle(residual, S, K, c, h)
+    pass_ = 0
+    while status == 0 and more and (pass_ == 0 or moved > K.real[NEWTON]):
+        pass_ += 1
+        more = lead(K, pass_)
+        status, again, moved = settle(residual, S, K, c, h)
+        if status != 0:
+            return status, again
+    return account(residual, S, K, c, h) if status == 0 else status, asked
+
+
+@formula
+def settle(residual, S, K, c, h):
+    """Newton's iteration. Returns (0, how often it was corrected) or (status, factor of the next width); what it moved.
+
+    The last is the size of the first correction in units of the tolerance.
+    """
     found = 0
     rate = max(K.real[RATE], 1e-16) ** 0.8
     theta = abs(K.real[THETA])
-    before = last = 0.0
+    before = last = moved = 0.0
     for n in range(MOST):
         rates(K, h)
         for k in range(STAGES):
             if residual(c.real[T] + C[k] * h, k, S, K, c) != 0:
-                return DIVERGED, 0.5
+                return DIVERGED, 0.5, moved
         share(K, h)
         size = correct(K, h)
         K.count[ITERATIONS] += 1
         if not size < 1e300:
-            return DIVERGED, 0.5
-        if n > 0:
+            return DIVERGED, 0.5, moved
+        if n == 0:
+            moved = size
+        else:
             ratio = size / last
             theta = ratio if n == 1 or before >= SURE else sqrt(ratio * before)
             before = ratio
@@ -164,20 +200,20 @@ def iterate(residual, S, K, c, h):
                 if size <= K.real[NEWTON]:  # rounding
                     found = n + 1
                     break
-                return DIVERGED, 0.5
+                return DIVERGED, 0.5, moved
             rate = theta / (1.0 - theta)
             left = rate * size * theta ** (MOST - 2 - n) / K.real[NEWTON]
             if left >= 1.0:
                 q = max(1e-4, min(20.0, left))
-                return SLOW, 0.8 * q ** (-1.0 / (4.0 + MOST - 2 - n))
+                return SLOW, 0.8 * q ** (-1.0 / (4.0 + MOST - 2 - n)), moved
         last = max(size, 1e-16)
         if rate * size <= K.real[NEWTON] and n + 1 >= K.count[LEAST]:
             found = n + 1
             break
     if found == 0:
-        return SLOW, 0.5
+        return SLOW, 0.5, moved
     K.real[RATE], K.real[THETA] = rate, theta
-    return account(residual, S, K, c, h), float(found)
+    return 0, float(found), moved
 
 
 @formula

@@ -12,7 +12,7 @@ from ...lu import lu_factor, lu_solve, times
 from ..clock import T
 from .coefficients import GAMMA, INVERSE, C
 from .desk import NEWTON, ROUGH, SHARED, WHOLE
-from .step import STAGES, account, rates, share
+from .step import STAGES, account, lead, rates, share
 
 MOST = 12
 REFINED = 6  # times that each solve is refined
@@ -88,27 +88,41 @@ def correct_whole(K, h):
 
 
 @formula
-def iterate_whole(callbacks, S, K, c, h):
-    """Find the stage values. Returns a status."""
+def settle_whole(callbacks, S, K, c, h):
+    """Newton's iteration. Returns a status, and the size of the first correction."""
     residual, linearise = callbacks
-    last = 1e300
+    last, moved = 1e300, 0.0
     for n in range(MOST):
         rates(K, h)
         for k in range(STAGES):
             t = c.real[T] + C[k] * h
             if residual(t, k, S, K, c) != 0 or linearise(t, k, S, K, c) != 0:
-                return 1
+                return 1, moved
         share(K, h)
         fill_whole(K, h)
         if lu_factor(K.whole_P, K.whole_A, K.whole_L, K.whole_U, K.whole_D, K.whole_Y) != 0:
-            return 1
+            return 1, moved
         size = correct_whole(K, h)
         K.count[WHOLE] += 1
+        moved = size if n == 0 else moved
         if not size < 1e300 or (n > 1 and size > AGAIN * last):
-            return 1
+            return 1, moved
         if size <= K.real[NEWTON] or (n > 0 and size * size / last <= K.real[NEWTON] and size < 0.1 * last):
-            return account(residual, S, K, c, h)
+            return 0, moved
         if n > 2 and 0.5 * last < size <= K.real[ROUGH]:
-            return account(residual, S, K, c, h)
+            return 0, moved
         last = size
-    return 1
+    return 1, moved
+
+
+@formula
+def iterate_whole(callbacks, S, K, c, h):
+    """Find the stage values. Returns a status."""
+    more = lead(K, 0)
+    status, moved = settle_whole(callbacks, S, K, c, h)
+    pass_ = 0
+    while status == 0 and more and (pass_ == 0 or moved > K.real[NEWTON]):
+        pass_ += 1
+        more = lead(K, pass_)
+        status, moved = settle_whole(callbacks, S, K, c, h)
+    return account(callbacks[0], S, K, c, h) if status == 0 else status
