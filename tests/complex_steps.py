@@ -176,7 +176,12 @@ def errors_of(s: Structure, name: str, size: float) -> list[str]:
         If the mechanism allows no change of this parameter.
     """
     value = s.model.environment()[name]
-    return list(compared(lambda change: tables(values(s, {name: value + change})), complex_tables(s, name), size))
+
+    def changed(change: float) -> Tables:
+        """As complex numbers, whose sense is not examined: a damping of zero is changed both ways."""
+        return {k: x.real for k, x in tables(values(s, {name: complex(value + change)})).items()}
+
+    return list(compared(changed, complex_tables(s, name), size))
 
 
 def largest(a: np.ndarray) -> Any:

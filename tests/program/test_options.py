@@ -200,12 +200,15 @@ def test_series_and_loci_are_subcommands(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     oscillator().save("m.toml")
     said = CliRunner().invoke(
-        app, ["root-locus", "m.toml", "c", "--values", "-1:1:5", "--equilibrium", "--plot", "l.png", "--json"]
+        app, ["root-locus", "m.toml", "c", "--values", "1:1.8:5", "--equilibrium", "--plot", "l.png", "--json"]
     )
     assert said.exit_code == 0, said.stderr
     data = json.loads(said.stdout)
-    assert [w[0] for w in data["eigenvalues"][0]] == pytest.approx([0.5, 0.5])
+    assert [w[0] for w in data["eigenvalues"][0]] == pytest.approx([-0.5, -0.5])
     assert (tmp_path / "l.png").stat().st_size > 10_000
+    none = CliRunner().invoke(app, ["root-locus", "m.toml", "c", "--values", "-1:1:5"])
+    assert none.exit_code == 2
+    assert "must be zero or greater" in none.stderr
     said = CliRunner().invoke(app, ["equilibria", "m.toml", "k", "--values", "1,2 N/m,3", "--plot", "s.png"])
     assert said.exit_code == 0, said.stderr
     assert "stable" in said.stdout

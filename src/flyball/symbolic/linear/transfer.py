@@ -92,6 +92,7 @@ class TransferFunction:
     # -- what pictures of linear models ask
 
     large = False
+    period = None  # in s, not in z
 
     @cached_property
     def inputs(self) -> tuple[str, ...]:
