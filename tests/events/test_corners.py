@@ -254,3 +254,26 @@ def test_two_frictions_on_one_body_that_stick_by_turns():
     assert x[2] == pytest.approx((np.sin(4.0) - 1) / 2, abs=1e-9)
     s = 6.0 - 1.5 * np.pi
     assert x[3] == pytest.approx(-1 + 0.2 * (1 - np.cos(s)), abs=1e-9)
+
+
+CARRIED = [  # law, speed of 1 kg after 2 s: what jumps with time carries u across its corner, not to it
+    ("abs(where(t<1, 1, -3) + 1e-9*value)", 4.0),
+    ("abs(where(t<1, 1, -3) - 1e-9*value)", 4.0),
+    ("abs(where(t<1, -1, 3) + 1e-9*value)", 4.0),
+    ("abs(where(t<1, -1, 3) - 1e-9*value)", 4.0),
+    ("sign(where(t<1, 1, -3) + 1e-9*value)", 0.0),
+    ("where(where(t<1, 1, -3) + 1e-9*value > 0, 2, 7)", 9.0),
+    ("max(-5, min(5, where(t<1, 2, -9) + 1e-9*value))", -3.0),
+    ("abs(where(t<1, 1, -3) + 1e-9*rate)", 4.0),
+    ("abs(S + 1e-9*value)", 4.0),
+    ("max(-2, min(2, S - 1e-9*value))", -1.0),
+]
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+@pytest.mark.parametrize(("law", "speed"), CARRIED)
+def test_a_jump_carries_a_law_across_its_corner(law, speed, method):
+    """The side is where u is then, however u goes on: back to the corner, as under every controller, or away."""
+    sampled = (fb.State("S", period=1.0, next="where(t<0.5, 1, -3)"),) if "S" in law else ()
+    r = cart(law, tables=sampled).simulate(2, outputs=3, method=method)
+    assert r["cart.vx"][-1] == pytest.approx(speed, abs=1e-7)

@@ -40,6 +40,7 @@ SWEEPS = 500
 KEPT = 1e3  # times rounding: where the motion is held on a corner it is still there
 THROWN = 10.0  # times what is left of u where its corner was found: farther off by a jump of velocities
 ALIKE = 1e-6  # of u: what is left of it where the same rate that is taken away was all of it
+INSTANT = 1e-12  # of the time: to that the instant is known at which u passes zero
 AHEAD = 1e-7  # part of the time span by which it is tried where the motion goes, at most
 BIT = 1e-3  # part of the width of steps, where that is less
 
@@ -95,8 +96,30 @@ class Corners:
 
     def fired(self, guards: np.ndarray) -> None:
         """Take note of guards that fired, and of the velocities with which they did."""
-        self.at |= self.n.fired(guards, G_CORNER)
+        found = self.n.fired(guards, G_CORNER)
+        self.at |= found - self._carried(found)
         self.fell = self.n.here.v.copy()
+
+    def _carried(self, found: set[int]) -> set[int]:
+        """Corners that what jumps with time, or a sample, has carried to the other side: u has not passed zero."""
+        n, real = self.n, self.n.here.clock.real
+        if not found:
+            return found
+        n.ask(MOTION)
+        now = {s: self.value(s) for s in sorted(found)}
+        off = [s for s, (u, least) in now.items() if abs(u) > KEPT * max(least, seen(n, s).grain)]
+        if not off:
+            return set()
+        h = self._ahead()
+        fast = {s: abs(u - now[s][0]) / h for s, (u, _) in zip(off, self._soon(off), strict=True)}
+        n.ask(MOTION)
+        late = THROWN * INSTANT * max(n.here.t, float(real[ex.SPAN]))
+        return {s for s in off if abs(now[s][0]) > late * fast[s]}
+
+    def _ahead(self) -> float:
+        """How far ahead it is tried where the motion goes [s]."""
+        real = self.n.here.clock.real
+        return min(AHEAD * float(real[ex.SPAN]), BIT * float(real[ex.H]) or np.inf)
 
     def settle(self) -> bool:
         """Decide all sides. Returns whether forces jump by that."""
@@ -289,7 +312,7 @@ class Corners:
         """The `value` of each of these corners a little later, if sides are as they stand: by the midpoint rule."""
         n = self.n
         t, y, real = n.here.t, n.here.y.copy(), n.here.clock.real
-        h = min(AHEAD * float(real[ex.SPAN]), BIT * float(real[ex.H]) or np.inf)
+        h = self._ahead()
         for part in (0.5, 1.0):
             n.ask(MOTION)
             real[ex.T], n.here.y[:] = t + part * h, y + part * h * n.desk.K[0]
