@@ -23,8 +23,8 @@ def test_page(page, least) -> None:
 def test_every_example(name):
     """At states about the start, and at other times where drivers move all; implicit coordinates included."""
     m = example(name)
-    if has_contact(m) or name in EVENTS:
-        pytest.skip("contact and events are refused by m.symbolic")
+    if has_contact(m) or m.controllers or name in EVENTS:
+        pytest.skip("contact, controllers and events are refused by m.symbolic")
     s = m.symbolic().state_space()
     coordinates = s.equations.coordinates.partition(":")[0]
     rng = np.random.default_rng(0)
