@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import flyball as fb
+from flyball.analysis.checkpoints import keeper
+from tests.checkpoints.motions import cut, killed
 from tests.control.slide import TIGHT, slide
 
 WAYS = ({}, {"method": "radau"}, {"method": "generalised-alpha", "step": 1e-3})
@@ -67,3 +69,42 @@ def test_events_reset_states(way):
     assert r["pid.output"] == pytest.approx([6, -1 + 60 * 1e-4 * (1 - r["A.displacement"][1])], abs=1e-3)
     with pytest.raises(fb.ModelError, match=r"has no parameter 'pid\.output'"):
         m.add(fb.Event("no", "t - 0.1", do=fb.Set("pid.output", 1)))
+
+
+def anew():
+    """Two states go back to 0 at 1.05 s, where k becomes 2: a ramp, and counts at each tenth of a second, both by k."""
+    m = slide(fb.Integrator("ramp", of="k"), fb.State("count", next="count + k", period=0.1), force="ramp", k=1.0)
+    m.add(fb.Event("anew", "t - 1.05", do=[fb.Set("ramp.value", 0), fb.Set("count.value", 0), fb.Set("k", "2*k")]))
+    return m
+
+
+@pytest.mark.parametrize("way", WAYS, ids=["auto", "radau", "alpha"])
+@pytest.mark.parametrize("file", [False, True])
+def test_going_on_where_events_set_states(way, file, tmp_path):
+    """Before the event and after it, and a third time: ramp is 2 (1.55 - 1.05), count 2 a sample."""
+    m, how = anew(), {"outputs": 2, **way}
+    whole = m.simulate(1.55, **how)
+    assert (whole["ramp.value"][-1], whole["count.value"][-1]) == pytest.approx((1.0, 10.0), abs=1e-9)
+    r = m.simulate(0.52, **how)
+    for t in (1.22, 1.55):
+        r.save(tmp_path / "run.nc")
+        r = m.simulate(t, start=fb.load_result(tmp_path / "run.nc") if file else r, **how)
+    assert (r["ramp.value"][-1], r["count.value"][-1]) == pytest.approx((1.0, 10.0), abs=1e-9)
+    assert r["A.displacement"][-1] == pytest.approx(whole["A.displacement"][-1], abs=1e-5)
+
+
+def test_states_that_events_set_in_a_motion_of_many_parts(tmp_path, monkeypatch):
+    """With checkpoints: parts end before the event and after it, and it is killed there."""
+    m = slide(fb.Integrator("ramp", of="k"), force="ramp", k=1.0)
+    m.add(fb.Event("anew", "t - 1.05", do=[fb.Set("ramp.value", 0), fb.Set("k", "2*k")]))
+    cut(monkeypatch, 4)
+    kept = []
+    with monkeypatch.context() as within:
+        write = keeper.Keeper.write
+        within.setattr(keeper.Keeper, "write", lambda self: (write(self), kept.append(self.parts[-1].final[0])))
+        m.simulate(1.55, rtol=1e-10, outputs=2, checkpoint=tmp_path / "whole.nc")
+    before = sum(t < 1.05 for t in kept)
+    assert 0 < before < len(kept)
+    r = killed(m, tmp_path / "run.nc", monkeypatch, (before, 1), t_end=1.55, rtol=1e-10, outputs=2)
+    assert r["ramp.value"][-1] == pytest.approx(1.0, abs=1e-9)
+    assert [h.name for h in r.events] == ["anew"]

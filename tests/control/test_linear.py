@@ -171,3 +171,23 @@ def test_modes_are_those_of_the_closed_loop():
         assert ratio == pytest.approx([ratio[0]] * 2, rel=1e-7)
     with pytest.raises(fb.ModelError, match="PID 'pid', sampled, and modes is about continuous time"):
         slide(pid(period=0.01), r=0.0).modes()
+
+
+def test_modes_in_a_study_are_those_of_the_closed_loop_where_it_rests():
+    """Its characteristic polynomial s (s^2 + 2 s + 10 + kp) + ki with a stiffness that grows by 3 c x^2."""
+    m = slide(
+        fb.PID("pid", setpoint="r", measured="A.displacement", kp="kp", ki=20), force="pid - 40*value**3", kp=1.0, r=0.5
+    )
+    of = ["frequency[0]", "omega[1]", "stable"]
+    found = m.study({"kp": [1.0, 30.0, 90.0]}, of, analysis="modes", about="equilibrium")
+    for k, kp in enumerate((1.0, 30.0, 90.0)):
+        roots = np.roots([1, 2, 10 + kp + 3 * 40 * 0.5**2, 20])
+        slow, fast = sorted(roots[roots.imag >= 0], key=abs)
+        one = m.modes(about=m.equilibrium(parameters={"kp": kp}), parameters={"kp": kp})
+        assert one.eigenvalues == pytest.approx([slow, fast], rel=1e-6)
+        assert np.asarray(found["omega[1]"])[k] == pytest.approx(one.omega[1], rel=1e-9)
+        assert np.asarray(found["omega[1]"])[k] == pytest.approx(abs(fast), rel=1e-6)
+        assert np.asarray(found["frequency[0]"])[k] == pytest.approx(one.frequency[0], rel=1e-9)
+        assert np.asarray(found["stable"])[k] == 1.0
+    with pytest.raises(fb.ModelError, match="PID 'pid', sampled, and modes is about continuous time"):
+        slide(pid(period=0.01), r=0.0).study({"r": [0.0, 1.0]}, of, analysis="modes")

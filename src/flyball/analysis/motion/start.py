@@ -113,9 +113,12 @@ def _as_it_came(base: Assembly, parameters: Mapping[str, float] | None, before: 
 
 
 def _set_by_events(model: Model, before: Result) -> dict[str, float]:
-    """Parameters that events set in an earlier motion, or in one that it went on from, as they were at its end."""
+    """Parameters that events set in an earlier motion, or in one that it went on from, as they were at its end.
+
+    States of controllers that events set are part of the state that it ended in.
+    """
     assert before.stretches is not None
-    names = {a.parameter for e in model.events for a in e.do if isinstance(a, Set)}
+    names = {a.parameter for e in model.events for a in e.do if isinstance(a, Set)} & model.parameters.keys()
     if not names:
         return {}
     env, last = compiled(model).values.env, before.stretches.all[-1].values.env

@@ -20,10 +20,11 @@ from ..equilibrium import equilibrium, resting
 from ..linear.curves import snapshot
 from ..linear.derivatives import State
 from ..linear.inputs import with_inputs
+from ..linear.sliders import refuse_sampled
 from ..linearize import LinearizeOptions, linearize
 from ..modes import ModesOptions, modes
 from ..options import AssembleOptions, Options
-from ..untouched import holding_parts, refuse_controllers
+from ..untouched import holding_parts
 from .reading import VALUE, Reading
 from .single import REDUCED, Single
 
@@ -151,8 +152,8 @@ class Swings(Small):
     title = "modes"
 
     def refuse(self, model: Model) -> None:
-        """Refuse controllers, which `linearize` knows."""
-        refuse_controllers(model, "modes")
+        """Refuse sampled controllers, which `linearize` knows."""
+        refuse_sampled(model, "modes")
 
     def run(self, model: Model, o: AboutOptions) -> Any:
         """The modes."""
