@@ -56,6 +56,7 @@ LEFT = 1e-10  # of `Watch.tied`, of the fastest rate: what rows that hold leave 
 def all_guards(A, W, t, K, row):
     """Guards by what stands in W, that of the group last, to a row; then its terms."""
     S, out, last = A[S_], K.g[row], K.way.shape[0] - 1
+    still(S, W, K)
     guards(S, W, t, out)
     kept_at_zero(S, W, K, out)
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
@@ -71,11 +72,30 @@ def kept_at_zero(S, W, K, out):
         if K.tied[i] > 0.0:
             least = LEFT * K.tied[i]
             if S.guard_i[i, GUARD_KIND] == G_BACK:
-                if fastest < 0.0:
-                    for m in range(measured(S)):
-                        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+                fastest = quickest(S, W) if fastest < 0.0 else fastest
                 least = LEFT * max(fastest, K.tied[i])
             out[i] -= min(max(out[i], -least), least)
+
+
+@formula
+def still(S, W, K):
+    """Take from rates that laws of events name and that what holds keeps at zero what it leaves of them."""
+    fastest, nm = -1.0, measured(S)
+    for m in range(nm):
+        if K.still[m] > 0.0:
+            fastest = quickest(S, W) if fastest < 0.0 else fastest
+            least = LEFT * max(fastest, K.still[m])
+            x = W.sensed[VALUE, nm + m]
+            W.sensed[VALUE, nm + m] -= min(max(x, -least), least)
+
+
+@formula
+def quickest(S, W):
+    """The largest rate that is measured."""
+    fastest = 0.0
+    for m in range(measured(S)):
+        fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+    return fastest
 
 
 @formula

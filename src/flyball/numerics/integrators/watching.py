@@ -38,6 +38,7 @@ class Watch(NamedTuple):
     firm: np.ndarray  # (ng,): 1 of those that get no farther below zero by rounding than they begin
     grain: np.ndarray  # (ng,): what is rounding of them; of those that may be anything, the less of both ends
     tied: np.ndarray  # (ng,): size of what those are of that others keep at zero; 0 of the rest
+    still: np.ndarray  # (nm,): size of rates that others keep at zero; 0 of the rest
     side: np.ndarray  # (ng,): 1 where the guard is above zero, -1 below; as a segment begins 0 if it has just fired
     fired: np.ndarray  # (ng,): 1 for those that the step ends on
     g: np.ndarray  # (GUARDS, ng + terms of a group)
@@ -138,6 +139,7 @@ def watching(
         firm=(np.asarray(holding) > 1).astype(np.int64),
         grain=np.zeros(ng),
         tied=np.zeros(ng),
+        still=np.zeros(measured),
         side=np.full(ng, UNKNOWN),
         fired=np.zeros(ng, np.int64),
         g=g,

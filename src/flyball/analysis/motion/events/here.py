@@ -73,6 +73,8 @@ class Here:
         What holds together and shares its forces (`equations.sharing`).
     tied : frozenset of tuple
         Guards (kind, switch) of what is at its end and is kept there by others (`events.idle`).
+    still : tuple of int
+        Measured quantities whose rates what holds keeps at zero (`events.still`).
     seen : Segments, optional
         What held at the rows of output so far (`events.segments`).
     """
@@ -94,6 +96,7 @@ class Here:
     bounces: dict[int, Any] = field(default_factory=dict)
     swings: dict[int, list[float]] = field(default_factory=dict)
     tied: frozenset[tuple[int, int]] = frozenset()
+    still: tuple[int, ...] = ()
     seen: Any = None
     sharing: Any = None
     counts: dict[str, int] = field(default_factory=dict)

@@ -17,7 +17,7 @@ from ....equations.tasks import MOTION
 from ....equations.watched import Loop
 from ....numerics.cone.dense.problem import EVEN, FOUND, OUT, PUSHES
 from ....numerics.integrators.clock import SPAN, H, T
-from ....tables.system import BODY_LAW, G_BACK, G_LOWER, G_UPPER, ROW_WORK, V0
+from ....tables.system import BODY_LAW, G_BACK, G_LOWER, G_UPPER, ROW_WORK, UNIT, V0
 from .here import Here
 from .instant import Instant, instant_of
 
@@ -110,7 +110,10 @@ def _driven(n: Instant, B: Bench, i: int, others: tuple[list[int], np.ndarray]) 
 
 def tie(here: Here, loop: Loop) -> None:
     """Have the loop know what is kept at its end by others: a rate is none by which nothing gets anywhere."""
-    loop.desk.tied[:] = 0.0
+    loop.desk.tied[:] = loop.desk.still[:] = 0.0
+    if here.still:
+        at, span = list(here.still), here.clock.real[SPAN]
+        loop.desk.still[at] = here.c.system.glob[UNIT : UNIT + len(loop.desk.still)][at] / span
     if here.tied:
         n = instant_of(here)
         for g, (kind, s, _) in enumerate(n.guarded):

@@ -20,6 +20,7 @@ from .instant import DECIDED, STOPS, Instant, Part
 from .parts import of_accelerations
 from .shares import give_way, rests, slides, write_group
 from .slips import loose, slide_on, write_slips
+from .still import still as still_by
 
 TIED = 1e-7  # of the accelerations that an acceleration is the difference of: as good as none
 CASCADE = 20  # times that others are asked again after some began to slide
@@ -69,7 +70,7 @@ def decide(n: Instant, at: dict[int, tuple[float, ...]], still: np.ndarray, fire
         let_go = {i: p for i, p in let_go.items() if i not in back} if back else {}
     if found.ended == FOUND:
         take_over(n, found)
-        n.here.tied = tied(n, found)
+        n.here.tied, n.here.still = tied(n, found), still_by(n, found)
         write(n, found, still)
     return found
 
