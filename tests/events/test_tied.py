@@ -81,3 +81,19 @@ def test_what_begins_with_no_force_is_no_impact() -> None:
     cut = m.simulate(r.events[0].t, outputs=3, progress=False)
     on = m.simulate(2, start=cut, outputs=3, progress=False)
     assert on["A1.angle"][-1] == pytest.approx(r["A1.angle"][-1], abs=1e-9)
+
+
+@pytest.mark.parametrize("load", [13.17, 1000.0])
+@pytest.mark.parametrize("at", [0.333333, 0.81237])
+def test_what_is_pressed_on_lets_go_later(at: float, load: float) -> None:
+    """The load of two stops passes zero; an arm that swings up from one presses on the other, and then pulls."""
+    m = fb.Mechanism("arms", planar=True, gravity=(0, 0))
+    for i in range(2):
+        m.add(fb.Body(f"b{i}", mass=1, inertia=0.1, position=(i + 0.5, 0)))
+        m.add(fb.Revolute(f"A{i}", f"b{i - 1}" if i else "ground", f"b{i}", at=(i, 0)))
+        m.add(fb.Limit(f"l{i}", f"A{i}.angle", lower=0))
+    m.add(fb.PointForce("f", "b1", force=("0", f"{load}*sin(t - {at})*({at + 0.3} - t)"), at=(1.93, 0.37)))
+    r = m.simulate(at + 0.45, outputs=41, progress=False)
+    assert r["l0"].force.min() > -1e-9 * load
+    assert r["l0"].force[(r.t > at + 0.02) & (r.t < at + 0.12)].min() > 0.0
+    assert [(e.name, e.kind) for e in r.events] == [("l1", "open"), ("l0", "open")]

@@ -52,6 +52,7 @@ def take_over(n: Instant, found: Decided) -> None:
     rows = idle(n, found)
     if not rows:
         return
+    found.parts = found.parts.copy()
     parts = [p._replace(rule=PUSHES) if p.rule == OUT else p for p in found.parts]
     here, y, t = n.here, n.here.y.copy(), n.here.t
     B, _, _ = n.problem(parts)
@@ -72,6 +73,7 @@ def take_over(n: Instant, found: Decided) -> None:
         for i in sorted(open_):
             if P.state[i] == EVEN and P.x[i] * P.A[i, i] > CLEAR * P.grain[i]:
                 found.state[i] = EVEN
+                found.parts[i] = parts[i]  # it pushes, and is watched for that
             if abs(P.u[i]) > CLEAR * P.grain[i] or found.state[i] == EVEN:
                 open_.discard(i)
     here.y[:], here.clock.real[T] = y, t
