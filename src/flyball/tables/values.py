@@ -31,7 +31,7 @@ from .poses import Poses
 from .specs import Structure, TermSpec
 from .system import EXCESS, EXCESS_MASS, FLAT, System
 
-NO_LENGTH = 1e-9  # of coordinates: a distance that is their rounding
+NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
 MOST = 4  # sets of values of one structure that are kept
 REGULARISATION = 1e-9
 

@@ -45,9 +45,10 @@ OFTEN, LIFTS_USUAL, STEPS_USUAL = 150, 25, 100
 
 
 def smallest(scene: Touching, values: Values) -> float:
-    """Radius [m] of the smallest shape."""
+    """Radius [m] of the smallest shape; the mechanism's length where all are without end."""
     sizes = scene.geometry.shape_x[:, RADIUS]
-    return float(np.min(sizes[np.isfinite(sizes)], initial=values.length))
+    bounded = sizes[np.isfinite(sizes)]
+    return float(bounded.min() if len(bounded) else values.length)
 
 
 def placed(scene: Touching, base: Assembly) -> Movers:
