@@ -19,7 +19,8 @@ from __future__ import annotations
 
 from ..compiler.jit import formula
 from ..constraints.modes import BY_RATE, FROZEN, RATCHET, STATIC, TURN
-from ..laws.evaluation import evaluate
+from ..laws.evaluation import evaluate, evaluate_jet
+from ..laws.opcodes import BY_TIME, SENSOR
 from ..math.scalar import magnitude
 from ..tables.system import (
     FORCE_F,
@@ -81,6 +82,7 @@ KEPT = (
 GRAZED = 1e-12  # of the same: an elastic stop that looks where it is by itself is pressed from there on
 RESTING = 1e-9  # of the same a second: not coming nearer
 CREEP = 1e-13  # of the same a second: a rate that is none
+OTHER = 1e-9  # of what decides a law's side: it is on the other one
 
 
 @formula
@@ -186,6 +188,39 @@ def law_grain(S, W, t, at, trial, fastest):
         if g - g == 0.0:
             most = max(most, magnitude(g - f))
     return most
+
+
+@formula
+def astray(S, W, t, span, out):
+    """How far below zero guards of laws' corners may be on the side that was taken, into ``out`` (ng,).
+
+    Less is rounding of velocities that something holds. Farther off the side is wrong, whatever it was taken by.
+    """
+    fastest = -1.0
+    for g in range(S.guard_i.shape[0]):
+        if S.guard_i[g, GUARD_KIND] == G_CORNER:
+            if fastest < 0.0:
+                for m in range(measured(S)):
+                    fastest = max(fastest, magnitude(W.sensed[RATE, m]))
+            s = S.guard_i[g, GUARD_OF]
+            out[g] = OTHER * (terms(S, W, t, s, span, fastest) if W.switch[MODE, s] == OFF else 1.0)
+
+
+@formula
+def terms(S, W, t, s, span, fastest):
+    """Size of what the function u of a corner is the sum of: no input less than what it is told from."""
+    nm, at = measured(S), S.switch_i[s, SWITCH_LAW]
+    size = magnitude(t * evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, BY_TIME)[1])
+    for i in range(at + 2, at + 2 + 2 * S.code[at], 2):
+        if S.code[i] == SENSOR:
+            m = S.code[i + 1]
+            x = magnitude(W.sensed[VALUE, m])
+            if m < nm:
+                x = max(x, S.glob[UNIT + m])
+            elif m < 2 * nm:
+                x = max(x, fastest, S.glob[UNIT + m - nm] / span)
+            size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
+    return size
 
 
 @formula

@@ -15,12 +15,12 @@ from ..compiler.bound import Bound
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..math.scalar import magnitude
-from ..numerics.integrators.clock import Clock, T
+from ..numerics.integrators.clock import SPAN, Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import GRAIN_END, GRAIN_START, START, TERMS, watching
+from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, TERMS, watching
 from ..tables.system import (
     BIAS,
     G_BACK,
@@ -42,7 +42,7 @@ from ..tables.system import (
 from .asking import ENGINE, GROUP, OWN, R_, S_, SHEET, W_, put, report, steps, through
 from .callbacks import Going, Own, levels
 from .engine import Sheet, engine
-from .guards import FIRM, KEPT, grains
+from .guards import FIRM, KEPT, astray, grains
 from .guards import watch as guards
 from .rows import measured
 from .sharing import GRAIN, Sharing, margin, renewed, terms
@@ -132,6 +132,7 @@ def note(A, K, row):
     all_guards(A, W, A[OWN].real[T], K, row)
     grain = GRAIN_START if row == START else GRAIN_END
     grains(S, W, A[OWN].real[T], A[EXPECTED].sensed, K.g[grain])
+    astray(S, W, A[OWN].real[T], A[OWN].real[SPAN], K.g[ASTRAY])
     last = K.grain.shape[0] - 1
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
         K.g[grain, last] = GRAIN * A[GROUP].size[0]

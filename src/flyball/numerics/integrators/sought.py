@@ -13,6 +13,7 @@ from .glance import compare, exactly, glance, true_guard
 from .panels import band, begin_sides, fires, rounding, side_of, survey
 from .pinned import crossing, end_on, retake
 from .watching import (
+    ASTRAY,
     AWAY,
     BEYOND,
     BRACKET,
@@ -109,7 +110,7 @@ def next_event(callbacks, S, W, R, c, h):
     W.real[DONE_TO] = 1.0
     i, a, b, at = begin_sides(callbacks, S, W, R, c, h)
     if i >= 0 and W.count[AWAY] == 1:
-        return left(callbacks, S, W, R, c, h, i, b)
+        return left(callbacks, S, W, R, c, h, i, b, band(W, i))
     if i < 0:
         i, a, b = survey(callbacks, S, W, R, c, h, at)
     skip = SKIPPED
@@ -137,6 +138,8 @@ def next_event(callbacks, S, W, R, c, h):
 def trespass(callbacks, S, W, R, c, h):
     """The first guard that is not where it began, or not above zero as it has to be, as `next_event` returns it.
 
+    Or on the other side than that which was taken for it, as the side of a law's corner is.
+
     Whatever was seen of it within the step.
     """
     best, at, side, away = -1, 2.0, 0.0, 0
@@ -147,9 +150,10 @@ def trespass(callbacks, S, W, R, c, h):
         if W.g[MARK, i] < 0.0 and s * f < 0.0 and fires(W.way[i], s):
             W.count[AWAY] = 0
             status, x = crossing(callbacks, S, W, R, c, h, i, 0.0, 1.0, s)
-        elif W.kept[i] == 1 and f < -band(W, i):
+        elif (W.kept[i] == 1 and f < -band(W, i)) or f < -W.g[ASTRAY, i]:
             W.real[BEYOND] = 0.0
-            status, _, x, s = left(callbacks, S, W, R, c, h, i, 1.0)
+            least = band(W, i) if W.kept[i] == 1 else W.g[ASTRAY, i]
+            status, _, x, s = left(callbacks, S, W, R, c, h, i, 1.0, least)
         else:
             continue
         if status != 0:
@@ -161,10 +165,9 @@ def trespass(callbacks, S, W, R, c, h):
 
 
 @formula
-def left(callbacks, S, W, R, c, h, i, b):
+def left(callbacks, S, W, R, c, h, i, b, least):
     """Where guard i, below zero at b, goes there by more than rounding, as `next_event` returns it."""
     W.count[AWAY] = 1
-    least = band(W, i)
     a = 0.0
     for _ in range(HALVES):
         x = 0.5 * (a + b)

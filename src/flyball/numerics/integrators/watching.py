@@ -10,9 +10,9 @@ import numpy as np
 FALLING, EITHER, RISING = -1, 0, 1
 # rows of Watch.g: guards at the start and end of the step; of the equations within; expected within; sides in the
 # making; what is zero of those that begin near it; what they were as they fired; what is rounding of them at the start
-# and the end; least, largest and farthest from what is expected at stages; then at the nodes of a panel, and where
-# these are checked
-START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST, MISS, NODE = range(13)
+# and the end; least, largest and farthest from what is expected at stages; how far below zero they may end, nan where
+# that tells nothing; then at the nodes of a panel, and where these are checked
+START, END, TRUE, THERE, SIDE, MARK, FIRED, GRAIN_START, GRAIN_END, LEAST, MOST, MISS, ASTRAY, NODE = range(14)
 NODES, CHECKS = 8, 2
 GUARDS = NODE + NODES + CHECKS
 CHECKED = (0.131, 0.567)  # places in a panel, far from those that are the same in a half of it

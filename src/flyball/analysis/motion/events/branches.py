@@ -97,7 +97,8 @@ class Corners:
     def fired(self, guards: np.ndarray) -> None:
         """Take note of guards that fired, and of the velocities with which they did."""
         found = self.n.fired(guards, G_CORNER)
-        self.at |= found - self._carried(found)
+        astray = found & self.n.here.astray
+        self.at |= found - astray - self._carried(found - astray)
         self.fell = self.n.here.v.copy()
 
     def _carried(self, found: set[int]) -> set[int]:

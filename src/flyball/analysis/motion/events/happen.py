@@ -155,7 +155,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         if jumped is None:
             still |= n.mode != OFF
         else:
-            hits |= {s: s in jumped.even for s in jumped.closing if s not in here.crept}
+            hits |= {s: s in jumped.even for s in jumped.closing if s not in here.astray}
             fired = unmoved(n, fired, rate)
             still = at_rest(n, fired)
             still[list(jumped.even)] = True
@@ -169,7 +169,7 @@ def resolve(n: Instant, fired: np.ndarray, told: bool = True) -> None:
         turned(n, hits)
         come_to_rest(n, found)
         n.arrive()
-        if jumped is not None and (jumped.blows or jumped.given or not jumped.closing.keys() <= here.crept):
+        if jumped is not None and (jumped.blows or jumped.given or not jumped.closing.keys() <= here.astray):
             tell_jump(n, jumped, before)
         guards = n.guards()
         if again < AGAIN and misled(n, guards):

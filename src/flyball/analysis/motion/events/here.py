@@ -67,8 +67,9 @@ class Here:
         How closely it was looked for events, in words.
     method : str
         By what it was computed from when on, in words, where that was not one method.
-    crept : frozenset of int
-        Switches that were at a side and left it the wrong way, with no speed: they close there without a bounce.
+    astray : frozenset of int
+        Switches found where they should not be (`events.astray`): stops left the wrong way with no speed, which close
+        without a bounce, and corners whose laws were on the wrong side.
     sharing : Sharing, optional
         What holds together and shares its forces (`equations.sharing`).
     tied : frozenset of tuple
@@ -102,7 +103,7 @@ class Here:
     counts: dict[str, int] = field(default_factory=dict)
     acted: dict[str, Any] = field(default_factory=dict)
     acted_at: float = float("nan")
-    crept: frozenset[int] = frozenset()
+    astray: frozenset[int] = frozenset()
     true: list[str] = field(default_factory=list)
     nothing: Mapping[int, float] = field(default_factory=dict)
     zero: dict[str, float] = field(default_factory=dict)

@@ -129,7 +129,7 @@ def expanded(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Impulses and velocities with what restitution gives back."""
     x, u = hit
-    bounces = [n.kind[p.switch] in STOPS and p.switch not in n.here.crept for p in parts]
+    bounces = [n.kind[p.switch] in STOPS and p.switch not in n.here.astray for p in parts]
     bounce = np.where(bounces, n.S.switch_x[[p.switch for p in parts], SWITCH_BOUNCE], 0.0)
     least = np.where((P.rule == PUSHES) & (x > 0.0), bounce * x, 0.0)
     if not least.any():

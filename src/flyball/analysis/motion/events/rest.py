@@ -33,7 +33,7 @@ class Bounces:
 def note_bounces(n: Instant, jumped: Jump) -> None:
     """Count what closed and goes on apart, or lets something else go."""
     t = n.here.t
-    for s in jumped.closing.keys() - n.here.crept:
+    for s in jumped.closing.keys() - n.here.astray:
         b = n.here.bounces.setdefault(s, Bounces())
         if t - b.last > 1.5 * (b.last - b.before):
             b.count = 0  # another series

@@ -21,7 +21,7 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import tableau
-from ....numerics.integrators.watching import AWAY, CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
 from ....tables.system import (
     G_BACK,
     G_CONE,
@@ -33,7 +33,6 @@ from ....tables.system import (
     G_UPPER,
     GUARD_KIND,
     GUARD_OF,
-    SWITCH_MEASURED,
 )
 from ...progress import Tell
 from ..engines import FAILED, Engine
@@ -44,6 +43,7 @@ from ..part import WEIGHT
 from ..stiff import EXPLICIT, NOT_STIFF, STIFF, STRUCK, Pace, on_corner
 from .accumulating import Counts
 from .actions import expressions, say_never, stepped_over, true_already
+from .astray import astray
 from .failed import accumulating, endless
 from .happen import begin, happen
 from .here import Here
@@ -59,7 +59,6 @@ ENDLESS = 2000  # events
 PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
 DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
-HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
 HOLDING = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
@@ -286,23 +285,11 @@ class Run:
         self.counts.add(fired, here.t)
         if found := self.counts.accumulate(fired, self.legs.end):
             raise accumulating(instant_of(here), *found)
-        if self.loop is not None and self.loop.desk.count[AWAY]:
-            here.crept = self.crept(self.loop)
         if self.loop is not None:
+            here.astray = astray(here, self.loop)
             as_fired(here, self.loop)
         self.happens(fired)
-        here.crept, here.nothing = frozenset(), {}
-
-    def crept(self, loop: Loop) -> frozenset[int]:
-        """Stops that what stood at them has crept past: at the step's begin it hardly moved; what did hits them."""
-        S, out = self.here.c.system, set()
-        for g in loop.fired:
-            kind, s = S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
-            if kind in DISTANCES:
-                before, now = np.abs(loop.desk.moving[:, 1, S.switch_i[s, SWITCH_MEASURED]])
-                if before <= HARDLY * now:
-                    out.add(s)
-        return frozenset(out)
+        here.astray, here.nothing = frozenset(), {}
 
     def happens(self, fired: Sequence[int]) -> None:
         """What happens where these guards fired."""

@@ -1,0 +1,29 @@
+"""Switches whose guards were found beyond zero, where a step's end was looked at and no passing had been seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ....equations.watched import Loop
+from ....numerics.integrators.watching import AWAY
+from ....tables.system import G_CORNER, G_LOWER, G_UPPER, GUARD_KIND, GUARD_OF, SWITCH_MEASURED
+from .here import Here
+
+HARDLY = 0.5  # of its rate at a stop, at the begin of the step: it began to move in between
+
+
+def astray(here: Here, loop: Loop) -> frozenset[int]:
+    """Switches that went where they should not be, unseen: stops crept past, corners on the other side.
+
+    At the step's begin such a stop hardly moved; what did hits it. On which side a law is then, what decides says.
+    """
+    S, out = here.c.system, set()
+    for g in loop.fired if loop.desk.count[AWAY] else ():
+        kind, s = S.guard_i[g, [GUARD_KIND, GUARD_OF]].tolist()
+        if kind == G_CORNER:
+            out.add(s)
+        elif kind in (G_LOWER, G_UPPER):
+            before, now = np.abs(loop.desk.moving[:, 1, S.switch_i[s, SWITCH_MEASURED]])
+            if before <= HARDLY * now:
+                out.add(s)
+    return frozenset(out)
