@@ -1,4 +1,4 @@
-"""The same mechanism a million times smaller, lighter, faster: the same events, and all in proportion."""
+"""The same mechanism a million times smaller, lighter, faster, slower: the same events, and all in proportion."""
 
 from __future__ import annotations
 
@@ -84,16 +84,47 @@ def pushed(u):
     return m
 
 
-SCALES = ((1e-6, 1, 1), (1e6, 1, 1), (1, 1e-6, 1), (1, 1, 1e-6), (1e-6, 1e-6, 1e-3))
+def turning(u):
+    """Slides in space, across a slope: friction turns with its way."""
+    m = fb.Mechanism("scaled", gravity=(0.3 * G * u.g, 0, -G * u.g))
+    look = fb.Sphere(radius=0.1 * u.L)
+    m.add(
+        fb.Body("b", mass=u.M, inertia=[0.004 * u.I] * 3, position=(0, 0, 0.1 * u.L), velocity=(0, u.v, 0), shape=look)
+    )
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 0, 1))), fb.Contact(friction=0.05, restitution=0.0))
+    return m
 
 
-@pytest.mark.parametrize("made", [ball, belt, rope, elastic, thrown, sign, pushed])
+def swing(u):
+    """A pendulum falls on a stop, and bounces until it rests."""
+    m = begun(u, 0.1, position=(0.5, 0))
+    m.add(fb.Revolute("A", "ground", "b", at=(0, 0)), fb.Limit("stop", "A.angle", lower=-1.0, restitution=0.5))
+    m.add(fb.Event("top", "A.rate"))
+    return m
+
+
+def struck(u):
+    """To and fro between two stops without gravity, and at rest on them."""
+    m = begun(u, 1.0, gravity=0.0)
+    m.add(fb.Body("other", mass=u.M, inertia=u.I, position=(u.L, 0)), fb.Prismatic("P", "ground", "b", **ALONG))
+    m.add(fb.Limit("stops", "P.displacement", lower=-0.3 * u.L, upper=0.2 * u.L, restitution=0.4))
+    m.add(fb.Actuator("push", "P.displacement", force=f"{5 * u.F!r}*sin(2*t/{u.T!r}) - {0.1 * u.c!r}*rate"))
+    m.add(fb.Event("turn", "P.rate", direction="either"))
+    return m
+
+
+SCALES = (
+    (1e-6, 1, 1), (1e6, 1, 1), (1, 1e-6, 1), (1, 1, 1e-6), (1, 1, 1e-3), (1, 1, 1e3), (1, 1, 1e6), (1e-6, 1e-6, 1e-3),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("made", [ball, belt, rope, elastic, thrown, sign, pushed, turning, swing, struck])
 def test_it_is_the_same(made):
     first = None
     for scale in ((1, 1, 1), *SCALES):
         u = scaled(*map(float, scale))
         fine = {"rtol": 1e-9, "atol": 1e-12 * u.L * min(1.0, 1 / u.T)}
-        r = made(u).simulate(2.4 * u.T, outputs=4, **fine)
+        r = made(u).simulate(3 * u.T, outputs=4, **fine)
         told = [(e.name, e.kind) for e in r.events]
         found = np.concatenate([[e.t / u.T for e in r.events], r["b"].position[:, :2].ravel() / u.L])
         first = first or (told, found.tolist())

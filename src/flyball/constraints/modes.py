@@ -12,8 +12,8 @@ FROZEN = 4.0
 """Way of an elastic switch that is open; one less: pressed at its upper side, one more: at its lower. A force that is
 told anything less than `STATIC` and a half looks where it is by itself."""
 TURN = 1e-9
-"""Rate, in lengths of the mechanism or rad a second, at which a ratchet has turned round: so one at rest is watched
-whichever way it begins to go."""
+"""Rate, in lengths of the mechanism or rad at its own rate, at which a ratchet has turned round: so one at rest is
+watched whichever way it begins to go."""
 STATIC = 2.0
 """In place of the way of sliding: asks the effort of a force for the most that it holds at rest."""
 BY_RATE = 8.0

@@ -56,6 +56,7 @@ from ..tables.system import (
     SWITCH_PARTNER,
     SWITCH_ROW,
     SWITCH_STIFFNESS,
+    TEMPO,
     UNIT,
     UPPER,
     VALUE,
@@ -80,8 +81,8 @@ KEPT = (
     G_SHARED,
 )  # guards above zero as long as modes are right
 GRAZED = 1e-12  # of the same: an elastic stop that looks where it is by itself is pressed from there on
-RESTING = 1e-9  # of the same a second: not coming nearer
-CREEP = 1e-13  # of the same a second: a rate that is none
+RESTING = 1e-9  # of the same, at the mechanism's own rate: not coming nearer
+CREEP = 1e-13  # of the same: a rate that is none
 OTHER = 1e-9  # of what decides a law's side: it is on the other one
 
 
@@ -121,7 +122,7 @@ def watched(S, W, t, kind, s):
         if kind == G_SLIDES:
             if way == BY_RATE:
                 return NOT_WATCHED
-            late = TURN * S.glob[UNIT + m] if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0
+            late = TURN * pace(S, m) if S.switch_i[s, SWITCH_KIND] == RATCHET else 0.0
             return way * moving(S, m, rate) + late
         if kind == G_BACK:
             return moving(S, m, rate)
@@ -136,14 +137,19 @@ def watched(S, W, t, kind, s):
 @formula
 def moving(S, m, rate):
     """The rate of quantity m; none where that is rounding, as of what nothing moves, or what something else holds."""
-    return 0.0 if magnitude(rate) <= CREEP * S.glob[UNIT + m] else rate
+    return 0.0 if magnitude(rate) <= CREEP * pace(S, m) else rate
 
 
 @formula
 def distance(S, m, x, rate):
     """How far quantity m is from a stop; none where that is rounding, as where it parts with no speed."""
-    size = S.glob[UNIT + m]
-    return 0.0 if magnitude(x) <= GRAIN * size and rate >= -RESTING * size else x
+    return 0.0 if magnitude(x) <= GRAIN * S.glob[UNIT + m] and rate >= -RESTING * pace(S, m) else x
+
+
+@formula
+def pace(S, m):
+    """What rates of quantity m are compared with: the mechanism's length, or a radian, at its own rate."""
+    return S.glob[UNIT + m] * S.glob[TEMPO]
 
 
 @formula
@@ -164,7 +170,7 @@ def grains(S, W, t, trial, out):
             m = S.switch_i[of, SWITCH_MEASURED]
             out[g] = GRAIN * max(S.glob[UNIT + m], magnitude(W.sensed[VALUE, m]))
         elif kind == G_SLIDES or kind == G_BACK or (kind == G_TURNS and S.switch_i[of, SWITCH_PARTNER] < 0):
-            out[g] = max(NOISE * fastest, GRAIN * S.glob[UNIT + S.switch_i[of, SWITCH_MEASURED]])
+            out[g] = max(NOISE * fastest, GRAIN * pace(S, S.switch_i[of, SWITCH_MEASURED]))
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
@@ -218,7 +224,7 @@ def terms(S, W, t, s, span, fastest):
             if m < nm:
                 x = max(x, S.glob[UNIT + m])
             elif m < 2 * nm:
-                x = max(x, fastest, S.glob[UNIT + m - nm] / span)
+                x = max(x, fastest, pace(S, m - nm), S.glob[UNIT + m - nm] / span)
             size += x * magnitude(evaluate_jet(S.code, S.const, at, W.stack, t, W.sensed, m)[1])
     return size
 

@@ -30,6 +30,7 @@ from ..tables.system import (
     PARENT,
     RATE,
     SLIDING,
+    TEMPO,
     V0,
     VALUE,
 )
@@ -39,7 +40,7 @@ from .rows import way_of
 from .sliding import slide
 from .tree import project
 
-SLOW = 1e-9  # lengths of the mechanism a second: slower is at rest
+SLOW = 1e-9  # lengths of the mechanism, at its own rate: slower is at rest
 
 
 @formula
@@ -151,7 +152,7 @@ def way(S, W, k, rate):
         return sign(rate)
     told = W.sensed[VALUE, way_of(S, W, s)]
     if told.real == BY_RATE:
-        return sign(rate) if magnitude(rate) > SLOW * S.glob[LENGTH].real else 0.0 * told
+        return sign(rate) if magnitude(rate) > SLOW * (S.glob[LENGTH] * S.glob[TEMPO]).real else 0.0 * told
     return told
 
 

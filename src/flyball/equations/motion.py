@@ -40,6 +40,7 @@ from ..tables.system import (
     SOLVER,
     STABILIZE,
     STATUS,
+    TEMPO,
     TOL_G,
     TOL_V,
     TREE,
@@ -97,7 +98,7 @@ def astray(S, W, t, q, v):
             if S.body_i[b, TREE] == REVOLUTE:  # its whole turns are the law's own
                 way = atan2(sin(way), cos(way))
                 size = 0.0 * size + 1.0
-            rate = magnitude(f1 - v[S.body_i[b, V0]]) / (size + magnitude(f1))
+            rate = magnitude(f1 - v[S.body_i[b, V0]]) / (size * S.glob[TEMPO] + magnitude(f1))
             worst = max(worst, magnitude(way) / size, rate)
     return worst
 

@@ -25,6 +25,7 @@ from ..tables.system import (
     RESIDUAL,
     SHOW,
     STABILIZE,
+    TEMPO,
     V0,
     V3,
 )
@@ -40,7 +41,7 @@ NOT_CLOSED = 2  # a status
 OLD, NEAR, HERE = range(3)
 PASSES = 16
 TIGHT_G, TIGHT_V = 1e-15, 1e-14  # relative violations of accepted states that are left alone
-REST = 1.0  # [m/s] or, if less, lengths of the mechanism a second: what slower rows are measured by
+METRE = 1.0  # [m] or, if less, the mechanism's length: at its own rate what slower rows are measured by
 CLOSED = 1e-9  # a projection that comes to rest above this has failed, if rounding is less
 LAST_DIGIT = 1e-15  # times the distance from the origin: what rounding leaves of a violation
 SLOW = 0.1  # a Newton step that gains less than this wants a new factor
@@ -208,7 +209,7 @@ def steer(S, W, v, tol_v, factored):
     step = W.vel[V3]
     r = W.row[R2]
     worst, size = drift(S, W, v, r)
-    if worst > tol_v * (REST * min(1.0, S.glob[LENGTH]) + size):
+    if worst > tol_v * (min(METRE, S.glob[LENGTH]) * S.glob[TEMPO] + size):
         if factored == NEAR:
             reuse(S, W)
         if factored == OLD or solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS) > STALE * W.option[PASS]:
@@ -218,7 +219,7 @@ def steer(S, W, v, tol_v, factored):
             solve(S, W, none, r, step, W.row[RESIDUAL], False, REFINEMENTS)
         for d in range(step.shape[0]):
             v[d] += step[d]
-    return 0, worst / (S.glob[LENGTH] + size), factored
+    return 0, worst / (S.glob[LENGTH] * S.glob[TEMPO] + size), factored
 
 
 @formula

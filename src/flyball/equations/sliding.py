@@ -27,15 +27,16 @@ from ..tables.system import (
     SWITCH_REST,
     SWITCH_ROW,
     SWITCH_SLIDING,
+    TEMPO,
     VALUE,
 )
 from .rows import way_of
 
-SLOW = 1e-10  # lengths of the mechanism a second: slower sliding in space goes the way of its switch
+SLOW = 1e-10  # lengths of the mechanism, at its own rate: slower sliding in space goes the way of its switch
 FRESH = 2.0  # length of the way of what begins to slide in space: in its first moments it goes that way
-FIRST = 3e-5  # lengths a second: so fast it goes its own way for the most part; so many times as fast, wholly
+FIRST = 3e-5  # of the same: so fast it goes its own way for the most part; so many times as fast, wholly
 OVER = 8.0
-BACK = 1e-11  # lengths a second: so fast it goes back when it is told; at first its acceleration is rounding
+BACK = 1e-11  # of the same: so fast it goes back when it is told; at first its acceleration is rounding
 TURNED = 0.5  # cosine of the angle by which a direction of sliding turns before its way is told anew
 NOT_WATCHED = float("nan")
 
@@ -64,7 +65,7 @@ def heading(S, W, sensed, s):
     square = u * u + v * v
     if (way * way + side * side).real > FRESH:
         return begins(S, (way, side), (u, v), square)
-    slow = SLOW * S.glob[LENGTH]
+    slow = SLOW * S.glob[LENGTH] * S.glob[TEMPO]
     if square.real <= slow.real * slow.real:
         return way, side, u * way + v * side
     speed = sqrt(square) if (u * way + v * side).real >= 0.0 else -sqrt(square)
@@ -73,8 +74,8 @@ def heading(S, W, sensed, s):
 
 @formula
 def begins(S, way, velocity, square):
-    """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths a second."""
-    first = FIRST * S.glob[LENGTH]
+    """The same of what has just begun to slide: velocity + c exp(-(speed / c)^2) way, c = FIRST lengths at its rate."""
+    first = FIRST * S.glob[LENGTH] * S.glob[TEMPO]
     c = first * exp(-square / (first * first)) / FRESH
     a, b = velocity[0] + c * way[0], velocity[1] + c * way[1]
     size = sqrt(a * a + b * b)
@@ -132,5 +133,6 @@ def watched_place(S, W, sensed, lam, kind, s):
     speed, size = sqrt(u * u + v * v), sqrt(way * way + side * side)
     turned = (way * u + side * v) / size - TURNED * speed
     if size * size > FRESH:
-        return min(turned + BACK * S.glob[LENGTH], OVER * FIRST * S.glob[LENGTH] - speed)
+        pace = S.glob[LENGTH] * S.glob[TEMPO]
+        return min(turned + BACK * pace, OVER * FIRST * pace - speed)
     return turned

@@ -81,8 +81,9 @@ SOLVER, COORDINATES, FRAMES, GROUND_FRAMES = -4, -3, -2, -1
 SCHUR, COUPLED, ARTICULATED = range(3)
 # entries of System.glob after the three of gravity
 REGULARISE, SEMIDEFINITE, LENGTH = 3, 4, 5
-# (from there on what each measured quantity is compared with: that length, or a radian)
-UNIT = 6
+# (a rate of its own [1/s]: see `tempo`; from there on what each measured quantity is compared with: that length, or a
+# radian)
+TEMPO, UNIT = 6, 7
 
 TERM_KINDS = len(KINDS)
 
@@ -114,7 +115,7 @@ class System(NamedTuple):
     )  # first row of each kind of term; solver; number of q; frames that are kept up to date, those of them on ground
     code: np.ndarray  # bytecode of the laws
     const: np.ndarray  # parameters, literals of the laws, splines
-    glob: np.ndarray  # (6 + nm,): gravity, relative regularisation, semidefinite mass or not, lengths (`UNIT`)
+    glob: np.ndarray  # (7 + nm,): gravity, relative regularisation, semidefinite mass or not, size, pace (`UNIT`)
     mass_i: np.ndarray  # (nM, 3): entries of M: row, column, place in A; only for the coupled matrix
     pair_i: np.ndarray  # (np, 4): products of G blocks that add up to S: first, second entry, length, place in A
     block_i: np.ndarray  # (ne, 3): blocks of G: body, first entry, row

@@ -30,6 +30,7 @@ from .points import check_centred
 from .poses import Poses
 from .specs import Structure, TermSpec
 from .system import EXCESS, EXCESS_MASS, FLAT, System
+from .tempo import tempo
 
 NO_LENGTH = 1e-13  # of coordinates: a distance that is their rounding
 MOST = 4  # sets of values of one structure that are kept
@@ -115,7 +116,9 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
     switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks, pose.apart)
     semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
-    glob = np.array([*model.gravity_vector(env), REGULARISATION, semidefinite, length, *_units(s, length)], dtype)
+    gravity = model.gravity_vector(env)
+    pace = tempo(given, model, gravity, length)
+    glob = np.array([*gravity, REGULARISATION, semidefinite, length, pace, *_units(s, length)], dtype)
     t = s.tables
     system = System(
         t["body_i"], body_x, t["frame_i"], frame_x, t["term_i"], term_x, t["seg_i"],

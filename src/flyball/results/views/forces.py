@@ -14,7 +14,7 @@ from ...laws.evaluation import evaluate
 from ...math.scalar import sign
 from ...math.vec import dot, sub
 from ...model.force import CoordinateForce, JointForce
-from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE
+from ...tables.system import FORCE_F, FORCE_LAW, FORCE_LOAD, FORCE_M, FORCE_SWITCH, HELD, LENGTH, SPARE, TEMPO
 from ..booked import basis
 from ..records import coordinate_frames, turned
 from .base import Curves, View
@@ -68,7 +68,7 @@ class ForceView(View):
         stretches = self._result.stretches
         if s < 0 or stretches is None:
             return sign(rate)
-        slow = SLOW * self._x.system.glob[LENGTH].real
+        slow = SLOW * (self._x.system.glob[LENGTH] * self._x.system.glob[TEMPO]).real
         by_rate = np.where(np.abs(rate) > slow, sign(rate), 0.0)
         return np.where(stretches.sigma[s] == BY_RATE, by_rate, stretches.sigma[s] + 0.0 * rate)
 

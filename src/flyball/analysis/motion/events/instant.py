@@ -30,6 +30,7 @@ from ....tables.system import (
     SWITCH_FORCE,
     SWITCH_KIND,
     SWITCH_MEASURED,
+    TEMPO,
     VALUE,
 )
 from .bounds import sizes, units
@@ -102,6 +103,7 @@ class Instant:
         self.engine = Bound(engine, *self.tables, Written(R), Written(self.desk), Written(self.sheet))
         self.asked = Written(Desk(np.array([self.engine.address]), R, self.desk, self.sheet))
         self.units = units(s)
+        self.tempo = float(S.glob[TEMPO].real)
         self.unit, metric = sizes(s, c.values.length), [unit == "m" for unit in self.units]
         mass, spin = S.body_x[:, MASS].sum(), np.trace(S.body_x[:, INERTIA : INERTIA + 9].reshape(-1, 3, 3).sum(axis=0))
         turning = mass * c.values.length**2 + spin

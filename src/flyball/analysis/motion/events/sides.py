@@ -29,7 +29,7 @@ from ....tables.system import (
 )
 from .instant import Instant
 
-SLOW = 1e-9  # of the mechanism's length (of a radian) a second squared: an acceleration that is none
+SLOW = 1e-9  # of the mechanism's length (of a radian), at its own rate: an acceleration that is none
 TOOTH = 1e-9  # of the pitch: as good as at a tooth
 BY_ITSELF = 0.0  # way of an elastic switch whose force looks where it is
 
@@ -55,8 +55,8 @@ def turned(n: Instant, hit: Collection[int]) -> None:
     for s in n.of(RATCHET):
         if n.W.switch[MODE, s] != OFF:
             continue
-        slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s]
-        if n.mode[s] != OFF or s in hit or (slow and _acceleration(n, s) > SLOW * n.unit[s]):
+        slow = abs(n.rate[s]) <= 2.0 * TURN * n.unit[s] * n.tempo
+        if n.mode[s] != OFF or s in hit or (slow and _acceleration(n, s) > SLOW * n.unit[s] * n.tempo**2):
             _goes_on(n, s)
         else:
             n.ways()[s] = n.way[s]
@@ -103,7 +103,7 @@ def _side(n: Instant, s: int, old: float, hit: set[int]) -> float:
         else:
             n.ways()[s] = FROZEN
             rise = -side * _acceleration(n, s)
-            if abs(rise) <= SLOW * n.unit[s]:
+            if abs(rise) <= SLOW * n.unit[s] * n.tempo**2:
                 return BY_ITSELF - FROZEN
             on = rise > 0.0
         now = side if on else now
