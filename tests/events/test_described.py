@@ -73,7 +73,7 @@ def test_a_comparison_becomes_true_where_a_difference_rises_through_zero(written
 WRONG = {
     "A.angel - 1": r"when of Event 'e': 'A.angel' is no curve; .*did you mean 'angle'",
     "B.angle": r"when of Event 'e': 'B.angle' is no curve of a part; .*no part named 'B'",
-    "A.fx - 1": r"'A.fx' is known only after the accelerations are",
+    "rod.ax - 1": r"'rod.ax' is known only after the accelerations are",
     "k - 1": r"when is 'k - 1', which never changes; name t, a sensor, or a curve",
     "3": r"when is '3', which never changes",
     "turnd - 1": r"unknown name 'turnd'",

@@ -61,7 +61,9 @@ from ..tables.system import (
     UPPER,
     VALUE,
 )
+from .control import column_of
 from .dispatch import effort
+from .friction import loads_end
 from .loads import law, wide
 from .rows import measured, way_of
 from .sliding import slides, watched_place
@@ -174,21 +176,24 @@ def grains(S, W, t, trial, out):
         elif kind == G_PULL or kind == G_HOLDS or kind == G_CONE:
             out[g] = NOISE * strongest
         elif kind == G_LAW or kind == G_CORNER:
-            out[g] = law_grain(S, W, t, of if kind == G_LAW else S.switch_i[of, SWITCH_LAW], trial, fastest)
+            at = of if kind == G_LAW else S.switch_i[of, SWITCH_LAW]
+            out[g] = law_grain(S, W, t, at, trial, (fastest, strongest))
 
 
 @formula
-def law_grain(S, W, t, at, trial, fastest):
-    """By how much a law changes with the last places of what it is asked with; ``fastest``: the largest rate."""
-    nm = measured(S)
+def law_grain(S, W, t, at, trial, most_of):
+    """By how much a law changes with the last places of what it is asked with; ``most_of``: largest rate, and force."""
+    nm, first, last = measured(S), loads_end(S, W), column_of(S, W, 0)
     f = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), W.sensed)
     most = GRAIN * magnitude(f)
     for n in range(3):  # all up; of two, and of four, one half up and the other down
         for m in range(trial.shape[1]):
             x = W.sensed[VALUE, m]
+            way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
             if m < 2 * nm:
-                way = 1.0 if n == 0 or (m // n) % 2 == 0 else -1.0
-                x += way * GRAIN * max(magnitude(x), S.glob[UNIT + m] if m < nm else fastest)
+                x += way * GRAIN * max(magnitude(x), S.glob[UNIT + m] if m < nm else most_of[0])
+            elif m >= first and m < last:
+                x += way * NOISE * most_of[1]
             trial[VALUE, m] = x
         g = evaluate(S.code, S.const, at, W.stack, (t, 0.0, 0.0), trial)
         if g - g == 0.0:

@@ -74,6 +74,7 @@ from .projection import (
     show_frames,
     violation,
 )
+from .readings import readings
 from .rows import BY_TIME, row_times
 from .solve import REFINEMENTS, factor, reuse, solve
 from .surfaces import PASSES, bound, settled
@@ -198,6 +199,7 @@ def finish(S, W, t, p, dy):
             d = S.body_i[b, V0]
             work[S.body_i[b, BODY_WORK]] = W.vel[EFFORT, d] * v[d]
     progress(S, W, p[nq + nv :], work)
+    readings(S, W, t)
     W.info[STATUS] = finite(dy)
     return W.info[STATUS]
 

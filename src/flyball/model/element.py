@@ -45,6 +45,7 @@ class LawOf:
     dimension: str | None
     inputs: tuple[str, ...] = ()
     curves: bool = False  # whether it may name curves of parts, such as A.angle
+    forces: bool = False  # and what parts carry, such as A.force
 
 
 def plain(value: Any) -> Any:

@@ -31,7 +31,9 @@ class Event(Element):
     """Something happens when a quantity passes zero: it is noted in ``run.events``, and what ``do`` says is done.
 
     The instant is found to the tolerance of the motion. Names are those that laws know (``t``, parameters, sensors,
-    tables), and curves of positions and velocities: ``A.angle``, ``A.angle_rate``, ``slider.vx``, ``spring.length``.
+    tables), curves of positions and velocities: ``A.angle``, ``A.angle_rate``, ``slider.vx``, ``spring.length``, and
+    what joints, ropes, stops, friction, springs along coordinates and drivers carry: ``A.fx``, ``A.force`` (its size),
+    ``rope.tension``, ``D.effort``.
 
     Parameters
     ----------
@@ -74,7 +76,7 @@ class Event(Element):
     @property
     def of(self) -> LawOf:
         """What its expressions may use."""
-        return LawOf(None, curves=True)
+        return LawOf(None, curves=True, forces=True)
 
     @property
     def told(self) -> str:

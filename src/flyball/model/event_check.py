@@ -20,6 +20,9 @@ from .words import listing, suggest
 if TYPE_CHECKING:
     from .model import Model
 
+VALUE = LawOf(None, curves=True)
+"""What values that events set may use."""
+
 
 def check_event(model: Model, e: Event) -> None:
     """Refuse names that are not there, expressions that never change, and actions that contradict one another.
@@ -69,7 +72,7 @@ def _check_action(model: Model, e: Event, a: Action) -> None:
     if isinstance(a, Set):
         states = [x.name for x in wired(model) if not x.signal] if model.controllers else []
         if a.parameter in states:
-            model.law(a.value, e.of, f"value of {a.title} in {e.title}")
+            model.law(a.value, VALUE, f"value of {a.title} in {e.title}")
             return
         if a.parameter not in model.parameters:
             known = [*model.parameters, *states]
@@ -78,7 +81,7 @@ def _check_action(model: Model, e: Event, a: Action) -> None:
                 f"{suggest(a.parameter, known)}; {listing(known)}"
             )
         where = f"value of {a.title} in {e.title}"
-        model.law(a.value, e.of, where)
+        model.law(a.value, VALUE, where)
         old = model.parameters[a.parameter]
         if isinstance(a.value, str) and isinstance(old, str) and is_number_text(a.value) and is_number_text(old):
             same_kind(old, a.value, where)

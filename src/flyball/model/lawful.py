@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import ExpressionError, ModelError
 from . import wiring
+from .carried import carried
 from .element import LawOf, limited
 from .examine import Curve, measured
 from .expressions import Expression, folded, law_expression
@@ -56,7 +57,7 @@ def law_of(
     for name in sorted(sensors):
         _check_sensed(model, sensors[name], where, driver)
     for name in sorted(curves):
-        _check_curve(model, name, where)
+        _check_curve(model, name, where, of)
     if not signals:
         return expression
     if driver:
@@ -82,10 +83,12 @@ def _check_sensed(model: Model, e: Sensor, where: str, driver: bool) -> None:
         )
 
 
-def _check_curve(model: Model, name: str, where: str) -> None:
-    """Whether a curve is one of positions or velocities."""
+def _check_curve(model: Model, name: str, where: str, of: LawOf) -> None:
+    """Whether a curve is one of positions or velocities, or, for an event, what a part carries."""
+    if of.forces and carried(model, name):
+        return
     if measured(model, Curve(where, name)) is None:
         raise ModelError(
             f"{where}: {name!r} is known only after the accelerations are; use positions, angles, lengths and their "
-            f"rates"
+            f"rates" + (", or what joints, drivers and forces along coordinates carry" if of.forces else "")
         )

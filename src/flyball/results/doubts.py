@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..equations.loads import wide
+from ..tables.reads import read
 from ..tables.system import FORCE_F, MASS
 
 if TYPE_CHECKING:
+    from ..model.model import Model
     from .result import Result
 
 UNBALANCED = 1e-4  # part of the energy moved above which the balance is worth a word, where no tolerance was asked for
@@ -35,6 +37,7 @@ def warnings(result: Result) -> tuple[str, ...]:
         *doubtful(result),
         _accelerations(result),
         *_open_loads(result),
+        *_open_forces(result),
         *_creep(result),
     ]
     return tuple(text for text in texts if text)
@@ -154,6 +157,30 @@ def _open_loads(result: Result) -> list[str]:
         f"({', '.join(what)}): its load is one choice of many. Replace a joint by one that holds less, as Spherical"
         for f, what in open_loads(_with_loads(result), result.health.undetermined)
     ]
+
+
+def _open_forces(result: Result) -> list[str]:
+    return [
+        f"an event names {name!r}, which redundant constraints leave undetermined ({', '.join(what)}): it is one "
+        f"choice of many. Replace a joint by one that holds less, as Spherical"
+        for name, what in open_forces(result.model, result.health.undetermined)
+    ]
+
+
+def open_forces(model: Model, undetermined: Mapping[str, tuple[str, ...]]) -> list[tuple[str, tuple]]:
+    """Forces and torques of joints that events name and that are undetermined, with what of these is.
+
+    Parameters
+    ----------
+    model : Model
+    undetermined : mapping
+        Joint -> components, as of `Mobility`.
+    """
+    found = []
+    for name, x in read(model).items():
+        kind = "force" if name.partition(".")[2].startswith("f") else "torque"
+        found.append((name, tuple(k for k in undetermined.get(x.element.name, ()) if k.startswith(kind))))
+    return [(name, what) for name, what in found if what]
 
 
 def open_loads(frictions: Iterable[Any], undetermined: Mapping[str, tuple[str, ...]]) -> list[tuple[Any, tuple]]:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..math.vec import dot, sub
+from ..tables.reads import width
 from .terms import coefficient, term
 
 if TYPE_CHECKING:
@@ -48,12 +49,12 @@ class Measured:
 
     @cached_property
     def slots(self) -> np.ndarray:
-        """What laws read: (3, slots, n): values, rates as values of their own, loads (not these), states of
-        controllers, ways of switches.
+        """What laws read: (3, slots, n): values, rates as values of their own, loads and forces (not these),
+        states of controllers, ways of switches.
         """
         s = self._result.values.structure
         n, switches = len(s.measured), len(s.switches)
-        first = 2 * n + len(s.loads)
+        first = 2 * n + len(s.loads) + width(s)
         out = self._result.records.zeros(3, first + len(s.controls) + switches)
         if s.controls:
             out[0, first : first + len(s.controls)] = self._result.states[:, : len(s.controls)].T

@@ -27,6 +27,7 @@ from ..model.model import Model
 from ..model.switch import Switch
 from ..model.wiring import wired
 from .controllers import CONTROLS
+from .reads import READS, width
 from .specs import Structure, frame
 from .switches import SwitchSpec
 from .terms import measured_term
@@ -150,11 +151,14 @@ def _named(u: Node, slots: dict[str, int]) -> tuple[Any, ...]:
 
 def settle(s: Structure) -> None:
     """Write the columns of ways, and of controllers' states, into the code, when all that is measured is numbered."""
-    first = 2 * len(s.measured) + len(s.loads)
+    read = 2 * len(s.measured) + len(s.loads)
+    first = read + width(s)
 
     def column(place: int) -> int:
         if place >= 0:
             return place
+        if place <= READS:
+            return read + READS - place
         return first + CONTROLS - place if place <= CONTROLS else first + len(s.controls) - 1 - place
 
     for at in s.laws:

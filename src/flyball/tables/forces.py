@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..constraints.blocks import DISTANCE, turning
+from ..model.carried import carried
 from ..model.controller import Controller
 from ..model.element import LawOf, fields_with
 from ..model.event import Event
@@ -29,7 +30,7 @@ def measured_quantities(s: Structure, watched: Mapping[str, Event | Controller])
             _along(s, e)
     sensors = [x for x in s.model.sensors if isinstance(x, Sensor)]
     own = {x.name for x in s.controls}
-    curves = sorted(name for name in watched if "." in name and name not in own)
+    curves = sorted(name for name in watched if "." in name and name not in own and not carried(s.model, name))
     if not sensors and not curves:
         return
     named = _names(s) | set(watched)

@@ -8,6 +8,7 @@ import numpy as np
 
 from ..errors import ModelError
 from ..numerics.ldl import analyse
+from .reads import entries
 from .specs import Structure, ints
 from .system import BODY_LAW, COUPLED, NV, SCHUR, SOLVER, V0
 
@@ -33,6 +34,7 @@ def patterns(s: Structure, solved: bool = True) -> None:
         for b in sorted(touched[len(s.rows) + m])
     ]
     load_i = [(2 * len(s.measured) + k, n) for k, e in enumerate(s.loads) for n in _pressing(s, e)]
+    load_i += entries(s)
     s.tables |= {
         "term_i": ints(term_i, 6),
         "seg_i": ints(seg_i, 3),

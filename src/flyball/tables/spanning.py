@@ -15,6 +15,7 @@ from ..model.model import Model
 from .events import parting
 from .forest import ends
 from .points import single
+from .reads import read
 
 MOST = 8  # choices that are kept of a mechanism
 
@@ -25,11 +26,11 @@ def saved(joint: Joint, planar: bool) -> int:
 
 
 def candidates(model: Model, avoided: Collection[str] = ()) -> dict[str, int]:
-    """Joints that can be tree joints -> rows saved. Those whose reaction a friction needs must be rows, those that an
-    event releases, and those of point masses, which turn with nothing.
+    """Joints that can be tree joints -> rows saved. Those whose reaction a friction or an event needs must be rows,
+    those that an event releases, and those of point masses, which turn with nothing.
     """
     needed = {getattr(f, "joint", "") for f in model.forces if hasattr(f, "load")}
-    needed |= {joint.name for joint in parting(model)}
+    needed |= {joint.name for joint in parting(model)} | {x.element.name for x in read(model).values()}
     alone = single(model)
     out = {}
     for joint in model.joints:

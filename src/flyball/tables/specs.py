@@ -91,6 +91,7 @@ class Structure:
     controls: list[Wired] = field(default_factory=list)  # states of controllers, the first of all states
     sampled: list[tuple[str, int, int, bool]] = field(default_factory=list)  # controller, state, law, whether last
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
+    reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its column (`reads`)
     state_at: dict[str, int] = field(default_factory=dict)  # name -> work, turn or place state
     tables: dict[str, np.ndarray] = field(default_factory=dict)
     code: list[int] = field(default_factory=list)

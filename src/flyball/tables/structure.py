@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.body import Initial
 from ..model.model import Model
-from . import controllers, events, forces, patterns, switches, terms
+from . import controllers, events, forces, patterns, reads, switches, terms
 from .branches import Branches, settle
 from .forest import body_table
 from .points import single
@@ -92,6 +92,8 @@ def _decided(model: Model, choices: Choices) -> Structure:
         events.quantities(s)
     forces.measured_quantities(s, {**controllers.names(model), **(events.names(model) if c.switches else {})})
     controllers.slots(s)
+    if c.switches:
+        reads.quantities(s)
     terms.rows(s, c.holds)
     if c.switches:
         switches.rows(s)

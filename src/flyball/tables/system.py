@@ -62,8 +62,8 @@ F_APPLIED, X_SOLVED, V1, V2, V3, GIVEN, EFFORT, PARTITION = range(8)
 # rows of Work.sensed: of each measured quantity; then, columns of their own, of its rate as a value
 VALUE, RATE, BIAS = range(3)
 # in the columns after those, of each load of a joint: the load now, the one returned; load and gap of the pass before;
-# scratch; and the inverse Jacobian of the gaps. Then value, rate and its rate of each controller's state
-# (`control.column_of`). Then, in row VALUE, the way of each switch (`rows.way_of`)
+# scratch; and the inverse Jacobian of the gaps. Then forces that events name (`readings`). Then value, rate and its
+# rate of each controller's state (`control.column_of`). Then, in row VALUE, the way of each switch (`rows.way_of`)
 LOAD, RETURNED, LOAD_BEFORE, GAP_BEFORE, MOVED, TOLD, INVERSE_JACOBIAN = range(7)
 # entries of Work.option
 STABILIZE, TOL_G, TOL_V, ALPHA, BETA, WORST_G, WORST_V, PASS, PARTED, LATER, PLACED = range(11)
@@ -105,7 +105,7 @@ class System(NamedTuple):
     force_i: np.ndarray  # (nk, 10): F, M, three laws, state of its work, its load (or -1), kind, family, switch or -1
     force_x: np.ndarray  # (nk, 16): parameters of the formula
     angle_i: np.ndarray  # (na, 3): frame F, frame M, state that counts its turns
-    load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term
+    load_i: np.ndarray  # (nj, 2): terms that make up the reaction behind a load: load, term; see `reads` too
     switch_i: np.ndarray  # (nw, 6): rows with modes: row, measured quantity, kind, force that slides, law, another
     switch_x: np.ndarray  # (nw, 8): parameters of each, by its kind
     guard_i: np.ndarray  # (ng, 3): what is watched for zeros: kind, switch or law, which way
@@ -138,7 +138,7 @@ class Work(NamedTuple):
     T: np.ndarray  # (nt, 6): wrench of each term on M, where loads are wanted; else (0, 6)
     row: np.ndarray  # (9, nr)
     vel: np.ndarray  # (8, nv)
-    sensed: np.ndarray  # (6 + nl, 2 nm + nl + nc + nw): what is measured: value, rate, bias; loads; controls; ways
+    sensed: np.ndarray  # (6 + nl, 2 nm + nl + ne + nc + nw): value, rate, bias measured; loads; forces; controls; ways
     switch: np.ndarray  # (12 + nw, nw): of each row with modes: its mode, where it is held, how far it may go; slopes
     A: np.ndarray  # matrix to be factored
     L: np.ndarray  # its factor

@@ -10,8 +10,9 @@ import numpy as np
 
 from ...equations.engine import MOTION
 from ...errors import AnalysisError, ModelError
-from ...results.doubts import open_loads
+from ...results.doubts import open_forces, open_loads
 from ...tables.cost import cost, least
+from ...tables.reads import read
 from ...tables.spanning import spanning
 from ...tables.specs import Structure
 from ...tables.system import COUPLED, MASS, NV, POINT, SEMIDEFINITE, SOLVER, TREE, V0
@@ -42,8 +43,8 @@ def in_coordinates(a: Assembly, wish: str, parameters: Mapping[str, float] | Non
     ModelError
         For an unknown wish.
     AnalysisError
-        If friction follows reactions that redundancy leaves undetermined, for joint coordinates: there a tree joint
-        would carry all, here what redundant joints carry is chosen by the size of their rows.
+        If friction or an event follows reactions that redundancy leaves undetermined, for joint coordinates: there a
+        tree joint would carry all, here what redundant joints carry is chosen by the size of their rows.
     """
     known(wish)
     if wish == "absolute":
@@ -74,15 +75,16 @@ def _cost(s: Structure) -> float:
 
 
 def _open_loads(a: Assembly) -> str:
-    """Why friction needs absolute coordinates, if it does."""
+    """Why friction, or an event that names what a joint carries, needs absolute coordinates, if it does."""
     s = a.compiled.structure
-    if not s.loads:
+    if not s.loads and not read(s.model):
         return ""
     m = mobility(s.model, a)
-    found = open_loads(s.loads, m.undetermined)
+    found = [f.title for f, _ in open_loads(s.loads, m.undetermined)]
+    found += [f"an event on {name!r}" for name, _ in open_forces(s.model, m.undetermined)]
     if not found:
         return ""
-    titles = ", ".join(f.title for f, _ in found)
+    titles = ", ".join(found)
     names = ", ".join(m.redundant[:8])
     return (
         f"{titles} follow{'s' if len(found) == 1 else ''} reactions that the constraints of {names} leave open; "

@@ -18,6 +18,8 @@ from ....model.event_check import coordinate_of
 from ....model.held import held_by
 from ....numerics.integrators.clock import SPAN
 from ....results.events import Happening
+from ....tables.reads import read
+from ....tables.specs import Structure
 from ....tables.system import GUARD_WAY, HELD, MODE
 from ....tables.values import Values
 from .blows import generalised
@@ -80,7 +82,20 @@ class Acts:
 
     def passed(self) -> np.ndarray:
         """Guards of events whose expressions went through zero by the jump itself, (n,)."""
-        return crossed(self.here, self.values if self.events else {})
+        return crossed(self.here, self.values)
+
+
+def _of_forces(here: Here) -> frozenset[int]:
+    """Guards of events that name forces: whatever happens, these may jump past zero."""
+    s = here.structure
+    found: frozenset[int] = s.kept.get("events of forces", 0, 1, lambda: _naming_forces(s))
+    return found
+
+
+def _naming_forces(s: Structure) -> frozenset[int]:
+    named = set(read(s.model))
+    laws = {g: s.model.law(e.law, e.of, f"when of {e.title}") for g, e in s.events.items()}
+    return frozenset(g for g, law in laws.items() if named & law.names)
 
 
 def _own(here: Here) -> set[str]:
@@ -130,11 +145,13 @@ def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
     every = [(e, a) for e in events for a in e.do]
+    watched = [g for g in here.structure.events if every or g in _of_forces(here)]
+    if every or watched:
+        here.evaluate()
+    for g in watched:
+        acts.values[g] = expression(here, g)
     if not every:
         return acts
-    here.evaluate()
-    for g in here.structure.events:
-        acts.values[g] = expression(here, g)
     refuse_contradictions(here, every)
     reckoned = [(e, a, [_reckoned(here, e, a, k, x) for k, x in a.laws()]) for e, a in every]
     for kind, do in DO.items():
