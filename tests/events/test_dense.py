@@ -213,3 +213,16 @@ def test_block_that_is_pushed_along_a_plane_slides_the_way_it_is_pushed():
     assert solve(P) == FOUND
     np.testing.assert_allclose(P.x, [1.0, -0.3, -0.4], rtol=1e-12)
     np.testing.assert_allclose(P.u, [0.0, 2.7, 3.6], atol=1e-12)
+
+
+def test_what_is_all_rounding_is_solved():
+    """Of two stops from which both loads have gone at once, one carries nothing: the other is held by itself then."""
+    P = dense(2)
+    P.A[:], P.rule[:], P.state[:] = (
+        [[0.62886209644231463, -2.5849336681079205], [-2.5849336681079205, 19.63456324632039]],
+        PUSHES,
+        EVEN,
+    )
+    P.b[:], P.grain[:] = [2.6303011932863456e-13, -2.2006461027982152e-12], 2.1047211629579372e-13
+    assert solve(P) == FOUND
+    assert P.x[1] == pytest.approx(-P.b[1] / P.A[1, 1], rel=1e-12) and P.x[0] == 0.0

@@ -26,7 +26,7 @@ class Carried(NamedTuple):
     """A force or torque by name: whose it is, and which of `WRENCH` or `ALONG`."""
 
     element: Element
-    index: int
+    column: int
 
 
 def carried(model: Model, name: str) -> Carried | None:

@@ -31,7 +31,7 @@ def quantities(s: Structure) -> None:
     """Number the columns."""
     for name, x in read(s.model).items():
         first = s.reads.setdefault(x.element.name, width(s))
-        s.slots[name] = READS - first - x.index
+        s.slots[name] = READS - first - x.column
 
 
 def width(s: Structure) -> int:

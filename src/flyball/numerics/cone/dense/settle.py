@@ -83,9 +83,13 @@ def found(P):
             P.state[i] = P.at[i]
         if not solved(P):
             return NONE_FOUND
+    idle = 0
     for i in range(n):  # what carries nothing and need not, does not hold
         if P.rule[i] == PUSHES and P.state[i] == EVEN and abs(P.row[REST, i]) <= rounding(P, P.row[REST], i):
-            P.state[i], P.row[REST, i] = FREE, 0.0
+            P.state[i] = FREE
+            idle += 1
+    if idle > 0 and not solved(P):  # the others by themselves: where all is rounding its share is not less than theirs
+        return NONE_FOUND
     most = 0.0
     for i in range(n):
         most = max(most, driving(P, P.row[REST], i))
