@@ -72,9 +72,9 @@ class Legs:
     def passed(self) -> None:
         """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
         real = self.clock.real
-        while real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+        while self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST]:
             if not self.next():
-                real[ex.T] = real[ex.T_END]
+                real[ex.T] = self.goal
                 break
 
     def aim(self) -> None:
