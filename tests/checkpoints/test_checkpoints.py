@@ -41,7 +41,7 @@ CASES = {  # mechanism, options, steps of a part; how near it is to the motion t
     "sampled, radau": (sampled, {"t_end": 0.3, "method": "radau"}, 60, 1e-6, "a.x pid.output M.torque"),
     "sampled, watched": (watched, {"t_end": 0.5}, 8, 1e-6, "a.x pid.output M.torque"),
     "jumps in time": (switched, {"t_end": 0.1}, 6, 1e-7, "a.x a.vx"),
-    "prescribed": (crank, {"t_end": 2}, 17, 1e-6, "c.x c.vx turn.effort turn.work"),
+    "prescribed": (crank, {"t_end": 2, "outputs": 101}, 20, 1e-6, "c.x c.vx turn.effort turn.work"),
     "corners": (twisting, {"t_end": 6.5, "rtol": 1e-10}, 8, 1e-8, "p.x p.vx M.force"),
     "impulses": (pile, {"t_end": 0.4, "method": "impulse"}, 8, 2e-2, "arm.z balls[0].z balls[5].z"),
 }

@@ -353,7 +353,7 @@ class Run:
         """The motion, or a part of it, ends here: the last row is written, but where it is already."""
         here, clock, part = self.here, self.here.clock, self.part
         part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
-        if part.paused and not part.open and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
+        if part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             return
         self.take(self.row()[None, :])
         if not part.paused:
