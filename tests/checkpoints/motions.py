@@ -87,12 +87,12 @@ def twisting() -> fb.Mechanism:
     return m
 
 
-def soft() -> fb.Mechanism:
+def soft(damping: float = 100.0, turning: float = 10.0) -> fb.Mechanism:
     """A stiff bushing."""
     m = fb.Mechanism("soft", planar=True, gravity=(0, -9.81))
     m.add(fb.Body("a", mass=1, inertia=0.1, position=(1, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
     m.add(fb.Body("b", mass=1, inertia=0.1, position=(2, 0)))
-    stiff = {"stiffness": 1e5, "damping": 100, "torsional_stiffness": 1e4, "torsional_damping": 10}
+    stiff = {"stiffness": 1e5, "damping": damping, "torsional_stiffness": 1e4, "torsional_damping": turning}
     m.add(fb.Bushing("B", "a", "b", at=(1.5, 0), **stiff))
     return m
 
@@ -114,4 +114,30 @@ def sampled() -> fb.Mechanism:
     m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
     m.add(fb.PID("pid", measured="A.angle", setpoint="0.2", kp=60, ki=20, kd=8, filter="50 ms", period="10 ms"))
     m.add(fb.Motor("M", "A", torque="pid"))
+    return m
+
+
+def crank(**parameters: float) -> fb.Mechanism:
+    """A four-bar that a driver turns: nothing of it is free."""
+    m = fb.Mechanism("crank", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Body("b", mass=2, inertia=0.5, position=(2, 0.75)))
+    m.add(fb.Body("c", mass=1, inertia=0.3, position=(3, 0.75)))
+    m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=(1, 0)))
+    m.add(fb.Revolute("C", "b", "c", at=(3, 1.5)), fb.Revolute("D", "ground", "c", at=(3, 0)))
+    m.add(fb.Driver("turn", "A.angle", "2*t + 0.3*sin(5*t)"), fb.CoordinateSpring("S", "D.angle", stiffness=5))
+    return m
+
+
+def switched() -> fb.Mechanism:
+    """A pendulum that is pushed to and fro, two hundred times a second: each step ends where the push turns."""
+    m = fb.Mechanism("switched", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=0.1, position=(0.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+    m.add(fb.Motor("M", "A", torque="sign(sin(628*t))"))
+    return m
+
+
+def watched() -> fb.Mechanism:
+    """A sampled controller beside a stop that nothing meets, and an event at an instant: the loop stops at each."""
+    m = sampled()
+    m.add(fb.Limit("stop", "A.angle", upper=2.0), fb.Event("now", "t - 0.2"))
     return m

@@ -14,16 +14,34 @@ import flyball as fb
 from flyball.analysis.checkpoints import keeper
 from flyball.analysis.motion import part
 
-from .motions import assert_same, bouncer, cut, double_pendulum, killed, pile, sampled, soft, twisting
+from .motions import (
+    assert_same,
+    bouncer,
+    crank,
+    cut,
+    double_pendulum,
+    killed,
+    pile,
+    sampled,
+    soft,
+    switched,
+    twisting,
+    watched,
+)
 
 CASES = {  # mechanism, options, steps of a part; how near it is to the motion that was not kept, and in what
     "smooth": (double_pendulum, {"t_end": 4, "rtol": 1e-9}, 40, 1e-6, "a.x b.x b.angle S.work M.work"),
     "joint": (double_pendulum, {"t_end": 4, "rtol": 1e-9, "coordinates": "joint"}, 40, 1e-6, "a.x b.x b.angle S.work"),
     "fixed steps": (double_pendulum, {"t_end": 1, "step": 0.004, "method": "rk45"}, 30, 1e-6, "a.x b.x b.angle"),
+    "stiff": (lambda: soft(5000.0, 500.0), {"t_end": 10, "outputs": 11}, 1500, 1e-4, "a.x b.x"),
     "implicit": (soft, {"t_end": 1, "method": "radau"}, 30, 1e-4, "a.x b.x"),
     "implicit events": (bouncer, {"t_end": 2, "method": "radau"}, 60, 1e-3, "b.x b.y"),
     "events": (bouncer, {"t_end": 4, "rtol": 1e-9}, 6, 1e-7, "b.x b.y b.vx S.work"),
     "sampled controller": (sampled, {"t_end": 1, "outputs": 201}, 11, 1e-6, "a.x pid.output M.torque"),
+    "sampled, radau": (sampled, {"t_end": 0.3, "method": "radau"}, 60, 1e-6, "a.x pid.output M.torque"),
+    "sampled, watched": (watched, {"t_end": 0.5}, 8, 1e-6, "a.x pid.output M.torque"),
+    "jumps in time": (switched, {"t_end": 0.1}, 6, 1e-7, "a.x a.vx"),
+    "prescribed": (crank, {"t_end": 2, "outputs": 101}, 20, 1e-6, "c.x c.vx turn.effort turn.work"),
     "corners": (twisting, {"t_end": 6.5, "rtol": 1e-10}, 8, 1e-8, "p.x p.vx M.force"),
     "impulses": (pile, {"t_end": 0.4, "method": "impulse"}, 8, 2e-2, "arm.z balls[0].z balls[5].z"),
 }

@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 import flyball as fb
 from flyball.analysis.checkpoints import keeper
+from flyball.analysis.motion.events import run
+from flyball.analysis.motion.implicit.made import implicit
+from flyball.numerics.integrators.implicit.desk import JACOBIANS
 from tests.checkpoints.motions import cut, killed
 from tests.control.slide import TIGHT, slide
 
@@ -108,3 +112,43 @@ def test_states_that_events_set_in_a_motion_of_many_parts(tmp_path, monkeypatch)
     r = killed(m, tmp_path / "run.nc", monkeypatch, (before, 1), t_end=1.55, rtol=1e-10, outputs=2)
     assert r["ramp.value"][-1] == pytest.approx(1.0, abs=1e-9)
     assert [h.name for h in r.events] == ["anew"]
+
+
+@pytest.mark.parametrize("way", WAYS[:2], ids=["auto", "radau"])
+def test_an_event_at_an_instant_where_a_law_jumps_later(way):
+    """Nothing is left of the stretch up to the instant, but much of that up to the jump: it went there at once."""
+    push = "3*sign(sin(t) - 0.5)"
+    m = slide(fb.State("count", next="count + 1", period=0.1), force=f"0.0*count + {push}")
+    m.add(fb.Event("at", "t - 0.2"))
+    r, plain = (x.simulate(1, outputs=11, **TIGHT, **way) for x in (m, slide(force=push)))
+    assert r["A.displacement"] == pytest.approx(plain["A.displacement"], abs=1e-9)
+    assert [h.t for h in r.events] == pytest.approx([0.2], abs=1e-12)
+
+
+def test_jacobians_serve_from_sample_to_sample(monkeypatch):
+    """Only what pushes jumps at instants: of a linear loop one is enough, to the exact discrete solution."""
+    period, made = 1e-3, []
+    monkeypatch.setattr(run, "implicit", lambda *a: made.append(implicit(*a)) or made[-1])
+    m = slide(fb.PID("pid", setpoint="1", measured="A.displacement", kp=80, ki=60, period=period))
+    r = m.simulate(0.5, outputs=501, method="radau", rtol=1e-10, atol=1e-11)
+    P = expm(np.array([[0, 1, 0], [-10, -2, 1], [0, 0, 0]]) * period)
+    x, integral, exact = np.zeros(3), 0.0, [0.0]
+    for _ in range(500):
+        error = 1 - x[0]
+        x[2] = 80 * error + integral
+        integral += 60 * error * period
+        x = P @ x
+        exact.append(x[0])
+    assert r["A.displacement"] == pytest.approx(exact, abs=1e-10)
+    assert made[-1].means.desk.count[JACOBIANS] < 10
+    assert r.health.steps < 520
+
+
+def test_auto_goes_back_where_a_sampled_loop_is_not_stiff_any_more():
+    """A damper that goes: its force is stiff for the first two seconds."""
+    m = slide(fb.PID("pid", setpoint="1", measured="A.displacement", kp=80, ki=60, kd=5, filter=0.02, period=0.05))
+    m.add(fb.Actuator("damper", coordinate="A.displacement", force="-1e6*exp(-10*t)*rate"))
+    r = m.simulate(60, outputs=61)
+    assert "radau from t = " in r.health.method
+    assert "dop853 from t = " in r.health.method
+    assert r["A.displacement"][-1] == pytest.approx(1.0, abs=1e-3)

@@ -1,7 +1,7 @@
 """A motion that is kept in a file as it goes on, part by part, and goes on from there: see `Mechanism.simulate`.
 
 A part begins where the one before it ended, by what a result says and nothing else: what a result does not hold, such
-as factors, widths of steps, and what solvers begin with, each part finds anew. So a motion that was interrupted, or
+as factors and what solvers begin with, each part finds anew. So a motion that was interrupted, or
 killed, and goes on from its file is to the last digit the one that was not.
 """
 

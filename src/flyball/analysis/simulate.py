@@ -98,11 +98,11 @@ def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Pa
             return impulse_motion(model, (t_start, o.t_end), times, o.method, o.parameters, tell, o.start, part)
     model = with_places(model, o.parameters)
     begun = begin(model, t_start, o.parameters, o.start, o.coordinates, switches=True, part=part)
-    slides = _no_stops(begun) and leaves_no_freedom(begun)  # what drivers prescribe follows no force
+    slides = _no_stops(begun) and _held(begun)  # what drivers prescribe follows no force
     if slides:
         begun = begin(model, t_start, o.parameters, o.start, o.coordinates, part=part)
     begun.since = started
-    if o.method in IMPLICIT and (watched(begun) or not leaves_no_freedom(begun)):
+    if o.method in IMPLICIT and (watched(begun) or not _held(begun)):
         begun = suited(begun, str(o.method), o.coordinates, o.parameters)
         if o.method == VARIATIONAL:
             refuse_unknown(begun)
@@ -116,7 +116,8 @@ def _computed(model: Model, o: SimulateOptions, span: Span, auto: bool, part: Pa
         begun.engine.told = f"{TABLES}: {o.method} goes through the tables"
     mixed = auto and o.stabilization == "projection" and o.step is None
     begun.pace = Pace(float(o.t_end), AUTO if mixed else str(o.method), partial(unsuited, begun))
-    follow = o.stabilization == "projection" and not watched(begun) and leaves_no_freedom(begun)
+    begun.pace.goes_on(begun.carried.get("by", ""))
+    follow = o.stabilization == "projection" and not watched(begun) and _held(begun)
     with shown(o.progress, "simulating") as tell:
         result = moved(begun, o.t_end, times, o, FOLLOW if follow else INTEGRATE, tell)
     if slides:
@@ -157,8 +158,10 @@ def moved(
         rows, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
     else:
         method = tableau(explicit(o.method))
-        rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace, begun.part)
-        if begun.pace is not None and begun.pace.asked:
+        rows, interrupted = np.zeros((0, width(begun.assembly))), False
+        if begun.pace is None or not begun.pace.asked:
+            rows, interrupted = run_clock(begun.assembly, clock, method, tell, task, engine, begun.pace, begun.part)
+        if begun.pace is not None and begun.pace.asked and not begun.part.paused:
             more, interrupted = run_events(here, o, width(begun.assembly), tell, engine, known)
             rows = np.concatenate([rows, more])
         elif begun.pace is not None:
@@ -176,6 +179,11 @@ def _no_stops(begun: Start) -> bool:
     """Whether nothing is watched but corners of laws and friction."""
     s = begun.assembly.compiled.structure
     return bool(s.switches) and not s.model.events and all(x.switch.kind in (BRANCH, FRICTION) for x in s.switches)
+
+
+def _held(begun: Start) -> bool:
+    """Whether drivers leave no freedom: as in the part before it, where there is one."""
+    return bool(begun.carried["followed"]) if "followed" in begun.carried else leaves_no_freedom(begun)
 
 
 def watched(begun: Start) -> bool:
@@ -214,7 +222,8 @@ def clock_for(
     real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
     first = t if start.part.first is None else start.part.first
     real[ex.SPAN] = (t_end - first) or 1.0
-    real[ex.H] = real[ex.STEP] = o.step or 0.0
+    real[ex.STEP] = o.step or 0.0
+    real[ex.H] = o.step or start.carried.get("width", 0.0)
     real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
     real[ex.SCALE] = a.compiled.values.length
     real[ex.LEDGER] = energy_size(start.base, float(real[ex.SPAN]))
@@ -301,7 +310,7 @@ def run_clock(
                 rows.clear()
                 part.anew()
                 forget(c.work.stack)
-            if part.over(clock):
+            if part.over(clock if task == INTEGRATE else None):  # of what is followed every step is one
                 return np.concatenate(rows), False
             quota = engine.limited(clock, max(done, 1) * SLICE / max(took, 1e-6))
             if pace is not None and task == INTEGRATE:

@@ -20,6 +20,7 @@ from ..laws.evaluation import evaluate
 from ..numerics.integrators.clock import (
     ACCEPTED,
     DONE,
+    JUMPED,
     NEXT,
     QUOTA,
     REJECTED,
@@ -127,7 +128,7 @@ def sample(A):
     for k in range(P.next.shape[0]):
         while due(P, k, t):
             P.next[k] += 1
-    clock.count[STARTED] = 0
+    clock.count[STARTED] = JUMPED
     clock.real[H] = max(clock.real[H], clock.real[WIDE])  # the last step was cut short
     return 0
 
@@ -142,12 +143,22 @@ def sample_kernel(address, S, W, R, clock, sheet, P):
 def sampled_kernel(address, S, W, R, clock, sheet, P, out):
     """Integrate from instant to instant, as `engine.INTEGRATE` does between them. Returns rows written."""
     A = (address, held(S), held(W), held(R), held(clock), held(sheet), held(P))
-    return advance(A, A[CLOCK], A[SHEET], A[PLAN], out)
+    return advance(by_engine, A, A, A[SHEET].rows, out)
 
 
 @formula
-def advance(A, clock, sheet, P, out):
-    """Go on until the end of the stretch, at which nothing is sampled, or for what else the engine returns."""
+def by_engine(A, rows):
+    """The engine's own loop, which writes to its sheet."""
+    return enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)
+
+
+@formula
+def advance(loop, own, A, rows, out):
+    """Go on until the end of the stretch, at which nothing is sampled, or for what else the loop between returns.
+
+    That is ``loop(own, rows)``: rows written, at most ``rows``.
+    """
+    clock, P = A[CLOCK], A[PLAN]
     used = 0
     end = clock.real[T_END]
     taken = clock.count[ACCEPTED] + clock.count[REJECTED]
@@ -157,19 +168,19 @@ def advance(A, clock, sheet, P, out):
             break
         at = min(beside(P, clock.times, coming(P)), end)
         clock.real[T_END] = at
-        n = enter(A[ENGINE], A[S_], A[W_], A[R_], A[CLOCK], A[SHEET], INTEGRATE)
+        n = loop(own, rows)
         clock.real[T_END] = end
         over = clock.count[STATUS] != DONE or at == end
-        if not over and n > 0 and sheet.rows[n - 1, 0] == at:  # written when it is known what is held from then on
+        if not over and n > 0 and rows[n - 1, 0] == at:  # written when it is known what is held from then on
             n -= 1
             clock.count[NEXT] -= 1
         for i in range(n):
             for j in range(out.shape[1]):
-                out[used + i, j] = sheet.rows[i, j]
+                out[used + i, j] = rows[i, j]
         used += n
         if over:
             break
-        full = used + sheet.rows.shape[0] > out.shape[0]
+        full = used + rows.shape[0] > out.shape[0]
         if full or clock.count[ACCEPTED] + clock.count[REJECTED] - taken >= clock.count[QUOTA]:
             clock.count[STATUS] = RUNNING
             break

@@ -45,6 +45,8 @@ from .engine import Sheet, engine
 from .guards import FIRM, KEPT, astray, grains
 from .guards import watch as guards
 from .rows import measured
+from .sampled import Sampling
+from .sampled import advance as from_instant_to_instant
 from .sharing import GRAIN, Sharing, margin, renewed, terms
 from .tasks import MOTION
 
@@ -163,6 +165,25 @@ def unwatched_kernel(doors, S, W, R, own, sheet, desk, clock, out):
     return advance(callbacks, A, held(desk), held(R), held(clock), out)
 
 
+@formula
+def by_steps(X, rows):
+    """The loop in which nothing is watched."""
+    callbacks, A, K, R, c = X
+    return advance(callbacks, A, K, R, c, rows)
+
+
+@kernel
+def sampled_steps_kernel(doors, S, W, R, own, sheet, desk, clock, P, part, out):
+    """Go on with an integration in which nothing is watched, from instant to instant of what is sampled.
+
+    ``part``: rows of output between two of them.
+    """
+    A = (doors[1][0], held(S), held(W), held(R), held(own), held(sheet))
+    c = held(clock)
+    X = ((steps, doors[0], report, nothing, whole), A, held(desk), held(R), c)
+    return from_instant_to_instant(by_steps, X, (*A[:4], c, A[5], held(P)), part, out)
+
+
 class Steps(Protocol):
     """Steps of a method behind a door."""
 
@@ -225,14 +246,20 @@ class Loop:
         self.own = Own(own, sheet, tableau("rk45"), np.zeros(2, np.int64))
         self._bound: Bound | None = None
 
-    def go_on(self, S: System, W: Work, out: np.ndarray) -> int:
-        """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written."""
+    def go_on(self, S: System, W: Work, out: np.ndarray, sampling: Sampling | None = None) -> int:
+        """Go on until an event, the end, or what else `loop.advance` returns for. Returns rows written.
+
+        Where nothing is watched, what ``sampling`` says is sampled on the way.
+        """
         x = self.own
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
             self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group))
         doors = self._bound.asked, x.doors
         tables = S, W, x.R, x.clock, x.sheet
+        if not len(S.guard_i) and sampling is not None:
+            plan, part = sampling.plan, sampling.sheet.rows
+            return int(sampled_steps_kernel(doors, *tables, self.desk, self.clock, plan, part, out))
         if not len(S.guard_i):
             return int(unwatched_kernel(doors, *tables, self.desk, self.clock, out))
         return int(watched_kernel(doors, *tables, self.group, self.expected, self.desk, self.clock, out))

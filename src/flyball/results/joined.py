@@ -144,7 +144,8 @@ def _health(every: Sequence[Health]) -> Health:
         last,
         **{name: max(getattr(h, name) for h in every) for name in ("violation", "velocity_violation")},
         **{name: sum(getattr(h, name) for h in every) for name in COUNTED},
-        **{name: getattr(first, name) for name in ("method", "coordinates", "engine", "departures", "options")},
+        **{name: getattr(first, name) for name in ("coordinates", "engine", "departures", "options")},
+        method=_method([h.method for h in every]),
         remarks=tuple(dict.fromkeys(r for h in every for r in h.remarks)),
         watched=next((h.watched for h in reversed(every) if h.watched), ""),
         contact=_contact([h.contact for h in every if h.contact]),
@@ -152,6 +153,16 @@ def _health(every: Sequence[Health]) -> Health:
     )
 
 
+def _method(every: Sequence[str]) -> str:
+    """By what each part went from when on; why it was not by another method is told once."""
+    told = every[0].split("; ")
+    for words in (x for part in every[1:] for x in part.split("; ") if SINCE in x):
+        if words not in told and not (THOUGH in words and any(THOUGH in x for x in told)):
+            told.append(words)
+    return "; ".join(told)
+
+
+SINCE, THOUGH = " from t = ", ", though "  # how `Pace` tells a change of the method, and that there is none
 COUNTED = ("steps", "rejected", "evaluations", "factorisations", "seconds", "compiling")
 LARGEST = ("most", "worst_overlap", "residual", "force_residual")
 ADDED = ("solves", "iterations", "unconverged", "halved", "reduced", "impacted")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from functools import partial
 from itertools import accumulate
+from typing import Any
 
 import numpy as np
 
@@ -71,9 +72,9 @@ def outcome(
     result.final = (t, clock.y[0].copy())
     result.owed, result.unsolved = owed, unsolved
     result.wound, result.begun = start.wound, begun(start)
-    if here.start.part.open:
-        result.carried["open"] = True
     result.carried |= carried(here) | {"made": start.engine is not None and a.compiled.made is not None}
+    if here.start.part.paused:
+        result.carried |= _for_the_next(here, owed is not None)
     health.late = {
         "mobility": partial(mobility, model, start.base),
         "energy_drift": partial(_energy_drift, result),
@@ -89,6 +90,12 @@ def outcome(
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
+
+
+def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:
+    """What the next part of the motion begins with."""
+    pace, found = here.start.pace, {"open": here.start.part.open, "followed": followed}
+    return found | {"by": pace.carried if pace else "", "width": float(here.clock.real[ex.H])}
 
 
 def _health(start: Start, clock: ex.Clock, o: Integration) -> Health:

@@ -79,11 +79,14 @@ class Part:
         """What happens at an instant was decided."""
         self._left -= self._event
 
+    def due(self) -> bool:
+        """Whether it is to end."""
+        return self._left <= 0.0 or (self._lasts < math.inf and time.monotonic() - self._since > LATEST)
+
     def over(self, clock: ex.Clock | None = None) -> bool:
         """Whether it ends here: not after a step that was refused."""
-        late = self._lasts < math.inf and time.monotonic() - self._since > LATEST
-        calm = clock is None or (clock.count[ex.STATUS] == ex.RUNNING and clock.real[ex.GROW] > 1.0)
-        if (self._left <= 0.0 or late) and calm:
+        calm = clock is None or (clock.count[ex.ACCEPTED] > 0 and clock.real[ex.GROW] > 1.0)
+        if calm and self.due():
             self.paused = True
         return self.paused
 

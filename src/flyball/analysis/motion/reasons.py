@@ -305,7 +305,7 @@ def _stuck(a: Assembly, clock: ex.Clock) -> str:
     if rows and isinstance(rows[k].element, Driver):
         where += f" (whose law there has the rate {W.row[NU, k]:.4g} and the second derivative {W.row[NU_DOT, k]:.4g})"
     t = f"t = {clock.real[ex.T]:.6g} s"
-    begun = clock.count[ex.STARTED] != 0
+    begun = clock.count[ex.STARTED] == 1
     if clock.real[ex.STEP] > 0.0 and begun:
         return (
             f"at {t} a step of {clock.real[ex.STEP]:g} s has no solution{where}: give a shorter step, or leave step "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -44,6 +45,11 @@ class Start:
     pace: Pace | None = None  # whether it goes on by another method; none: it does not
     since: float = 0.0  # when the call began, by the clock of `time.perf_counter`
     part: Part = field(default_factory=whole)  # of the motion
+
+    @property
+    def carried(self) -> Mapping[str, Any]:
+        """What the part of the motion before this one hands on; nothing where there is none."""
+        return self.before.carried if self.part.later and self.before is not None else {}
 
 
 def start_time(t_start: float | None, before: Result | None) -> float:

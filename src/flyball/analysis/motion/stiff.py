@@ -54,12 +54,15 @@ class Pace:
         What it should go on by, and does not yet.
     back : str
         What it goes on by again as soon as that knows what is.
+    now : str
+        What it has gone over to.
     """
 
     def __init__(self, t_end: float, method: str, why_not: Callable[[], str]) -> None:
         self.t_end, self.mixed, self.why_not = t_end, method == AUTO, why_not
         self.told: list[str] = []
-        self.asked = self.back = ""
+        self.asked = self.back = self.now = ""
+        self._goes_on = False
         self.every, self.row = EVERY, 0
         self.last: tuple[int, int, float] | None = None
 
@@ -93,6 +96,16 @@ class Pace:
         if self.mixed and now == IMPLICIT:
             self.asked = EXPLICIT
 
+    @property
+    def carried(self) -> str:
+        """What a motion that goes on from here begins by, where that is not what others begin by."""
+        return self.back or self.now if self.mixed else ""
+
+    def goes_on(self, by: str) -> None:
+        """It goes on from a part of the motion at whose end that was `carried`."""
+        self.asked = by if self.mixed else ""
+        self._goes_on = bool(self.asked)
+
     def words(self) -> str:
         """By what it went from when on."""
         if len(self.told) <= TOLD + 1:
@@ -101,9 +114,12 @@ class Pace:
 
     def turned(self, clock: ex.Clock, to: str, why: str) -> None:
         """It goes on by that from now on."""
-        if not self.told:
-            self.told.append(EXPLICIT if to == IMPLICIT else IMPLICIT)
-        self.told.append(f"{to} from t = {clock.real[ex.T]:.6g} s on, {why}")
+        self.now = to
+        if not self._goes_on:
+            if not self.told:
+                self.told.append(EXPLICIT if to == IMPLICIT else IMPLICIT)
+            self.told.append(f"{to} from t = {clock.real[ex.T]:.6g} s on, {why}")
+        self._goes_on = False
         again = sum(x.endswith(NOT_STIFF) for x in self.told)
         self.every = SELDOM if to == IMPLICIT else EVERY * PATIENCE ** min(again, 6)
         self.row, self.asked = 0, ""

@@ -20,6 +20,8 @@ STEP, TRIED, ERROR, PART, REALS = range(21, 26)
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS = range(9)
 # (how the last step tried ended; whether the state within it was asked for)
 TROUBLE, EXTENDED, COUNTS = range(9, 12)
+# (STARTED: whether a stretch has begun; it does not yet, but only what pushes has jumped where it begins)
+JUMPED = 2
 # rows of Clock.y: the state, the one in the making, the interpolated one; what a trial puts aside; the step before
 NOW, NEW, BETWEEN, ASIDE, ASIDE_RATE, OLD, OLD_RATE, STATES = range(8)
 # rows of Clock.seen that the integrator looks at: what is kept of the begin of a step, and of its end

@@ -166,7 +166,7 @@ def advance(callbacks, S, W, R, c, out):
     ask, own, _, begun, onward = callbacks[:5]
     used = 0
     c.count[STATUS] = RUNNING
-    if c.count[STARTED] == 0:
+    if c.count[STARTED] != 1:
         c.count[STATUS], used = start(callbacks, S, W, R, c, out)
         if c.count[STATUS] != RUNNING:
             return used

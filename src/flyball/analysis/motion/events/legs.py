@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -61,10 +60,10 @@ class Legs:
         As the motion begins.
     found : Breaks
     until : callable
-        A time up to which the clock is to run at most, for reasons of its own.
+        Of a time: one up to which the clock is to run at most, for reasons of its own, no later than that.
     """
 
-    def __init__(self, clock: ex.Clock, found: Breaks, until: Callable[[], float] = lambda: math.inf) -> None:
+    def __init__(self, clock: ex.Clock, found: Breaks, until: Callable[[float], float] = lambda end: end) -> None:
         self.clock, self.end, self.until = clock, float(clock.real[ex.T_END]), until
         self.times, self.sharp = found.times, found.sharp
         self.at = 0
@@ -73,19 +72,26 @@ class Legs:
     def passed(self) -> None:
         """Go on with the next one where nothing is left of this one; where that was the last, this is the end."""
         real = self.clock.real
-        while real[ex.T_END] - real[ex.T] <= SLIVER * real[ex.LARGEST]:
+        while self.goal - real[ex.T] <= SLIVER * real[ex.LARGEST]:
             if not self.next():
-                real[ex.T] = real[ex.T_END]
+                real[ex.T] = self.goal
                 break
 
     def aim(self) -> None:
         """Have the clock run to the end of the stretch."""
-        end = self.end
-        if self.at < len(self.times):
-            end = float(self.times[self.at])
-            if self.sharp[self.at]:
-                end -= margin(end)
-        self.clock.real[ex.T_END] = min(end, self.until())
+        self.clock.real[ex.T_END] = self.until(self.goal)
+
+    @property
+    def goal(self) -> float:
+        """Where the stretch ends."""
+        if self.at == len(self.times):
+            return self.end
+        end = float(self.times[self.at])
+        return min(self.end, end - margin(end) if self.sharp[self.at] else end)
+
+    def through(self) -> bool:
+        """Whether the clock is at its end."""
+        return bool(self.clock.real[ex.T] >= self.goal)
 
     def whole(self) -> None:
         """Have it run to the end of the motion."""
@@ -109,7 +115,7 @@ class Legs:
             behind = t + margin(t)
             self.clock.y[ex.NOW] += (behind - real[ex.T]) * self.clock.K[0]
             real[ex.T] = behind
-            self.clock.count[ex.STARTED] = 0
+            self.clock.count[ex.STARTED] = ex.JUMPED
             real[ex.H] = max(real[ex.H], real[ex.WIDE])  # the last one was cut short
         self.at += 1
         self.aim()

@@ -21,16 +21,14 @@ from ....laws.breaks import Breaks
 from ....laws.functions import forget, interrupts_kept
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.tableaux import tableau
-from ....numerics.integrators.watching import CHECKS, EVENT, LOOKS, NODES, STEPS
+from ....numerics.integrators.watching import EVENT
 from ....tables.system import (
     G_BACK,
     G_CONE,
     G_CORNER,
     G_HOLDS,
-    G_LOWER,
     G_PULL,
     G_SHARED,
-    G_UPPER,
     GUARD_KIND,
     GUARD_OF,
 )
@@ -50,15 +48,15 @@ from .here import Here
 from .idle import tie
 from .instant import instant_of
 from .legs import Legs, breaks
+from .looked import DISTANCES, told
+from .pauses import Pauses
 from .sampling import sampling
 from .segments import Segments
 from .zeros import as_fired, as_grains, resume
 
 SLICE = 0.05  # seconds that a call of the compiled loop should take
 ENDLESS = 2000  # events
-PLACES = NODES - 1 + CHECKS  # of a step at which guards are looked at, at least
 LATEST = 20  # events of which it is told who they were
-DISTANCES = (G_LOWER, G_UPPER)  # guards of what is open
 REACHED = 1e-10  # of the mechanism's length, or a radian: what is no farther from a stop is at it
 HOLDING = (G_PULL, G_HOLDS, G_CONE, G_SHARED, G_CORNER)  # guards of what holds, by the forces that it carries
 AT_ONCE = 1e-9  # part of the time span within which so many never end
@@ -89,7 +87,8 @@ class Run:
         self.rows: list[np.ndarray] = [np.zeros((0, width))]
         self.end = float(clock.real[ex.T_END])  # of the motion; the clock's own goes from leg to leg
         self.first, self.span = here.t, self.end - here.t or 1.0
-        self.part, self.quota, self.settled = here.start.part, int(clock.count[ex.QUOTA]), -1
+        self.part, self.quota = here.start.part, int(clock.count[ex.QUOTA])
+        self.pauses = Pauses(self.part, clock)
         self.recent: deque[float] = deque(maxlen=ENDLESS)
         self.latest: deque[Sequence[int]] = deque(maxlen=LATEST)
         self.counts = Counts()
@@ -102,17 +101,22 @@ class Run:
     def _sampling(self, t: float) -> Sampling | None:
         return sampling(self.here.c, self.method, (t, self.end), (self.width, len(self.buffer)))
 
-    def _instant(self) -> float:
-        """Until when the watched loop may run: the next instant of a sampled controller."""
-        return math.inf if self.sampling is None or self.loop is None else self.sampling.next(self.here.clock.times)
+    @property
+    def stops(self) -> Sampling | None:
+        """What the loop stops for at instants: where nothing is watched it samples itself."""
+        return self.sampling if self.guarded else None
+
+    def _until(self, end: float) -> float:
+        """Until when the loop is to run: the next instant at which it stops to sample, or where a part ends."""
+        return self.pauses.until(min(end, math.inf if self.stops is None else self.stops.next(self.here.clock.times)))
 
     def sampled(self) -> bool:
         """Sample what is due now, where the loop stops for it; forces may jump. Whether anything was."""
         here = self.here
-        if self.sampling is None or self.loop is None or not self.sampling.due(here.t):
+        if self.stops is None or not self.stops.due(here.t):
             return False
         before = expressions(here)
-        if self.sampling.sample(here.c.system, here.c.work, here.clock) != 0:
+        if self.stops.sample(here.c.system, here.c.work, here.clock) != 0:
             here.clock.count[ex.STATUS] = ex.STUCK
             return True
         self.jumped(before)
@@ -137,7 +141,7 @@ class Run:
         try:
             self.begin()
             engine.begin(here.clock)
-            self.legs = Legs(here.clock, known, self._instant)
+            self.legs = Legs(here.clock, known, self._until)
             while not here.stopped:
                 self.integrate()
                 if self.over():
@@ -206,17 +210,7 @@ class Run:
         if status == EVENT:
             self.event()
         elif status == ex.DONE:
-            if self.sampled():
-                self.legs.aim()
-                return bool(clock.count[ex.STATUS] == ex.STUCK)
-            sharp = self.legs.ends_sharply() and self.guarded
-            before = expressions(self.here) if sharp else {}
-            if not self.legs.next():
-                return True
-            if sharp:
-                self.jumped(before)
-                self.turned()
-            return False
+            return self.arrived()
         elif status != ex.RUNNING and not engine.hands_over(clock) and not self.turned():
             return True
         self.turned()
@@ -227,16 +221,39 @@ class Run:
             self.here.seen = self.here.seen and Segments()
             forget(self.here.c.work.stack)
             self.legs.anew()
-        if clock.count[ex.ACCEPTED] > self.settled and self.part.over(clock):
+        if self.pauses.here():
             return True
         self.legs.aim()
+        return False
+
+    def arrived(self) -> bool:
+        """The loop ran as far as it was to: whether the motion is over."""
+        clock, through = self.here.clock, self.legs.through()
+        if not through and self.pauses.here():
+            clock.real[ex.H] = max(clock.real[ex.H], clock.real[ex.WIDE])  # the last step was cut short
+            return True
+        if self.sampled() or not through:
+            if clock.count[ex.STATUS] == ex.STUCK:
+                return True
+            clock.count[ex.STATUS] = ex.RUNNING
+            self.turned()
+            self.legs.aim()
+            return False
+        sharp = self.legs.ends_sharply() and self.guarded
+        before = expressions(self.here) if sharp else {}
+        self.pauses.happened()
+        if not self.legs.next():
+            return True
+        if sharp:
+            self.jumped(before)
+            self.turned()
         return False
 
     def begin(self) -> None:
         """What happens as the motion begins."""
         here = self.here
-        if self.sampling is not None and self.loop is not None and self.sampling.due(here.t):
-            self.sampling.sample(here.c.system, here.c.work, here.clock)
+        if self.stops is not None and self.stops.due(here.t):
+            self.stops.sample(here.c.system, here.c.work, here.clock)
         begin(here)
         if self.loop is not None and self.guarded and here.start.before is not None:
             resume(here, self.loop)
@@ -258,7 +275,7 @@ class Run:
                 used = motion_kernel(c.system, c.work, self.method, clock, self.buffer, INTEGRATE)
             else:
                 tie(here, self.loop)
-                used = self.loop.go_on(c.system, c.work, self.buffer)
+                used = self.loop.go_on(c.system, c.work, self.buffer, self.sampling)
             self.take(self.buffer[:used].copy())
         self.tell(max(0.0, min(1.0, (clock.real[ex.T] - self.first) / self.span)))
         done = int(clock.count[ex.ACCEPTED] + clock.count[ex.REJECTED] - steps)
@@ -299,11 +316,11 @@ class Run:
         if np.abs(here.v - before).max(initial=0.0) > self.options.rtol * np.abs(before).max(initial=0.0):
             self.pace.struck(self.now)
         self.part.decided()
-        self.settled = int(clock.count[ex.ACCEPTED])
+        self.pauses.happened()
         clock.count[ex.STARTED] = 0
         if here.c.system is not system:  # another value of a parameter: laws have other corners
             self.legs.whole()
-            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._instant)
+            self.legs = Legs(clock, breaks(here.c, here.t, self.legs.end), self._until)
             other = self._sampling(here.t)
             if other is not None and self.sampling is not None and other.differs(self.sampling):
                 self.sampling = other
@@ -335,9 +352,9 @@ class Run:
     def stop(self) -> None:
         """The motion, or a part of it, ends here: the last row is written, but where it is already."""
         here, clock, part = self.here, self.here.clock, self.part
+        part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
         if part.paused and len(self.rows[-1]) and self.rows[-1][-1, 0] == here.t:
             return
-        part.open = part.paused and self.sampling is not None and self.sampling.due(here.t)
         self.take(self.row()[None, :])
         if not part.paused:
             clock.count[ex.STATUS] = ex.DONE
@@ -350,17 +367,6 @@ class Run:
         motion_kernel(c.system, c.work, self.method, here.clock, row, REPORT)
         here.y[:], here.clock.count[ex.STATUS] = y, status
         return row[0]
-
-
-def told(loop: Loop) -> str:
-    """How closely a motion was looked for events: what may have come and gone in between was not seen."""
-    count = loop.desk.count
-    guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
-    what = "1 guard" if guards == 1 else f"{guards} guards"
-    return (
-        f"{what} at {count[LOOKS] / steps:.0f} places a step on average, {PLACES} at least: what passes zero and comes "
-        f"back between two of them is not seen"
-    )
 
 
 def run_events(

@@ -36,7 +36,7 @@ NO_WAY = (
     "steps, method=fb.Stepping(step=...)"
 )
 NOTICE = "compiling steps with contact for this machine, once: about a quarter of a minute"
-EACH = 1000  # steps after which it is told how far it is
+EACH, SLICE = 1000, 1.0  # steps after which it is told how far it is, and seconds that they take at most
 
 
 def impulse_motion(
@@ -124,7 +124,7 @@ def march(
     Where the part ends there is a row of output in any case.
     """
     first, last = span
-    real = stepper.pace.real
+    real, each = stepper.pace.real, 1
     real[TIME] = first
     if len(times) and times[0] == first:
         kept.add(False)
@@ -139,9 +139,10 @@ def march(
                 part.took(1)
                 left = steps - 1
                 while left and not part.over():
-                    n = part.most(min(EACH, left))
+                    n, began = part.most(min(each, left)), time.perf_counter()
                     stepper.run(n, way / steps)
                     part.took(n)
+                    each = max(1, min(EACH, int(n * SLICE / max(time.perf_counter() - began, 1e-9))))
                     left -= n
                     tell((float(real[TIME]) - first) / (last - first))
                 if left:

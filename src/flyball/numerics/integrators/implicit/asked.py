@@ -22,11 +22,13 @@ from ..clock import (
     EXCESS,
     EXTENDED,
     GROW,
+    JUMPED,
     NEW,
     NOT_FINITE,
     NOW,
     PART,
     SPAN,
+    STARTED,
     STEP,
     STUCK,
     TRIED,
@@ -43,17 +45,20 @@ from .step import defect
 SURE = 1e-3  # a rate of the iteration below which the Jacobian serves on
 WIDEST = 8.0  # what the width changes by at most
 FIRST = 1e-4  # part of the time span that is tried first
-JUMPED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
+MOVED = 1e-5  # part of size and speed by which a state that is off its constraints has not moved by itself
 
 
 @formula
 def begin(arrive, inspect, S, K, c):
-    """The state as a stretch of time begins, put on its constraints, and its derivative. Returns a status."""
+    """The state as a stretch of time begins, put on its constraints, and its derivative. Returns a status.
+
+    Where nothing but what pushes has jumped (JUMPED), Jacobian and factors serve on, as from step to step.
+    """
     y = c.y[NEW]
     for i in range(y.shape[0]):
         y[i] = c.y[NOW, i]
     status, moved = arrive(c.real[T], y, c.K[0], S, K)
-    if status != 0 or moved > JUMPED:
+    if status != 0 or moved > MOVED:
         return STUCK
     for i in range(y.shape[0]):
         c.y[NOW, i] = y[i]
@@ -62,13 +67,15 @@ def begin(arrive, inspect, S, K, c):
     inspect(c.real[T], 0.0, c.real[SPAN], AT_START, c.seen, S, K)
     for i in range(K.found.shape[0]):
         K.lam[START, i] = K.found[i]
-    K.count[FRESH] = K.count[FOLLOWS] = 0
-    K.real[WIDTH] = 0.0
-    K.real[RATE], K.real[THETA] = 1.0, SURE
+    K.count[FOLLOWS] = 0
     K.real[LAST_ERROR] = 0.0
     c.real[GROW] = WIDEST
-    c.real[EXCESS] = 1.0
-    c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
+    if c.count[STARTED] != JUMPED:
+        K.count[FRESH] = 0
+        K.real[WIDTH] = 0.0
+        K.real[RATE], K.real[THETA] = 1.0, SURE
+        c.real[EXCESS] = 1.0
+        c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
     c.real[BEFORE] = c.real[T]
     c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
     if c.real[H] <= 0.0:

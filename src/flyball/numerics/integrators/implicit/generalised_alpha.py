@@ -232,7 +232,8 @@ def attempt(callbacks, S, K, c, h):
     _, _, compose, arrive = callbacks[:4]
     if K.count[BEFORE] == 0:
         begin(callbacks, S, K, c)
-        K.count[FRESH] = -1
+        if K.real[WIDTH] == 0.0:
+            K.count[FRESH] = -1
     tolerances(c, K)
     if K.count[FRESH] < 0:
         for i in range(K.v.shape[1]):
