@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..tables.system import ALONG, BETWEEN, FORCE_ALONG, FORCE_F, FORCE_M, MASS, NV, PARENT, SLIDING, System
+from ..tables.system import BETWEEN, FORCE_ALONG, FORCE_F, FORCE_M, MASS, NV, PARENT, SLIDING, System
 from .booked import GIVEN
 from .energy import EXCHANGED, gravity, kinetic
 
@@ -89,7 +89,8 @@ def apart(result: Result) -> list[Ledger]:
     if many < 2 or result.bulk or not len(result.t):
         return []
     of = [np.flatnonzero(part == p) for p in range(many)]
-    elastic, works = [result.records.zeros() for _ in of], [[] for _ in of]
+    elastic = [result.records.zeros() for _ in of]
+    works: list[list[np.ndarray]] = [[] for _ in of]
     for f in result.model.acting():
         at = _part_of(result, f, part)
         if at >= 0:
@@ -132,7 +133,6 @@ def _of_force(S: System, k: int) -> np.ndarray:
         at = S.frame_i[ends[ends >= 0]]
         return np.unique(at[at >= 0])
     lines = ends[ends >= 0] if force[FORCE_ALONG] == SLIDING else ends[:1]
-    assert force[FORCE_ALONG] in (ALONG, SLIDING)
     return np.unique(np.concatenate([_of_line(S, len(S.row_i) + m) for m in lines]))
 
 
