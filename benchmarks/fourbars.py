@@ -1,11 +1,14 @@
 """N-four-bar for 10 s at an energy error of 1e-3 J: flyball and its peers side by side in one run; N = 1000 by itself.
 
 For N = 1000 only flyball is timed, over 1 s and 4 s: per window, against N = 40 at the same tolerance.
-Usage: ``python fourbars.py [N ...] [--json FILE]``.
+With ``--radau``: the energy error of that method through all singular positions, at every hundredth of a second, with
+each hinge once and twice.
+Usage: ``python fourbars.py [N ...] [--radau] [--json FILE]``.
 """
 
 from __future__ import annotations
 
+import time
 from functools import partial
 from typing import Any
 
@@ -16,6 +19,7 @@ from contest import Contest, Flyball
 from trees import Tree, planar_tree
 from trees import planar_motion as tree_motion
 
+import flyball as fb
 from mechanisms import (
     Kernel,
     Planar,
@@ -43,6 +47,15 @@ PEERS = (
     ("pinocchio", "Python RK4", {1: 800, 10: 800, 40: 1200}, 40),
 )
 ACCURACY = {"energy_error": "energy error [J]", "end_error": "end error [m]", "gap": "gap [m]"}
+TIGHT = (1e-7, 1e-9, 1e-10, 1e-11, 1e-12)
+RADAU_COLUMNS = {
+    "n": "N",
+    "hinges": "hinges",
+    "rtol": "rtol",
+    "energy_error": "energy error [J]",
+    "steps": "steps",
+    "cpu": "CPU s",
+}
 SCALE_COLUMNS = {
     "n": "N",
     "span": "seconds",
@@ -99,14 +112,39 @@ def scaling(span: float, coordinates: str) -> list[dict[str, Any]]:
     return rows
 
 
+def implicit(n: int) -> list[dict[str, Any]]:
+    """Energy errors of `radau`, by tolerances, with each hinge once and twice."""
+    rows = []
+    for hinges in (1, 2):
+        model = flyball_planar(fourbars(n))
+        for k in range(len(model.joints) if hinges == 2 else 0):
+            j = model.joints[k]
+            model.add(fb.Revolute(f"{j.name} again", j.body_i, j.body_j, at=j.at))
+        for rtol in TIGHT:
+            row = {"n": n, "hinges": hinges, "rtol": rtol, "energy_error": float("nan")}
+            rows.append(row)
+            begin = time.process_time()
+            try:
+                health = simulate(model, T_END, outputs=1001, method="radau", rtol=rtol).health
+            except fb.SimulationError as error:
+                print(f"  N = {n}, rtol {rtol:g}: {error}", flush=True)
+                continue
+            row |= {"energy_error": health.energy_drift, "steps": health.steps, "cpu": time.process_time() - begin}
+    return rows
+
+
 def main() -> None:
     """Command line."""
     parser = contest.parser(__doc__)
+    parser.add_argument("--radau", action="store_true", help="energy errors of radau, alone")
     parser.add_argument("n", nargs="*", type=int, help=f"numbers of windows (1 10 40 {LARGE})")
     arguments = parser.parse_args()
     rows = []
-    for n in arguments.n or (1, 10, 40, LARGE):
-        if n == LARGE:
+    for n in arguments.n or ((1, 10, 40) if arguments.radau else (1, 10, 40, LARGE)):
+        if arguments.radau:
+            found = implicit(n)
+            print(timing.table(found, RADAU_COLUMNS), flush=True)
+        elif n == LARGE:
             found = [row for span in SPANS for row in scaling(span, arguments.coordinates)]
             print(timing.table(found, SCALE_COLUMNS), flush=True)
         else:

@@ -106,3 +106,13 @@ def test_an_elastic_stop_gives_back_what_falls_on_it():
     exact = m.simulate(1.5, outputs=[1.5], rtol=1e-11)
     assert [e.t for e in r.events] == pytest.approx([e.t for e in exact.events], abs=1e-6)
     assert r["b"].position[-1, 1] == pytest.approx(exact["b"].position[-1, 1], abs=5e-4)
+
+
+def test_a_stack_is_pushed_away():
+    """Places on outlines are at their corners: rounding must not take them to the next edge."""
+    m = fb.Mechanism("stack", planar=True, gravity=(0, -G))
+    m.add(fb.Ground("floor", shape=fb.Plane(normal=(0, 1))), fb.Contact(friction=0.5))
+    for k in range(2):
+        m.add(fb.Body(f"b{k}", shape=fb.Box(edges=(0.3, 0.2, 0.2), mass=1), position=(0.01 * k, 0.1 + 0.2 * k)))
+    m.add(fb.PointForce("push", "b0", at=(0, 0.1), force=("12*t", 0)))
+    of_order_2(m, ALPHA, 4e-3, 1.0, 1e-5)

@@ -155,6 +155,24 @@ def test_energy_through_singular_positions(number, double):
     assert not r.health.doubtful
 
 
+@pytest.mark.parametrize(("number", "coordinates", "rtol"), [
+    (1, "joint", 1e-10), (1, "absolute", 1e-10), (10, "joint", 1e-11), (10, "joint", 1e-12),
+])  # fmt: skip
+@pytest.mark.parametrize("double", [False, True])
+def test_energy_between_steps_too(number, coordinates, rtol, double):
+    """A microjoule at every hundredth of a second, where the polynomial within steps of order 4 tells the motion."""
+    r = windows(double, number).simulate(10.0, outputs=1001, method="radau", rtol=rtol, coordinates=coordinates)
+    assert r.health.energy_drift < 1e-6
+    assert not r.health.doubtful
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-8])
+def test_a_step_that_ends_too_close_to_a_singular_position_is_taken_back(rtol):
+    """From within a microsecond of it no width led on: ten windows in absolute coordinates."""
+    r = windows(False, 10).simulate(10.0, outputs=101, method="radau", rtol=rtol, coordinates="absolute")
+    assert r.health.energy_drift < 5e3 * rtol
+
+
 @pytest.mark.parametrize("rtol", [1e-9, 1e-10])
 def test_the_widest_step_passes_where_rounding_decides(rtol):
     """Narrower ones lead into the singular position; this ended there with a width of 1e-14 s."""

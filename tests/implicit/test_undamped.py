@@ -34,7 +34,7 @@ def test_a_blow_swings_on(k, rtol, near):
 
 
 @pytest.mark.parametrize("method", ["radau", "auto"])
-@pytest.mark.parametrize(("k", "rtol"), [(1e8, 1e-4), (1e8, 1e-5), (1e10, 1e-7)])
+@pytest.mark.parametrize(("k", "rtol"), [(1e8, 1e-3), (1e8, 1e-5), (1e10, 1e-5), (1e12, 1e-7)])
 def test_a_push_within_a_step_excites_what_it_should(k, rtol, method):
     """50 (1 + tanh) of the way of another body: B swings about 100 / k by (100 / k) x / sinh x, x = pi w s / 2."""
     w = np.sqrt(k)

@@ -88,3 +88,36 @@ def test_what_moves_between_two_rows_only_is_not_nothing():
     r = m.simulate(20.0, outputs=3)
     assert np.abs(r["A.displacement_rate"]).max() < 1e-9
     assert not r.health.doubtful
+
+
+def beside(k: float, *more) -> fb.Mechanism:
+    """1 kg on a spring of k with 5e-3 J beside 1000 t that swing with 1e6 J."""
+    m = fb.Mechanism("beside", planar=True, gravity=(0, 0))
+    for n, mass in (("a", 1e6), ("b", 1.0)):
+        m.add(fb.Body(n, mass=mass, inertia=1), fb.Prismatic(n.upper(), "ground", n, at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("slow", "A.displacement", stiffness=2e6), fb.Initial("A.displacement", value=1))
+    m.add(fb.CoordinateSpring("hard", "B.displacement", stiffness=k), fb.Initial("B.displacement", value=0.0, rate=0.1))
+    m.add(*more)
+    return m
+
+
+def test_a_part_that_nothing_connects_is_judged_by_its_own_energy():
+    """Steps of 1 ms damp 1e4 rad/s away. By what A moves, 5e-3 J are nothing."""
+    r = beside(1e8).simulate(1.0, outputs=101, method="radau", step=1e-3)
+    assert np.abs(r["B.displacement_rate"][-25:]).max() < 1e-3
+    assert r.health.energy_drift < 1e-7 * 1e6
+    (text,) = r.health.doubtful
+    assert text.startswith("the energy balance of 'b' is off by 0.005 J where ")
+    assert not beside(1e4).simulate(1.0, outputs=101, method="radau", step=1e-3).health.doubtful
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-5, 1e-7, 1e-9])
+@pytest.mark.parametrize("method", ["radau", "dop853"])
+def test_parts_with_works_and_events_are_sound(method, rtol):
+    """Damping, a blow and a spring that an event makes weaker, each in a part of its own."""
+    m = beside(1e4, fb.Body("c", mass=1e-3, inertia=1e-3))
+    m.add(fb.Prismatic("C", "ground", "c", at=(0, 0), axis=(1, 0)), fb.Initial("C.displacement", value=1e-3))
+    m.add(fb.CoordinateSpring("oil", "C.displacement", stiffness=10.0, damping=0.1))
+    m.add(fb.Event("blow", "t > 0.5", do=[fb.Impulse("c", (1e-4, 0))]))
+    r = m.simulate(1.0, outputs=101, method=method, rtol=rtol)
+    assert not r.health.doubtful

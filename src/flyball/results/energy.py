@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property
 from typing import TYPE_CHECKING, ClassVar
 
@@ -23,6 +24,26 @@ EXCHANGED = {"friction_loss": -1.0, "impact_loss": -1.0, "surface_work": 1.0}
 """Energies that contacts exchange, and by which sign the bodies have them."""
 STORED = "contact_elastic"
 """Energy stored in contacts that give way, among what contacts exchange."""
+
+
+def kinetic(result: Result, bodies: Iterable[int]) -> np.ndarray:
+    """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
+    r, S = result.records, result.values.system
+    total = r.zeros()
+    for b in bodies:
+        _, R, w, v, _, _ = r.body(b)
+        w_B = mtv(R, w)
+        total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
+    return total
+
+
+def gravity(result: Result, bodies: Iterable[int]) -> np.ndarray:
+    """Potential energy of gravity of rows of the body table [J]."""
+    r, S = result.records, result.values.system
+    total = r.zeros()
+    for b in bodies:
+        total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
+    return total
 
 
 class Energy(Named):
@@ -48,23 +69,16 @@ class Energy(Named):
         """Sum of m v^2 / 2 + w . I w / 2 over the bodies."""
         if self._result.pieces:
             return self._of_pieces("kinetic")
-        r, S = self._result.records, self._result.values.system
-        total = r.zeros()
-        for b in range(len(S.body_i)):
-            _, R, w, v, _, _ = r.body(b)
-            w_B = mtv(R, w)
-            total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
-        return sum((b.kinetic for b in self._result.bulk.values()), total)
+        every = range(len(self._result.values.system.body_i))
+        return sum((b.kinetic for b in self._result.bulk.values()), kinetic(self._result, every))
 
     @cached_property
     def gravity(self) -> np.ndarray:
         """Potential energy of gravity, zero where every centre of mass lies in the world's origin."""
         if self._result.pieces:
             return self._of_pieces("gravity")
-        r, S = self._result.records, self._result.values.system
-        total = r.zeros()
-        for b in range(len(S.body_i)):
-            total -= S.body_x[b, MASS] * dot(tuple(S.glob[:3]), r.body(b)[0])
+        S = self._result.values.system
+        total = gravity(self._result, range(len(S.body_i)))
         return sum((b.potential(S.glob[:3]) for b in self._result.bulk.values()), total)
 
     @cached_property

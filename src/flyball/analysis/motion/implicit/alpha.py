@@ -36,6 +36,7 @@ class Desk(NamedTuple):
     place: np.ndarray
     x: np.ndarray
     J: np.ndarray
+    spring: np.ndarray
     put: np.ndarray
     part: np.ndarray
     real_A: np.ndarray

@@ -82,11 +82,12 @@ class Implicit:
         t, step = float(self.clock.real[ex.T]), float(self.clock.real[ex.STEP])
         if not step or self.clock.count[ex.STATUS] != ex.STUCK:
             return None
-        return SimulationError(
-            f"at t = {t:.6g} s the equations of a step of {step:g} s have no solution that Newton's method finds; give "
-            f"a shorter step, or leave it out",
-            t=t,
+        why = (
+            f"the equations of a step of {step:g} s have no solution that Newton's method finds"
+            if self.clock.count[ex.TROUBLE] != 0
+            else f"what happens within a step of {step:g} s cannot be told: between its ends it is too far off"
         )
+        return SimulationError(f"at t = {t:.6g} s {why}; give a shorter step, or leave it out", t=t)
 
     def _benches(self, ny: int) -> tuple[Bench, Bench, Bench]:
         x = self.layout

@@ -15,6 +15,7 @@ from ..clock import (
     ASIDE,
     AT_END,
     AT_START,
+    BACK,
     BEFORE,
     BETWEEN,
     BLURRED_AT,
@@ -77,7 +78,7 @@ def begin(arrive, inspect, S, K, c):
         c.real[EXCESS] = 1.0
         c.real[WIDE] = 0.0  # steps of before tell nothing of what is narrow now
     c.real[BEFORE] = c.real[T]
-    c.real[BLURRED_AT] = c.real[T] - c.real[SPAN]
+    c.real[BLURRED_AT] = c.real[BACK] = c.real[T] - c.real[SPAN]
     if c.real[H] <= 0.0:
         c.real[H] = FIRST * c.real[SPAN]
     afresh(c)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from ....compiler.jit import formula
 from ..clock import (
     ACCEPTED,
+    BACK,
     BEST,
     BEST_H,
     BLURRED_AT,
@@ -20,6 +21,8 @@ from ..clock import (
     GROW,
     NEW,
     NOW,
+    OLD,
+    OLD_RATE,
     PARDON,
     STEP,
     TO,
@@ -30,10 +33,26 @@ from ..clock import (
     H,
     T,
 )
+from ..clock import BEFORE as BEGAN
 from ..loop import shorten
-from ..refusal import afresh
+from ..refusal import afresh, take_back
 from .asked import WIDEST
-from .desk import ASKED, BEFORE, FRESH, JACOBIANS, LAST_ERROR, LAST_H, RTOL, SERVES, START, STAYS, THETA, WIDTH
+from .desk import (
+    ASKED,
+    BEFORE,
+    FRESH,
+    JACOBIANS,
+    LAST_ERROR,
+    LAST_H,
+    REFINE,
+    RTOL,
+    SERVES,
+    SHARED,
+    START,
+    STAYS,
+    THETA,
+    WIDTH,
+)
 from .newton import factor
 from .step import MOST, begin, estimate, iterate, predict
 from .whole import iterate_whole
@@ -44,6 +63,8 @@ WALKED = 1e-3  # part of the widest step of late below which narrower ones lead 
 FALLS, NARROWER = 0.5, 0.1  # what an error falls by at least in a step that is so much narrower, if it is no rounding
 SLIGHT = 10.0  # an error from rounding that is accepted where no step of another width is found
 ROUGH = 1e-5  # a relative error of a step above which rounding is no excuse
+ELSEWHERE = 1.24  # what half a step taken back is taken wider by: two of them end beyond where it did
+REFINED = 1  # times that solves are refined after a step that could not be taken
 SINGULAR = 3
 
 
@@ -107,16 +128,21 @@ def wider(h, error, iterations):
 def refuse(K, c):
     """Try a narrower step, and with the Jacobian of where it begins. Returns 0, or that there is nothing to try."""
     h, error, asked = c.real[TRIED], c.real[ERROR], K.real[ASKED]
+    if K.count[SHARED] == 0 and (c.count[TROUBLE] != 0 or c.real[GROW] <= 1.0):
+        K.count[REFINE] = REFINED
     if c.count[TROUBLE] != 0:
         if c.real[STEP] > 0.0:
             shorten(c, h)
             return 1 if K.count[FRESH] == 1 else 0
         shorten(c, asked * h)
-        stranded(c)
+        stranded(K, c)
         return 0
-    shorten(c, wider(h, error, asked)[0] if K.count[BEFORE] == 1 else 0.1 * h)
-    if K.count[BEFORE] == 1:  # what a jump excites is not followed by steps as wide as those before it
+    goes_on = K.count[BEFORE] == 1 or c.real[BACK] == c.real[T]
+    shorten(c, wider(h, error, asked)[0] if goes_on else 0.1 * h)
+    if goes_on:  # what a jump excites is not followed by steps as wide as those before it
         pardon(K, c, h, error)
+        if c.real[PARDON] > 0.0:
+            stranded(K, c)
     return 0
 
 
@@ -137,18 +163,29 @@ def pardon(K, c, h, error):
 
 
 @formula
-def stranded(c):
-    """Where the iteration fails in ever narrower steps, a wide one is tried, which ends beyond the place."""
-    if c.real[H] < WALKED * c.real[WIDE] and c.real[PARDON] == 0.0:
-        c.real[PARDON] = SLIGHT
-        c.real[H] = c.real[WIDE]
-        c.real[BLURRED_AT] = c.real[T]
+def stranded(K, c):
+    """Where ever narrower steps lead nowhere: too close to a singular position the last one may have ended.
+
+    It is taken back and ends elsewhere. If that does not help, a wide step is tried, which ends beyond the place, then
+    others, each somewhat narrower, with more pardoned.
+    """
+    if not (c.real[H] < WALKED * c.real[WIDE] and c.real[PARDON] * K.real[RTOL] < ROUGH):
+        return
+    if c.real[PARDON] == 0.0 and c.real[T] - c.real[BEGAN] > WALKED * c.real[WIDE] and c.real[BACK] < c.real[BEGAN]:
+        take_back(c)
+        c.real[H] *= ELSEWHERE
+        K.count[BEFORE], K.count[FRESH] = 0, -1
+        return
+    c.real[PARDON] = max(SLIGHT, SLIGHT * c.real[PARDON])
+    c.real[H] = c.real[WIDE] * (SLIGHT / c.real[PARDON]) ** 0.15
+    c.real[BLURRED_AT] = c.real[T]
 
 
 @formula
 def enter(K, c, t, h, error, iterations):
     """Make the end of the step the present state, and choose the width of the next one."""
     for i in range(c.y.shape[1]):
+        c.y[OLD, i], c.y[OLD_RATE, i] = c.y[NOW, i], c.K[0, i]
         c.y[NOW, i] = c.y[NEW, i]
         c.K[0, i] = c.K[1, i]
     for i in range(K.v.shape[1]):
@@ -170,6 +207,8 @@ def enter(K, c, t, h, error, iterations):
         wide = min(wide, h * max(NARROWEST, min(WIDEST, f)))
     if c.real[GROW] <= 1.0:
         wide = min(wide, h)
+    else:
+        K.count[REFINE] = 0
     if c.real[PARDON] > 0.0:
         wide = max(h, c.real[WIDE])
     afresh(c)

@@ -358,7 +358,7 @@ def defect(residual, S, K, c, h, x):
         K.lam[START, r] = at_stages(K.lam, r, x)
     status, size = filtered(residual, S, K, c, c.real[T] + x * h, h)
     back(K, c)
-    return size if status == 0 else 1e300
+    return max(size, springing(K, h)) if status == 0 else 1e300
 
 
 @formula
