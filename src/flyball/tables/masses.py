@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..math.lanes import has_lanes, per_lane
 from ..math.scalar import maximum, real_parts
 from ..model.body import GROUND
 from .afresh import Afresh
@@ -36,7 +37,7 @@ def mass_table(s: Structure, bodies: Mapping, frame_x: np.ndarray, length: Any, 
     """
     body_x = new.table("body_x", (len(s.tables["body_i"]), BODY_WIDTH), frame_x.dtype)
     moved = {f.body for f in s.frames if new.asks(f.element)}
-    rescaled = new.base is None or new.base.system.glob[LENGTH] != length
+    rescaled = new.base is None or has_lanes([length]) or new.base.system.glob[LENGTH] != length
     usual = usual_mass([d.mass for name, d in bodies.items() if name != GROUND])
     reach = _reaches(s, frame_x)
     for name, b in s.place.items():
@@ -76,6 +77,7 @@ def _turning(x: np.ndarray, J: np.ndarray, compact: Any, bulky: Any, planar: boo
     x[INVERSE : INVERSE + 9], x[EXCESS : EXCESS + 9] = inverse.ravel(), more.ravel()
 
 
+@per_lane
 def _reaches(s: Structure, frame_x: np.ndarray) -> np.ndarray:
     """Of every body the largest component, taken positive, of the ways from its centre of mass to its frames."""
     out = np.zeros(len(s.tables["body_i"]), frame_x.dtype)

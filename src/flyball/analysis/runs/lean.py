@@ -42,10 +42,11 @@ from ..motion.start import Start, begin, start_time
 from ..motion.stiff import EXPLICIT, Pace
 from ..simulate import clock_for
 from .compute import DONE, Answers, Question, alone
-from .firm import Weighing, rests_as_drawn
+from .drawn import Drawn, rests_as_drawn
 from .readable import of_states
 from .reading import FUNCTION, reduced
 from .soft import Filling, soft
+from .spread import TABLES, Spread, system_of
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Shared:
     question: Question
     options: SimulateOptions
     begun: Start
-    filling: Filling | Weighing
+    filling: Filling | Drawn
     made: special.Made | None
     plain: tuple[np.ndarray, ...]  # where tables of the first run are 0, 1 or -1: made code goes by that
     fixed: tuple[tuple[str, int, float], ...]  # entries that made code knows, and their values
@@ -67,15 +68,18 @@ class Shared:
         return self.begun.assembly.compiled.values
 
 
-def shared(question: Question, point: np.ndarray) -> Shared | None:
-    """What runs have in common, from the run at one point; None if there is more to do for each, or that one fails."""
+def shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared | None:
+    """What runs have in common, from the run at one point; None if there is more to do for each, or that one fails.
+
+    ``points`` are those that will be asked for, as far as they are known.
+    """
     try:
-        return _shared(question, point)
+        return _shared(question, point, points)
     except FlyballError:  # by itself each says why it fails
         return None
 
 
-def _shared(question: Question, point: np.ndarray) -> Shared | None:
+def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared | None:
     model, o = question.model, question.options
     if not isinstance(o.specialize, bool) or o.start is not None or _watched(model):
         return None
@@ -91,32 +95,31 @@ def _shared(question: Question, point: np.ndarray) -> Shared | None:
         return None
     if s.controls or laws_of_time(c):
         return None
-    o = o.sized(begun.base.compiled.values.length)
+    asked, o = o, o.sized(begun.base.compiled.values.length)
     made, fixed = None, tuple[tuple[str, int, float], ...]()
     if o.specialize:
         Engine(c, True)
         made = c.made
         if made is None or (entries := special.entries(made)) is None:
             return None
-        fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in VARIED)
-    if (filling := _filling(question, o, begun)) is None:
+        fixed = tuple((name, k, float(getattr(S, name).ravel()[k])) for name, k in entries if name in TABLES)
+    if (filling := _filling(question, asked, begun, points)) is None:
         return None
     mixed = question.options.method == AUTO and o.step is None
     return Shared(question, o, begun, filling, made, _plain(S, filling.tables), fixed, AUTO if mixed else str(o.method))
 
 
-def _filling(question: Question, o: SimulateOptions, begun: Start) -> Filling | Weighing | None:
+def _filling(question: Question, o: SimulateOptions, begun: Start, points: np.ndarray) -> Filling | Drawn | None:
     """What fills in the numbers that change; None if more changes than that."""
     changed = soft(question.model, question.names)
     if changed is not None:
         return Filling.of(begun.assembly.compiled.values, question.names, changed)
     if not rests_as_drawn(begun):
         return None
-    return Weighing(question.names, question.options.parameters or {}, begun, float(o.t_end - begun.base.t))
-
-
-VARIED = Weighing.tables
-"""Tables that may change from run to run."""
+    plain, mine = begun.base.compiled.structure, begun.assembly.compiled.structure
+    structures = (plain,) if plain is mine else (plain, mine)
+    given = {name: x for name, x in (question.options.parameters or {}).items() if name not in question.names}
+    return Drawn(begun, o, Spread(structures, given, question.names, points))
 
 
 def _watched(model: Model) -> bool:
@@ -134,8 +137,9 @@ class Desk:
     def __init__(self, of: Shared) -> None:
         self.of = of
         a, x = of.begun.assembly.again(), of.values
-        own = {name: getattr(x.system, name).copy() for name in VARIED}
-        c = Compiled(replace(x, system=x.system._replace(**own)), a.compiled.z, a.compiled.parameters)
+        c = Compiled(replace(x, system=system_of(x)), a.compiled.z, a.compiled.parameters)
+        self.own = {name: getattr(c.values.system, name) for name in TABLES}
+        self.filler = of.filling.desk(c)
         if of.made is not None:
             c.run_on(of.made)
         self.start = replace(of.begun, assembly=replace(a, compiled=c))
@@ -144,7 +148,6 @@ class Desk:
         sampled = sampled_laws(c, NO_BREAKS)
         self.clock = clock_for(self.start, self.start.base.t, float(o.t_end), times, o, sampled)
         self.clock.count[ex.QUOTA] = LONGEST
-        self.own = own | {"ledger": self.clock.real[[ex.LEDGER]]}
         self.later = open_until_asked(self.start, o, INTEGRATE)
         c.work.option[LATER] = float(self.later)
         forget(c.work.stack)
@@ -162,7 +165,7 @@ class Desk:
     def run(self, point: np.ndarray) -> bool:
         """Compute the motion at a point into ``rows``; False if it is not for us."""
         of, c = self.of, self.compiled
-        if not of.filling.fill(point, self.own):
+        if not self.filler.fill(point, self.own):
             return False
         S = c.values.system
         if of.made is not None:
@@ -174,7 +177,7 @@ class Desk:
         for array, new in self.kept:
             array[...] = new
         clock, used = self.clock, 0
-        clock.real[ex.LEDGER] = self.own["ledger"][0]
+        self.filler.begin(self.start.assembly, clock)
         pace = Pace(float(of.options.t_end), of.asked, partial(unsuited, of.begun))
         while clock.count[ex.STATUS] == ex.RUNNING:
             clock.count[ex.QUOTA] = pace.limited(clock, LONGEST)
@@ -192,7 +195,8 @@ class Lean:
         self._own = threading.local()
         self.alone_count = 0  # runs that were computed by themselves after all
         q = of.question
-        self.stacked = [k for k, r in enumerate(q.asked) if of_states(q.model, r.name)]
+        same = isinstance(of.filling, Filling)  # where things are on bodies, and where these are drawn
+        self.stacked = [k for k, r in enumerate(q.asked) if same and of_states(q.model, r.name)]
         self.alone = [k for k in range(len(q.asked)) if k not in self.stacked]
         self.remarks = [
             *map(not_allowed, changed_velocities(of.begun.base.departures)), *nothing_touches(q.model)

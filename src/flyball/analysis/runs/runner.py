@@ -20,6 +20,6 @@ def runner(question: Question, points: np.ndarray) -> Runner:
     """What computes the runs of a question, of which some points are given."""
     if len(points) > FEW and isinstance(question.single, Motion):
         for k in (0, len(points) // 2, len(points) - 1):  # one may fail
-            if (found := shared(question, points[k])) is not None:
+            if (found := shared(question, points[k], points)) is not None:
                 return Lean(found).compute
     return partial(compute, question)

@@ -12,8 +12,11 @@ from ...model.element import Element, resolve
 from ...model.expressions import Expression, law_expression, number
 from ...model.force import Force
 from ...model.model import Model
+from ...numerics.integrators.clock import Clock
 from ...tables.numbers import words
 from ...tables.values import Values
+from ..assembly.start import Assembly
+from ..compiled import Compiled
 
 PLACES = ("at", "angle", "orientation", "axis")
 """Fields of forces that say where their frames are."""
@@ -75,6 +78,13 @@ class Filling:
         slots = [(k, name) for k, name in enumerate(s.model.parameters) if name in reached]
         rows = [(k, e, x.poses.apart(e)) for k, e in enumerate(s.forces) if any(e is c for c in changed)]
         return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
+
+    def desk(self, c: Compiled) -> Filling:
+        """What one thread fills in: all of it is in the tables."""
+        return self
+
+    def begin(self, at: Assembly, clock: Clock) -> None:
+        """The start is that of the first run."""
 
     def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
         """Write them into ``own["force_x"]`` and ``own["const"]``: it always can.
