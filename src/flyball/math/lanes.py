@@ -1,8 +1,8 @@
-"""A number for many runs at once: formulas are evaluated once, and every run has what it would have by itself, to the bit.
+"""A number for many runs at once: formulas are evaluated once, each run has what it has by itself, to the bit.
 
-``Lanes`` holds one float for each run and passes for an expression (`math/scalar.py`), so that all code that fills tables
-takes it. Every operation is the one of floats, lane by lane. Where code decides by a number, all lanes have to decide
-alike; else ``Diverged`` says which do and which do not.
+``Lanes`` holds one float for each run and passes for an expression (`math/scalar.py`), so that all code that fills
+tables takes it. Every operation is the one of floats, lane by lane. Where code decides by a number, all lanes have to
+decide alike; else ``Diverged`` says which do and which do not.
 """
 
 from __future__ import annotations
@@ -149,6 +149,11 @@ def lanewise(function: Callable[..., Any], *args: Any) -> Lanes:
     return Lanes(np.array([function(*row) for row in zip(*columns, strict=True)], float))
 
 
+def over_time(x: Any) -> Any:
+    """What a formula over time takes: of lanes, which then are times, the array of them."""
+    return x.x if type(x) is Lanes else x
+
+
 def has_lanes(values: Iterable[Any]) -> bool:
     """Whether one of these is for many runs."""
     return any(type(x) is Lanes for x in values)
@@ -183,14 +188,15 @@ def gathered(rows: np.ndarray) -> Any:
 
 
 def per_lane(function: F) -> F:
-    """Let a function of arrays, numbers and mappings take each lane by itself, where there are lanes: for what decides."""
+    """Let a function of arrays and numbers take each lane by itself, where there are lanes: for what decides."""
 
     @wraps(function)
     def each(*args: Any) -> Any:
-        n = _count(args)
+        n = count(args)
         if n == 0:
             return function(*args)
-        found = [function(*(_lane(a, k, n) for a in args)) for k in range(n)]
+        many = [spread(a, n) if count((a,)) or getattr(a, "dtype", None) == object else None for a in args]
+        found = [function(*(_run(a, x, k) for a, x in zip(args, many, strict=True))) for k in range(n)]
         if isinstance(found[0], tuple):
             return tuple(gathered(np.array(part, float)) for part in zip(*found, strict=True))
         return gathered(np.array(found, float))
@@ -198,23 +204,29 @@ def per_lane(function: F) -> F:
     return each  # type: ignore[return-value]
 
 
-def _count(values: Iterable[Any]) -> int:
+def _run(plain: Any, many: np.ndarray | None, k: int) -> Any:
+    return plain if many is None else many[k] if many.ndim > 1 else float(many[k])
+
+
+def over_lanes(function: F) -> F:
+    """Give a function of arrays that takes leading axes all lanes at once, as the first."""
+
+    @wraps(function)
+    def at_once(*args: Any) -> Any:
+        n = count(args)
+        return gathered(function(*(spread(a, n) for a in args))) if n else function(*args)
+
+    return at_once  # type: ignore[return-value]
+
+
+def count(values: Iterable[Any]) -> int:
     """How many lanes there are; 0 if these are plain."""
     for x in values:
         if type(x) is Lanes:
             return len(x.x)
-        if isinstance(x, np.ndarray) and x.dtype == object and (n := _count(x.ravel().tolist())):
+        if isinstance(x, np.ndarray) and x.dtype == object and (n := count(x.ravel().tolist())):
             return n
     return 0
-
-
-def _lane(x: Any, k: int, n: int) -> Any:
-    """What a float run would have there."""
-    if type(x) is Lanes:
-        return float(x.x[k])
-    if isinstance(x, np.ndarray) and x.dtype == object:
-        return np.array([float(a.x[k]) if type(a) is Lanes else a for a in x.ravel().tolist()], float).reshape(x.shape)
-    return x
 
 
 def lanes_of(points: np.ndarray, names: Iterable[str]) -> Mapping[str, Lanes]:

@@ -163,6 +163,6 @@ def check_centred(model: Model, name: str, element: Any, way: np.ndarray, length
     if isinstance(element, (Joint, Force)) and (off > CENTRED * length.real).any():
         raise ModelError(
             f"{model[name].title} has no inertia and is a point mass as the model describes it, but with these "
-            f"parameters {element.title} is attached {float(off.max()):.3g} m off its centre of mass. Place both by the same "
-            f"expression, or give the body an inertia"
+            f"parameters {element.title} is attached {float(off.max()):.3g} m off its centre of mass. Place both by "
+            f"the same expression, or give the body an inertia"
         )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
-from ..math.lanes import has_lanes, per_lane
+from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.coupling import Coupling
@@ -166,15 +166,17 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     return length if length.real > 0.0 else 1.0
 
 
-@per_lane
+@over_lanes
 def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
-    """The same by places alone; 0 where they are all one."""
-    places = np.concatenate([on_ground, centres])
-    nothing = NO_LENGTH * np.abs(real_parts(places)).max(initial=0.0)
-    if (length := _longest([on_bodies, centres - centres.mean(axis=0)])).real > nothing:
-        return length
-    length = _longest([places - places.mean(axis=0)])
-    return length if length.real > nothing else 0.0
+    """The same by places alone, (..., k, 3) each; 0 where they are all one."""
+    places = np.concatenate([on_ground, centres], axis=-2)
+    nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)
+    first = _longest(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
+    if (real_parts(first) > nothing).all():
+        return first
+    other = _longest(places - places.mean(axis=-2, keepdims=True))
+    other = np.where(real_parts(other) > nothing, other, 0.0)
+    return np.where(real_parts(first) > nothing, first, other)[()]
 
 
 def _units(s: Structure, length: Any) -> list[Any]:
@@ -183,10 +185,10 @@ def _units(s: Structure, length: Any) -> list[Any]:
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
-def _longest(ways: list[np.ndarray]) -> Any:
-    every = np.concatenate(ways)
-    longest = every[np.argmax((real_parts(every) ** 2).sum(axis=1))]
-    return np.sqrt((longest**2).sum())
+def _longest(ways: np.ndarray) -> Any:
+    at = np.argmax((real_parts(ways) ** 2).sum(axis=-1), axis=-1)
+    longest = np.take_along_axis(ways, at[..., None, None], axis=-2)[..., 0, :]
+    return np.sqrt((longest**2).sum(axis=-1))
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:

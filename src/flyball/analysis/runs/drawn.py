@@ -19,7 +19,7 @@ from ..compiled import Compiled
 from ..motion.options import Integration
 from ..motion.start import Start
 from ..simulate import size
-from .spread import TABLES, Spread, Tables, system_of
+from .spread import TABLES, Place, Spread, Tables, system_of
 
 
 def rests_as_drawn(begun: Start) -> bool:
@@ -42,6 +42,10 @@ class Drawn:
     asked: Integration  # tolerances as they were asked for, whatever its length
     spread: Spread
 
+    def also(self, points: np.ndarray) -> None:
+        """Points that are asked for next."""
+        self.spread.also(points)
+
     def desk(self, c: Compiled) -> Desk:
         """What one thread fills in, for a mechanism in the coordinates of the motion with tables of its own."""
         return Desk(self, c)
@@ -59,13 +63,15 @@ class Desk:
         self.plain = self.motion if self.same else Compiled(own, c.z.copy(), c.parameters)
         self.base = Assembly(self.plain, of.begun.base.t, np.zeros(plain.structure.nq), of.begun.base.v.copy())
         self.start = of.begun.y.copy()
+        self.place: Place = None, 0
+        self.pattern = b""
 
     def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
         """Write the tables of a run into ``own``, those of the motion; False if it does not start as drawn."""
         found = self.of.spread.of(point)
         if found is None:
             return False
-        group, k = found
+        self.place = group, k = found
         tables = group.tables
         if not (self._take(self.plain, tables[0], k) and self._rests()):
             return False
@@ -79,6 +85,7 @@ class Desk:
             if self.motion.z.tobytes() != tables[1].z.of_run(k).tobytes():
                 return False
         x = self.motion.values
+        self.pattern = tables[-1].pattern_of(k)
         self.start[:] = np.concatenate([x.q, np.zeros(x.structure.nv), self.motion.z])
         return True
 

@@ -17,6 +17,7 @@ from ...tables.numbers import words
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import Compiled
+from .spread import Place
 
 PLACES = ("at", "angle", "orientation", "axis")
 """Fields of forces that say where their frames are."""
@@ -79,9 +80,19 @@ class Filling:
         rows = [(k, e, x.poses.apart(e)) for k, e in enumerate(s.forces) if any(e is c for c in changed)]
         return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
 
+    def also(self, points: np.ndarray) -> None:
+        """Points that are asked for next: nothing is made ready for them."""
+
+    @property
+    def place(self) -> Place:
+        """All have the tables of the first run, but for forces."""
+        return None, 0
+
     def desk(self, c: Compiled) -> Filling:
         """What one thread fills in: all of it is in the tables."""
         return self
+
+    pattern = b""  # of numbers that are 0, 1 or -1: looked at in each run
 
     def begin(self, at: Assembly, clock: Clock) -> None:
         """The start is that of the first run."""

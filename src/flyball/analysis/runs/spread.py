@@ -14,6 +14,7 @@ import numpy as np
 
 from ...errors import FlyballError
 from ...math.lanes import Diverged, Lanes, lanes_of
+from ...special.recorder import PLAIN
 from ...tables.numbers import numbers
 from ...tables.specs import Structure
 from ...tables.system import System
@@ -68,13 +69,22 @@ class Tables:
     z: Column
     length: np.ndarray
     values: Values  # with lanes
+    pattern: np.ndarray  # (n, k): which of the numbers that differ are 0, 1 or -1
+    base: bytes  # the same of those of the first run, and which differ
 
     @classmethod
     def of(cls, x: Values, n: int) -> Tables:
         """From values with lanes."""
         length = x.length.x if isinstance(x.length, Lanes) else np.full(n, x.length)
         system = {name: Column.of(getattr(x.system, name), n) for name in TABLES}
-        return cls(system, Column.of(x.q, n), Column.of(x.v, n), Column.of(places(x), n), length, x)
+        differ = np.concatenate([c.x for c in system.values()], axis=1)
+        base = b"".join(part.tobytes() for c in system.values() for part in (_plain(c.base), c.at))
+        state = Column.of(x.q, n), Column.of(x.v, n), Column.of(places(x), n)
+        return cls(system, *state, length, x, _plain(differ), base)
+
+    def pattern_of(self, k: int) -> bytes:
+        """What two runs have in common that have the same numbers 0, 1 and -1."""
+        return self.pattern[k].tobytes() + self.base
 
     def is_of(self, x: Values, k: int) -> bool:
         """Whether run k has the tables of ``x`` to the bit."""
@@ -88,12 +98,17 @@ class Group:
     """Runs that decide alike: their tables in each structure."""
 
     tables: tuple[Tables, ...]
+    reads: bool | None = None  # whether curves of its runs can be read at once; None: not known yet
 
     @property
     def finite(self) -> np.ndarray:
         """Which runs have nothing but finite numbers where runs differ, (n,)."""
         columns = [c for t in self.tables for c in (*t.system.values(), t.q, t.v, t.z)]
         return np.all([np.isfinite(c.x).all(axis=1) for c in columns], axis=0)
+
+
+Place = tuple[Group | None, int]
+"""The group that a run is in, if there are groups, and its number there."""
 
 
 @dataclass
@@ -179,6 +194,10 @@ class Spread:
         if not all(t.is_of(values(s, one), 0) for s, t in zip(self.structures, group.tables, strict=True)):
             raise TypeError("some operation is another one for floats")
         return group
+
+
+def _plain(x: np.ndarray) -> np.ndarray:
+    return sum(((x == value) * np.int8(k + 1) for k, value in enumerate(PLAIN)), np.zeros(x.shape, np.int8))
 
 
 def system_of(x: Values) -> System:
