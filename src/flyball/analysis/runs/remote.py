@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import ModelError, StartWarning
 from .compute import Answers, Question
-from .runner import Runner, runner
+from .runner import Runner, runner, timed
 
 HELD = 4  # questions that a worker process keeps
 
@@ -62,4 +62,4 @@ def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
                 _HELD.popitem(last=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks say it
-        return run(points, lambda: False)
+        return timed(run, points, lambda: False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -14,6 +15,14 @@ from .single import Motion
 FEW = 3  # runs for which it is not worth while to look for what they share
 Runner = Callable[[np.ndarray, Callable[[], bool]], Answers]
 """(points, whether to stop) -> answers."""
+
+
+def timed(run: Runner, points: np.ndarray, stopped: Callable[[], bool]) -> Answers:
+    """What it answers, and how long that took."""
+    started = time.perf_counter()
+    found = run(points, stopped)
+    found.seconds = time.perf_counter() - started
+    return found
 
 
 def runner(question: Question, points: np.ndarray) -> Runner:
