@@ -195,7 +195,7 @@ def per_lane(function: F) -> F:
         n = count(args)
         if n == 0:
             return function(*args)
-        many = [spread(a, n) if type(a) is Lanes or isinstance(a, np.ndarray) and a.dtype == object else None for a in args]
+        many = [spread(a, n) if type(a) is Lanes or np.asarray(a).dtype == object else None for a in args]
         found = [function(*(_run(a, x, k) for a, x in zip(args, many, strict=True))) for k in range(n)]
         if isinstance(found[0], tuple):
             return tuple(gathered(np.array(part, float)) for part in zip(*found, strict=True))

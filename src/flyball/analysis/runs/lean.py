@@ -8,7 +8,7 @@ scratch and clock as new, one call. Whatever is unusual is left to `compute.alon
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -93,13 +93,14 @@ def _shared(question: Question, point: np.ndarray, points: np.ndarray) -> Shared
 def _filling(question: Question, o: SimulateOptions, begun: Start, points: np.ndarray) -> Filling | Drawn | None:
     """What fills in the numbers that change; None if more changes than that."""
     changed = soft(question.model, question.names)
+    plain, mine = begun.base.compiled.structure, begun.assembly.compiled.structure
+    given = {name: x for name, x in (question.options.parameters or {}).items() if name not in question.names}
     if changed is not None:
-        return Filling.of(begun.assembly.compiled.values, question.names, changed)
+        filling = Filling.of(begun.assembly.compiled.values, question.names, changed)
+        return replace(filling, spread=Spread((mine,), given, question.names, points))
     if not rests_as_drawn(begun):
         return None
-    plain, mine = begun.base.compiled.structure, begun.assembly.compiled.structure
     structures = (plain,) if plain is mine else (plain, mine)
-    given = {name: x for name, x in (question.options.parameters or {}).items() if name not in question.names}
     return Drawn(begun, o, Spread(structures, given, question.names, points))
 
 

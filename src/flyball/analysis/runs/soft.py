@@ -17,7 +17,7 @@ from ...tables.numbers import words
 from ...tables.values import Values
 from ..assembly.start import Assembly
 from ..compiled import Compiled
-from .spread import Place
+from .spread import Place, Spread
 
 PLACES = ("at", "angle", "orientation", "axis")
 """Fields of forces that say where their frames are."""
@@ -69,6 +69,7 @@ class Filling:
     slots: tuple[tuple[int, str], ...]  # of parameters in the table of constants
     rows: tuple[tuple[int, Any, float], ...]  # of forces: row of their table, force, drawn distance of its ends
     env: Mapping[str, float]
+    spread: Spread | None = None  # of many runs at once
 
     @classmethod
     def of(cls, x: Values, names: Sequence[str], changed: Sequence[Element]) -> Filling:
@@ -81,7 +82,9 @@ class Filling:
         return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
 
     def also(self, points: np.ndarray) -> None:
-        """Points that are asked for next: nothing is made ready for them."""
+        """Points that are asked for next."""
+        if self.spread is not None:
+            self.spread.also(points)
 
     @property
     def place(self) -> Place:
@@ -105,6 +108,11 @@ class Filling:
         ModelError
             If a number makes no sense.
         """
+        if self.spread is not None and (found := self.spread.of(point)) is not None:
+            (tables,), k = found[0].tables, found[1]
+            for name in self.tables:
+                tables.system[name].write(k, own[name])
+            return True
         env, force_x, const = dict(self.env), own["force_x"], own["const"]
         env.update(zip(self.names, point.tolist(), strict=True))
         for name, formula in self.derived:
