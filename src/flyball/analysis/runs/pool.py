@@ -16,6 +16,7 @@ from .runner import runner, timed
 
 LONG, FIRST, PARTS = 512, 8, 64  # most runs in a task; in the first ones; into how many these divide a study
 SECONDS = 0.25  # that a task should take
+TIMES = 100_000  # states that a task keeps at most
 AHEAD = 4  # tasks that wait, for each worker that there may be
 Task = Callable[[np.ndarray], "Future[Answers]"]
 
@@ -36,6 +37,7 @@ def computed(
     When the consumer stops, or is interrupted, runs that have not begun are given up.
     """
     size, at = max(1, min(FIRST, len(todo) // PARTS)), 0
+    most = max(1, min(LONG, TIMES // len(question.times)))
     with _submitting(question, points[todo], executor, threads) as (submit, workers):
         waiting: dict[Future[Answers], np.ndarray] = {}
         try:
@@ -46,7 +48,7 @@ def computed(
                     waiting[submit(points[part])] = part
                     at += len(part)
                 for part, found in _done(waiting):
-                    size = max(1, min(LONG, int(SECONDS * len(part) / max(found.seconds, 1e-6))))
+                    size = max(1, min(most, int(SECONDS * len(part) / max(found.seconds, 1e-6))))
                     yield part, found
         finally:
             for future in waiting:
@@ -65,7 +67,7 @@ def _submitting(
 ) -> Iterator[tuple[Task, int]]:
     """(what computes some runs, how many workers there are)."""
     if executor is not None:
-        key, data = packed(question)
+        key, data = packed(question, len(points))
         yield (
             lambda some: executor.submit(elsewhere, key, data, some),
             max(cores(), getattr(executor, "_max_workers", 0)),

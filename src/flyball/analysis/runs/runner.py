@@ -25,9 +25,9 @@ def timed(run: Runner, points: np.ndarray, stopped: Callable[[], bool]) -> Answe
     return found
 
 
-def runner(question: Question, points: np.ndarray) -> Runner:
-    """What computes the runs of a question, of which some points are given."""
-    if len(points) > FEW and isinstance(question.single, Motion):
+def runner(question: Question, points: np.ndarray, runs: int = 0) -> Runner:
+    """What computes the runs of a question, of which some points are given: all, or the first of so many ``runs``."""
+    if max(len(points), runs) > FEW and isinstance(question.single, Motion):
         for k in (0, len(points) // 2, len(points) - 1):  # one may fail
             if (found := shared(question, points[k], points)) is not None:
                 return Lean(found).compute

@@ -22,7 +22,7 @@ from ...tables.values import Values, values, values_of
 from ..compiled import places
 
 BLOCK = 512  # points in a block
-HELD = 4  # blocks that are kept
+HELD = 3  # blocks that are kept
 LEAST = 4  # points from which on it is worth while
 SPLIT = 24  # groups that are tried in a block
 TABLES = ("force_x", "const", "body_x", "glob", "frame_x", "term_x", "switch_x")

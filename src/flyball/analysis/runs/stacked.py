@@ -19,6 +19,8 @@ from .readable import of_states
 from .reading import reduced
 from .spread import TABLES, Group, Place
 
+AT_ONCE = 20_000  # times that are read at once: each takes some kilobytes
+
 
 class Reader:
     """Reads what depends on positions and velocities alone.
@@ -45,7 +47,8 @@ class Reader:
         groups: dict[int, list[int]] = {}
         for k, (group, _) in enumerate(places):
             groups.setdefault(id(group), []).append(k)
-        for some in groups.values():
+        most = max(1, AT_ONCE // rows.shape[1])
+        for some in (g[k : k + most] for g in groups.values() for k in range(0, len(g), most)):
             group = places[some[0]][0]
             lanes = np.array([places[k][1] for k in some])
             curves = self._curves(x, rows[some]) if group is None else self._at_once(group, lanes, points, rows, some)
