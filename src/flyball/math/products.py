@@ -9,17 +9,16 @@ from typing import Any
 
 import numpy as np
 
+from .vec import mm, mv
+
 
 def product(A: Any, B: Any) -> np.ndarray:
     """A B of matrices (..., 3, 3) and a vector (3,) or matrices (..., 3, k)."""
     if A.ndim == 2 and B.ndim == 1:
-        x, y, z = B.tolist()
-        return np.array([a * x + b * y + c * z for a, b, c in A.tolist()])
-    if A.ndim == 2 and B.ndim == 2:
-        columns = list(zip(*B.tolist(), strict=True))
-        return np.array([[a * x + b * y + c * z for x, y, z in columns] for a, b, c in A.tolist()])
-    terms = (A[..., :, k, None] * B[..., None, k, :] for k in range(3))
-    return next(terms) + next(terms) + next(terms)
+        return np.array(mv(A.ravel().tolist(), B.tolist()))
+    if A.shape == B.shape == (3, 3):  # tuples take a tenth of the time of arrays
+        return np.array(mm(A.ravel().tolist(), B.ravel().tolist())).reshape(3, 3)
+    return A[..., 0:1] * B[..., 0:1, :] + A[..., 1:2] * B[..., 1:2, :] + A[..., 2:] * B[..., 2:, :]
 
 
 def inner(a: Any, b: Any) -> Any:

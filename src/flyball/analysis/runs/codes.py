@@ -41,9 +41,6 @@ class Codes:
         self._turn = threading.Lock()
         self._add(c.again())
 
-    def __reduce__(self) -> object:
-        raise TypeError("addresses mean nothing in another process")
-
     def of(self, x: Values, pattern: bytes) -> Code | None:
         """The code for a run with these tables; of the same ``pattern``, if that is told, all are plain alike."""
         S = x.system

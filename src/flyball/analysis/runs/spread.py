@@ -134,9 +134,6 @@ class Spread:
         self._blocks: OrderedDict[int, Block] = OrderedDict()
         self._turn = threading.Lock()
 
-    def __reduce__(self) -> object:
-        return Spread, (self.structures, self.parameters, self.names, self.points)
-
     def of(self, point: np.ndarray) -> tuple[Group, int] | None:
         """The group of a point and its number there; None if it is for itself."""
         key = point.tobytes()

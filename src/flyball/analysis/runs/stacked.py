@@ -106,7 +106,7 @@ def stacked(x: Values, some: np.ndarray, times: int) -> Values:
     def over(a: Any) -> Any:
         return Lanes(np.repeat(a.x[some], times)) if type(a) is Lanes else a
 
-    system = {name: _each(getattr(x.system, name), lambda a: _array(over(a))) for name in TABLES}
+    system: dict[str, Any] = {name: _each(getattr(x.system, name), lambda a: _array(over(a))) for name in TABLES}
     of = {name: _namespace(n, over) for name, n in x.given.of.items()}
     bodies = {name: _namespace(n, over) for name, n in x.given.bodies.items()}
     for n in bodies.values():
