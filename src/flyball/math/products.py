@@ -18,8 +18,15 @@ def product(A: Any, B: Any) -> np.ndarray:
         return np.array(mv(A.ravel().tolist(), B.tolist()))
     if A.shape == B.shape == (3, 3):  # tuples take a tenth of the time of arrays
         return np.array(mm(A.ravel().tolist(), B.ravel().tolist())).reshape(3, 3)
-    if "c" in (A.dtype.kind, B.dtype.kind):  # NumPy multiplies complex arrays by their places in memory
-        return A @ B
+    if "c" not in (A.dtype.kind, B.dtype.kind):
+        return _terms(A, B)
+    real = _terms(A.real, B.real) - (_terms(A.imag, B.imag) + 0.0)  # no zero changes its sign
+    out = np.empty(real.shape, complex)  # NumPy multiplies complex arrays by their places in memory
+    out.real, out.imag = real, _terms(A.real, B.imag) + _terms(A.imag, B.real) + 0.0
+    return out
+
+
+def _terms(A: Any, B: Any) -> Any:
     return A[..., 0:1] * B[..., 0:1, :] + A[..., 1:2] * B[..., 1:2, :] + A[..., 2:] * B[..., 2:, :]
 
 
