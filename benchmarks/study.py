@@ -3,9 +3,9 @@
 ``kernel``: the compiled loop of a run by itself, mean of a thousand runs, the least of three readings. ``CPU`` is
 that of the process and ``ratio`` what it is of the kernels'; ``wall`` is a clock's. On a shared machine that measures
 the neighbours too: its ratio is to the kernels of the same points alone, called by as many threads right before each
-study, the least of both. Of three studies the quickest. ``simulate``: CPU of `m.simulate` with a curve read, in a loop
-over some of the points. Stiffnesses and torques only forces see; with another length each run is assembled by itself.
-Usage: ``python study.py [--runs 10000] [--threads 1 2]``.
+study, the least of both. Of some studies the quickest. ``simulate``: CPU of `m.simulate` with a curve read, in a loop
+over some of the points. Stiffnesses and torques only forces see; with another length all tables are others.
+Usage: ``python study.py [--runs 10000] [--threads 1 2] [--vary stiffness d] [--repeats 3] [--engines made tables]``.
 """
 
 from __future__ import annotations
@@ -22,16 +22,17 @@ import numpy as np
 
 import flyball as fb
 from flyball.analysis.motion.choice import SimulateOptions
-from flyball.analysis.runs import lean
 from flyball.analysis.runs.compute import Question
+from flyball.analysis.runs.desk import Desk
+from flyball.analysis.runs.lean import shared
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.single import Motion
 from flyball.equations.engine import motion_kernel
 from mechanisms import example
 
 VARIED = {"stiffness": 0.1, "torque": 0.1, "d": 0.001}  # by how much, as part of the model's value
-OF = ["end(K5.x)", "end(crank.rate)"]
-REPEATS, FEW, FEWER = 3, 1000, 400  # readings; runs whose kernels are measured; runs that are assembled by themselves
+OF = ["end(K2.x)", "end(crank.rate)"]
+FEW, FEWER = 1000, 200  # runs whose kernels are measured alone; runs of `simulate`
 COLUMNS = {
     "varied": "varied",
     "engine": "engine",
@@ -54,11 +55,14 @@ class Kernels:
         model, single = m.snapshot(), Motion()
         asked = readings(OF, partial(single.named, model))
         question = Question(model, single, SimulateOptions.asked(usual), study.parameters, asked, study.t)
-        self.shared, self.points = lean.shared(question, study.points[0]), study.points
+        self.shared, self.points = shared(question, study.points[0], study.points), study.points
 
     def through(self, points: np.ndarray, clock: Callable[[], float], spent: list[float]) -> None:
         """Time [s] of the calls for some points, as a clock tells it."""
-        desk, total = lean.Desk(self.shared), 0.0
+        desk, total = Desk(self.shared), 0.0
+        spread = getattr(self.shared.filling, "spread", None)
+        if spread is not None:
+            spread.points, spread.given = points, 0
 
         def timed(*arguments: object) -> int:
             nonlocal total
@@ -72,10 +76,10 @@ class Kernels:
             desk.run(point)
         spent.append(total)
 
-    def each(self) -> float:
+    def each(self, repeats: int) -> float:
         """CPU seconds of one."""
         spent: list[float] = []
-        for _ in range(REPEATS):
+        for _ in range(repeats):
             self.through(self.points[:FEW], time.thread_time, spent)
         return min(spent) / len(self.points[:FEW])
 
@@ -98,14 +102,22 @@ def asked(m: fb.Mechanism, name: str, runs: int, threads: int, made: bool) -> fb
                    threads=threads, specialize=made, progress=False)  # fmt: skip
 
 
+def points(m: fb.Mechanism, name: str, runs: int) -> np.ndarray:
+    """Those of the study."""
+    value, part = m.environment()[name], VARIED[name]
+    u = np.random.default_rng(0).random((runs, 1))
+    return value * (1 - part) + 2.0 * value * part * u
+
+
 def measured(
-    m: fb.Mechanism, name: str, runs: int, threads: int, made: bool
-) -> tuple[fb.Study, float, float, Kernels | None, float]:
-    """(study, CPU seconds, wall seconds, its kernels if they can be had, wall seconds of these): the least of each."""
-    kernels = None if name == "d" else Kernels(m, asked(m, name, runs, threads, made))
+    m: fb.Mechanism, name: str, runs: int, threads: int, made: bool, repeats: int
+) -> tuple[fb.Study, float, float, Kernels, float]:
+    """(study, CPU seconds, wall seconds, its kernels, wall seconds of these): the least of each."""
+    kernels = Kernels(m, asked(m, name, FEW, threads, made))
+    kernels.points = points(m, name, runs)
     found, cpu, wall, alone = None, np.inf, np.inf, np.inf
-    for _ in range(REPEATS):
-        alone = min(alone, np.nan if kernels is None else kernels.wall(threads))
+    for _ in range(repeats):
+        alone = min(alone, kernels.wall(threads))
         start = time.process_time(), time.perf_counter()
         found = asked(m, name, runs, threads, made)
         cpu, wall = min(cpu, time.process_time() - start[0]), min(wall, time.perf_counter() - start[1])
@@ -117,7 +129,7 @@ def alone(m: fb.Mechanism, study: fb.Study) -> float:
     count = min(FEWER, len(study)) // 2
     start = time.process_time()
     for k in range(count):
-        m.simulate(**study.question(k))["K5"].x  # noqa: B018
+        m.simulate(**study.question(k))["K2"].x  # noqa: B018
     return (time.process_time() - start) / count
 
 
@@ -126,16 +138,16 @@ def main() -> None:
     told = argparse.ArgumentParser(description=__doc__)
     told.add_argument("--runs", type=int, default=10_000)
     told.add_argument("--threads", type=int, nargs="+", default=[1, 2])
+    told.add_argument("--vary", nargs="+", default=list(VARIED), choices=VARIED)
+    told.add_argument("--repeats", type=int, default=3)
+    told.add_argument("--engines", nargs="+", default=["made", "tables"])
     asked = told.parse_args()
-    m, rows = example("andrews.toml"), []
-    for made in (True, False):
-        each = np.nan
-        for name in VARIED:
-            runs = min(asked.runs, FEWER) if name == "d" else asked.runs
+    m, rows, runs = example("andrews.toml"), [], asked.runs
+    for made in (engine == "made" for engine in asked.engines):
+        for name in asked.vary:
             for threads in asked.threads:
-                s, cpu, wall, kernels, calls = measured(m, name, runs, threads, made)
-                each = kernels.each() if kernels is not None else each
-                calls = calls if kernels is not None else each * runs / threads
+                s, cpu, wall, kernels, calls = measured(m, name, runs, threads, made, asked.repeats)
+                each = kernels.each(asked.repeats)
                 rows.append(
                     {
                         "varied": name,

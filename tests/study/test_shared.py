@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import partial
 
 import numpy as np
@@ -11,7 +12,7 @@ import flyball as fb
 from flyball import forces
 from flyball.analysis.motion.choice import SimulateOptions
 from flyball.analysis.runs.compute import Question, compute
-from flyball.analysis.runs.lean import VARIED, Lean
+from flyball.analysis.runs.lean import Lean
 from flyball.analysis.runs.readable import of_states
 from flyball.analysis.runs.reading import readings
 from flyball.analysis.runs.runner import runner
@@ -56,7 +57,7 @@ def test_every_number_of_every_force_changes_its_own_table_or_is_not_shared(wher
             except ModelError:
                 continue
             for table, a in x.system._asdict().items():
-                if table not in (*VARIED, "ldl", "flat", "switch_x"):
+                if table not in (*Filling.tables, "ldl", "flat", "switch_x"):
                     np.testing.assert_array_equal(a, getattr(first.system, table), err_msg=f"{field} {table}")
             assert x.q.tobytes() == first.q.tobytes()
             force_x, const = first.system.force_x.copy(), first.system.const.copy()
@@ -154,6 +155,7 @@ def swinging():
     )
     m.add(fb.Body("a", mass="mass", inertia="J", position=("l/2", 0)))
     m.add(fb.Body("b", mass="2*mass", inertia="0.5*J", position=("1.5*l", 0), angular_velocity="w"))
+    m.add(fb.Frame("tip", "b", position=("l/2", "l/10"), angle="0.3*l"))
     m.add(fb.Revolute("A", "ground", "a", at=(0, 0)), fb.Revolute("B", "a", "b", at=("l", 0)))
     m.add(fb.Distance("rod", "ground", "b", at=((1.5, -1.0), ("2*l", 0))))
     m.add(fb.TorsionalSpringDamper("spring", "A", stiffness="10*mass", damping="g/10"))
@@ -162,26 +164,63 @@ def swinging():
 
 @pytest.mark.parametrize("coordinates", ["joint", "absolute"])
 @pytest.mark.parametrize("specialize", [False, True])
-@pytest.mark.parametrize("names", [("mass",), ("J", "g"), ("g",)])
-def test_masses_and_gravity_of_what_starts_at_rest_are_shared(names, specialize, coordinates):
-    of = ["b.y", "end(b.angle)", "min(A.rate)", "end(rod.fx)", "max(energy.kinetic)"]
+@pytest.mark.parametrize("names", [("mass",), ("J", "g"), ("l",), ("l", "mass", "J", "g")])
+def test_lengths_masses_and_gravity_of_what_starts_at_rest_are_shared(names, specialize, coordinates):
+    of = ["b.y", "end(b.angle)", "min(A.rate)", "end(rod.fx)", "max(energy.kinetic)", "tip.x", "end(tip.angle)"]
     q = question(swinging(), names, of, specialize, coordinates=coordinates)
     points = np.random.default_rng(2).uniform(0.5, 1.5, (5, len(names)))
     points[3] = 1.0  # made code goes by what is 1
     run = runner(q, points)
     assert isinstance(run.__self__, Lean)
-    a, b = run(points, lambda: False), compute(q, points)
+    parts = [run(part, lambda: False) for part in (points[:2], points[2:])]
+    a, b = q.empty(5), compute(q, points)
+    a.take(np.arange(2), parts[0])
+    a.take(np.arange(2, 5), parts[1])
     for x, y in zip(a.values, b.values, strict=True):
         assert x.tobytes() == y.tobytes()
     assert len(set(a.values[2])) == 5
-    assert run.__self__.alone_count < 5
+    assert run.__self__.alone_count == 0
 
 
-@pytest.mark.parametrize("name", ["l", "w"])
-def test_lengths_and_velocities_are_not(name):
-    q = question(swinging(), (name,), ["b.y", "end(A.rate)"])
+def test_velocities_are_not():
+    q = question(swinging(), ("w",), ["b.y", "end(A.rate)"])
     points = np.linspace(0.9, 1.1, 5)[:, None]
     a, b = runner(q, points)(points, lambda: False), compute(q, points)
     for x, y in zip(a.values, b.values, strict=True):
         assert x.tobytes() == y.tobytes()
     assert len({x.tobytes() for x in a.values[0]}) == 5
+
+
+def test_runs_that_decide_otherwise_or_fail_are_told_apart():
+    """Of many points some have another longest way, some no length at all: each is what it is by itself."""
+    q = question(swinging(), ("l", "mass"), ["end(b.y)", "end(tip.angle)"])
+    points = np.column_stack([np.linspace(0.5, 1.5, 40), np.linspace(1.0, 2.0, 40)])
+    points[7, 1] = points[31, 1] = -1.0
+    points[11, 0] = 0.0
+    points[12] = points[13]
+    run = runner(q, points)
+    a, b = run(points, lambda: False), compute(q, points)
+    assert a.status.tolist() == b.status.tolist()
+    assert a.reasons == b.reasons
+    assert {7, 31} <= set(a.reasons)
+    for x, y in zip(a.values, b.values, strict=True):
+        assert x.tobytes() == y.tobytes()
+    assert run.__self__.alone_count <= 8
+
+
+def test_what_only_floats_take_is_computed_by_itself():
+    """The points of a cam are one of those: no lanes go through its splines."""
+    m = swinging()
+    m.parameters["r"] = 0.05
+    angles = np.linspace(0.0, 2.0 * np.pi, 13)[:-1].tolist()
+    outline = tuple((f"{1.0 + 0.1 * math.cos(2 * a)!r}*r*cos({a!r})", f"r*sin({a!r})") for a in angles)
+    m.add(fb.Body("cam", mass=1.0, inertia=0.1, position=(3.0, 0.0)))
+    m.add(fb.Body("follower", mass=1.0, inertia=0.1, position=("3 + 1.1*r", 0.0)))
+    m.add(fb.Revolute("C", "ground", "cam", at=(3.0, 0.0)))
+    m.add(fb.Prismatic("G", "ground", "follower", at=(3.0, 0.0), axis=(1, 0)))
+    m.add(fb.Cam("K", "cam", "follower", points=outline, centre=(3.0, 0.0), at=("3 + 1.1*r", 0.0)))
+    q = question(m, ("r",), ["end(follower.x)"])
+    points = np.linspace(0.04, 0.06, 6)[:, None]
+    a, b = runner(q, points)(points, lambda: False), compute(q, points)
+    assert a.status.tolist() == b.status.tolist()
+    assert a.values[0].tobytes() == b.values[0].tobytes()

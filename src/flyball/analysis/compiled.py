@@ -159,7 +159,7 @@ class Compiled:
 
     def drawn(self, q: np.ndarray) -> bool:
         """Whether that is the position that is drawn, with the turns that it is drawn with."""
-        return np.array_equal(q, self.values.q) and np.array_equal(self.z, _places(self.values))
+        return np.array_equal(q, self.values.q) and np.array_equal(self.z, places(self.values))
 
     def turned(self, q: np.ndarray) -> dict[str, float]:
         """Angles of joints that are coordinates, by name, as the states that count turns have them."""
@@ -273,10 +273,10 @@ def compiled(
     )
     with uncollected():
         x = values(structure(model, choices), parameters, held)
-    return Compiled(x, _places(x), dict(parameters or {}))
+    return Compiled(x, places(x), dict(parameters or {}))
 
 
-def _places(x: Values) -> np.ndarray:
+def places(x: Values) -> np.ndarray:
     """States as drawn: joints have no turns yet and works are none; bodies are turned as drawn, places on curves are
     those nearest to the followers.
     """

@@ -21,6 +21,7 @@ from ..results.departure import changed_velocities, not_allowed
 from ..results.result import Result
 from ..tables.system import ALPHA, BETA, LATER, MASS, PASS, STABILIZE, TOL_G, TOL_V
 from .assembly.start import Assembly
+from .compiled import Compiled
 from .motion import partition
 from .motion.ahead import refuse_missing
 from .motion.choice import AUTO, SimulateOptions, chosen, instead_of, unresolved
@@ -219,14 +220,12 @@ def clock_for(
     refuse_unheld(len(times), width(a))
     s, W = a.compiled.structure, a.compiled.work
     real, count = np.zeros(ex.REALS), np.zeros(ex.COUNTS, np.int64)
-    real[[ex.T, ex.T_END, ex.RTOL, ex.ATOL]] = t, t_end, o.rtol, o.tolerance(a.compiled.values.length)
+    real[[ex.T, ex.T_END, ex.RTOL]] = t, t_end, o.rtol
     first = t if start.part.first is None else start.part.first
     real[ex.SPAN] = (t_end - first) or 1.0
     real[ex.STEP] = o.step or 0.0
     real[ex.H] = o.step or start.carried.get("width", 0.0)
     real[ex.H_MAX] = min(o.step or o.max_step, t_end - t)
-    real[ex.SCALE] = a.compiled.values.length
-    real[ex.LEDGER] = energy_size(start.base, float(real[ex.SPAN]))
     real[ex.LARGEST] = max(abs(t), abs(t_end))
     count[ex.QUOTA] = 50
     count[ex.LIMIT] = o.max_steps
@@ -235,17 +234,25 @@ def clock_for(
     Y[0] = y
     W.option[STABILIZE] = STABILIZATION[o.stabilization]
     W.option[ALPHA], W.option[BETA] = o.alpha or 0.0, o.beta or 0.0
-    length = a.compiled.values.length
-    loose = o.tolerance(length) + o.rtol * length
-    near = loose * min(1.0, loose / (NEARER * length))
-    W.option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
-    W.option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
     W.option[PASS] = 1e-13
     nothing = sampled is not None and not sampled and not breaking(a.compiled.values.system)
     seen = np.zeros((ROWS, 0)) if nothing else kept(a.compiled.values.system, sampled)
     works = [s.nq + s.nv + k for name, k in s.state_at.items() if name.endswith(".work")]
     K = np.zeros((len(tableau(explicit(o.method)).c) + 1, len(y)))
-    return ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
+    clock = ex.Clock(real, count, times, Y, K, np.array(works, np.int64), seen)
+    size(clock, start.base, a.compiled, o.tolerance(a.compiled.values.length))
+    return clock
+
+
+def size(clock: ex.Clock, base: Assembly, c: Compiled, atol: float) -> None:
+    """Write what follows from a mechanism's length and weight: tolerances, and what they are compared with."""
+    real, option, length = clock.real, c.work.option, c.values.length
+    real[ex.ATOL], real[ex.SCALE] = atol, length
+    real[ex.LEDGER] = energy_size(base, float(real[ex.SPAN]))
+    loose = atol + real[ex.RTOL] * length
+    near = loose * min(1.0, loose / (NEARER * length))
+    option[TOL_G] = min(1e-6, max(TIGHT_G * length, 1e-2 * near))
+    option[TOL_V] = min(1e-5, max(TIGHT_V, 1e-1 * near))
 
 
 def energy_size(a: Assembly, span: float) -> float:

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator
 from ..constraints import curve
 from ..constraints.blocks import CURVE, Row
 from ..errors import ModelError
+from ..math.products import product
 from ..math.scalar import absolute
 from ..math.spline import complex_cubic, packed
 from ..model.element import Flag, Length, Numbers, Point, Unit, element, nonnegative
@@ -105,7 +106,7 @@ class Cam(Joint):
         par = (0.0, 0.0, float(len(self.curves(n)[0])), 1.0, 0.0, 0.0, 0.0, 1.0)
         s = np.linspace(0.0, _chords(n.points, self.closed)[-1].real, 20 * len(n.points) + 1)
         x, _, _, y, _, _ = curve.point(par, s, data)
-        p = F[1].T @ (M[0] - F[0])
+        p = product(F[1].T, M[0] - F[0])
         guess = float(s[np.argmin((x - p[0]).real ** 2 + (y - p[1]).real ** 2)])
         zero = np.zeros(3)
         i, j = ((tuple(f[0]), tuple(f[1].ravel()), *(tuple(zero),) * 4) for f in (F, M))

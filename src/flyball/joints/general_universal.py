@@ -10,6 +10,7 @@ import numpy as np
 from ..constraints import skew
 from ..constraints.blocks import ANGLE, SKEW_LINES, Row
 from ..errors import ModelError
+from ..math.products import inner
 from ..math.turns import reciprocal
 from ..math.vec import dot
 from ..model.element import Angle, Directions, PointPair, element
@@ -69,14 +70,14 @@ class GeneralUniversal(Joint):
                 f"{self.title}: its axes are parallel; a link with parallel hinges is a Planar joint and a Distance"
             )
         if row.kind != skew.KIND:
-            return (*row.par[:6], np.dot(f, m))
+            return (*row.par[:6], inner(f, m))
         way = M[0] - F[0]
         return (*row.par[:3], *(dot(way, r) for r in reciprocal((f, m, across))), 0.0)
 
 
 def _with_x(z: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Axes with the given z and x towards ``other``."""
-    x = other - (other @ z) * z
+    x = other - inner(other, z) * z
     size = np.sqrt((x * x).sum())
     if not size.real > PARALLEL:
         return triad(z)

@@ -6,10 +6,9 @@ from dataclasses import replace
 from types import SimpleNamespace
 from typing import ClassVar
 
-import numpy as np
-
 from ..constraints.blocks import ANGLE, SLIDE, STRAIGHT_LINE, Row
 from ..errors import ModelError
+from ..math.products import inner, product
 from ..model.element import Angle, Length, Point, element
 from ..model.geometry import vector
 from ..model.joint import Z_TO_X, Coordinate, Joint, WorldFrame
@@ -55,7 +54,7 @@ class WheelOnLine(Joint):
         R = self.orientation(n.axis, planar)
         at = vector(n.at, planar, f"'at' of {self.title}")
         centre = vector(n.centre, planar, f"centre of {self.title}")
-        d = R.T @ (centre - at)
+        d = product(R.T, centre - at)
         if not abs(d[0].real) > 0.0:
             raise ModelError(f"{self.title}: its centre lies on the line; the wheel has no radius")
         if abs(d[2].real) > 1e-9 * abs(d[0].real):
@@ -75,4 +74,4 @@ class WheelOnLine(Joint):
 
 
 def _height(F: WorldFrame, M: WorldFrame) -> float:
-    return np.dot(F[1][:, 0], M[0] - F[0])
+    return inner(F[1][:, 0], M[0] - F[0])

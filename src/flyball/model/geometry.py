@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.lanes import per_lane
+from ..math.products import product
 from ..math.scalar import real_parts
 from ..math.turns import turn
 from ..math.vec import cross, quaternion_matrix
@@ -37,6 +39,7 @@ def vector(values: Any, planar: bool, what: str, direction: bool = False) -> np.
     return a / size
 
 
+@per_lane
 def triad(z: np.ndarray) -> np.ndarray:
     """Right-handed axes (columns) with the given unit vector as z; the world's axes where z is vertical.
 
@@ -63,6 +66,7 @@ def quaternion_to_matrix(e: np.ndarray) -> np.ndarray:
     return np.array(quaternion_matrix(*e)).reshape(3, 3)
 
 
+@per_lane
 def matrix_to_quaternion(R: np.ndarray) -> np.ndarray:
     """Unit quaternion, scalar first and not negative, of a rotation matrix."""
     return quaternion_of(R)
@@ -82,5 +86,5 @@ def orientation_matrix(value: Any, what: str) -> np.ndarray:
     if a.shape == (4,):
         return quaternion_to_matrix(unit_quaternions(a, what))
     if a.shape == (3,):
-        return rotation_about(0, a[0]) @ rotation_about(1, a[1]) @ rotation_about(2, a[2])
+        return product(product(rotation_about(0, a[0]), rotation_about(1, a[1])), rotation_about(2, a[2]))
     raise ModelError(f"{what}: give a quaternion (4, scalar first), Bryant angles (3) or a 3x3 rotation matrix")

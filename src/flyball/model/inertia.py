@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.lanes import per_lane
+from ..math.products import inner, product
 from ..math.scalar import real_parts
 from .element import positive
 from .geometry import orientation_matrix, vector
@@ -123,8 +125,8 @@ def _from_shapes(body: Body, n: SimpleNamespace, planar: bool, heavy: list) -> M
     com = found.com * np.array([1.0, 1.0, 0.0]) if planar else found.com
     if n.com is not None:
         given = vector(n.com, planar, f"com of {body.title}")
-        size = np.sqrt(abs(np.trace(found.inertia)) / abs(found.mass)) + np.sqrt(abs(com @ com))
-        if np.sqrt(abs((given - com) @ (given - com))) > SAME * size:
+        size = np.sqrt(abs(np.trace(found.inertia)) / abs(found.mass)) + np.sqrt(abs(inner(com, com)))
+        if np.sqrt(abs(inner(given - com, given - com))) > SAME * size:
             raise ModelError(
                 f"{body.title}: com is {_numbers(given)} m, but the centre of mass of its shapes is {_numbers(com)} m. "
                 f"Leave com out, or give mass and inertia as well: the shapes are then for looks only"
@@ -163,7 +165,7 @@ def _given(body: Body, n: SimpleNamespace, planar: bool, com: np.ndarray) -> np.
         J = _matrix(body, n)
         if n.inertia_axes is not None:
             T = orientation_matrix(n.inertia_axes, f"inertia_axes of {body.title}")
-            J = T @ J @ T.T
+            J = product(product(T, J), T.T)
     if n.inertia_about is not None:
         about = vector(n.inertia_about, planar, f"inertia_about of {body.title}")
         J = J - shifted(n.mass, about - com)
@@ -184,14 +186,14 @@ def _matrix(body: Body, n: SimpleNamespace) -> np.ndarray:
             f"(0 for a point mass), got {n.inertia}{six}"
         )
     J = np.diag(a) if a.shape == (3,) else a
-    if any(np.abs(A - A.T).max() > 1e-12 * np.abs(A).max() for A in (real_parts(J), J.imag)):
+    if not _symmetric(J):
         raise ModelError(f"{body.title}: its inertia matrix is not symmetric: {a.tolist()}")
     return J
 
 
 def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
     """Refuse an inertia that no body of positive mass has."""
-    a, b, c = np.linalg.eigvalsh(real_parts(found.inertia))
+    a, b, c = _moments(found.inertia)
     slack = TRIANGLE * max(abs(c), abs(a))
     inside = "Its holes must lie inside the other shapes" if n.inertia is None else ""
     if a < -slack:
@@ -205,6 +207,17 @@ def _check(body: Body, n: SimpleNamespace, found: MassProperties) -> None:
             f"{body.title}: principal moments {a:g}, {b:g}, {c:g} kg m^2 break the triangle inequality "
             f"({a:g} + {b:g} < {c:g}); no body of positive mass has them. {why}"
         )
+
+
+@per_lane
+def _symmetric(J: np.ndarray) -> bool:
+    return all(np.abs(A - A.T).max() <= 1e-12 * np.abs(A).max() for A in (real_parts(J), J.imag))
+
+
+@per_lane
+def _moments(J: np.ndarray) -> np.ndarray:
+    """Principal moments, ascending."""
+    return np.linalg.eigvalsh(real_parts(J))
 
 
 def _doubt(n: SimpleNamespace) -> str:

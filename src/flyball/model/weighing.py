@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.products import inner
 from .element import resolve
 from .shapes import Solid
 
@@ -31,7 +32,7 @@ class Weighed:
 
 def shifted(mass: Any, d: np.ndarray) -> np.ndarray:
     """Inertia of a point mass at d: m (d.d 1 - d d^T), the term of the parallel axis theorem (Hahn, eq. 4.26)."""
-    return mass * ((d @ d) * np.eye(3) - np.outer(d, d))
+    return mass * (inner(d, d) * np.eye(3) - np.outer(d, d))
 
 
 def checked(body: Body | Ground, env: Any, planar: bool) -> list[tuple[Solid, SimpleNamespace, str]]:

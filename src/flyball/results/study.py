@@ -200,10 +200,14 @@ class Study:
             out.append((name, f"{span(self.points[:, k])} (in the model {self.base[name]:.6g})"))
         for name, unit in zip(self.of, self.units, strict=True):
             y = self.values[name][self.done]
+            none = int((~np.isfinite(y)).sum()) if y.ndim == 1 else 0  # curves are none where a motion ended before
+            missed = [f"{none} of {len(y)} runs have no number"] if none else []
             y = y[np.isfinite(y)]
             if len(y):
                 text = f"{span(y)} {unit.replace('*', ' ')}".rstrip()
-                out.append((name, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}"))
+                missed.insert(0, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}")
+            if missed:
+                out.append((name, "; ".join(missed)))
         told_of = self._told_of(self.reasons)
         out += [("failed", text) for text in told_of[:TOLD]]
         if len(told_of) > TOLD:

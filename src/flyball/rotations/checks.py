@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ModelError
+from ..math.lanes import deciding
 from ..math.scalar import real_parts, sqrt
 
 ORTHONORMAL = 1e-9  # largest entry of R^T R - 1 of what still counts as a rotation matrix
@@ -36,10 +37,17 @@ def numbers(value: Any, shape: tuple[int, ...], what: str, rule: str = "") -> np
     if n < 0 or a.shape[n:] != shape:
         wanted = ", ".join(["...", *map(str, shape)])
         raise ModelError(f"{what}: the shape is {a.shape}, expected ({wanted})" + (f"; {rule}" if rule else ""))
-    finite = np.isfinite(real_parts(a) if a.dtype == object else a)
+    finite = _finite(a)
     if not finite.all():
         refuse(~finite, a, what, "is not a finite number")
     return a
+
+
+def _finite(a: np.ndarray) -> np.ndarray:
+    if a.dtype != object:
+        return np.isfinite(a)
+    known = deciding(a)
+    return np.asarray(known - known == 0.0)
 
 
 def _expressions(a: np.ndarray) -> bool:
@@ -75,7 +83,7 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
         If a matrix is not orthonormal to 1e-9 or is left-handed.
     """
     R = numbers(value, (3, 3), what)
-    known = real_parts(R) if R.dtype == object else R
+    known = deciding(R) if R.dtype == object else R
     off = np.abs(np.swapaxes(known, -1, -2) @ known - np.eye(3)).max(axis=(-1, -2), initial=0.0)
     if np.any(off > ORTHONORMAL):
         k = np.unravel_index(int(np.argmax(off)), off.shape)
@@ -83,7 +91,7 @@ def rotation_matrices(value: Any, what: str) -> np.ndarray:
             f"{what}{place(tuple(map(int, k)))}: the matrix is not a rotation: its columns must be orthonormal, but "
             f"R^T R is off by {off[k]:.2g} (at most {ORTHONORMAL:g}); rotations.nearest gives the closest rotation"
         )
-    refuse(np.linalg.det(real_parts(R)) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
+    refuse(np.linalg.det(deciding(R)) < 0, R, what, "is not a rotation: it mirrors, so make its columns right-handed")
     return R
 
 
@@ -97,7 +105,7 @@ def unit_quaternions(value: Any, what: str) -> np.ndarray:
     """
     e = numbers(value, (4,), what)
     size = np.sqrt((e * e).sum(axis=-1, keepdims=True))
-    bad = ~(real_parts(size)[..., 0] > SMALLEST)
+    bad = ~(deciding(size)[..., 0] > SMALLEST)
     refuse(bad, e, what, "has no direction; a quaternion must not be zero (no rotation is (1, 0, 0, 0))")
     return e / size
 

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..math.scalar import atan2, rounded
+from ..math.products import inner, product
+from ..math.scalar import atan2, cos, rounded, sin
 from ..math.vec import cross
 from ..model.body import GROUND
 from ..model.geometry import matrix_to_quaternion
@@ -94,7 +95,7 @@ def free_velocities(x: Values, bodies: Mapping[str, BodyState], new: Afresh = AL
             elif s.model.planar:
                 v[v0 : v0 + 3] = d.v[0], d.v[1], d.w[2]
             else:
-                v[v0 : v0 + 6] = np.r_[d.v, d.R.T @ d.w]
+                v[v0 : v0 + 6] = np.r_[d.v, product(d.R.T, d.w)]
     return v
 
 
@@ -110,11 +111,11 @@ def _read_single(
         own = np.array([x.poses.row(FrameSpec(0, t.joint, role)) for t in joints])
         carriers = [bodies.get(_ends(x, t)[k], REST) for t in joints]
         p, R = np.array([d.p for d in carriers]), np.array([d.R for d in carriers])
-        frames.append((p + (R @ own[:, :3, None])[..., 0], R @ own[:, 3:].reshape(-1, 3, 3)))
+        frames.append((p + product(R, own[:, :3, None])[..., 0], product(R, own[:, 3:].reshape(-1, 3, 3))))
     (pF, RF), (pM, RM) = frames
     back = RF.swapaxes(1, 2)
     rest = np.array([t.joint.rest or np.eye(3) for t in joints])
-    shift, turn = (back @ (pM - pF)[..., None])[..., 0], back @ RM @ rest.swapaxes(1, 2)
+    shift, turn = product(back, (pM - pF)[..., None])[..., 0], product(product(back, RM), rest.swapaxes(1, 2))
     for name, i in (("x", 0), ("y", 1), ("z", 2)):
         of = np.array([t.primitives[0].axis == name for t in joints])
         slides = of & np.array([t.primitives[0].kind == "P" for t in joints])
@@ -137,13 +138,13 @@ def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mappi
     body_i = x.structure.tables["body_i"]
     (pF, RF), (pM, RM) = _frames(x, t, bodies)
     rest = np.array(t.joint.rest or np.eye(3))
-    shift, turn = RF.T @ (pM - pF), RF.T @ RM @ rest.T
+    shift, turn = product(RF.T, pM - pF), product(product(RF.T, RM), rest.T)
     way = list(zip(t.links, t.primitives, strict=False))
     for link, step in way[::-1] if t.reversed else way:
         at = body_i[link, Q0]
         a = AXES[step.axis]
         if step.kind == "P":
-            q[at] = a @ shift
+            q[at] = inner(a, shift)
         elif step.kind == "S":
             q[at : at + 4] = matrix_to_quaternion(turn.T if t.reversed else turn)
         else:
@@ -152,9 +153,9 @@ def _read(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState], hints: Mappi
             if crossing and crossing[0].axis != step.axis:
                 b = AXES[crossing[0].axis]
             c = np.array(cross(a, b))
-            turned = turn @ b
-            angle = atan2(c @ turned, b @ turned)
-            turn = _about(a, -angle) @ turn
+            turned = product(turn, b)
+            angle = atan2(inner(c, turned), inner(b, turned))
+            turn = product(_about(a, -angle), turn)
             q[at] = _with_turns(x, t, step.coordinate, angle, bodies, hints)
 
 
@@ -164,14 +165,14 @@ def _frames(x: Values, t: TreeJoint, bodies: Mapping[str, BodyState]) -> list[tu
     for role, name in zip("FM", _ends(x, t), strict=True):
         p, R = x.poses.local(FrameSpec(0, t.joint, role))
         d = bodies.get(name, REST)
-        out.append((d.p + d.R @ p, d.R @ R))
+        out.append((d.p + product(d.R, p), product(d.R, R)))
     return out
 
 
 def _about(a: np.ndarray, angle: float) -> np.ndarray:
     """Rotation about one of the three axes."""
     K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
+    return np.eye(3) + sin(angle) * K + (1.0 - cos(angle)) * product(K, K)
 
 
 def _with_turns(
@@ -188,7 +189,7 @@ def _with_turns(
         drawn = [x.bodies[k].angle if k != GROUND else 0.0 for k in (i, j)]
         now_by, drawn_by = (sign * (a[1] - a[0]) for a in (now, drawn))
         F, M = (x.poses.world(FrameSpec(0, t.joint, role))[1] for role in "FM")
-        at = 0.0 if F is M else _planar_angle(F.T @ M, t)
+        at = 0.0 if F is M else _planar_angle(product(F.T, M), t)
         near = at + now_by - drawn_by
     else:
         return angle
@@ -203,11 +204,12 @@ def whole_turns(near: Any, angle: Any) -> Any:
 def _normal(x: Values, t: TreeJoint) -> float:
     """Component along the plane's normal of the axis that a joint in the plane turns about."""
     R = x.poses.world(FrameSpec(0, t.joint, "F"))[1]
-    return float((R @ AXES[t.joint.planar_normal])[2].real)
+    return float(product(R, AXES[t.joint.planar_normal])[2].real)
 
 
 def _planar_angle(turn: np.ndarray, t: TreeJoint) -> Any:
     """Angle of a turn about a planar joint's normal."""
     b = AXES[NEXT[t.joint.planar_normal]]
     c = np.array(cross(AXES[t.joint.planar_normal], b))
-    return atan2(c @ turn @ b, b @ turn @ b)
+    turned = product(turn, b)
+    return atan2(inner(c, turned), inner(b, turned))

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ..math.scalar import real_parts
+from ..math.lanes import deciding
+from ..math.products import product
 from .afresh import Afresh
 from .poses import Poses
 from .specs import FrameSpec, Structure
@@ -29,9 +30,9 @@ def tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray,
     back = np.array([t.reversed for t in joints])[:, None, None]
     rest = np.array([t.joint.rest or ONE for t in joints])
     (pF, RF), (pM, RM) = (_stacked([pose.local(FrameSpec(0, t.joint, role)) for t in joints]) for role in "FM")
-    M_back, F_back = rest @ _turned(RM), _turned(RF)
-    before_p, before_R = np.where(back, pM, pF), np.where(back, RM @ _turned(rest), RF)
-    beyond_p, beyond_R = np.where(back, -F_back @ pF, -M_back @ pM), np.where(back, F_back, M_back)
+    M_back, F_back = product(rest, _turned(RM)), _turned(RF)
+    before_p, before_R = np.where(back, pM, pF), np.where(back, product(RM, _turned(rest)), RF)
+    beyond_p, beyond_R = np.where(back, product(-F_back, pF), product(-M_back, pM)), np.where(back, F_back, M_back)
     for t in joints:
         for link, step in zip(t.links, t.primitives, strict=False):
             if step.coordinate in t.joint.coordinates:
@@ -42,12 +43,12 @@ def tree_frames(s: Structure, pose: Poses, numbers: Mapping, body_x: np.ndarray,
     first = np.r_[0, last[:-1] + 1]
     p, R = np.zeros((len(links), 3, 1), body_x.dtype), np.tile(ONE.astype(body_x.dtype), (len(links), 1, 1))
     p[first], R[first] = before_p, before_R
-    body_x[links, TREE_P : TREE_P + 3], body_x[links, TREE_R : TREE_R + 9] = p[..., 0], (R @ turns).reshape(-1, 9)
+    body_x[links, TREE_P : TREE_P + 3], body_x[links, TREE_R : TREE_R + 9] = p[..., 0], product(R, turns).reshape(-1, 9)
     p[:], R[:] = 0.0, ONE
     p[last], R[last] = beyond_p, beyond_R
     turns = _turned(turns)
-    body_x[links, BODY_P : BODY_P + 3] = (turns @ p)[..., 0]
-    body_x[links, BODY_R : BODY_R + 9] = (turns @ R).reshape(-1, 9)
+    body_x[links, BODY_P : BODY_P + 3] = product(turns, p)[..., 0]
+    body_x[links, BODY_R : BODY_R + 9] = product(turns, R).reshape(-1, 9)
     _leave_out(body_x, links, s.tables["body_i"][links, TREE])
 
 
@@ -76,16 +77,18 @@ def _leave_out(body_x: np.ndarray, links: np.ndarray, kinds: np.ndarray) -> None
     """
     tree, body = slice(TREE_R, TREE_R + 9), slice(BODY_R, BODY_R + 9)
     T = body_x[links, tree].reshape(-1, 3, 3)
-    about = (kinds == REVOLUTE) & (T[:, 2, 2] == 1.0) & ~T[:, 2, :2].any(axis=1) & ~T[:, :2, 2].any(axis=1)
+    upright = (T[:, 2, 2] == 1.0) & ~(T[:, 2, :2] != 0.0).any(axis=1) & ~(T[:, :2, 2] != 0.0).any(axis=1)
+    about = (kinds == REVOLUTE) & upright
     at, T = links[about], T[about]
-    body_x[at, BODY_P : BODY_P + 3] = (T @ body_x[at, BODY_P : BODY_P + 3, None])[..., 0]
-    body_x[at, body] = (T @ body_x[at, body].reshape(-1, 3, 3)).reshape(-1, 9)
+    body_x[at, BODY_P : BODY_P + 3] = product(T, body_x[at, BODY_P : BODY_P + 3, None])[..., 0]
+    body_x[at, body] = product(T, body_x[at, body].reshape(-1, 3, 3)).reshape(-1, 9)
     body_x[at, tree] = ONE.ravel()
     for rotation, turns in ((tree, TREE_TURNS), (body, BODY_TURNS)):
         R = body_x[links, rotation]
-        none = _never_else(R) & (np.abs(real_parts(R) - ONE.ravel()).max(axis=1) < 1e-15)
+        none = _never_else(R) & (np.abs(deciding(R) - ONE.ravel()) < 1e-15).all(axis=1)
         body_x[links[none], rotation] = ONE.ravel()
-        body_x[links, turns] = (~none & (ONE.ravel() != R).any(axis=1)).astype(float)
+        body_x[links[none], turns] = 0.0
+        body_x[links[~none], turns] = (ONE.ravel() != R[~none]).any(axis=1).astype(float)
 
 
 def _never_else(R: np.ndarray) -> np.ndarray:

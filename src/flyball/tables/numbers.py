@@ -11,6 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ..math.lanes import has_lanes
+from ..math.products import product
+from ..math.vec import cross
 from ..model.body import GROUND, Body
 from ..model.element import Element, resolve
 from ..model.expressions import Expression
@@ -60,9 +63,12 @@ def numbers(model: Model, parameters: Mapping[str, Any] | None = None) -> Number
     """
     model = model.snapshot()
     env = _environment(model, parameters or {})
+    files = tuple(_state_of(path) for path in _files(model))
+    if has_lanes(env.values()):
+        return _found(model, env, (object(), files))
     if kind_of(env.values()) is object:
         return _all(model, env, object())
-    key = bits(env), tuple(_state_of(path) for path in _files(model))
+    key = bits(env), files
     return model.kept.get("numbers", key, MOST, lambda: _found(model, env, key))
 
 
@@ -108,7 +114,7 @@ def _all(model: Model, env: Mapping[str, Any], key: Hashable) -> Numbers:
 def _checked(e: Element, env: Mapping[str, Any]) -> SimpleNamespace:
     """The fields of an element in numbers, which make sense at these values of the parameters."""
     n = resolve(e, env)
-    if kind_of(env.values()) is float:  # a complex step is none to be compared
+    if kind_of(env.values()) is float or has_lanes(env.values()):  # a complex step is none to be compared
         e.check(n)
     return n
 
@@ -143,11 +149,11 @@ def _body(b: Body, n: SimpleNamespace, env: Mapping[str, float], planar: bool) -
     R = b.rotation(n)
     p = vector(n.position, planar, b.name)
     w = np.zeros(3)
-    arm = R @ m.com
+    arm = product(R, m.com)
     v = np.zeros(3) if n.velocity is None else vector(n.velocity, planar, b.name)
     if n.angular_velocity is not None:
         w = np.array([0, 0, n.angular_velocity]) if planar else vector(n.angular_velocity, False, b.name)
-        v = v + np.cross(w, arm)
+        v = v + np.array(cross(w, arm))
     return SimpleNamespace(
         p=p, R=R, com=m.com, mass=m.mass, inertia=m.inertia, volume=m.volume, c=p + arm, v=v, w=w, angle=n.angle
     )

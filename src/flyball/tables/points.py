@@ -16,6 +16,7 @@ import numpy as np
 from ..constraints.blocks import Row
 from ..constraints.registry import KINDS
 from ..errors import FlyballError, ModelError
+from ..math.products import product
 from ..model.body import Body, Frame
 from ..model.element import Element, si_numbers
 from ..model.expressions import Expression, is_number_text
@@ -139,7 +140,7 @@ class _Places:
         if not isinstance(end, Frame):
             return self.numbers.bodies[end.name].p
         b = self.numbers.bodies[end.body]
-        return b.p + b.R @ vector(self.numbers.of[end.name].position, planar, end.title)
+        return b.p + product(b.R, vector(self.numbers.of[end.name].position, planar, end.title))
 
 
 def _written(e: Any, role: str) -> Any:
@@ -158,10 +159,10 @@ def check_centred(model: Model, name: str, element: Any, way: np.ndarray, length
     ModelError
         Naming both, and how far.
     """
-    off = float(np.abs(way.real).max(initial=0.0))
-    if isinstance(element, (Joint, Force)) and off > CENTRED * length.real:
+    off = np.abs(way.real)
+    if isinstance(element, (Joint, Force)) and (off > CENTRED * length.real).any():
         raise ModelError(
             f"{model[name].title} has no inertia and is a point mass as the model describes it, but with these "
-            f"parameters {element.title} is attached {off:.3g} m off its centre of mass. Place both by the same "
-            f"expression, or give the body an inertia"
+            f"parameters {element.title} is attached {float(off.max()):.3g} m off its centre of mass. Place both by "
+            f"the same expression, or give the body an inertia"
         )

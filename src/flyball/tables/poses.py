@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
+from ..math.products import product
 from ..model.body import GROUND, Body
 from ..model.force import BodyForce
 from ..model.geometry import vector
@@ -33,7 +34,7 @@ class Poses:
             p, R, name = self.world(f)
             b = self.bodies[name]
             back = b.R.T
-            found = self._given.local[key] = np.concatenate((back @ (p - b.c), (back @ R).ravel()))
+            found = self._given.local[key] = np.concatenate((product(back, p - b.c), product(back, R).ravel()))
         return found
 
     def local(self, f: FrameSpec) -> tuple[np.ndarray, np.ndarray]:
@@ -64,7 +65,7 @@ class Poses:
             return p, R, name
         p, R = self._placed(e, n)[f.role] if hasattr(e, "placed") and n.at is not None else self.named(end)
         if f.coordinate:
-            R = R @ np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}"))
+            R = product(R, np.array(getattr(e.coordinates[f.coordinate], f"turn_{f.role}")))
         return p, R, name
 
     def _placed(self, e: Any, n: SimpleNamespace) -> dict[str, tuple[np.ndarray, np.ndarray]]:
@@ -80,7 +81,7 @@ class Poses:
         e = self.model[name]
         n = self.numbers[name]
         b = self.bodies[e.body]
-        return b.p + b.R @ vector(n.position, self.model.planar, e.title), b.R @ e.rotation(n)
+        return b.p + product(b.R, vector(n.position, self.model.planar, e.title)), product(b.R, e.rotation(n))
 
     def separation(self, e: Any) -> float:
         """Drawn distance from the first of an element's frames to the last, by way of all between."""
@@ -101,7 +102,7 @@ class Poses:
         e = self.model[joint]
         R = self.ends(e)[0][1]
         turn = e.coordinates["angle"].turn_F if "angle" in e.coordinates else ()
-        return (R @ np.array(turn) if len(turn) else R)[:, 2]
+        return (product(R, np.array(turn)) if len(turn) else R)[:, 2]
 
     def drawn(self, t: TermSpec) -> float:
         """What a term's formula gives in the drawn configuration."""

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..constraints.registry import KINDS
+from ..math.lanes import has_lanes, over_lanes
 from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.coupling import Coupling
@@ -85,7 +86,11 @@ def values(
     holds : mapping, optional
         Values of the coordinates that are held (see ``structure``).
     """
-    n = numbers(s.model, parameters)
+    return values_of(s, numbers(s.model, parameters), holds)
+
+
+def values_of(s: Structure, n: Numbers, holds: Mapping[str, complex] | None = None) -> Values:
+    """The same from the numbers of its elements."""
     if kind_of([*n.env.values(), *(holds or {}).values()]) is not float:
         return _filled(s, n, holds or {})
     return s.kept.get("values", (n.key, bits(holds or {})), MOST, lambda: _filled(s, n, holds or {}))
@@ -115,7 +120,7 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
     term_x = _term_x(s, pose, holds, curve_at, new.table("term_x", (len(s.terms), 8), dtype), new)
     force_x = _force_x(s, pose, new.table("force_x", (len(s.forces), 16), dtype), new)
     switch_x = switches.numbers(s, numbers, new.table("switch_x", (len(s.switches), 8), dtype), new.asks, pose.apart)
-    semidefinite = float(body_x[:, EXCESS : EXCESS + 9].any() or body_x[:, EXCESS_MASS].any())
+    semidefinite = float((body_x[:, EXCESS : EXCESS + 9] != 0.0).any() or (body_x[:, EXCESS_MASS] != 0.0).any())
     gravity = model.gravity_vector(env)
     pace = tempo(given, model, gravity, length)
     glob = np.array([*gravity, REGULARISATION, semidefinite, length, pace, *_units(s, length)], dtype)
@@ -126,7 +131,8 @@ def _refilled(s: Structure, given: Numbers, holds: Mapping[str, Any], new: Afres
         t["switch_i"], switch_x, t["guard_i"], t["control_i"],
          t["kinds"], t["code"], const, glob, t["mass_i"], t["pair_i"], t["block_i"], s.ldl, np.zeros(FLAT, np.int64),
     )  # fmt: skip
-    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, float(length.real), pose)
+    typical = length if has_lanes([length]) else float(length.real)
+    x = Values(s, system, new.state("q", s.nq, dtype), new.state("v", s.nv, dtype), given, typical, pose)
     drawn = {b.name: BodyState(d.c, d.R, d.v, d.w, d.angle) for b, d in ((b, bodies[b.name]) for b in model.bodies)}
     x.q[:], x.v[:] = positions(x, drawn, new=new), free_velocities(x, drawn, new=new)
     return x
@@ -156,15 +162,24 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
     if not moving:
         return 1.0
     centres, on_body = np.array([b.c for b in moving]), s.tables["frame_i"] >= 0
-    places = np.concatenate([frame_x[~on_body, :3], centres])
-    nothing = NO_LENGTH * np.abs(real_parts(places)).max(initial=0.0)
-    if (length := _longest([frame_x[on_body, :3], centres - centres.mean(axis=0)])).real > nothing:
-        return length
-    if (length := _longest([places - places.mean(axis=0)])).real > nothing:
+    if (length := _reach(frame_x[on_body, :3], frame_x[~on_body, :3], centres)).real > 0.0:
         return length
     spin = [np.trace(b.inertia) / b.mass for b in moving if b.mass.real > 0.0]
     length = np.sqrt(max(spin, key=lambda x: x.real, default=0.0))
     return length if length.real > 0.0 else 1.0
+
+
+@over_lanes
+def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
+    """The same by places alone, (..., k, 3) each; 0 where they are all one."""
+    places = np.concatenate([on_ground, centres], axis=-2)
+    nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)
+    first = _longest(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
+    if (real_parts(first) > nothing).all():
+        return first
+    other = _longest(places - places.mean(axis=-2, keepdims=True))
+    other = np.where(real_parts(other) > nothing, other, 0.0)
+    return np.where(real_parts(first) > nothing, first, other)[()]
 
 
 def _units(s: Structure, length: Any) -> list[Any]:
@@ -173,10 +188,10 @@ def _units(s: Structure, length: Any) -> list[Any]:
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
-def _longest(ways: list[np.ndarray]) -> Any:
-    every = np.concatenate(ways)
-    longest = every[np.argmax((real_parts(every) ** 2).sum(axis=1))]
-    return np.sqrt((longest**2).sum())
+def _longest(ways: np.ndarray) -> Any:
+    at = np.argmax((real_parts(ways) ** 2).sum(axis=-1), axis=-1)
+    longest = np.take_along_axis(ways, at[..., None, None], axis=-2)[..., 0, :]
+    return np.sqrt((longest**2).sum(axis=-1))
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:

@@ -13,10 +13,11 @@ REFINED = 4  # times that a solution is improved, at most
 
 
 def least(A, b: np.ndarray) -> np.ndarray:
-    """The smallest x that leaves the least of A x = b; A is sparse.
+    """The smallest x that leaves the least of A x = b; A is sparse, or an array if it is small.
 
     It is refined: a part of b that has nothing to do with a larger one is met to its own last digits.
     """
+    A = A.toarray() if max(A.shape) <= DENSE and not isinstance(A, np.ndarray) else A
     solve = _dense(A) if max(A.shape) <= DENSE else _sparse(A)
     x, left, before = np.zeros(A.shape[1]), b, np.inf
     for _ in range(REFINED):
@@ -30,7 +31,7 @@ def least(A, b: np.ndarray) -> np.ndarray:
 
 
 def _dense(A) -> Callable[[np.ndarray], np.ndarray]:
-    U, d, Vt = np.linalg.svd(A.toarray(), full_matrices=False)
+    U, d, Vt = np.linalg.svd(A, full_matrices=False)
     k = int((d > NONE * d.max(initial=0.0)).sum())
     return lambda b: Vt[:k].T @ ((U[:, :k].T @ b) / d[:k])
 

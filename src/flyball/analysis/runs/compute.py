@@ -49,6 +49,7 @@ class Answers:
     status: np.ndarray
     reasons: dict[int, str] = field(default_factory=dict)
     remarks: dict[int, str] = field(default_factory=dict)
+    seconds: float = 0.0  # that it took to find them
 
     def take(self, at: np.ndarray, other: Answers) -> None:
         """Write those of some runs, ``at`` being their numbers here."""

@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import ModelError
 from ...model.expressions import number
 from ...model.model import Model
+from ...model.units import same_kind
 from ...model.words import listing, suggest
 
 GIVEN, SAMPLED = ("grid", "list"), ("random", "latin", "sobol", "saltelli")
@@ -74,6 +75,9 @@ def _values(model: Model, name: str, given: Any) -> np.ndarray:
             f"vary {name!r}: a grid takes a list of values, not {given!r}; ranges and distributions go with "
             f"design='random', 'latin', 'sobol' or 'saltelli', and samples="
         )
+    texts = [x for x in given if isinstance(x, str)]
+    for text in texts[1:]:
+        same_kind(texts[0], text, f"vary {name!r}: the first of its values")
     found = np.array([_number(model, name, x) for x in given], float)
     if not len(found):
         raise ModelError(f"vary {name!r}: there are no values")

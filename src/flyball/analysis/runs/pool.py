@@ -12,9 +12,11 @@ import numpy as np
 
 from .compute import Answers, Question
 from .remote import elsewhere, packed
-from .runner import runner
+from .runner import runner, timed
 
-LONG, PARTS = 256, 64  # most runs in a task, and tasks that a study has at least if it has that many runs
+LONG, FIRST, PARTS = 512, 8, 64  # most runs in a task; in the first ones; into how many these divide a study
+SECONDS = 0.25  # that a task should take
+TIMES = 100_000  # states that a task keeps at most
 AHEAD = 4  # tasks that wait, for each worker that there may be
 Task = Callable[[np.ndarray], "Future[Answers]"]
 
@@ -34,17 +36,20 @@ def computed(
 
     When the consumer stops, or is interrupted, runs that have not begun are given up.
     """
-    size = max(1, min(LONG, len(todo) // PARTS))
-    parts = [todo[k : k + size] for k in range(0, len(todo), size)]
-    with _submitting(question, points[todo], executor, threads) as (submit, most):
+    size, at = max(1, min(FIRST, len(todo) // PARTS)), 0
+    most = max(1, min(LONG, TIMES // len(question.times)))
+    with _submitting(question, points[todo], executor, threads) as (submit, workers):
         waiting: dict[Future[Answers], np.ndarray] = {}
         try:
-            for part in parts:
-                waiting[submit(points[part])] = part
-                while len(waiting) >= most:
-                    yield from _done(waiting)
-            while waiting:
-                yield from _done(waiting)
+            while at < len(todo) or waiting:
+                while at < len(todo) and len(waiting) < AHEAD * workers:
+                    left = len(todo) - at
+                    part = todo[at : at + max(1, min(size, left // (2 * workers)))]
+                    waiting[submit(points[part])] = part
+                    at += len(part)
+                for part, found in _done(waiting):
+                    size = max(1, min(most, int(SECONDS * len(part) / max(found.seconds, 1e-6))))
+                    yield part, found
         finally:
             for future in waiting:
                 future.cancel()
@@ -60,18 +65,18 @@ def _done(waiting: dict[Future[Answers], np.ndarray]) -> Iterator[tuple[np.ndarr
 def _submitting(
     question: Question, points: np.ndarray, executor: Executor | None, threads: int
 ) -> Iterator[tuple[Task, int]]:
-    """(what computes some runs, how many such tasks may wait)."""
+    """(what computes some runs, how many workers there are)."""
     if executor is not None:
-        key, data = packed(question)
+        key, data = packed(question, len(points))
         yield (
             lambda some: executor.submit(elsewhere, key, data, some),
-            AHEAD * max(cores(), getattr(executor, "_max_workers", 0)),
+            max(cores(), getattr(executor, "_max_workers", 0)),
         )
         return
     stop, run = threading.Event(), runner(question, points)
     pool = ThreadPoolExecutor(threads, thread_name_prefix="flyball study")
     try:
-        yield lambda some: pool.submit(run, some, stop.is_set), AHEAD * threads
+        yield lambda some: pool.submit(timed, run, some, stop.is_set), threads
     finally:
         stop.set()  # runs that go on end, others do not begin
         pool.shutdown(cancel_futures=True)

@@ -13,13 +13,13 @@ import numpy as np
 
 from ...errors import ModelError, StartWarning
 from .compute import Answers, Question
-from .runner import Runner, runner
+from .runner import Runner, runner, timed
 
 HELD = 4  # questions that a worker process keeps
 
 
-def packed(question: Question) -> tuple[str, bytes]:
-    """For other processes: bytes, and what they are known by.
+def packed(question: Question, runs: int) -> tuple[str, bytes]:
+    """For other processes, which compute so many runs together: bytes, and what they are known by.
 
     Raises
     ------
@@ -27,13 +27,13 @@ def packed(question: Question) -> tuple[str, bytes]:
         If it holds something that cannot be sent.
     """
     try:
-        data = pickle.dumps(question)
+        data = pickle.dumps((question, runs))
     except Exception as pickling:
-        data = _by_value(question, pickling)
+        data = _by_value((question, runs), pickling)
     return hashlib.sha256(data).hexdigest(), data
 
 
-def _by_value(question: Question, pickling: Exception) -> bytes:
+def _by_value(question: tuple[Question, int], pickling: Exception) -> bytes:
     """With functions that have no name in a module, if what Dask brings for that is there."""
     try:
         import cloudpickle
@@ -54,12 +54,12 @@ def elsewhere(key: str, data: bytes, points: np.ndarray) -> Answers:
     with _LOCK:
         run = _HELD.get(key)
     if run is None:
-        question = pickle.loads(data)
-        run = runner(replace(question, model=question.model.snapshot()), points)
+        question, runs = pickle.loads(data)
+        run = runner(replace(question, model=question.model.snapshot()), points, runs)
         with _LOCK:
             _HELD[key] = run
             while len(_HELD) > HELD:
                 _HELD.popitem(last=False)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", StartWarning)  # remarks say it
-        return run(points, lambda: False)
+        return timed(run, points, lambda: False)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -16,10 +17,18 @@ Runner = Callable[[np.ndarray, Callable[[], bool]], Answers]
 """(points, whether to stop) -> answers."""
 
 
-def runner(question: Question, points: np.ndarray) -> Runner:
-    """What computes the runs of a question, of which some points are given."""
-    if len(points) > FEW and isinstance(question.single, Motion):
+def timed(run: Runner, points: np.ndarray, stopped: Callable[[], bool]) -> Answers:
+    """What it answers, and how long that took."""
+    started = time.perf_counter()
+    found = run(points, stopped)
+    found.seconds = time.perf_counter() - started
+    return found
+
+
+def runner(question: Question, points: np.ndarray, runs: int = 0) -> Runner:
+    """What computes the runs of a question, of which some points are given: all, or the first of so many ``runs``."""
+    if max(len(points), runs) > FEW and isinstance(question.single, Motion):
         for k in (0, len(points) // 2, len(points) - 1):  # one may fail
-            if (found := shared(question, points[k])) is not None:
+            if (found := shared(question, points[k], points)) is not None:
                 return Lean(found).compute
     return partial(compute, question)

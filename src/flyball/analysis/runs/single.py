@@ -12,6 +12,7 @@ import numpy as np
 from ...errors import ModelError, SimulationError
 from ...model.model import Model
 from ...model.quantities import one
+from ...model.words import listing, suggest
 from ..kinematics import KinematicsOptions, kinematics
 from ..motion.choice import SimulateOptions
 from ..options import Options
@@ -20,7 +21,9 @@ from ..untouched import refuse_contact
 from ..watched import KNOWN
 from .reading import CURVE, FUNCTION, Reading, reduced
 
-REDUCED = re.compile(r"\s*(end|max|min|mean|rms)\s*\((.+)\)\s*")
+NUMBERS = ("end", "max", "min", "mean", "rms")
+REDUCED = re.compile(rf"\s*({'|'.join(NUMBERS)})\s*\((.+)\)\s*")
+CALLED = re.compile(r"\s*(\w+)\s*\(.*\)\s*")
 
 
 class Single:
@@ -83,6 +86,11 @@ class Timed(Single):
         """A curve, or one number of it."""
         found = REDUCED.fullmatch(text) if isinstance(text, str) else None
         how, name = (found[1], found[2].strip()) if found else (CURVE, text)
+        if isinstance(name, str) and (called := CALLED.fullmatch(name)):
+            raise ModelError(
+                f"of={text!r}: {called[1]!r} is no number of a curve{suggest(called[1], NUMBERS)}; "
+                f"{listing(list(NUMBERS))}, of one curve each; for others give functions, of={{'name': function}}"
+            )
         return Reading(text, how, name, one(model, name).unit)
 
     def value(self, found: Any, r: Reading, times: np.ndarray) -> np.ndarray:

@@ -12,8 +12,12 @@ from ...model.element import Element, resolve
 from ...model.expressions import Expression, law_expression, number
 from ...model.force import Force
 from ...model.model import Model
+from ...numerics.integrators.clock import Clock
 from ...tables.numbers import words
 from ...tables.values import Values
+from ..assembly.start import Assembly
+from ..compiled import Compiled
+from .spread import Place, Spread
 
 PLACES = ("at", "angle", "orientation", "axis")
 """Fields of forces that say where their frames are."""
@@ -65,6 +69,7 @@ class Filling:
     slots: tuple[tuple[int, str], ...]  # of parameters in the table of constants
     rows: tuple[tuple[int, Any, float], ...]  # of forces: row of their table, force, drawn distance of its ends
     env: Mapping[str, float]
+    spread: Spread | None = None  # of many runs at once
 
     @classmethod
     def of(cls, x: Values, names: Sequence[str], changed: Sequence[Element]) -> Filling:
@@ -76,6 +81,25 @@ class Filling:
         rows = [(k, e, x.poses.apart(e)) for k, e in enumerate(s.forces) if any(e is c for c in changed)]
         return cls(tuple(names), tuple(later), tuple(slots), tuple(rows), dict(x.env))
 
+    def also(self, points: np.ndarray) -> None:
+        """Points that are asked for next."""
+        if self.spread is not None:
+            self.spread.also(points)
+
+    @property
+    def place(self) -> Place:
+        """All have the tables of the first run, but for forces."""
+        return None, 0
+
+    def desk(self, c: Compiled) -> Filling:
+        """What one thread fills in: all of it is in the tables."""
+        return self
+
+    pattern = b""  # of numbers that are 0, 1 or -1: looked at in each run
+
+    def begin(self, at: Assembly, clock: Clock) -> None:
+        """The start is that of the first run."""
+
     def fill(self, point: np.ndarray, own: Mapping[str, np.ndarray]) -> bool:
         """Write them into ``own["force_x"]`` and ``own["const"]``: it always can.
 
@@ -84,6 +108,11 @@ class Filling:
         ModelError
             If a number makes no sense.
         """
+        if self.spread is not None and (found := self.spread.of(point)) is not None:
+            (tables,), k = found[0].tables, found[1]
+            for name in self.tables:
+                tables.system[name].write(k, own[name])
+            return True
         env, force_x, const = dict(self.env), own["force_x"], own["const"]
         env.update(zip(self.names, point.tolist(), strict=True))
         for name, formula in self.derived:

@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
+from ...math.products import inner, product
 from ..element import Direction, Length, Point, element, positive
 from ..geometry import vector
 from .form import Form
@@ -57,11 +58,11 @@ class Link(Solid):
             z = np.array([1.0, 0, 0] if (x[:2].real ** 2).sum() < 1e-12 else [0, 0, 1.0])
         else:
             z = vector(n.normal, False, f"normal of {self.title}", direction=True)
-        z = z - (z @ x) * x
-        if not (z @ z).real > 1e-12:
+        z = z - inner(z, x) * x
+        if not inner(z, z).real > 1e-12:
             raise ModelError(f"{self.title}: its normal {tuple(n.normal)} points along the bar; it must point across")
-        z = z / np.sqrt(z @ z)
-        return p + R @ middle, R @ np.column_stack([x, np.cross(z, x), z])
+        z = z / np.sqrt(inner(z, z))
+        return p + product(R, middle), product(R, np.column_stack([x, np.cross(z, x), z]))
 
     def volume(self, n: SimpleNamespace) -> Any:
         """V = (l w + pi r^2) t, with r = w / 2."""

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
+from ...math.products import product
 from ..element import Length, Point, element, positive
 from ..geometry import triad
 from .cylinder import Cylinder
@@ -53,7 +54,7 @@ class Rod(Solid):
         """The middle, and axes with z along the bar; ``position`` and ``orientation`` move all of it."""
         p, R = super().pose(n)
         middle, axis, _ = ends(self, n)
-        return p + R @ middle, R @ triad(axis)
+        return p + product(R, middle), product(R, triad(axis))
 
     def _bar(self, n: SimpleNamespace) -> SimpleNamespace:
         return SimpleNamespace(radius=n.radius, length=ends(self, n)[2])

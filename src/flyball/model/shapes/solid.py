@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...errors import ModelError
+from ...math.products import product
 from ..element import Density, Element, Flag, Mass, Name, Point, positive
 from ..geometry import orientation_matrix, vector
 from ..orientation import Orientation
@@ -156,7 +157,8 @@ class Solid(Element):
         """Centre of mass [m] and inertia per unit mass [m^2] about it, in the body's reference frame."""
         p, R = self.pose(n)
         k = np.asarray(self.gyration(n))
-        return p + R @ np.asarray(self.centre(n)), R @ (np.diag(k) if k.ndim == 1 else k) @ R.T
+        inertia = product(product(R, np.diag(k) if k.ndim == 1 else k), R.T)
+        return p + product(R, np.asarray(self.centre(n))), inertia
 
     def mesh(self, n: SimpleNamespace) -> tuple[np.ndarray, np.ndarray]:
         """Its surface for drawing: vertices (k, 3) [m] in the body's reference frame and triangles (m, 3)."""
