@@ -1,0 +1,77 @@
+"""Where a mechanism rests with its controllers: a copy with bodies in their place rests there (`sliders`)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...errors import ModelError
+from ...model.model import Model
+from ...model.touching import holds_at_times
+from ..compiled import Compiled
+from .derivatives import State
+from .natural import natural_scales
+from .own_words import in_own_words, refusal
+from .rest import Rest
+from .search import newton_to
+from .sliders import Scale, Slid, slid, states, there
+
+PASSES = 4  # searches, each in the natural sizes of where the one before ended
+ALIKE = 30.0  # times that natural sizes may differ from those that were searched in
+
+
+def resting_copy(model: Model, at: dict[str, float], x: State, scales: dict[str, Scale]) -> tuple[Slid, Rest]:
+    """The copy in which places stand for states, and where it is.
+
+    Raises
+    ------
+    ModelError
+        If something holds at times, too.
+    """
+    other = slid(model, {name: repr(z) for name, z in at.items()}, places=True, scales=scales)
+    if holds_at_times(other.model):
+        raise ModelError(
+            f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "
+            f"leave what holds out, m.changed({{...: None}}), or simulate until it rests"
+        )
+    b = there(other, x, "absolute")
+    return other, Rest.at(b.c, b.t, b.q)
+
+
+def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str, float]) -> np.ndarray:
+    """Positions at rest near some; the states there are left in ``c``.
+
+    Parameters
+    ----------
+    model : Model
+    c : Compiled
+        Of it, in absolute coordinates.
+    t, q : float, ndarray
+    at : dict
+        State -> its value where the search begins.
+
+    Raises
+    ------
+    NotConverged
+        With what is left.
+    """
+    scales = None
+    for _ in range(PASSES):
+        c.z[: len(at)] = [*at.values()]
+        x = State.resting(c, t, q)
+        before, scales = scales, natural_scales(model, at, x, places=True)
+        if before is not None and _alike(before, scales):
+            break
+        other, begin = resting_copy(model, at, x, scales)
+        with in_own_words(other, at):
+            found, last = newton_to(begin)
+        if found is None:
+            raise refusal(last, other, at)
+        q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
+        at = dict(zip(at, states(other, at, found), strict=True))
+    return q
+
+
+def _alike(a: dict[str, Scale], b: dict[str, Scale]) -> bool:
+    """Whether states and rates are as large here as there."""
+    ratios = np.array([(a[k].stride / b[k].stride, a[k].push / b[k].push) for k in a])
+    return bool((np.abs(np.log(ratios)) <= np.log(ALIKE)).all())
