@@ -16,7 +16,7 @@ from .linear.derivatives import State
 from .linear.in_bodies import in_bodies
 from .linear.large import DENSE, Large, is_large
 from .linear.reduced import Frame
-from .linear.sliders import of_slides, refuse_sampled, without
+from .linear.sliders import of_slides, of_states_only, refuse_sampled
 from .linear.spectrum import EQUAL, Spectrum, spectrum
 from .linearize import InstantOptions, without_inputs
 from .options import count as at_least
@@ -88,13 +88,11 @@ def _controlled(model: Model, o: ModesOptions) -> Modes:
     slides, x = d.other.slides, d.state
     with d.in_own_words():
         f, frame, r = without_inputs(x, o.frozen, off=d.off)
-    assert r.doubt is not None
-    left = [k for k, name in enumerate(f.labels) if not of_slides(name, slides)]
-    left += range(len(f.labels), len(r.A))
-    own = without(r.A, r.doubt, left)
+    r = of_states_only(r, f, slides)
+    own = spectrum(r.A, r.doubt)
     one, rest = _listed(own, o.count)
     mine = np.array([not of_slides(n.name, slides) for n in velocity_names(x.c.structure)])
-    found = _made(x, own, one, r.position[:, left] @ own.vectors[:, one], mine)
+    found = _made(x, own, one, r.position @ own.vectors[:, one], mine)
     found.point = snapshot(d.here)
     return _judged(found, own, one, rest, frame)
 

@@ -45,7 +45,7 @@ class InBodies:
 
     def in_own_words(self) -> AbstractContextManager[None]:
         """Have errors that are raised within name states and signals as the user does."""
-        return in_own_words(self.other, self.at)
+        return in_own_words(self.other)
 
 
 def in_bodies(model: Model, here: State, coordinates: str, outputs: Sequence[str], *, frozen: bool) -> InBodies:

@@ -18,27 +18,25 @@ NUMBER = r"[-+]?(?:\d[\d.]*(?:e[-+]?\d+)?|inf|nan)"
 
 
 @contextmanager
-def in_own_words(other: Slid, at: Mapping[str, float]) -> Iterator[None]:
+def in_own_words(other: Slid) -> Iterator[None]:
     """Have errors that are raised within name states and signals as the user does.
 
     Parameters
     ----------
     other : Slid
         The copy.
-    at : mapping
-        State -> its value where the copy's bodies are drawn.
     """
     try:
         yield
     except FlyballError as error:
         if error.args and isinstance(error.args[0], str):
-            error.args = (told(error.args[0], other, at), *error.args[1:])
+            error.args = (told(error.args[0], other), *error.args[1:])
         if isinstance(getattr(error, "elements", None), tuple):
-            error.elements = tuple(told(name, other, at) for name in error.elements)  # type: ignore[attr-defined]
+            error.elements = tuple(told(name, other) for name in error.elements)  # type: ignore[attr-defined]
         raise
 
 
-def told(text: str, other: Slid, at: Mapping[str, float]) -> str:
+def told(text: str, other: Slid) -> str:
     """A text about the copy as one about the model."""
     for theirs, own in sorted(other.words.items(), key=lambda x: -len(x[0])):
         text = text.replace(theirs, own)
@@ -46,7 +44,7 @@ def told(text: str, other: Slid, at: Mapping[str, float]) -> str:
         stride = other.scales[name].stride
 
         def value(found: re.Match[str], name: str = name, stride: float = stride) -> str:
-            return f"{name} = {at[name] + stride * float(found[1]) + 0.0:.6g}"
+            return f"{name} = {float(other.at[name]) + stride * float(found[1]) + 0.0:.6g}"
 
         text = re.sub(rf"\b{body}_now\.value = ({NUMBER})(?: m/s| m)?", value, text)
         text = re.sub(rf"Actuator '{body}_push'(?:: its law)?", f"the law of {name!r}:", text)
@@ -54,7 +52,7 @@ def told(text: str, other: Slid, at: Mapping[str, float]) -> str:
     return text
 
 
-def refusal(x: Rest, other: Slid, at: Mapping[str, float]) -> NotConverged:
+def refusal(x: Rest, other: Slid) -> NotConverged:
     """What remains where the search for a position at rest ended.
 
     Parameters
@@ -63,8 +61,6 @@ def refusal(x: Rest, other: Slid, at: Mapping[str, float]) -> NotConverged:
         Of the copy.
     other : Slid
         The copy.
-    at : mapping
-        State -> its value where the copy's bodies are drawn.
     """
     best = Rest.at(x.c, x.t, x.q)
     error, rates = failure(best), rates_left(best.equations, other)
@@ -73,7 +69,7 @@ def refusal(x: Rest, other: Slid, at: Mapping[str, float]) -> NotConverged:
     own = {name: value for name, value in error.residuals.items() if not of_slides(name, other.slides)} | rates
     k = int(np.argmax(left[rows]))
     if left[rows[k]] < left.max(initial=0.0):
-        return NotConverged(told(error.args[0], other, at), own)
+        return NotConverged(told(error.args[0], other), own)
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, "
         f"{changing(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look whether "

@@ -38,6 +38,8 @@ from ..assembly.start import Assembly
 from ..compiled import compiled
 from ..motion.layer import in_coordinates
 from .derivatives import State
+from .free import Free
+from .reduced import Reduced
 from .rest import Rest
 from .rounding import Doubt
 from .spectrum import Spectrum, spectrum
@@ -78,6 +80,8 @@ class Slid:
         Signal that was asked for -> curve of the copy that it is.
     laws : dict
         State or signal that is sampled -> curve of the copy that its value from the next instant on is.
+    at : dict
+        State -> its value where the bodies are drawn, a number or a formula.
     held : frozenset of str
         States and signals that are sampled.
     scales : dict
@@ -91,6 +95,7 @@ class Slid:
     added: tuple[str, ...]
     outputs: dict[str, str]
     laws: dict[str, str]
+    at: Mapping[str, float | str]
     held: frozenset[str]
     scales: dict[str, Scale]
     words: dict[str, str]
@@ -159,6 +164,7 @@ class _Sliding:
         self.new.by_name = {k: e for k, e in model.by_name.items() if e.category not in ("controllers", "events")}
         self.states = wired(model)
         self.body = {x.name: self._free(x.name.replace(".", "_")) for x in self.states}
+        self.at = at
         self.scales = {x.name: scales.get(x.name, Scale()) for x in self.states}
         self.known = {name: f"(({at[name]}) + {self._stride(name)}{b}_now)" for name, b in self.body.items()}
         self.words = {self.known[name]: name for name in self.body}
@@ -191,7 +197,7 @@ class _Sliding:
         slides = {body: name for name, body in self.body.items()}
         added = (*slides, self.board) if self.board else tuple(slides)
         held = frozenset(x.name for x in self.states if x.controller.sampled)
-        return Slid(self.new, slides, added, found, laws, held, self.scales, self.words)
+        return Slid(self.new, slides, added, found, laws, self.at, held, self.scales, self.words)
 
     def _stride(self, name: str) -> str:
         """What the sensor of a state is multiplied by."""
@@ -325,7 +331,7 @@ def without_places(dense: StateSpace, doubt: Doubt, other: Slid) -> tuple[StateS
     left = [k for k, name in enumerate(dense.states) if k not in owner or name.endswith(" rate")]
     names = tuple(slides[owner[k]] if k in owner else dense.states[k] for k in left)
     units = tuple("" if k in owner else dense.state_units[k] for k in left)
-    own = without(dense.A, doubt, left)
+    own = spectrum(dense.A[np.ix_(left, left)], _of_left(doubt, left))
     one = np.array([other.scales[slides[owner[k]]].stride if k in owner else 1.0 for k in left])
     space = StateSpace(
         A=one[:, None] * dense.A[np.ix_(left, left)] / one,
@@ -343,9 +349,20 @@ def without_places(dense: StateSpace, doubt: Doubt, other: Slid) -> tuple[StateS
     return space, own
 
 
-def without(A: np.ndarray, doubt: Doubt, left: Sequence[int]) -> Spectrum:
-    """Eigenvalues of the equations without the places of bodies that stand for states; ``left`` are the others."""
-    return spectrum(A[np.ix_(left, left)], Doubt(doubt.by[left], doubt.size[:, left]))
+def of_states_only(r: Reduced, f: Free, slides: Mapping[str, str]) -> Reduced:
+    """Reduced equations without inputs and without the places of bodies that stand for states."""
+    left = [k for k, name in enumerate(f.labels) if not of_slides(name, slides)]
+    left += range(len(f.labels), len(r.rate))
+    assert r.doubt is not None
+    parts = {k: getattr(r, k)[:, left] for k in ("position", "velocity", "acceleration", "multipliers")}
+    return dataclasses.replace(
+        r, rate=r.rate[np.ix_(left, left)], doubt=_of_left(r.doubt, left), M=None, D=None, K=None, **parts
+    )
+
+
+def _of_left(doubt: Doubt, left: Sequence[int]) -> Doubt:
+    """The same of the equations that are left."""
+    return Doubt(doubt.by[left], doubt.size[:, left])
 
 
 def of_states(other: Slid, s: Structure) -> list[int]:
