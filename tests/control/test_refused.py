@@ -90,7 +90,7 @@ def test_friction_of_a_negative_coefficient_in_a_single_run():
         lambda m: m.inverse_dynamics([0, 1]),
         lambda m: m.prepare(),
         lambda m: m.sensitivity(["A.displacement"], ["k"]),
-        lambda m: m.root_locus("k", [1, 2]),
+        lambda m: m.equilibria("k", [1, 2]),
         lambda m: m.symbolic(),
         lambda m: m.simulate(1, method="variational", step=0.01),
         lambda m: m.simulate(1, method="impulse"),
@@ -100,3 +100,61 @@ def test_who_does_not_know_them_says_so(ask):
     m = slide(fb.Lag("lag", of="1", time=1), force="lag", k=1.0)
     with pytest.raises(fb.ModelError, match="Lag 'lag'"):
         ask(m)
+
+
+def test_states_that_do_not_rest_are_called_what_they_are_called():
+    """Not by the bodies that stand for them inside."""
+    m = slide(
+        fb.StateSpace("K", inputs=["A.displacement - 1"], A=[[-1, 0], [0, -2]], B=[[1], [2]], C=[[1, 1]]), force="K"
+    )
+    with pytest.raises(fb.AnalysisError, match=r"not in equilibrium.*: 'K\.x[12]' changes by -[12] in a second"):
+        m.linearize()
+    with pytest.raises(fb.NotConverged, match=r"'i\.value' changes by 1 in a second") as caught:
+        slide(fb.Integrator("i", of="1"), force="i").equilibrium()
+    assert caught.value.residuals["i.value"] == pytest.approx(1.0)
+    assert set(caught.value.residuals) == {"i.value", "cart.x", "cart.y", "cart.angle"}
+    with pytest.raises(fb.NotConverged, match=r"the next sample changes 'n\.value' by 1"):
+        slide(fb.State("n", next="n + 1", period=0.1), force="0*n").equilibrium()
+    m = slide(fb.State("K_x", rate="abs(K_x - 2e-4) - A.displacement + 0*t", initial=2e-4), force="K_x - 2e-4")
+    with pytest.raises(
+        fb.SingularityError, match=r"the law of 'K_x\.value': 'abs\(K_x - .*' has a kink at K_x\.value = 0\.0002\."
+    ):
+        m.linearize()
+
+
+CROSSING = {
+    "by time": ({"lower": "-1", "upper": "2 - t"}, {}, 3.0),
+    "by the motion": ({"lower": "50*A.displacement - 1", "upper": "0.5"}, {}, None),
+    "by a parameter": ({"lower": "a", "upper": 2.0}, {"parameters": {"a": 3.0}}, 0.0),
+    "by an event": ({"lower": "b", "upper": "2"}, {}, 0.5),
+}
+
+
+@pytest.mark.parametrize("way", [{}, {"method": "radau"}, {"method": "generalised-alpha", "step": 0.01}], ids=str)
+@pytest.mark.parametrize("period", [None, 0.01])
+@pytest.mark.parametrize("case", CROSSING)
+def test_limits_that_cross(case, period, way):
+    """They gave the upper one, silently."""
+    limits, more, t = CROSSING[case]
+    pid = fb.PID("pid", setpoint="1", measured="A.displacement", kp=8, ki=6, tracking=1, period=period, **limits)
+    m = slide(pid, a=1.0, b=1.0)
+    m.add(fb.Event("later", "t - 0.5", do=fb.Set("b", 4)))
+    with pytest.raises(
+        fb.SimulationError, match=r"PID 'pid' has no output: its limits cross, lower is .* and upper"
+    ) as e:
+        m.simulate(4, outputs=5, **more, **way)
+    if t is not None:
+        assert e.value.t == pytest.approx(t, abs=0.0101)
+    else:  # where the mechanism is at 0.03 m
+        assert e.value.result.final[1][0] == pytest.approx(0.03, abs=3e-3)
+
+
+def test_limits_that_cross_where_it_is_to_rest():
+    pid = fb.PID("pid", setpoint="1", measured="A.displacement", kp=8, ki=6, tracking=1, lower="a", upper="b")
+    m = slide(pid, a=1.0, b=20.0)
+    assert m.equilibrium()["pid.output"] == pytest.approx(10.0)
+    for ask in (m.equilibrium, m.linearize, m.modes):
+        with pytest.raises(
+            fb.AnalysisError, match="at t = 0 s, PID 'pid' has no output: its limits cross, lower is 30"
+        ):
+            ask(parameters={"a": 30.0})

@@ -11,19 +11,19 @@ import numpy as np
 from ..errors import ModelError, SingularityError
 from ..model.model import Model
 from ..model.touching import holds_at_times
-from ..results.equilibrium import MARGINAL, STABLE, UNSTABLE, Equilibrium
+from ..results.equilibrium import STABLE, UNSTABLE, Equilibrium
 from .assemble import assemble
 from .assembly.start import Assembly
+from .linear.controlled import found_rest
 from .linear.curves import snapshot
-from .linear.derivatives import State
 from .linear.found import finished
 from .linear.preload import preloaded
 from .linear.rest import Rest
 from .linear.search import LONGEST, descent, failure, newton, pushed
-from .linear.sliders import STRIDE, places, slid, there
-from .linear.stability import GROWTH, stability
+from .linear.spectrum import spectrum
+from .linear.stability import by_eigenvalues, stability
 from .linear.turning import turning as turn
-from .linearize import LinearizeOptions, linearize, without_inputs
+from .linearize import LinearizeOptions, small_motions, without_inputs
 from .options import Options
 from .resting.rest import rest
 from .steps import tangent_step
@@ -93,27 +93,11 @@ def _controlled(model: Model, o: EquilibriumOptions) -> Equilibrium:
             raise ModelError(f"{name}= is for mechanisms without controllers; leave it out")
     a = assemble(model, t=o.t, parameters=o.parameters)
     begin, c = _begun(a, o.start), a.compiled
-    names = [x.name for x in c.structure.controls]
-    old = dict(zip(names, (begin if o.start is None else o.start.assembly).compiled.z.tolist(), strict=False))
-    other = slid(model, {name: repr(z) for name, z in old.items()}, places=True)
-    if holds_at_times(other.model):
-        raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and equilibrium knows only one of the two; "
-            f"leave what holds out, m.changed({{...: None}}), or simulate until it rests"
-        )
-    b = there(other, State.resting(c, a.t, begin.q), "absolute")
-    x = Rest.at(b.c, b.t, b.q)
-    if (found := newton(x)) is None:
-        raise failure(x)
-    q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
-    c.z[: len(names)] = [old[name] + STRIDE * at for name, at in zip(names, places(other, found), strict=True)]
+    z = (begin if o.start is None else o.start.assembly).compiled.z.tolist()
+    at = dict(zip((x.name for x in c.structure.controls), z, strict=False))
+    q = found_rest(model.snapshot(), c, a.t, begin.q, at)
     out = finished(Rest.at(c, a.t, q), {}, "Newton's method")
-    small = linearize(model, LinearizeOptions(about=out, **ABOUT))
-    w = small.eigenvalues
-    grows = w.real.max(initial=-1.0) / max(np.abs(w).max(initial=0.0), 1e-300)
-    if small.period is not None:  # what is multiplied by more than 1 from instant to instant grows
-        grows = np.abs(w).max(initial=0.0) - 1.0
-    out.stability = UNSTABLE if grows > GROWTH else MARGINAL if grows > -GROWTH else STABLE
+    out.stability = small_motions(model, LinearizeOptions(about=out, **ABOUT))[1]
     return out
 
 
@@ -170,12 +154,11 @@ def _steady(a: Assembly, described: Assembly, names: Sequence[str]) -> Equilibri
     found = turn(a, described, names, c.parameters)
     x = found.state
     f, _, r = without_inputs(x)
-    w = np.linalg.eigvals(r.A)
-    grows = w.real.max(initial=0.0) / max(np.abs(w).max(initial=0.0), 1e-300)
+    grows = by_eigenvalues(spectrum(r.A, r.doubt)) == UNSTABLE
     q, v = c.take(x.c, x.t, x.q, x.v)
     return Equilibrium(
         t=x.t,
-        stability=UNSTABLE if grows > GROWTH else STABLE,
+        stability=UNSTABLE if grows else STABLE,
         freedoms=tuple(f.labels),
         stiffness=r.K if r.K is not None else np.zeros((0, 0)),
         weakest={},

@@ -29,13 +29,15 @@ from .linear.descriptor import descriptor, descriptor_of_large
 from .linear.effects import effects, stepped
 from .linear.frames import kinematic, told
 from .linear.free import Free, free, refuse_singular
+from .linear.in_bodies import in_bodies
 from .linear.inputs import Input, with_inputs
 from .linear.instant import instant
 from .linear.kinks import refuse_kinks
 from .linear.large import DENSE, Large, is_large
 from .linear.reduced import Frame, Inputs, Reduced, reduced
-from .linear.sliders import Slid, slid, there, without_places
+from .linear.sliders import without_places
 from .linear.spectrum import spectrum
+from .linear.stability import by_eigenvalues
 from .linear.steady import moved_on, seen_from
 from .linear.undetermined import refuse_undetermined
 from .options import Options
@@ -82,7 +84,7 @@ class LinearizeOptions(InstantOptions):
 def linearize(model: Model, o: LinearizeOptions) -> LinearModel:
     """Linear equations about an equilibrium or a steady motion: see `Mechanism.linearize`."""
     if model.controllers:
-        return _controlled(model, o)
+        return small_motions(model, o)[0]
     if holds_at_times(model):
         joined, there, notes = closed_instant(model, o, "linearize")
         out = _linear(joined, there)
@@ -104,28 +106,34 @@ def _linear(model: Model, o: LinearizeOptions) -> LinearModel:
     if o.about is not None:
         x, named = _with(x, o.inputs)
     if not is_large(x):
-        return _small(x, o, named)
+        return _small(x, o, named)[0]
     whole = Large.at(x, o.frozen, _parameters(named))
     later = partial(_state_space_of, model.snapshot(), o)
     return _told(whole.e, named, o.outputs, later, descriptor_of_large(whole, named, o.outputs), None)
 
 
-def _controlled(model: Model, o: LinearizeOptions) -> LinearModel:
-    """Of a mechanism with controllers: of one that has bodies in their place; with sampled ones over a cycle."""
-    here, other, x = in_bodies(model, o, o.outputs)
+def small_motions(model: Model, o: LinearizeOptions) -> tuple[LinearModel, str]:
+    """Linear equations of a mechanism with controllers, and their stability.
+
+    They are those of one that has bodies in their place; with sampled ones over a cycle.
+    """
+    d = in_bodies(model, o.state(model), o.coordinates, o.outputs, frozen=o.frozen)
+    here, other = d.here, d.other
     asked = replace(o, outputs=(*(other.outputs.get(name, name) for name in o.outputs), *other.laws.values()))
-    x, named = _with(x, o.inputs)
-    found = _small(x, asked, named)
-    space, cycle = without_places(found.dense, other.slides), None
+    with d.in_own_words():
+        x, named = _with(d.state, o.inputs)
+        found, r = _small(x, asked, named, d.off)
+        assert r.doubt is not None
+        space, own = without_places(found.dense, r.doubt, other)
+    cycle = None
     if other.laws:
         samples = _samples(here, list(other.laws), len(o.outputs))
-        at = dict(zip((x.name for x in here.c.structure.controls), here.z.tolist(), strict=False))
-        refuse_unsettled(
-            samples, np.array([at[s.name] for s in samples]), found.output_values[len(o.outputs) :], model.name
-        )
-        space, cycle = over_a_cycle(space, samples, len(o.outputs))
+        at = np.array([d.at[s.name] for s in samples])
+        sizes = np.array([other.scales[s.name].size for s in samples])
+        refuse_unsettled(samples, at, found.output_values[len(o.outputs) :], sizes, model.name)
+        space, own, cycle = over_a_cycle(space, samples, len(o.outputs))
     units = ["" if name in other.outputs else u for name, u in zip(o.outputs, found.output_units, strict=False)]
-    return LinearModel(
+    linear = LinearModel(
         model.name,
         list(zip(found.inputs, found.input_units, strict=True)),
         list(zip(o.outputs, units, strict=True)),
@@ -137,25 +145,7 @@ def _controlled(model: Model, o: LinearizeOptions) -> LinearModel:
         found.seen_from,
         cycle,
     )
-
-
-def in_bodies(model: Model, o: InstantOptions, outputs: Sequence[str] = ()) -> tuple[State, Slid, State]:
-    """The state, the copy with bodies in place of controllers, and the state of this copy.
-
-    Raises
-    ------
-    ModelError
-        If something holds at times, too.
-    """
-    here = o.state(model)
-    now = zip(here.c.structure.controls, here.z.tolist(), strict=False)
-    other = slid(model, {x.name: repr(z) for x, z in now}, outputs)
-    if holds_at_times(other.model):
-        raise ModelError(
-            f"{model.name!r} has controllers and parts that hold at times, and small motions know only one of the two; "
-            f"leave what holds out, m.changed({{...: None}}), or put joints in its place"
-        )
-    return here, other, there(other, here, o.coordinates)
+    return linear, by_eigenvalues(own, discrete=cycle is not None)
 
 
 def _samples(here: State, names: Sequence[str], first: int) -> list[Sample]:
@@ -168,21 +158,23 @@ def _samples(here: State, names: Sequence[str], first: int) -> list[Sample]:
     return out
 
 
-def _small(x: State, o: LinearizeOptions, named: list[Input]) -> LinearModel:
-    """Of mechanisms with few velocities: the constraints are taken out."""
-    e, f, frame = _about(x, o.frozen, to=_parameters(named))
-    r = reduced(e, f, frame, _effects(e, f, named))
+def _small(
+    x: State, o: LinearizeOptions, named: list[Input], off: np.ndarray | None = None
+) -> tuple[LinearModel, Reduced]:
+    """Of mechanisms with few velocities: the constraints are taken out; ``off`` is as in `steady.balanced`."""
+    e, f, frame = _about(x, o.frozen, to=_parameters(named), off=off)
+    r = reduced(e, f, frame, _effects(e, f, named), off)
     if frame.turning.any() and (named or o.outputs):
         _refuse_turning(e, f, r, frame, named, o.outputs)
     refuse_undetermined(x, o.outputs)
     space = _state_space(e, f, r, named, o.outputs)
-    return _told(e, named, o.outputs, space, partial(descriptor, e, f, frame, named, o.outputs), frame)
+    return _told(e, named, o.outputs, space, partial(descriptor, e, f, frame, named, o.outputs), frame), r
 
 
 def _state_space_of(model: Model, o: LinearizeOptions) -> StateSpace:
     """What is dense of a large mechanism."""
     x, named = _with(o.state(model), o.inputs)
-    return _small(x, o, named).dense
+    return _small(x, o, named)[0].dense
 
 
 def _with(x: State, inputs: Sequence[str]) -> tuple[State, list[Input]]:
@@ -218,20 +210,24 @@ def _refuse_turning(
                 )
 
 
-def without_inputs(x: State, frozen: bool = False, like: Free | None = None) -> tuple[Free, Frame, Reduced]:
+def without_inputs(
+    x: State, frozen: bool = False, like: Free | None = None, off: np.ndarray | None = None
+) -> tuple[Free, Frame, Reduced]:
     """The reduced linear equations at a state, in the coordinates of others if given; errors as `linearize`."""
-    e, f, frame = _about(x, frozen, like)
-    return f, frame, reduced(e, f, frame, None)
+    e, f, frame = _about(x, frozen, like, off=off)
+    return f, frame, reduced(e, f, frame, None, off)
 
 
-def _about(x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = ()) -> tuple[Equations, Free, Frame]:
+def _about(
+    x: State, frozen: bool, like: Free | None = None, to: Sequence[str] = (), off: np.ndarray | None = None
+) -> tuple[Equations, Free, Frame]:
     e = Equations(x)
     f = free(e, like)
     refuse_singular(e, f)
     both = np.hstack([f.Z, 0.0 * f.Zv]), np.hstack([0.0 * f.Z, f.Zv])
     refuse_kinks(e, *both, to)
     still = np.zeros((len(x.v),) * 2)
-    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f)
+    frame = Frame(np.zeros(3), still, kinematic(x)) if frozen else seen_from(x, e, f, off)
     frame.told = told(x, frame, frozen)
     return e, f, frame
 

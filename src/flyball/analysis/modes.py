@@ -9,18 +9,21 @@ import numpy as np
 from ..model.model import Model
 from ..model.touching import holds_at_times
 from ..numerics.rank import span
-from ..results.modes import GROWS, STILL, Modes
+from ..results.modes import GROWS, Modes
 from ..tables.names import velocity_names
 from .linear.curves import snapshot
 from .linear.derivatives import State
+from .linear.in_bodies import in_bodies
 from .linear.large import DENSE, Large, is_large
-from .linear.sliders import of_slides, refuse_sampled
-from .linear.spectrum import EQUAL, spectrum
-from .linearize import InstantOptions, in_bodies, without_inputs
+from .linear.reduced import Frame
+from .linear.sliders import of_slides, of_states_only, refuse_sampled
+from .linear.spectrum import EQUAL, Spectrum, spectrum
+from .linearize import InstantOptions, without_inputs
 from .options import count as at_least
 from .resting.instant import closed_instant
 
 FEW = 10
+STILL = 1e-6  # of the fastest: sparse eigenvalues below are zero; a double zero shows rounding by its square root
 ROUNDED = 1e-11  # parts of a shape, or of an eigenvalue, below this part of its largest are rounding
 TINY = 1e-7  # directions of rigid motions below this part of the largest are none
 
@@ -55,46 +58,56 @@ def _modes(model: Model, o: ModesOptions) -> Modes:
         return _sparse(x, count or FEW, frozen)
     f, frame, r = without_inputs(x, frozen)
     own = spectrum(r.A, r.doubt)
+    one, rest = _listed(own, count)
+    found = _made(x, own, one, r.position[:, : len(r.A)] @ own.vectors[:, one])
+    return _judged(found, own, one, rest, frame)
+
+
+def _listed(own: Spectrum, count: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of the eigenvalues that are told, one of each pair, slowest first; and of those left out."""
     w = own.values
     listed = np.array([k for group in own.groups for k in group[: own.geometric[group[0]]]], int)
     one = listed[w[listed].imag >= 0.0]
     one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
-    rest = one[count:] if count is not None else one[:0]
-    one = one[:count]
-    shapes = r.position[:, : len(r.A)] @ own.vectors[:, one]
-    found = _made(x, w[one], shapes, float(np.abs(w).max(initial=0.0)))
+    return one[:count], one[count:] if count is not None else one[:0]
+
+
+def _judged(found: Modes, own: Spectrum, one: np.ndarray, rest: np.ndarray, frame: Frame) -> Modes:
+    """The same modes, with what the eigenvalues say besides."""
     found.turning, found.seen_from = frame.turning, frame.told
     found.multiplicity, found.geometric_multiplicity = own.multiplicity[one], own.geometric[one]
     found.residual = own.residual
-    found.growing = bool((w[rest].real > GROWS * np.abs(w[rest])).any())
+    found.growing = bool((own.values[rest].real > GROWS * np.abs(own.values[rest])).any())
     return found
 
 
 def _controlled(model: Model, o: ModesOptions) -> Modes:
     """Of a mechanism with continuous controllers: of one that has bodies in their place, less these."""
     refuse_sampled(model, "modes")
-    here, other, x = in_bodies(model, o)
-    f, frame, r = without_inputs(x, o.frozen)
-    names = [f.names[d].name for d in f.chosen], [f.names[d].name for d in f.chosen_v]
-    left = [k for k, name in enumerate(names[0]) if not of_slides(name, other.slides)]
-    left += range(len(names[0]), len(r.A))
-    w, vectors = np.linalg.eig(r.A[np.ix_(left, left)])
-    one = np.flatnonzero(w.imag >= 0.0)
-    one = one[np.lexsort((-w[one].real, np.abs(w[one])))]
-    shapes = r.position[:, left] @ vectors[:, one[: o.count]]
-    own = np.array([not of_slides(n.name, other.slides) for n in velocity_names(x.c.structure)])
-    found = _made(x, w[one[: o.count]], shapes, float(np.abs(w).max(initial=0.0)), own)
-    found.turning, found.seen_from, found.point = frame.turning, frame.told, snapshot(here)
-    rest = w[one[o.count :]] if o.count is not None else w[:0]
-    found.growing = bool((rest.real > GROWS * np.abs(rest)).any())
-    return found
+    d = in_bodies(model, o.state(model), o.coordinates, (), frozen=o.frozen)
+    slides, x = d.other.slides, d.state
+    with d.in_own_words():
+        f, frame, r = without_inputs(x, o.frozen, off=d.off)
+    r = of_states_only(r, f, slides)
+    own = spectrum(r.A, r.doubt)
+    one, rest = _listed(own, o.count)
+    mine = np.array([not of_slides(n.name, slides) for n in velocity_names(x.c.structure)])
+    found = _made(x, own, one, r.position @ own.vectors[:, one], mine)
+    found.point = snapshot(d.here)
+    return _judged(found, own, one, rest, frame)
 
 
-def _made(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float, own: np.ndarray | None = None) -> Modes:
-    """Modes whose largest part is 1, seen from the ground; of the velocities ``own`` only, if given."""
-    own = np.ones(len(shapes), bool) if own is None else own
-    names = [n for n, mine in zip(velocity_names(x.c.structure), own, strict=True) if mine]
-    length, shapes = (x.c.values.length / x.c.sizes)[own, None], shapes[own]
+def _made(x: State, own: Spectrum, which: np.ndarray, shapes: np.ndarray, mine: np.ndarray | None = None) -> Modes:
+    """Modes whose largest part is 1, seen from the ground; of the velocities ``mine`` only, if given."""
+    w, fastest = own.values[which], float(np.abs(own.values).max(initial=0.0))
+    mine = np.ones(len(shapes), bool) if mine is None else mine
+    return _scaled(x, w, shapes[mine], fastest, mine)
+
+
+def _scaled(x: State, w: np.ndarray, shapes: np.ndarray, fastest: float, mine: np.ndarray) -> Modes:
+    """The same of given eigenvalues, and parts of the shapes."""
+    names = [n for n, own in zip(velocity_names(x.c.structure), mine, strict=True) if own]
+    length = (x.c.values.length / x.c.sizes)[mine, None]
     size = length * np.abs(shapes)
     for k in range(shapes.shape[1]):
         if size[:, k].max(initial=0.0) > 0.0:
@@ -129,7 +142,9 @@ def _sparse(x: State, count: int, frozen: bool) -> Modes:
         values += [w[own].mean()] * own_shapes.shape[1]
         often += [(len(own), own_shapes.shape[1])] * own_shapes.shape[1]
         shapes.append(own_shapes)
-    found = _made(x, np.array(values[:count], complex), whole.scale[:, None] * np.hstack(shapes)[:, :count], p.fastest)
+    every = np.ones(len(whole.scale), bool)
+    shape = whole.scale[:, None] * np.hstack(shapes)[:, :count]
+    found = _scaled(x, np.array(values[:count], complex), shape, p.fastest, every)
     found.residual = residual
     found.multiplicity, found.geometric_multiplicity = np.array(often[:count], int).reshape(-1, 2).T
     return found

@@ -13,9 +13,12 @@ from ..model.model import Model
 from ..results.equilibrium import Equilibrium
 from ..results.root_locus import Crossing, RootLocus
 from .equilibria import EquilibriaOptions, checked, equilibria, stopped
+from .equilibrium import equilibrium, resting
 from .linear.crossings import Event, Search
+from .linear.in_bodies import in_bodies
 from .linear.passing import passing
 from .linear.sample import Sample, match, sample
+from .linear.sliders import of_states_only, refuse_sampled
 from .linearize import InstantOptions, without_inputs
 from .progress import Tell, shown
 from .untouched import refuse_contact
@@ -74,22 +77,57 @@ class RootLocusOptions(InstantOptions):
 
 def root_locus(model: Model, o: RootLocusOptions) -> RootLocus:
     """Eigenvalues over values of a parameter, as branches, and where stability changes: see `Mechanism.root_locus`."""
-    refuse_contact(model, "root_locus")
+    refuse_contact(model, "root_locus", controlled=True)
+    refuse_sampled(model, "root_locus")
     points = checked(model, o.parameter, o.values, o.t, o.parameters)
-    along = equilibria(model, o.rest(points)) if o.equilibrium else None
+    rest = (_Controlled if model.controllers else _Series)(model, o, points)
 
     def at(place: float) -> Sample:
         value = float(np.interp(place, np.arange(len(points)), points))
-        about = None
-        if along is not None:
-            about = along[int(place)]
-            if place != int(place):  # between those of the series
-                about = equilibria(model, o.rest([along.values[int(place)], value], about))[1]
-        return sample(place, value, *without_inputs(o.here(value, about).state(model), o.frozen))
+        about = rest.at(place, value) if o.equilibrium else None
+        here = o.here(value, about)
+        if not model.controllers:
+            return sample(place, value, *without_inputs(here.state(model), o.frozen))
+        d = in_bodies(model, here.state(model), o.coordinates, (), frozen=o.frozen)
+        with d.in_own_words():
+            f, frame, r = without_inputs(d.state, o.frozen, off=d.off)
+        return sample(place, value, f, frame, of_states_only(r, f, d.other.slides))
 
     done = RootLocus(model.name, o.parameter, points[:0], np.zeros((0, 0), complex))
     with shown(o.progress, f"eigenvalues over {o.parameter}") as tell:
         return _traced(done, points, at, tell)
+
+
+class _Series:
+    """Equilibria at the values and between them, along one branch."""
+
+    def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
+        self.model, self.o = model, o
+        self.along = equilibria(model, o.rest(points)) if o.equilibrium else None
+
+    def at(self, place: float, value: float) -> Equilibrium:
+        """The equilibrium at a place among the values."""
+        assert self.along is not None
+        about = self.along[int(place)]
+        if place == int(place):
+            return about
+        return equilibria(self.model, self.o.rest([self.along.values[int(place)], value], about))[1]
+
+
+class _Controlled:
+    """The same with controllers: each search begins at the nearest one that is known."""
+
+    def __init__(self, model: Model, o: RootLocusOptions, points: np.ndarray) -> None:
+        self.model, self.o, self.known = model, o, dict[float, Equilibrium]()
+
+    def at(self, place: float, value: float) -> Equilibrium:
+        """The equilibrium at a place among the values."""
+        if place not in self.known:
+            near = min(self.known, key=lambda k: abs(k - place), default=None)
+            here = self.o.here(value, None)
+            start = None if near is None else self.known[near]
+            self.known[place] = equilibrium(self.model, resting(here.t or 0.0, here.parameters, start))
+        return self.known[place]
 
 
 def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], tell: Tell) -> RootLocus:

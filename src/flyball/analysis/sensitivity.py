@@ -20,6 +20,7 @@ from .compiled import Compiled
 from .equilibrium import equilibrium, resting
 from .linear.begun import held, start_changes, start_tangents
 from .linear.carried import carried
+from .linear.controlled import determined_copy
 from .linear.curves import over_time, slopes, snapshot
 from .linear.derivatives import Equations, State, announce, stepped_values
 from .linear.differences import Found, aside, check, derivative, whole
@@ -27,8 +28,9 @@ from .linear.eigenvalues import changes
 from .linear.instant import instant
 from .linear.jumps import refuse_jumps
 from .linear.kinks import refuse_kinks
+from .linear.own_words import in_own_words
 from .linear.rest import Rest
-from .linear.sliders import beginnings, refuse_sampled, slid
+from .linear.sliders import Slid, beginnings, refuse_sampled, slid
 from .linear.tangent import Direction, Linear, Tangent, friction
 from .linear.undetermined import refuse_undetermined, told_by_reactions
 from .linear.variation import Variation, Varied, followed
@@ -123,7 +125,11 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Derivatives of quantities with respect to parameters: see `Mechanism.sensitivity`."""
     if model.controllers:
         return _controlled(model, o)
-    refuse_contact(model, "sensitivity")
+    return _asked(model, o)
+
+
+def _asked(model: Model, o: SensitivityOptions) -> Sensitivity:
+    refuse_contact(model, "sensitivity", controlled=True)
     env = model.environment(o.parameters)
     for name in o.to:
         if name not in env:
@@ -155,17 +161,24 @@ def sensitivity(model: Model, o: SensitivityOptions) -> Sensitivity:
 
 def _controlled(model: Model, o: SensitivityOptions) -> Sensitivity:
     """Of a mechanism with controllers: of one that has bodies in their place."""
-    if o.analysis != "motion" or model.events:
+    if o.analysis not in ("motion", "equilibrium") or model.events:
         refuse_controllers(
             model, f"sensitivity with analysis={o.analysis!r}" + (", with events," if model.events else "")
         )
+    if o.analysis == "equilibrium":
+        return _asked(model, o)
     refuse_sampled(model, "sensitivity")
     for name in o.of:
         one(model, name)
     other = slid(model, beginnings(model), o.of)
     found = sensitivity(other.model, replace(o, of=tuple(other.outputs.get(name, name) for name in o.of)))
-    units = ("" if name in other.outputs else u for name, u in zip(o.of, found.units, strict=True))
-    return replace(found, of=o.of, units=tuple(units))
+    return _named(found, o.of, other)
+
+
+def _named(found: Sensitivity, of: tuple[str, ...], other: Slid) -> Sensitivity:
+    """What was found of a copy, by the names of the model."""
+    units = ("" if name in other.outputs else u for name, u in zip(of, found.units, strict=True))
+    return replace(found, of=of, units=tuple(units))
 
 
 def _verified(a: Question, analysis: str, out: Sensitivity) -> Sensitivity:
@@ -292,6 +305,12 @@ def _at_motion(a: Question) -> Found:
 
 def _equilibrium(a: Question) -> Sensitivity:
     found = equilibrium(a.model, resting(a.t, a.parameters))
+    b = found.assembly
+    if a.model.controllers:  # their states are unknowns, too
+        other, rest = determined_copy(a.model, b, a.of)
+        named = tuple(other.outputs.get(name, name) for name in a.of)
+        with in_own_words(other):
+            return _named(_of_rest(replace(a, model=other.model, of=named), rest), a.of, other)
     if abs(found.least) < FLAT:
         weak = ", ".join(found.weakest)
         raise SingularityError(
@@ -300,8 +319,11 @@ def _equilibrium(a: Question) -> Sensitivity:
             a.t,
             tuple(found.weakest),
         )
-    b = found.assembly
-    rest = Rest.at(b.compiled, b.t, b.q)
+    return _of_rest(a, Rest.at(b.compiled, b.t, b.q))
+
+
+def _of_rest(a: Question, rest: Rest) -> Sensitivity:
+    """By the equations at rest: changes of positions and multipliers make up for those by the parameters."""
     x = rest.equations.state
     directions, tangents = [Direction(rest.equations, name) for name in a.to], []
     still = np.zeros(len(x.v))

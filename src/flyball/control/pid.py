@@ -29,7 +29,7 @@ class PID(Controller):
     filter : number [s]
         Time constant of the derivative's filter; needed where there is a derivative.
     lower, upper : expression, optional
-        Limits of the output.
+        Limits of the output. A motion ends, with an error, where the lower one comes to be above the upper.
     anti_windup : {"back-calculation", "clamping", "none"}
         What the integral does while the output is at a limit: it is led back, I' = ki e + (u_limited - u) / tracking;
         or it stands still as long as the error would lead it further beyond; or it goes on.
@@ -107,6 +107,11 @@ class PID(Controller):
         if isinstance(self.lower, float) and isinstance(self.upper, float) and not self.lower < self.upper:
             raise ModelError(f"{self.title}: lower is {self.lower:g}, upper {self.upper:g}; lower must be less")
 
+    def ordered(self) -> tuple[str, str] | None:
+        """Limits that follow expressions may cross."""
+        plain = isinstance(self.lower, float) and isinstance(self.upper, float)
+        return None if plain or self.lower is None or self.upper is None else ("lower", "upper")
+
     def given(self) -> dict[str, Any]:
         """Inputs, gains, limits."""
         numbers = ("kp", "ki", "kd", "filter", "lower", "upper", "tracking", "bias", "period")
@@ -128,6 +133,8 @@ class PID(Controller):
         total = " + ".join([*parts, *(["integral"] if self.ki != 0.0 else []), *(["bias"] if self.bias != 0.0 else [])])
         out = "unlimited" if self.lower is None else "max(unlimited, lower)"
         out = out if self.upper is None else f"min({out}, upper)"
+        if self.ordered():  # no number where they cross
+            out = f"where(lower > upper, (upper - lower)**0.5, {out})"
         inner = {"damped": "-measured" if self.derivative_weight == 0.0 else "weight_d*setpoint - measured"}
         return {
             "output": out,

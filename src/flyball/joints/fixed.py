@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from ..constraints.blocks import COMMON_POINT, SAME_AXES
 from ..model.element import element
@@ -27,3 +27,8 @@ class Fixed(Joint):
     drawn: ClassVar[str] = "fixed"
     replaceable: ClassVar[bool] = True
     omission: ClassVar[float] = 1.5
+
+
+def welded(name: str, body: str, at: Any) -> Fixed:
+    """A joint that holds a body where it is drawn."""
+    return Fixed(name, "ground", body, at=at)

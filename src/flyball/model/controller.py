@@ -70,6 +70,10 @@ class Controller(Element, ABC):
         if n.period is None and n.offset != 0.0:
             raise ModelError(f"{self.title}: offset does nothing without period; leave it out")
 
+    def ordered(self) -> tuple[str, str] | None:
+        """Two of what it is given of which the first must not exceed the second; it has no output where it does."""
+        return None
+
     @abstractmethod
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""

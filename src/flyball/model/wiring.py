@@ -75,6 +75,11 @@ def signal(model: Model, e: Controller, name: str) -> Expression:
     return Expression(f"{e.name}.{name}", _wiring(model).signal(e, name), None, f"{name} of {e.title}")
 
 
+def given(model: Model, e: Controller, name: str) -> Expression:
+    """What a controller is given, as a law."""
+    return Expression(name, _wiring(model).template(e, name), None, f"{name} of {e.title}")
+
+
 def wired(model: Model) -> list[Wired]:
     """All states of all controllers: those with a rate; then of sampled ones signals, in the order in which they are
     known, and states.

@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     from .result import Result
 
 ROUNDING = 1e-9  # damping ratios below this are 0
-STILL = 1e-6  # part of the fastest eigenvalue below which one is zero: a double zero shows rounding by its square root
 GROWS = 1e-6  # damping ratios above minus this are not growth
 
 
@@ -35,7 +34,7 @@ class Modes:
     growing : bool
         Whether a mode that was not asked for grows.
     fastest : float [1/s]
-        Size of the largest eigenvalue, those that were not asked for included: what zeros are compared with.
+        Size of the largest eigenvalue, those that were not asked for included.
     multiplicity, geometric_multiplicity : ndarray (n,) int
         How often each eigenvalue is repeated, and how many shapes it has; where these are fewer, the eigenvalue is
         defective: motions also grow as t exp(eigenvalue t), such as a body that nothing holds and that drifts away.
@@ -64,7 +63,7 @@ class Modes:
 
     @property
     def _still(self) -> np.ndarray:
-        return np.abs(self.eigenvalues) <= STILL * max(self.fastest, np.abs(self.eigenvalues).max(initial=0.0))
+        return self.eigenvalues == 0.0
 
     @property
     def omega(self) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Any
 from ..model.controller import Controller
 from ..model.element import resolve
 from ..model.model import Model
-from ..model.wiring import signal, wired
+from ..model.wiring import given, signal, wired
 from .specs import Structure, ints
 
 CONTROLS = -1_000_000_000
@@ -30,6 +30,7 @@ def names(model: Model) -> dict[str, Controller]:
     out: dict[str, Controller] = {}
     for e in model.controllers:
         laws = [x.law for x in wired(model) if x.controller is e] + [signal(model, e, name) for name in e.signals()]
+        laws += [given(model, e, name) for name in e.ordered() or ()]
         out |= dict.fromkeys((name for law in laws for name in law.names), e)
     return out
 
@@ -41,13 +42,16 @@ def slots(s: Structure) -> None:
 
 def table(s: Structure) -> None:
     """The laws of the rates."""
-    rows, s.sampled = [], []
+    rows, s.sampled, s.ordered = [], [], []
     for k, x in enumerate(s.controls):
         at = s.law(x.law, (), None if x.controller.sampled else x.controller)
         rows.append((-1 if x.controller.sampled else at,))
         if x.controller.sampled:
             s.sampled.append((x.controller.name, k, at, not x.signal))
     s.tables["control_i"] = ints(rows, 1)
+    for e in s.model.controllers:
+        if ordered := e.ordered():
+            s.ordered += [(e, ordered, [s.law(given(s.model, e, name), ()) for name in ordered])]
 
 
 def initial(model: Model, env: Any) -> list[Any]:

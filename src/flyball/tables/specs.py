@@ -10,6 +10,7 @@ import numpy as np
 from ..constraints.blocks import Row
 from ..laws.functions import Missed, missed
 from ..laws.program import compile_law
+from ..model.controller import Controller
 from ..model.element import Element
 from ..model.expressions import Expression
 from ..model.force import Force
@@ -89,6 +90,7 @@ class Structure:
     guards: list[tuple[int, int, int]] = field(default_factory=list)  # what is watched: kind, of what, which way
     events: dict[int, Any] = field(default_factory=dict)  # guard -> event of the model
     controls: list[Wired] = field(default_factory=list)  # states of controllers, the first of all states
+    ordered: list[tuple[Controller, tuple[str, str], list[int]]] = field(default_factory=list)
     sampled: list[tuple[str, int, int, bool]] = field(default_factory=list)  # controller, state, law, whether last
     loads: list[Force] = field(default_factory=list)  # those that need to know what their joint carries
     reads: dict[str, int] = field(default_factory=dict)  # element whose force events name -> its column (`reads`)

@@ -49,25 +49,16 @@ def rounding(e: Equations) -> np.ndarray:
     return WIDER * most[part] / size
 
 
-def connected(e: Equations) -> np.ndarray:
-    """Numbers of the parts of the mechanism that nothing connects, for every velocity, (nv,)."""
-    return _parts(e, abs(e.by_velocity[e.at["n"]]))
-
-
 def _joined(e: Equations) -> np.ndarray:
-    """The same, where all that a constraint can act on is connected, whether it does in this position or not.
+    """Numbers of the parts of the mechanism that nothing connects, for every velocity, (nv,).
 
-    An equation may hold nothing but a multiplier that is rounding itself: what acts beside it tells of what.
+    All that a constraint can act on is connected, whether it does in this position or not: an equation may hold nothing
+    but a multiplier that is rounding itself, and what acts beside it tells of what.
     """
-    G = e.state.c.sparse_jacobian()
-    G.data[:] = 1.0
-    return _parts(e, G)
-
-
-def _parts(e: Equations, G) -> np.ndarray:
     from scipy.sparse.csgraph import connected_components
 
-    r = e.at["r"]
+    G, r = e.state.c.sparse_jacobian(), e.at["r"]
+    G.data[:] = 1.0
     return connected_components(abs(e.by_position[r]) + abs(e.by_acceleration[r]) + G.T @ G, directed=False)[1]
 
 

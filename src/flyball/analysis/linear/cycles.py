@@ -17,10 +17,14 @@ import numpy as np
 
 from ...errors import ModelError
 from ...results.linear import StateSpace
+from .rounding import Doubt
+from .spectrum import Spectrum, spectrum
 
 EXACT = 1e-9  # of a period: what periods may be off a common one
 FINEST = 10_000  # common parts of a period, and instants of a cycle, at most
-SETTLED = 1e-6  # part of its size, or of 1, by which what is held is what its law says
+SETTLED = 1e-6  # part of its size, or of a large change of it, by which what is held is what its law says
+
+ROUNDED = 4.0 * np.finfo(float).eps  # of the largest number of an equation: what exponentials leave uncertain
 
 
 class Sample(NamedTuple):
@@ -84,18 +88,18 @@ def instants(clocks: Sequence[tuple[float, float]]) -> tuple[float, list[tuple[f
     return cycle, found
 
 
-def refuse_unsettled(samples: Sequence[Sample], at: np.ndarray, law: np.ndarray, name: str) -> None:
-    """Refuse a state in which what is held is not what it will be."""
-    for s, held, next_one in zip(samples, at.tolist(), law.tolist(), strict=True):
-        if not abs(next_one - held) <= SETTLED * max(1.0, abs(held)):
+def refuse_unsettled(samples: Sequence[Sample], at: np.ndarray, law: np.ndarray, sizes: np.ndarray, name: str) -> None:
+    """Refuse a state in which what is held is not what it will be; ``sizes`` are large changes of it."""
+    for s, held, next_one, size in zip(samples, at.tolist(), law.tolist(), sizes.tolist(), strict=True):
+        if not abs(next_one - held) <= SETTLED * max(size, abs(held)):
             raise ModelError(
                 f"{name!r} does not rest there: {s.name!r} is {held:.6g}, and {next_one:.6g} when it is sampled next; "
                 f"ask about an equilibrium, about=m.equilibrium(), or about the end of a motion that has settled"
             )
 
 
-def over_a_cycle(space: StateSpace, samples: Sequence[Sample], outputs: int) -> tuple[StateSpace, float]:
-    """The equations from the begin of one cycle to that of the next, and its length [s]; see `Sample`.
+def over_a_cycle(space: StateSpace, samples: Sequence[Sample], outputs: int) -> tuple[StateSpace, Spectrum, float]:
+    """The equations from the begin of one cycle to that of the next, their multipliers, its length [s]; see `Sample`.
 
     The state is that just before the first instant, outputs and inputs are those from this instant on.
     """
@@ -119,7 +123,9 @@ def over_a_cycle(space: StateSpace, samples: Sequence[Sample], outputs: int) -> 
         space, A=A[np.ix_(left, left)], B=B[left], C=Y[:, left], D=Y[:, n:], states=names,
         state_units=tuple(space.state_units[i] for i in left), motion=space.motion[:, left],
     )  # fmt: skip
-    return replace(out, eigenvalues=np.linalg.eigvals(out.A)), cycle
+    rounded = ROUNDED * np.abs(out.A).max(axis=1, keepdims=True, initial=0.0) * np.ones(len(left))
+    found = spectrum(out.A, Doubt(np.eye(len(left)), rounded))
+    return replace(out, eigenvalues=found.values), found, cycle
 
 
 def _one_after_the_other(due: list[Sample]) -> Iterator[list[Sample]]:

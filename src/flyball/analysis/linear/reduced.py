@@ -96,8 +96,8 @@ class Reduced:
         return np.split(part[:, len(self.rate) :], 3, axis=1)
 
 
-def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Reduced:
-    """Take the constraints out.
+def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None, off: np.ndarray | None = None) -> Reduced:
+    """Take the constraints out; ``off`` is as in `rounding.without_rounding`.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def reduced(e: Equations, f: Free, frame: Frame, w: Inputs | None = None) -> Red
     terms = Terms(Y.T @ M @ f.Zv, abs(f.left) @ (abs(u) + abs(N - H) @ abs(x)), size, Y, M)
     forces = Y.T @ (M @ known + others)
     try:
-        doubt = without_rounding(terms, a_dot, forces, e, f)
+        doubt = without_rounding(terms, a_dot, forces, e, f, off)
     except np.linalg.LinAlgError:
         d = f.chosen_v[int(np.argmin(np.abs(np.diag(terms.mass))))]
         raise without_inertia(f.names[d].name) from None

@@ -51,7 +51,9 @@ class Doubt(NamedTuple):
     size: np.ndarray
 
 
-def without_rounding(terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equations, f: Free) -> Doubt:
+def without_rounding(
+    terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equations, f: Free, off: np.ndarray | None = None
+) -> Doubt:
     """Set coefficients that are rounding to 0, and say what is uncertain of the others.
 
     The entries of an equation are compared in units of the coordinates' natural sizes, rates at the speed of the
@@ -66,6 +68,8 @@ def without_rounding(terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equ
         Rates of the free coordinates.
     forces : ndarray (fv, p)
         What acts along the directions in which the multipliers drop out.
+    off : ndarray (nv,), optional
+        Large speeds of what has a size of its own, because it stands for something else; 0 of all others.
     """
     (a, fv), nv = (len(a_dot), len(forces)), len(f.scale)
     n = a + fv
@@ -75,10 +79,14 @@ def without_rounding(terms: Terms, a_dot: np.ndarray, forces: np.ndarray, e: Equ
     inverse = np.linalg.inv(terms.mass) if fv else terms.mass
     turned = _spread(acting(e), terms.M, e, f.scale)  # by a radian, or a length
     unit = scale.copy()
+    large = np.zeros(fv) if off is None else off[f.chosen_v]
     if fv:
         A = np.abs(inverse @ forces[:, :n]) / scale[a:, None] * scale
         most = np.hstack([along @ terms.forces[:, :n] * scale, (along @ turned)[:, None]])
-        unit[a:] *= _fastest(A, most / inertia[:, None] ** 2 / scale[a:, None], a)
+        moves = np.r_[np.ones(a, bool), large == 0.0]
+        uncancelled = most / inertia[:, None] ** 2 / scale[a:, None]
+        fastest = _fastest(A[moves[a:]][:, moves], uncancelled[moves[a:]][:, np.r_[moves, True]], a)
+        unit[a:] = np.where(large > 0.0, large, fastest * unit[a:])
     rows = (terms.forces[:, :n] * unit).max(axis=1, initial=0.0) if n else np.zeros(nv)
     first = EXACT * (terms.rates[:, :n] * unit).max(axis=1, initial=0.0)
     second = along @ (EXACT * rows + LEAK * (_spread(rows, terms.M, e, f.scale) + turned))

@@ -36,15 +36,20 @@ def newton(x: Rest) -> Rest | None:
     SingularityError
         If it ends in a position in which no finite reactions carry the load.
     """
+    return newton_to(x)[0]
+
+
+def newton_to(x: Rest) -> tuple[Rest | None, Rest]:
+    """The same, and where it ended."""
     for _ in range(NEWTON):
         step, lam = x.step()
         longest = np.abs(step).max(initial=0.0)
         if not np.isfinite(longest):
-            return None
+            break
         x = x.moved(step * min(1.0, LONGEST / max(longest, 1e-300)), lam)
         if longest < ARRIVED and (best := arrived(x)):
-            return best
-    return None
+            return best, x
+    return None, x
 
 
 def arrived(x: Rest) -> Rest | None:

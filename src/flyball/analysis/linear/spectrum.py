@@ -1,10 +1,12 @@
 """Eigenvalues and eigenvectors of a system matrix, with what is uncertain of them, and which of them are one.
 
 A perturbation E of the matrix moves a simple eigenvalue by y^H E x / y^H x (Wilkinson 1965). With E what rounding may
-have made of every entry, parts of an eigenvalue that are smaller are none. Where eigenvectors are nearly parallel,
-rounding by r splits a defective eigenvalue by as much as sqrt(r), but not its mean: eigenvalues that cannot be told
-apart are replaced by theirs (Kato 1966, II.2), and how many eigenvectors they have in common is found in the invariant
-subspace that belongs to them.
+have made of every entry, parts of an eigenvalue that are smaller are none. What the solver has left of A x - w x is as
+large as rounding of the largest entry: a simple eigenvalue is told as y^H A x / y^H x, whose error is its square
+(Ostrowski 1958), so that slow ones are known beside fast ones. Where eigenvectors are nearly parallel, rounding by r
+splits a defective eigenvalue by as much as sqrt(r), but not its mean: eigenvalues that cannot be told apart become
+their mean (Kato 1966, II.2), and how many eigenvectors they have in common is found in the invariant subspace that
+belongs to them.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ EQUAL = 1e-9  # difference of eigenvalues, of their own size, below which they a
 WIDEST = 1e-4  # of the matrix' size: a defective eigenvalue is not split further than this by rounding
 NULL = 1e-9  # singular values below this part of the largest are none
 FOUND = 1e-9  # what may be left of A x - w x, of |A| |x| + |w| |x|
+NEAR = 1e-2  # of the way to the next eigenvalue: corrections are small beside it, and their squares are none
 LOST = 1e-15  # of the largest entry: left out where balancing makes too much of small entries
 
 
@@ -41,6 +44,8 @@ class Spectrum:
         Indices of eigenvalues that are one.
     multiplicity, geometric : ndarray (n,) int
         How many eigenvalues are one with each, and how many eigenvectors they have in common.
+    blur : ndarray (n,)
+        What each of the values is uncertain by.
     residual : float
         The largest part of A x - w x, of |A| |x| + |w| |x|.
     """
@@ -51,6 +56,7 @@ class Spectrum:
     groups: list[list[int]]
     multiplicity: np.ndarray
     geometric: np.ndarray
+    blur: np.ndarray
     residual: float
 
 
@@ -71,23 +77,32 @@ def spectrum(A: np.ndarray, doubt: Doubt | None = None) -> Spectrum:
     n = len(A)
     if not n:
         none = np.zeros(0, complex)
-        return Spectrum(none, none, np.zeros((0, 0), complex), [], np.zeros(0, int), np.zeros(0, int), 0.0)
+        return Spectrum(none, none, np.zeros((0, 0), complex), [], np.zeros(0, int), np.zeros(0, int), none.real, 0.0)
     B, scale, w, left, right, residual = _pairs(A)
     E = [(np.eye(n), ROUNDED * np.abs(B))]
     if doubt is not None:
         E.append((doubt.by / scale[:, None], doubt.size * scale))
     size = float(np.linalg.norm(B, 2))
-    angle = np.abs((left.conj() * right).sum(axis=0))
-    blur = sum((np.abs(left.conj().T @ L) * (X @ np.abs(right)).T).sum(axis=1) for L, X in E)
-    blur = np.minimum(blur / np.maximum(angle, 1e-300), WIDEST * size)
-    out = Spectrum(w, w.copy(), right.copy(), [], np.ones(n, int), np.ones(n, int), residual)
+    inner = (left.conj() * right).sum(axis=0)
+    known = sum((np.abs(left.conj().T @ L) * (X @ np.abs(right)).T).sum(axis=1) for L, X in E)
+    blur = np.minimum(known / np.maximum(np.abs(inner), 1e-300), WIDEST * size)
+    better = (left.conj() * (B @ right - w * right)).sum(axis=0) / np.where(inner != 0.0, inner, 1.0)
+    out = Spectrum(w, w.copy(), right.copy(), [], np.ones(n, int), np.ones(n, int), blur, residual)
     for group in equal(w, blur):
+        if len(group) == 1:
+            out.values[group] += _better(w, group[0], better[group], blur)
         _told_apart(out, group, B, E, blur)
     out.groups.sort()
     out.values = _clean(out.values, blur)
     out.vectors = scale[:, None] * out.vectors
     out.vectors /= np.maximum(np.abs(out.vectors).max(axis=0), 1e-300)
     return out
+
+
+def _better(w: np.ndarray, k: int, by: np.ndarray, blur: np.ndarray) -> np.ndarray:
+    """What makes a simple eigenvalue better, where the solver has left more than the matrix is uncertain by."""
+    others = np.abs(np.delete(w, k) - w[k]).min(initial=np.inf)
+    return np.where((np.abs(by) > blur[k]) & (np.abs(by) < NEAR * others), by, 0.0)
 
 
 def _told_apart(

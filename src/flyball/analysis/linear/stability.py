@@ -7,16 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.equilibrium import MARGINAL, STABLE, UNSTABLE
-from .balance import connected
 from .derivatives import Equations
 from .free import Free, free
 from .kinks import kinks, refuse_kinks
+from .reduced import Frame, reduced
 from .rest import Rest
 from .sides import from_all_sides
+from .spectrum import Spectrum, spectrum
 from .stiffness import NEUTRAL, stiffness
-
-GROWTH = 1e-4  # real parts below this part of their eigenvalue are none
-ZERO = 1e-7  # eigenvalues below this part of the fastest of what is connected are none
 
 
 @dataclass
@@ -80,23 +78,27 @@ def _judged(x: Rest) -> Stability:
     return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
 
 
+def by_eigenvalues(own: Spectrum, *, discrete: bool = False) -> str:
+    """Stability by the motion, each eigenvalue judged by what it is uncertain by itself.
+
+    Parameters
+    ----------
+    own : Spectrum
+    discrete : bool
+        Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
+    """
+    w, blur = own.values, own.blur
+    if discrete:
+        grows = np.abs(w) - 1.0
+        grows[np.abs(grows) <= blur] = 0.0
+    else:
+        grows = w.real  # without what is rounding
+    most = float(grows.max(initial=-1.0))
+    return UNSTABLE if most > 0.0 else MARGINAL if most == 0.0 else STABLE
+
+
 def _by_motion(e: Equations, f: Free) -> str:
-    """Stability by the eigenvalues, damping included; parts that nothing connects one by one."""
-    r = e.at["r"]
-    M, D, K = (f.Zv.T @ X[r] @ f.Zv for X in (e.by_acceleration, e.by_velocity, e.by_position))
-    part = connected(e)[f.chosen_v]
-    growth = max(_growth(*(X[np.ix_(own, own)] for X in (M, D, K))) for own in (part == k for k in np.unique(part)))
-    return UNSTABLE if growth > GROWTH else MARGINAL if growth > -GROWTH else STABLE
-
-
-def _growth(M: np.ndarray, D: np.ndarray, K: np.ndarray) -> float:
-    """The largest real part, of its eigenvalue; zeros of higher order, which rounding spreads, have none."""
-    from scipy.linalg import eigvals
-
-    one, none = np.eye(len(M)), np.zeros_like(M)
-    w = eigvals(np.block([[none, one], [-K, -D]]), np.block([[one, none], [none, M]]))
-    w = w[np.isfinite(w)]
-    size = np.abs(w)
-    return float(
-        np.where(size > ZERO * size.max(initial=0.0), w.real / np.maximum(size, 1e-300), 0.0).max(initial=-1.0)
-    )
+    """Stability by the eigenvalues, damping included."""
+    none = np.zeros((len(f.scale),) * 2)
+    r = reduced(e, f, Frame(np.zeros(3), none, none))
+    return by_eigenvalues(spectrum(r.A, r.doubt))

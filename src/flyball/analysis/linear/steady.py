@@ -51,20 +51,27 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
     return bool(np.abs(other - now).max(initial=0.0) <= SAME * np.abs(now).max(initial=0.0))
 
 
-def seen_from(x: State, e: Equations, f: Free) -> Frame:
-    """The frame from which the state is steady: the world at an equilibrium.
+def still(x: State) -> bool:
+    """Whether nothing moves, compared with what gravity or other forces give."""
+    scale = x.c.sizes / x.c.values.length
+    given = np.sqrt(1.0 + np.abs(x.vdot / scale).max(initial=0.0))
+    return not (np.abs(x.v) / scale).max(initial=0.0) > STILL * given
+
+
+def seen_from(x: State, e: Equations, f: Free, off: np.ndarray | None = None) -> Frame:
+    """The frame from which the state is steady: the world at an equilibrium; ``off`` is as in `balanced`.
 
     Raises
     ------
     AnalysisError
         If the state is neither an equilibrium nor a steady motion; the message says what is accelerated.
     """
-    still = np.zeros((len(x.v),) * 2)
+    none = np.zeros((len(x.v),) * 2)
     if not f.Zv.shape[1]:  # drivers leave no freedom: there is nothing to be steady
-        return Frame(np.zeros(3), still, still)
-    if not (np.abs(x.v) / f.scale).max(initial=0.0) > STILL * np.sqrt(1.0 + np.abs(x.vdot / f.scale).max(initial=0.0)):
-        balanced(x, e)
-        at_rest = Frame(np.zeros(3), still, still)
+        return Frame(np.zeros(3), none, none)
+    if still(x):
+        balanced(x, e, off)
+        at_rest = Frame(np.zeros(3), none, none)
         if timed(x.c.values.system):
             _refuse_changing(x, e, f, at_rest)
         return at_rest
@@ -78,26 +85,43 @@ def seen_from(x: State, e: Equations, f: Free) -> Frame:
     )
 
 
-def balanced(x: State, e: Equations) -> None:
+def balanced(x: State, e: Equations, off: np.ndarray | None = None) -> None:
     """Refuse a state at rest that does not stay there.
+
+    Parameters
+    ----------
+    x : State
+    e : Equations
+        There.
+    off : ndarray (nv,), optional
+        Speeds of which the equilibrium may be off by a part, because they stand for something else.
 
     Raises
     ------
     AnalysisError
         Naming what is accelerated most.
     """
-    names = velocity_names(x.c.structure)
-    rest = at_rest(e)
-    left = np.abs(rest.block("r"))
-    may = BALANCED * acting(rest) + NEAR * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
-    if (left <= may).all() or (left <= may + rounding(rest)).all():
+    left = left_over(x, e, off)
+    if not left.any():
         return
-    d = int(np.argmax(np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)))
+    names, d = velocity_names(x.c.structure), int(np.argmax(left))
     raise AnalysisError(
         f"the mechanism is not in equilibrium where it is: {names[d].name} is accelerated with "
         f"{x.vdot[d]:.3g} {names[d].unit}/s^2. Find an equilibrium first and linearise about it: "
         f"about=m.equilibrium()"
     )
+
+
+def left_over(x: State, e: Equations, off: np.ndarray | None = None) -> np.ndarray:
+    """Accelerations (nv,) in natural units of what does not stay at rest, zero elsewhere; arguments of `balanced`."""
+    rest = at_rest(e)
+    left = np.abs(rest.block("r"))
+    may = BALANCED * acting(rest) + NEAR * (abs(e.by_position[e.at["r"]]) @ x.c.sizes)
+    if off is not None:
+        may += NEAR * (abs(e.by_velocity[e.at["r"]]) @ off)
+    if (left <= may).all() or (left <= may + rounding(rest)).all():
+        return np.zeros(len(left))
+    return np.where(left > may, np.abs(x.vdot) * x.c.sizes, 0.0)
 
 
 def timed(S: System) -> bool:

@@ -20,6 +20,7 @@ from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
 from ..compile_time import compiled_since
 from ..mobility import mobility
+from .crossed import crossed
 from .events.carried import carried
 from .events.here import Here
 from .options import Integration
@@ -56,7 +57,10 @@ def outcome(
     elif here.start.part.paused:
         message = KEPT.format(t)
     elif here.failed is not None:
-        message = f"{model.name!r}: {here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
+        broken = f"at t = {t:.6g} s, {text}" if status == ex.STUCK and (text := crossed(a.compiled, t)) else ""
+        message = (
+            f"{model.name!r}: {broken or here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
+        )
     elif status != ex.DONE:
         message, cause = reason(a, start.base, clock)
     health = _health(start, clock, o)

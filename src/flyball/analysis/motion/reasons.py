@@ -40,6 +40,7 @@ from ...tables.system import (
 from ..assembly.start import Assembly
 from ..compiled import Compiled
 from ..freedom.contradiction import story
+from .crossed import crossed
 from .jams import Unresolved, jam
 from .residual import missed
 
@@ -228,7 +229,12 @@ def _not_finite(a: Assembly, clock: ex.Clock) -> str:
 
 
 def broken_force(c: Compiled, t: float) -> str:
-    """The force that is no number at the kinematics that the compiled loop has left, and why; else nothing."""
+    """The force that is no number at the kinematics that the compiled loop has left, and why; else nothing.
+
+    Where limits of a controller cross it is that.
+    """
+    if text := crossed(c, t):
+        return text
     s, S, W = c.structure, c.values.system, c.work
     stack = np.zeros_like(W.stack)
     forces: list[Any] = list(s.forces)
