@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..math.scalar import real_parts
+from ..math.lanes import deciding
+from ..math.products import inner
 from ..model.body import GROUND
 from ..model.model import Model
 from .numbers import Numbers
@@ -29,12 +30,12 @@ def tempo(given: Numbers, model: Model, gravity: np.ndarray, length: Any) -> Any
     speeds = [x for d in moving for x in (_size(d.v) / length, _size(d.w))]
     for e in model.initial:
         if (rate := getattr(given.of.get(e.name), "rate", None)) is not None:
-            size = _size(np.array([rate]))
+            size = _size(np.array([rate, 0.0, 0.0]))
             speeds.append(size / length if model.unit(e.name, e) == "m" else size)
     fastest = max(speeds, key=lambda x: x.real, default=0.0)
     return fastest if fastest.real > 0.0 else A_SECOND
 
 
 def _size(x: np.ndarray) -> Any:
-    """Length of a vector; zero of what is zero, where a root has no derivative."""
-    return np.sqrt((x**2).sum()) if real_parts(x).any() else 0.0
+    """Length of a vector (3,); zero of what is zero, where a root has no derivative."""
+    return np.sqrt(inner(x, x)) if deciding(x).any() else 0.0
