@@ -170,7 +170,7 @@ def _told(done: RootLocus, taken: Sequence[Sample]) -> None:
 
 
 def _met(base: Sample, x: Sample, later: Sequence[Sample]) -> bool:
-    """Whether eigenvalues that are apart before and soon after are one at a sample: there none has a shape of its own."""
+    """Whether eigenvalues that are apart before and soon after are one at a sample, where none has its own shape."""
     many = len(np.unique(x.w))
     if many >= len(np.unique(base.w)):
         return False
