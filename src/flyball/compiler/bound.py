@@ -119,8 +119,6 @@ class Mould:
     """
 
     def __init__(self, fields: Any, constant: Sequence[np.ndarray] = ()) -> None:
-        written = Written(fields)
-        self.numbers, self.kinds, self.kind = written.numbers, written.kinds, written.kind
         self._new, self._shared = fields, {id(x) for x in constant}
         self._size, own = 0, list[int]()
         self._laid: list[tuple[tuple[int, ...], Any, int]] = []
@@ -128,10 +126,13 @@ class Mould:
         self._lay(fields, 0, own)
         self.own = np.array(own, np.int64)
         self.block = np.zeros(max(self._size, 1), np.uint8)
-        self.numbers[self.own] = [begin for _, _, begin in self._laid]
-        for mine, new in zip(_leaves(self.fill(self.block)), _leaves(fields), strict=True):
+        filled = self.fill(self.block)
+        for mine, new in zip(_leaves(filled), _leaves(fields), strict=True):
             if mine is not new:
                 mine[...] = new
+        written = Written(filled)
+        self.numbers, self.kinds, self.kind = written.numbers, written.kinds, written.kind
+        self.numbers[self.own] = [begin for _, _, begin in self._laid]
 
     def new(self) -> Moulded:
         """A tuple of one's own."""
