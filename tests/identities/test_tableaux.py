@@ -51,3 +51,38 @@ def test_numbers_are_those_of_scipy(name):
     for i, f in enumerate(reversed(F)):
         y = (y + f) * (x if i % 2 == 0 else 1 - x)
     assert R.P @ x ** np.arange(1, 8) @ K == pytest.approx(y, rel=1e-13)
+
+
+def on_the_test_equation(R, z):
+    """Of y' = lambda y, y = 1, z = h lambda: y at the end, how far the dense output is off, and what is said of both."""
+    K = np.zeros(R.order_i[2], complex)
+    for i in range(len(K)):
+        K[i] = z * (1.0 + R.A[i, :i] @ K[:i])
+    last = R.order_i[1]
+    x = np.linspace(0.0, 1.0, 101)
+    u = 1.0 + K @ R.P @ x ** np.arange(1, R.P.shape[1] + 1)[:, None]
+    e, damped, said, less = (abs(w @ K[: len(w)]) for w in (*R.E, *R.D))
+    step = e**2 / np.hypot(e, 0.1 * damped)
+    between = said**3 / (said**2 + less**2) if said > 0.0 else 0.0
+    return abs(1.0 + R.A[last] @ K), abs(u - np.exp(z * x)).max(), step, between
+
+
+@pytest.mark.parametrize("argument", [1.0, 0.9, 0.75, 0.6, 0.5])
+def test_what_is_said_of_the_dense_output_is_so(argument):
+    """All over the left half of the plane, as far as the method is stable; where rk45 says nothing its step does."""
+    for width in np.linspace(2.0, 6.5, 19):
+        end, off, step, between = on_the_test_equation(tableau("dop853"), width * np.exp(1j * np.pi * argument))
+        assert 0.85 * off < between < 1.35 * off
+    for width in np.linspace(0.1, 3.5, 18):
+        end, off, step, between = on_the_test_equation(tableau("rk45"), width * np.exp(1j * np.pi * argument))
+        assert between == 0.0
+        assert end > 1.5 or off < 2.5 * step
+
+
+def test_errors_of_steps_say_nothing_of_the_dense_output_where_stability_limits_them():
+    end, off, step, _ = on_the_test_equation(tableau("dop853"), -6.0)
+    assert end < 0.5
+    assert off > 50.0 * step
+    for width in (0.5, 1.0, 2.0, 3.0):
+        _, off, step, _ = on_the_test_equation(tableau("dop853"), -width)
+        assert off < 3.0 * step

@@ -98,7 +98,7 @@ def no_mechanism() -> Joined:
     """Tables of no mechanism, of the types of all others: what the loop of steps is compiled for."""
     S = _none(System, "b2a2b2bbaabb2bbb2bbaa11bbba", ldl=_none(Pattern, "aaaaaaaa"))
     W = _none(Work, "22222211122222112221a1")
-    clock, R = _none(Clock, "1a122a2"), _none(Tableau, "2122a")
+    clock, R = _none(Clock, "1a122a2"), _none(Tableau, "21222a")
     sheet = Sheet(np.zeros((0, 0)))
     tables = _none(Joined, "a1aba22222222b2bba2", S=S, W=W, R=R, clock=clock, sheet=sheet, slopes=sheet)
     return tables._replace(real=np.zeros(8), count=np.zeros(16, np.int64), group=np.zeros(1, np.int64))

@@ -14,11 +14,12 @@ LAST, BEST, BEST_H, PARDON = range(11, 15)
 # when an error was last found to be rounding)
 WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT = range(15, 21)
 # (fixed width of steps, 0: adaptive; of the step in the making its width, its error in units of the tolerance, and a
-# part of it that is asked for)
-STEP, TRIED, ERROR, PART, REALS = range(21, 26)
+# part of it that is asked for; a width at which the state within may be told, where it cannot: 0 if that is not known;
+# the widest that is tried as that was so of late: 0 if any; at which step it was)
+STEP, TRIED, ERROR, PART, CLEARER, CALM, CALM_SINCE, REALS = range(21, 29)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS = range(9)
-# (how the last step tried ended; whether the state within it was asked for)
+# (how the last step tried ended; whether the state within it was asked for: 1 there is one, 2 it is good)
 TROUBLE, EXTENDED, COUNTS = range(9, 12)
 # (STARTED: whether a stretch has begun; it does not yet, but only what pushes has jumped where it begins)
 JUMPED = 2

@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import (
+    ACCEPTED,
     AT_END,
     AT_START,
     BACK,
     BEFORE,
     BETWEEN,
     BLURRED_AT,
+    CALM,
+    CALM_SINCE,
+    CLEARER,
     ERROR,
     EXCESS,
     EXTENDED,
@@ -31,8 +35,13 @@ from .clock import (
     T,
 )
 from .loop import BEGIN, ENDED, ENTER, OVERLOOKED, REFUSE, TRY, WITHIN, ending
-from .refusal import afresh, enter, refuse
-from .step import attempt, defect, extend, first_step, interpolate
+from .refusal import SAFETY, afresh, enter, refuse
+from .step import astray, attempt, defect, extend, first_step, interpolate, stretch
+
+FAR = 4.0  # times the error of a step, if that is more than the tolerance, that the dense output may be off by
+FARTHER = 8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
+EDGE = 3.0  # h |lambda| of steps that stability may limit
+EXTENDED_TO, CLEAR = 1, 2  # what c.count[EXTENDED] says: the stages of dense output are there; it is good
 
 
 @formula
@@ -57,12 +66,39 @@ def begin(derivative, inspect, S, W, R, c):
 @formula
 def within(derivative, S, W, R, c):
     """Dense output at a part of the step. Returns a status."""
-    if c.count[EXTENDED] == 0:
-        if extend(derivative, S, W, R, c, c.real[TRIED]) != 0:
+    if c.count[EXTENDED] == 0 and extend(derivative, S, W, R, c, c.real[TRIED]) != 0:
+        return 1
+    if c.count[EXTENDED] != CLEAR:
+        c.count[EXTENDED] = EXTENDED_TO
+        if not clear(R, c):
             return 1
-        c.count[EXTENDED] = 1
+        c.count[EXTENDED] = CLEAR
     interpolate(R, c, c.real[PART], c.real[TRIED], c.y[BETWEEN])
     return 0
+
+
+@formula
+def clear(R, c):
+    """Whether the dense output is as good as steps are. If not, c.real[CLEARER] is a width at which it may be.
+
+    Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
+    read within has to be narrower there, and the next ones are no wider (c.real[CALM]): they may be read too. Elsewhere
+    it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
+    """
+    if c.real[STEP] > 0.0:
+        return True
+    h = c.real[TRIED]
+    gap = astray(R, c, h)
+    if gap <= 1.0:
+        return True
+    limited = stretch(R, c, h) > EDGE
+    most = max(1.0, FAR * c.real[ERROR]) if limited else FARTHER * max(1.0, c.real[ERROR])
+    if gap <= most:
+        return True
+    c.real[CLEARER] = h * max(0.2, SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))
+    if limited:
+        c.real[CALM], c.real[CALM_SINCE] = SAFETY * h, c.count[ACCEPTED]
+    return False
 
 
 @formula
@@ -79,7 +115,7 @@ def overlooked(derivative, inspect, S, W, R, c):
     if k > 0 and c.count[EXTENDED] == 0:
         if extend(derivative, S, W, R, c, h) != 0:
             return 1
-        c.count[EXTENDED] = 1
+        c.count[EXTENDED] = EXTENDED_TO
     while k > 0:
         if share > 1.0:
             return 1

@@ -14,6 +14,7 @@ from ...compiler.jit import formula
 from .clock import (
     ACCEPTED,
     BETWEEN,
+    CLEARER,
     DONE,
     ERROR,
     GROW,
@@ -127,6 +128,12 @@ def narrow(c, h):
 
 
 @formula
+def unclear(c, h):
+    """Try a step next within which the state may be told, after one of width h in which it cannot be."""
+    narrow(c, c.real[CLEARER] if c.real[CLEARER] > 0.0 else 0.25 * h)
+
+
+@formula
 def ending(c):
     """Time at which the step in the making ends."""
     h = c.real[TRIED]
@@ -149,7 +156,7 @@ def whole(callbacks, S, W, R, c, out, used):
         return used, False
     status, used = write(callbacks, S, W, R, c, out, used)
     if status != 0:  # what lies inside the step cannot be reported: take a shorter one
-        narrow(c, 0.25 * h)
+        unclear(c, h)
         return used, False
     if full(c):
         return used, True
@@ -183,6 +190,7 @@ def advance(callbacks, S, W, R, c, out):
             return used
         steps += 1
         t = c.real[T]
+        c.real[CLEARER] = 0.0
         c.count[TROUBLE] = ask(own, S, W, R, c, TRY)
         if c.count[TROUBLE] != 0 or not c.real[ERROR] <= max(1.0, c.real[PARDON]):
             if ask(own, S, W, R, c, REFUSE) != 0:

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from ...compiler.jit import formula
 from .clock import LARGEST, TRIED, ULP, T
+from .concave import NOISE
 from .glance import true_guard
 from .loop import TRY
 from .panels import fires
-from .watching import AGAIN, BEYOND, BRACKET, END, MARK, START
+from .watching import AGAIN, BEYOND, BRACKET, END, GRAIN_END, MARK, START
 
 GOLDEN = 0.381966011250105
 ROUNDS = 60  # evaluations in which a bracket is closed, or an extremum found
@@ -19,6 +20,7 @@ CLOSE = 1e-13  # part of the step that a bracket is closed to
 FLAT = 1e-8  # part of the step to which the place of an extremum is found
 TRIES = 80  # times that a step is taken again
 STEEPER = 1.5  # times the slope seen before: a guard that falls so past zero may jump there, and tells no place
+SOMEWHERE = 1e3  # times that by which a guard may be beside zero where a step ends on it
 REACHED = 1e-14  # part of a step's width to which it ends on an event: solutions of equations are no better
 
 
@@ -169,7 +171,7 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
 
     The secant on the width; by halves where a guard jumps. ``slope``: of the guard by time, before it leaves;
     ``between``: a width at which it has not left, and the width of the step as it was. It does not end there where
-    the guard was on that side nowhere.
+    the guard was on that side nowhere, or has not left it at the end: the dense output told of what did not happen.
     """
     least, most = between
     ulp = ULP * max(abs(c.real[T]) + h, 1e-3 * c.real[LARGEST])
@@ -207,7 +209,9 @@ def end_on(callbacks, S, W, R, c, h, slope, i, s, between):
         else:
             h = halved(h, low, high, stride, bound, high < most, s * f > 0.0)
             stride *= 8.0
-    found = not least > 0.0 or bound or done or abs(W.g[END, i]) <= 1e3 * near * abs(slope)
+    f = W.g[END, i]
+    there = abs(f) <= max(SOMEWHERE * near * abs(slope), NOISE * W.g[GRAIN_END, i])
+    found = there or (not s * f > 0.0 and (not least > 0.0 or bound or done))
     return status, found
 
 

@@ -16,6 +16,8 @@ from .clock import (
     BEST,
     BEST_H,
     BLURRED_AT,
+    CALM,
+    CALM_SINCE,
     CONTROLLED,
     EXCESS,
     EXCESS_AT,
@@ -44,6 +46,7 @@ DIGITS = 1e-14  # part of a state that its last digits are, once rounding has bu
 BLUR = 0.1  # an error that changes by more than this part of it with the state's last digits is rounding
 ROUGH = 1e-7  # a relative error of a step above which rounding is no excuse
 SLOWLY = 0.8  # what the width of wide steps falls by with each that is not
+BOLDER = 0.005  # what the width that steps are not wider than of late grows by, times the steps since
 SLIGHT = 10.0  # an error from rounding that is accepted before a step is taken back
 
 
@@ -73,6 +76,9 @@ def enter(R, c, t, h, error):
         c.real[WIDE] = max(h, SLOWLY * c.real[WIDE])
     grow = c.real[GROW]
     c.real[H] = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
+    if c.real[CALM] > 0.0:
+        c.real[H] = min(c.real[H], c.real[CALM])
+        c.real[CALM] *= 1.0 + BOLDER * (c.count[ACCEPTED] - c.real[CALM_SINCE])
     if c.real[STEP] > 0.0:
         c.real[H] = c.real[STEP]
     c.real[T] = t

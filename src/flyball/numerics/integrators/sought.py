@@ -78,6 +78,8 @@ def first_event(callbacks, S, W, R, c):
             status, found = end_on(callbacks, S, W, R, c, x * h, slope, i, s, (W.real[BEYOND] * h, most))
             if not found and W.count[CUTS] < HALVES:  # the dense output told of what the step does not do
                 return CUT, 0.5 * h, False
+            if status == 0 and not found and s * W.g[END, i] > 0.0:  # nothing happened
+                break
         h = c.real[TRIED]
         if status != 0:
             return LOST_SIGHT, h, False
@@ -89,7 +91,7 @@ def first_event(callbacks, S, W, R, c):
         at_once(callbacks, S, W, R, c, h, i)
     if not hit and h == c.real[T_END] - c.real[T]:
         hit = at_the_end(callbacks, S, W, R, c, h)
-    if hit and c.count[EXTENDED] == 1:  # places within were looked at: back to the end
+    if hit and c.count[EXTENDED] > 0:  # places within were looked at: back to the end
         return watch(c.real[T] + h, c.y[NEW], S, W, TRUE), h, True
     return 0, h, hit
 

@@ -144,16 +144,22 @@ def part(tangent, S, W, R, c, k, kept):
 
 
 @formula
+def accountable(c):
+    """Tolerance of the accounts: relative to all that stands in them and to c.real[LEDGER]."""
+    size = c.real[LEDGER]
+    for k in range(c.accounts.shape[0]):
+        size += abs(c.y[NEW, c.accounts[k]])
+    return LOOSER * c.real[RTOL] * size
+
+
+@formula
 def accounting_error(R, c, h):
-    """Error of the accounts in units of the tolerance: relative to all that stands in them and to c.real[LEDGER].
+    """Error of the accounts in units of their tolerance.
 
     Where coordinates follow a driver their errors say nothing of forces that change abruptly; works do.
     """
     n = c.accounts.shape[0]
-    size = c.real[LEDGER]
-    for k in range(n):
-        size += abs(c.y[NEW, c.accounts[k]])
-    s = LOOSER * c.real[RTOL] * size
+    s = accountable(c)
     e5 = 0.0
     e3 = 0.0
     for k in range(n):
@@ -186,6 +192,54 @@ def interpolate(R, c, x, h, out):
                 out[i] += w * c.K[j, i]
     for i in range(n):
         out[i] += c.y[NOW, i]
+
+
+@formula
+def astray(R, c, h):
+    """By how much the dense output is off within the step, in units of the tolerance; 0 where steps bound that.
+
+    From its stages alone, which `extend` has made: no evaluation.
+    """
+    n, m = c.count[CONTROLLED], c.accounts.shape[0]
+    s = accountable(c)
+    e = less = a = a_less = 0.0
+    for i in range(n):
+        size = allowed(c, i, max(abs(c.y[NOW, i]), abs(c.y[NEW, i])))
+        e += (off(R, c, 0, i) / size) ** 2
+        less += (off(R, c, 1, i) / size) ** 2
+    for k in range(m):
+        a += (off(R, c, 0, c.accounts[k]) / s) ** 2
+        a_less += (off(R, c, 1, c.accounts[k]) / s) ** 2
+    of_state = e / (e + less) * sqrt(e / n) if e > 0.0 else 0.0
+    of_accounts = a / (a + a_less) * sqrt(a / m) if a > 0.0 else 0.0
+    return h * max(of_state, of_accounts)
+
+
+@formula
+def stretch(R, c, h):
+    """About the step's width times the largest eigenvalue, as its last two stages tell, which are both at its end.
+
+    The first look of Hairer and Wanner's dop853.f at whether a problem is stiff. Exact for y' = lambda y.
+    """
+    last = R.order_i[1]
+    a = b = 0.0
+    for i in range(c.count[CONTROLLED]):
+        size = allowed(c, i, max(abs(c.y[NOW, i]), abs(c.y[NEW, i])))
+        d = 0.0
+        for j in range(last):
+            d += (R.A[last, j] - R.A[last - 1, j]) * c.K[j, i]
+        a += ((c.K[last, i] - c.K[last - 1, i]) / size) ** 2
+        b += (d / size) ** 2
+    return sqrt(a / b) if b > 0.0 else 0.0
+
+
+@formula
+def off(R, c, k, i):
+    """One of the two sums over stages that tell what the dense output of component i is off by, per second."""
+    e = 0.0
+    for j in range(R.order_i[2]):
+        e += R.D[k, j] * c.K[j, i]
+    return e
 
 
 @formula

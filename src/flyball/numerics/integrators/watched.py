@@ -12,7 +12,7 @@ from __future__ import annotations
 from ...compiler.jit import formula
 from .clock import NEXT, NOW, STATUS, TRIED, WIDE, H, T
 from .concave import NOISE
-from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, write
+from .loop import ENDED, ENTER, OVERLOOKED, ending, full, narrow, shorten, unclear, write
 from .panels import NEAR, rounding, side_of
 from .sought import CUT, first_event
 from .watching import (
@@ -71,7 +71,7 @@ def onward(callbacks, S, W, R, c, out, used):
         shorten(c, h)
         return used, False
     if status != 0:  # what lies inside the step cannot be told: take a shorter one
-        narrow(c, 0.25 * most)
+        unclear(c, most)
         return used, False
     if hit and used > 0 and out[used - 1, 0] == ending(c):  # written when it is known how the motion goes on
         used -= 1
