@@ -130,3 +130,12 @@ def test_it_is_the_same(made):
         first = first or (told, found.tolist())
         assert told == first[0], (made.__name__, scale)
         assert found == pytest.approx(first[1], abs=1e-8), (made.__name__, scale)
+
+
+@pytest.mark.parametrize("rate", ["w", "2 rad/s"])
+def test_a_first_rate_in_words_tells_the_pace(rate):
+    """Without gravity; it was taken for a number."""
+    m = fb.Mechanism("spun", planar=True, parameters={"w": 2.0})
+    m.add(fb.Body("b", mass=1, inertia=0.1, position=(1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Initial("A.angle", rate=rate))
+    assert m.simulate(0.5, outputs=2)["A.angle"][-1] == pytest.approx(1.0, abs=1e-9)
