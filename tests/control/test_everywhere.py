@@ -152,3 +152,26 @@ def test_auto_goes_back_where_a_sampled_loop_is_not_stiff_any_more():
     assert "radau from t = " in r.health.method
     assert "dop853 from t = " in r.health.method
     assert r["A.displacement"][-1] == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("cut", [0.2, 0.3, 0.35])
+@pytest.mark.parametrize("way", WAYS[:2], ids=["auto", "radau"])
+def test_events_by_samples_at_a_seam(way, cut):
+    """A count that is 3 from 0.2 s on, which a driver bears: each event is in one motion or the other."""
+    m = slide(fb.State("count", next="count + 1", period=0.1), force="count")
+    m.add(fb.Driver("D", "A.displacement", "0.1*t**2"))
+    m.add(fb.Event("many", "count > 2.5"), fb.Event("effort", "D.effort < -2"))
+    first = m.simulate(cut, outputs=2, **way)
+    rest = m.simulate(0.6, outputs=2, start=first, **way)
+    for name, late in (("many", 0.2), ("effort", 0.2)):
+        assert [h.t for r in (first, rest) for h in r.events if h.name == name] == pytest.approx([late], abs=1e-9)
+
+
+@pytest.mark.parametrize("steps", [1, 3])
+def test_events_by_samples_where_a_part_ends(steps, tmp_path, monkeypatch):
+    """The same in a motion of parts of few steps: at any of them something was sampled."""
+    m = slide(fb.State("count", next="count + 1", period=0.1), force="count")
+    m.add(*(fb.Event(f"{k}", f"count > {k} - 0.5") for k in range(2, 6)))
+    cut(monkeypatch, steps)
+    r = m.simulate(0.6, outputs=2, checkpoint=tmp_path / "run.nc")
+    assert [(h.name, round(h.t, 9)) for h in r.events] == [(f"{k}", round(0.1 * (k - 1), 9)) for k in range(2, 6)]

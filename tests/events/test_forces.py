@@ -167,3 +167,20 @@ def test_what_redundant_joints_share_is_told_as_a_choice():
     assert any("'pin.force'" in text for text in m.simulate(0.1, coordinates="absolute").health.warnings)
     with pytest.raises(fb.AnalysisError, match=r"'pin\.force'"):
         m.simulate(0.1, coordinates="joint")
+
+
+@pytest.mark.parametrize("kind", ["brake", "stop", "rope"])
+def test_what_is_carried_from_the_start_has_not_become_so(kind):
+    """1 kg rests on a rod of 1 m: on a stop or brake its hinge bears 9.81 N, on a rope 6.94; nothing jumps to that."""
+    m = fb.Mechanism("at rest", planar=True, gravity=(0, -G), parameters={"k": 1.0})
+    m.add(fb.Body("b", mass=1, inertia=0.1, position=(1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    holds = {"brake": fb.Brake("h", "A.angle", capacity=20), "stop": fb.Limit("h", "A.angle", lower=0)}
+    m.add(holds.get(kind) or fb.Rope("h", ("ground", "b"), at=((0, 1), (1, 0))))
+    bears = float(G / np.sqrt(2)) if kind == "rope" else G
+    for name, sign in (("more", ">"), ("less", "<")):
+        for part, by in (("under", 0.9), ("over", 1.1)):
+            m.add(fb.Event(f"{name} {part}", f"A.force {sign} {by * bears!r}", do=[fb.Release("A")]))
+    m.add(fb.Event("begun", "start", do=[fb.Set("k", 2)]))
+    r = m.simulate(0.3, outputs=3)
+    assert [h.name for h in r.events if h.kind == "event"] == ["begun"]
+    assert np.abs(r["b.y"]).max() < 1e-12

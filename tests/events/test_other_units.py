@@ -142,3 +142,12 @@ def test_a_start_against_a_freewheel_is_told_at_any_pace(time):
     with pytest.raises(fb.ModelError, match=r"OneWay 'wheel': the motion begins beyond it"):
         m.simulate(u.T, parameters={"rate": -1e-6 / u.T})
     assert m.simulate(1e-3 * u.T, parameters={"rate": -1e-12 / u.T}).health.success
+
+
+@pytest.mark.parametrize("rate", ["w", "2 rad/s"])
+def test_a_first_rate_in_words_tells_the_pace(rate):
+    """Without gravity; it was taken for a number."""
+    m = fb.Mechanism("spun", planar=True, parameters={"w": 2.0})
+    m.add(fb.Body("b", mass=1, inertia=0.1, position=(1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Initial("A.angle", rate=rate))
+    assert m.simulate(0.5, outputs=2)["A.angle"][-1] == pytest.approx(1.0, abs=1e-9)

@@ -70,6 +70,15 @@ def test_steady_motions_seen_by_their_joints():
         same(linear_equations(m), m.linearize(coordinates="joint"))
 
 
+@pytest.mark.parametrize("rate", ["w", "2 rad/s", 2.0])
+def test_initial_conditions_in_words(rate):
+    """A wheel that spins evenly, told by a parameter or with a unit."""
+    m = fb.Mechanism("wheel", planar=True, parameters={"w": 2.0})
+    m.add(fb.Body("b", mass=1, inertia=0.1), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    m.add(fb.Initial("A.angle", value="30 deg", rate=rate))
+    same(linear_equations(m), m.linearize(coordinates="joint"))
+
+
 def test_about_an_equilibrium_that_was_found():
     """The IFToMM governor: springs as stiff as rods, spinning at the speed that is kept."""
     m = fb.load(Path(__file__).parents[2] / "examples" / "governor.toml")

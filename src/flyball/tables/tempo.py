@@ -13,6 +13,7 @@ import numpy as np
 from ..math.lanes import deciding
 from ..math.products import inner
 from ..model.body import GROUND
+from ..model.expressions import number
 from ..model.model import Model
 from .numbers import Numbers
 
@@ -30,8 +31,9 @@ def tempo(given: Numbers, model: Model, gravity: np.ndarray, length: Any) -> Any
     speeds = [x for d in moving for x in (_size(d.v) / length, _size(d.w))]
     for e in model.initial:
         if (rate := getattr(given.of.get(e.name), "rate", None)) is not None:
-            size = _size(np.array([rate, 0.0, 0.0]))
-            speeds.append(size / length if model.unit(e.name, e) == "m" else size)
+            unit = model.unit(e.name, e)
+            size = _size(np.array([number(rate, given.env, f"{unit}/s", f"rate of {e.title}"), 0.0, 0.0]))
+            speeds.append(size / length if unit == "m" else size)
     fastest = max(speeds, key=lambda x: x.real, default=0.0)
     return fastest if fastest.real > 0.0 else A_SECOND
 

@@ -17,6 +17,7 @@ from ...errors import ModelError
 from ...graph.derivative import jacobian, replaced
 from ...graph.node import Node
 from ...graph.values import evaluate
+from ...model.body import Initial
 from ...model.expressions import number as number_of
 from ...model.words import listing, suggest
 from ...tables.forest import steps
@@ -88,8 +89,7 @@ def drawn(m: Mechanics) -> Point:
         v = velocities(m, [*zip(m.x.q, q, strict=True), *zip(m.x.z, z, strict=True)])
     at = coordinates(m)
     for e in m.model.initial:
-        told = x.numbers[e.name]
-        for name, value in ((e.name, told.value), (f"{e.name} rate", told.rate)):
+        for name, value in _told(m, e):
             if value is not None and name not in at:
                 raise ModelError(
                     f"the initial condition of {e.name!r} is of no coordinate that these equations are in; say where "
@@ -100,6 +100,14 @@ def drawn(m: Mechanics) -> Point:
     for k, d, law, rate in m.laws:
         q[k], v[d] = replaced([law, rate], [(m.x.t, 0.0)])
     return Point(q, v, z)
+
+
+def _told(m: Mechanics, e: Initial) -> list[tuple[str, Any]]:
+    """What an initial condition says of a coordinate and of its rate, by their names; None where it says nothing."""
+    unit = m.model.unit(e.name, e)
+    every = ((e.name, e.value, unit, "value"), (f"{e.name} rate", e.rate, f"{unit}/s", "rate"))
+    env = m.values.env
+    return [(name, x if x is None else number_of(x, env, of, f"{what} of {e.title}")) for name, x, of, what in every]
 
 
 @dataclass(frozen=True)

@@ -137,15 +137,17 @@ def act_at_start(here: Here) -> Acts:
         gone_on(here, here.start.before)
         take_up(here, here.start.before.carried)
         return Acts(here, (), before=here.y.copy(), tables=here.c.values)
-    return _acted(here, tuple(e for e in here.structure.model.events if e.at_start))
+    # what parts carry is known only once it is decided what holds: nothing has jumped from what it is before that
+    return _acted(here, tuple(e for e in here.structure.model.events if e.at_start), _of_forces(here))
 
 
-def _acted(here: Here, events: tuple[Event, ...]) -> Acts:
+def _acted(here: Here, events: tuple[Event, ...], unknown: frozenset[int] = frozenset()) -> Acts:
+    """``unknown``: guards of events whose expressions say nothing yet."""
     acts = Acts(here, events, before=here.y.copy(), first=len(here.records), tables=here.c.values)
     for e in events:
         here.counts[e.name] = here.counts.get(e.name, 0) + 1
     every = [(e, a) for e in events for a in e.do]
-    watched = [g for g in here.structure.events if every or g in _of_forces(here)]
+    watched = [g for g in here.structure.events if (every or g in _of_forces(here)) and g not in unknown]
     if every or watched:
         here.evaluate()
     for g in watched:

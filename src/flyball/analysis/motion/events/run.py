@@ -142,6 +142,9 @@ class Run:
             self.begin()
             engine.begin(here.clock)
             self.legs = Legs(here.clock, known, self._until)
+            if here.start.before is not None and self.sampled():  # that was not sampled: events may happen by it
+                here.clock.count[ex.STATUS] = ex.RUNNING
+                self.turned()
             while not here.stopped:
                 self.integrate()
                 if self.over():
@@ -251,11 +254,11 @@ class Run:
 
     def begin(self) -> None:
         """What happens as the motion begins."""
-        here = self.here
-        if self.stops is not None and self.stops.due(here.t):
+        here, on = self.here, self.here.start.before is not None
+        if not on and self.stops is not None and self.stops.due(here.t):
             self.stops.sample(here.c.system, here.c.work, here.clock)
         begin(here)
-        if self.loop is not None and self.guarded and here.start.before is not None:
+        if self.loop is not None and self.guarded and on:
             resume(here, self.loop)
         here.true = true_already(here)
         self.here.fresh = False
