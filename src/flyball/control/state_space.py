@@ -15,7 +15,7 @@ from .systems import matrices
 
 def _listed(value: Any) -> Any:
     """One law is a list of one."""
-    return (value,) if isinstance(value, (str, int, float)) else plain(value)
+    return (value,) if isinstance(value, (str, int, float)) or callable(value) else plain(value)
 
 
 def _matrix(value: Any) -> Any:
