@@ -65,6 +65,41 @@ def test_names():
         m.add(fb.Transfer("D", of="1", num=[1, 0], den=[1]))
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("pi", "laws read 'pi' as the number 3.14159; rename it, 'lag_pi'"),
+        ("e", "laws read 'e' as the number 2.71828"),
+        ("sin", "laws read 'sin' as the function sin"),
+        ("t", "the name 't' is reserved"),
+        *((name, "laws name a controller by its name; use letters, digits and _") for name in ("2x", "my pid", "or")),
+        ("\u00b5", "laws read '\u00b5' as '\u03bc', another letter"),
+    ],
+)
+def test_names_that_laws_read_as_something_else(name, said):
+    """A force "pi" was 3.14159 N beside a controller of that name, without a word."""
+    with pytest.raises(fb.ModelError, match=said):
+        slide(fb.Lag(name, of="1", time=1), force="0")
+
+
+def test_names_that_laws_read_with_a_dot():
+    """No constant has one; so bodies are free, and of sensors those that only results name."""
+    m = slide(fb.Lag("lag", of="1", time=1), force="lag")
+    m.add(fb.Body("pi", mass=1, inertia=1), fb.Body("post 0", mass=1, inertia=1))
+    m.add(fb.Sensor("post 0 x", "post 0.x"), fb.Lag("far", of="pi.x + 1", time=1))
+    assert m.simulate(0.1)["far.input"][0] == 1.0
+    with pytest.raises(fb.ModelError, match="Sensor 'pi': laws read 'pi' as the number"):
+        m.add(fb.Sensor("pi", "A.displacement"))
+    with pytest.raises(fb.ModelError, match="'if' is no plain name for a signal"):
+        m.add(fb.StateSpace("K", inputs=["t"], D=1, outputs=("if",)))
+
+
+@pytest.mark.parametrize("x", [float("nan"), float("inf")])
+def test_matrices_of_finite_numbers(x):
+    with pytest.raises(fb.ModelError, match=f"row 2 of A of StateSpace 'K': the value is {x}, a finite number"):
+        slide(fb.StateSpace("K", inputs=["t"], A=[[0, 1], [0, x]], B=[[0], [1]], C=[[1, 0]]), force="K")
+
+
 def test_values_of_parameters_that_make_no_sense():
     """Those of a single run are looked at as those of the model are."""
     m = slide(fb.Lag("lag", of="1", time="T"), fb.State("x", next="x", period="P"), force="lag + x", T=1.0, P=0.1)

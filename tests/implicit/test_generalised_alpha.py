@@ -75,7 +75,7 @@ def recursion(k, h, n, rho):
     return np.array(out)
 
 
-@pytest.mark.parametrize("rho", [1.0, 0.5, 0.0])
+@pytest.mark.parametrize("rho", [1.0, 0.5, 0.0, 1, 0])
 @pytest.mark.parametrize("k", [100.0, 1e10])
 def test_steps_are_those_of_the_formulas(rho, k):
     """An oscillator that steps resolve, and one of a thousand periods a step: what of it is left after each is rho."""

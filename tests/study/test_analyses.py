@@ -141,3 +141,14 @@ def test_from_a_shell(tmp_path, monkeypatch):
     bad = CliRunner().invoke(app, [*words, "--t-end", "1"])
     assert bad.exit_code == 2
     assert "t_end does nothing with analysis='modes'" in bad.stderr
+
+
+def test_the_abscissa_of_sampled_models():
+    """Of x_(k+1) = a x_k every period: ln(a) / period; it was the real part of the multiplier, in 1/s."""
+    m = fb.Mechanism("slide", planar=True, parameters={"a": 0.5})
+    m.add(fb.Body("cart", mass=1.0, inertia=1.0), fb.Prismatic("A", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("spring", "A.displacement", stiffness=4.0, damping=1.0))
+    m.add(fb.State("x", next="a*x", period=0.1), fb.Actuator("drive", "A.displacement", force="x"))
+    s = m.study({"a": [0.5, 1.5, -1.5]}, ["abscissa"], analysis="linearize")
+    unstable = np.log(1.5) / 0.1
+    np.testing.assert_allclose(s["abscissa"], [-0.5, unstable, unstable], rtol=1e-9)

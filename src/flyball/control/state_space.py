@@ -9,13 +9,13 @@ from pydantic import BeforeValidator
 
 from ..errors import ModelError
 from ..model.controller import OUTPUT, Controller, ControlState, numbered
-from ..model.element import Laws, Numbers, Unit, element, plain
+from ..model.element import Laws, Numbers, Unit, element, plain, si_numbers
 from .systems import matrices
 
 
 def _listed(value: Any) -> Any:
     """One law is a list of one."""
-    return (value,) if isinstance(value, (str, int, float)) else plain(value)
+    return (value,) if isinstance(value, (str, int, float)) or callable(value) else plain(value)
 
 
 def _matrix(value: Any) -> Any:
@@ -123,6 +123,10 @@ class StateSpace(Controller):
                 raise ModelError(
                     f"{self.title}: {name} is {told}; of {states} states, {inputs} inputs and {outputs} outputs it "
                     f"must be {rows} x {columns}"
+                )
+            for i, row in enumerate(M):
+                si_numbers(
+                    [x for x in row if not isinstance(x, str)], {}, None, f"row {i + 1} of {name} of {self.title}"
                 )
         if self.outputs and len(self.outputs) != outputs:
             raise ModelError(f"{self.title}: it has {outputs} outputs, and {len(self.outputs)} names for them")

@@ -20,8 +20,7 @@ import numpy as np
 
 from ..compiler.jit import LOCK, start_numba
 from ..errors import PerformanceNotice, warn
-from ..model.expressions import Expression
-from ..model.function import MOST, function_name
+from ..model.function import MOST, Call, function_name
 from .call import NATIVE
 
 _made: WeakKeyDictionary[FunctionType, dict[int, Native]] = WeakKeyDictionary()
@@ -67,9 +66,10 @@ class Native:
         )
 
 
-def native(expression: Expression, count: int) -> Native:
-    """The code of a law that is a Python function of ``count`` numbers."""
-    plain: Any = getattr(expression.function, "py_func", expression.function)  # the Python under Numba's decorators
+def native(asked: Call) -> Native:
+    """The code of a Python function that a law calls."""
+    count = len(asked.names)
+    plain: Any = getattr(asked.function, "py_func", asked.function)  # the Python under Numba's decorators
     with LOCK:
         if not isinstance(plain, FunctionType):
             made = Native(plain, count)
@@ -81,7 +81,7 @@ def native(expression: Expression, count: int) -> Native:
                 codes[count].original = ref(plain)
             made = codes[count]
     if made.reason:
-        _tell(expression, plain, made.reason)
+        _tell(asked, plain, made.reason)
     return made
 
 
@@ -215,7 +215,7 @@ def _short(error: Exception) -> str:
     return lines[0][:200]
 
 
-def _tell(expression: Expression, function: Any, reason: str) -> None:
+def _tell(asked: Call, function: Any, reason: str) -> None:
     """Say once for each function that it is called back in Python."""
     owner = getattr(function, "__func__", function)
     if _told.get(id(owner)) is owner:
@@ -223,7 +223,7 @@ def _tell(expression: Expression, function: Any, reason: str) -> None:
     with suppress(TypeError):  # of what cannot be referred to weakly it is told again
         _told[id(owner)] = owner
     warn(
-        f"{expression.where + ': ' if expression.where else ''}the Python function '{function_name(function)}' cannot "
+        f"{asked.where + ': ' if asked.where else ''}the Python function '{function_name(function)}' cannot "
         f"be compiled ({reason}). It is called back in Python: each call takes about a microsecond where compiled code "
         f"takes ten nanoseconds, and simulations on several threads wait for each other there. Use only numbers, "
         f"arrays, math and NumPy in it, or give an expression or a Table",

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 from ..errors import ExpressionError
 from ..model.expressions import Expression, folded
-from ..model.function import arguments
+from ..model.function import Call, called
 from ..model.grammar import Node
 from .functions import Called
 from .native import native
@@ -105,8 +106,8 @@ def compile_law(
         expression.require_derivatives()
     tree = expression.tree
     if expression.function is not None:
-        args = tuple(arguments(tree, known))
-        tree = Node("function", args, _function(expression, args, code, functions))
+        tree = called(tree, known, expression.text, expression.where)
+    tree = _with_code(tree, code, functions)
     writer = _Writer(expression, inputs, parameters, const, sensors, tables)
     tree = _folded(expression, tree, writer.varying)
     if corners is not None:
@@ -132,7 +133,7 @@ def compile_side(
 
 def bends(law: Expression, inputs: Sequence[str], sensors: Collection[str]) -> bool:
     """Whether a law has corners, or jumps, where inputs (time apart) or sensors decide."""
-    if law.function is not None:
+    if calls(law):
         return False
     found: list[Node] = []
 
@@ -142,6 +143,11 @@ def bends(law: Expression, inputs: Sequence[str], sensors: Collection[str]) -> b
 
     on_one_side(_expand(law.tree, {*inputs, *sensors}), frozenset((*inputs[1:], *sensors)), corner)
     return bool(found)
+
+
+def calls(law: Expression) -> bool:
+    """Whether a law is, or calls, a Python function: its corners nobody knows."""
+    return law.function is not None or any(n.kind == "called" for n in law.tree.walk())
 
 
 def _folded(expression: Expression, tree: Node, varying: Collection[str]) -> Node:
@@ -162,14 +168,21 @@ def _refuse_twins(
             raise ExpressionError(f"'{expression}': '{name}' is {what} and also {also}; rename the {also[2:]}")
 
 
-def _function(expression: Expression, args: Sequence[Node], code: list[int], functions: list[Called] | None) -> int:
-    """Append what a call of the law's function needs to the code; where it stands there."""
+def _with_code(tree: Node, code: list[int], functions: list[Called] | None) -> Node:
+    """The tree with the places of what calls of functions need in place of the functions."""
+    args = tuple(_with_code(arg, code, functions) for arg in tree.args)
+    if tree.kind != "called":
+        return replace(tree, args=args) if args else tree
+    return Node("function", args, _function(tree.value, code, functions), tree.start, tree.stop)
+
+
+def _function(asked: Call, code: list[int], functions: list[Called] | None) -> int:
+    """Append what a call of a function needs to the code; where it stands there."""
     if functions is None:
         raise ValueError("a law that is a Python function needs a list to be kept in")
-    names = tuple("" if node.kind == "number" else node.value for node in args)
-    made = native(expression, len(names))
-    code += [made.address, len(functions), len(names)]
-    functions.append(Called(made, names, expression.text, expression.where))
+    made = native(asked)
+    code += [made.address, len(functions), len(asked.names)]
+    functions.append(Called(made, asked.names, asked.text, asked.where))
     return len(code) - 3
 
 

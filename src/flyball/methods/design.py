@@ -216,8 +216,9 @@ class Design(Model):
             ``rms``, over the output times. Of an equilibrium also ``"least"`` (its least stiffness) and ``"stable"``
             (1 or 0); of modes ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and
             ``"stable"``; of linear models ``"gain(output, input)"``, with an angular frequency [rad/s] as third
-            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s]. Or name -> function of a
-            run's answer that returns a number.
+            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s]; of sampled models
+            ln(abs(z)) / period of the largest multiplier z. Or name -> function of a run's answer that returns a
+            number.
         analysis : {"motion", "kinematics", "instant", "equilibrium", "modes", "linearize"} or callable
             What each run is: `simulate`, `kinematics`, `assemble` with accelerations and reactions, `equilibrium`,
             `modes`, `linearize`; or a function of the mechanism and the values of its parameters, of any other.

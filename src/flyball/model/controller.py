@@ -7,6 +7,7 @@ value. A sampled controller holds its signals from one instant to the next: to l
 
 from __future__ import annotations
 
+import keyword
 from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 from types import SimpleNamespace
@@ -96,7 +97,7 @@ def refuse_equal(e: Controller, names: Any) -> None:
     """Refuse states and signals of one name, and names that are no plain words."""
     seen: set[str] = set()
     for name in names:
-        if not isinstance(name, str) or not name.isidentifier():
+        if not isinstance(name, str) or not name.isidentifier() or keyword.iskeyword(name):
             raise ModelError(f"{e.title}: {name!r} is no plain name for a signal; use letters, digits and _")
         if name in seen:
             raise ModelError(f"{e.title}: two of its signals or states are called {name!r}; name them differently")

@@ -263,8 +263,8 @@ def _evaluate(node: Node, env: Mapping[str, Any], tables: Mapping[str, Table]) -
     args = [_evaluate(arg, env, tables) for arg in (arguments(node, env) if node.kind == "function" else node.args)]
     if node.kind == "table":
         return tables[node.value].value(*args)
-    if node.kind == "function":
-        return apply(node.value, *args)
+    if node.kind in ("function", "called"):
+        return apply(node.value.function if node.kind == "called" else node.value, *args)
     return OPERATIONS[node.kind](*args)
 
 
@@ -334,4 +334,4 @@ OPERATIONS = {
     "or": _fold(operator.or_),
     "not": lambda a: not a if isinstance(a, bool) else ~a,
 }
-_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function"})
+_UNFOLDED = frozenset({"number", "name", "where", "<", "<=", "and", "or", "not", "table", "function", "called"})

@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Collection
 from numbers import Real
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -87,6 +87,32 @@ def arguments(node: Node, known: Collection[str]) -> list[Node]:
             name, f"takes {len(given)} arguments", f"a law may take {MOST} at most: put constants into the function"
         )
     return given
+
+
+class Call(NamedTuple):
+    """What a node "called" calls, with its arguments' names for messages: a function as a part of an expression."""
+
+    function: Callable[..., Any]
+    names: tuple[str, ...]
+    text: str
+    where: str
+
+
+def called(node: Node, known: Collection[str], text: str, where: str) -> Node:
+    """A function as a part of an expression: its arguments are nodes as any other's.
+
+    Parameters
+    ----------
+    node : Node
+        The function's.
+    known : collection of str
+        Names that it may be given.
+    text, where : str
+        What it is, and what it is the law of, for messages.
+    """
+    given = tuple(arguments(node, known))
+    names = tuple("" if x.kind == "number" else x.value for x in given)
+    return Node("called", given, Call(node.value, names, text, where), node.start, node.stop)
 
 
 def function_name(function: Any) -> str:

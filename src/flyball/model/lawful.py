@@ -63,7 +63,7 @@ def law_of(
     if driver:
         wiring.refuse_in_driver(model, expression, where)
     try:
-        return wiring.inlined(model, expression) if whole else expression
+        return wiring.inlined(model, expression, of) if whole else expression
     except ExpressionError as error:
         raise ExpressionError(f"{where}: {error}") from None
 

@@ -29,6 +29,7 @@ from .kept import Kept
 from .lawful import law_of
 from .limit import Unilateral
 from .material import Material, MaterialPair
+from .naming import check_name
 from .parameters import parameter_formulas, resolve_changed, resolve_parameters
 from .references import check_references
 from .sensor import IMU, Sensor
@@ -38,8 +39,6 @@ from .units import same_kind
 from .validity import check_kind, check_vectors, told_gravity
 from .words import listing as listing
 from .words import suggest as suggest
-
-RESERVED = (GROUND, "energy", "t", "time")
 
 
 class Model:
@@ -222,7 +221,7 @@ class Model:
                     f"cannot add {e!r}: it is no body, frame, joint, coupling, force, driver, sensor, table, initial "
                     f"condition, part of ground, material, contact, limit, controller or event"
                 )
-            self._check_name(e)
+            check_name(self, e)
             check_references(self, e)
             self.validate(e, self.environment())
             getattr(self, e.category).append(e)
@@ -249,20 +248,6 @@ class Model:
         parts[parts.index(old)] = e
         self.by_name[e.name] = e
         return e
-
-    def _check_name(self, e: Element) -> None:
-        if isinstance(e, Initial):
-            if any(i.name == e.name for i in self.initial):
-                raise ModelError(f"{e.title}: there is an initial condition for {e.name!r} already")
-            return
-        if not e.name or "." in e.name or e.name != e.name.strip():
-            raise ModelError(f"{type(e).__name__}: {e.name!r} is no good name; it must not be empty or contain '.'")
-        if e.name in RESERVED:
-            raise ModelError(f"{e.title}: the name {e.name!r} is reserved")
-        if isinstance(e, (Sensor, Table, Controller)) and e.name in self.parameters:
-            raise ModelError(f"{e.title}: the name {e.name!r} is a parameter's, and laws use both; rename one of them")
-        if e.name in self.by_name:
-            raise ModelError(f"{e.title}: the name is taken by {self.by_name[e.name].title}; names must be unique")
 
     def body(self, name: str, e: Element) -> Body:
         """The body of that name, as asked for by e."""

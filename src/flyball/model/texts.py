@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..errors import ModelError
+from .function import function_name
 from .grammar import Node
 
 _BETWEEN = ("+", "-", "*", "/", "**", "<", "<=", "and", "or")
@@ -31,6 +32,10 @@ def text_of(node: Node, names: Mapping[str, str]) -> str:
         return f"({f' {node.kind} '.join(args)})"
     if node.kind == "table":
         return f"{node.value}({args[0]})"
-    if node.kind in ("function", "optional", "keyword"):
-        raise ModelError("a Python function has no text")
+    if node.kind in ("function", "called"):
+        where, what = (f"{node.value.where}: ", node.value.function) if node.kind == "called" else ("", node.value)
+        raise ModelError(
+            f"{where}the Python function '{function_name(what)}' has no derivatives that are known; write it as an "
+            f"expression or a Table"
+        )
     return f"{node.kind}({', '.join(args)})"

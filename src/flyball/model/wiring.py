@@ -14,6 +14,7 @@ from ..errors import ExpressionError, ModelError
 from .controller import OUTPUT, Controller, refuse_equal
 from .element import LawOf, resolve
 from .expressions import Expression
+from .function import called
 from .grammar import Node
 from .rings import solved
 from .words import suggest
@@ -51,23 +52,15 @@ def names(model: Model) -> Collection[str]:
     return _wiring(model).names if controllers(model) else ()
 
 
-def inlined(model: Model, law: Expression) -> Expression:
-    """The law with formulas of controllers' signals in the places of their names.
-
-    Raises
-    ------
-    ExpressionError
-        If the law is a Python function, in which nothing can be put in place.
-    """
-    used = sorted(law.names & set(names(model)))
-    if not used:
+def inlined(model: Model, law: Expression, of: LawOf) -> Expression:
+    """The law with formulas of controllers' signals in the places of their names; of a function its arguments are."""
+    known = set(names(model))
+    if not law.names & known:
         return law
-    if law.function is not None:
-        raise ExpressionError(
-            f"the Python function '{law.text}' asks for {used[0]!r} of a controller, which only expressions can name; "
-            f"write an expression"
-        )
-    return dataclasses.replace(law, tree=_wiring(model).placed(law.tree))
+    if law.function is None:
+        return dataclasses.replace(law, tree=_wiring(model).placed(law.tree))
+    tree = called(law.tree, model.names_in_laws(of), law.text, law.where)
+    return dataclasses.replace(law, tree=_wiring(model).placed(tree), function=None)
 
 
 def signal(model: Model, e: Controller, name: str) -> Expression:
@@ -198,7 +191,10 @@ class _Wiring:
 
     def law(self, value: Any, where: str) -> Node:
         """A law of the user's that a controller is given."""
-        return self.placed(self.model.law(value, GIVEN, where, whole=False).tree)
+        law = self.model.law(value, GIVEN, where, whole=False)
+        if law.function is None:
+            return self.placed(law.tree)
+        return self.placed(called(law.tree, self.model.names_in_laws(GIVEN), law.text, where))
 
     def placed(self, tree: Node) -> Node:
         """A law's tree with signals in place."""

@@ -16,7 +16,7 @@ from ..constraints.blocks import DISTANCE
 from ..constraints.modes import BRANCH
 from ..laws.intervals.steps import bent
 from ..laws.opcodes import SENSOR
-from ..laws.program import bends, compile_side
+from ..laws.program import bends, calls, compile_side
 from ..laws.sides import Corners, meaning
 from ..math.spline import packed
 from ..model.element import Element, LawOf, fields_with
@@ -92,7 +92,7 @@ class Branches:
 
     def of(self, e: Any, law: Expression, inputs: tuple[str, ...]) -> Corners | None:
         """Where the sides of a law's corners are found; None for what has none."""
-        if law.function is not None:
+        if calls(law):
             return None
         s = self.s
         slots = {name: s.slots[name] for name in law.names if name in s.slots}

@@ -28,6 +28,7 @@ from .pieces import faces
 BESIDE = 1e-6  # the little way: of the mechanism's length, a radian, or these in a second
 TENTH = 0.1
 AS_MUCH = 0.5  # of the difference that far away
+ROUNDED = 16.0 * np.finfo(float).eps
 FLAT = 1e-7  # differences of slopes below this part of them are none
 
 KINK, JUMP, NO_VALUE = "has a kink", "jumps", "has no value or no slope"
@@ -130,7 +131,8 @@ def across(law: Law, at: np.ndarray, sizes: np.ndarray) -> list[tuple[np.ndarray
         step = np.zeros(len(at))
         step[i] = BESIDE * size
         far, near = (Beside.of(law, at, part * step, sizes) for part in (1.0, TENTH))
-        jump = near.jump > max(AS_MUCH * far.jump, FLAT * near.value)
+        rounding = ROUNDED * near.slope * (BESIDE + float(np.abs(at / sizes).max()))  # of terms that cancel
+        jump = near.jump > max(AS_MUCH * far.jump, FLAT * near.value) and near.jump > rounding
         kink = near.bend > max(AS_MUCH * far.bend, FLAT * near.slope)
         known = np.isfinite([near.value, near.slope])
         if known.all() and not jump and not kink:

@@ -202,7 +202,18 @@ class Answers(Small):
     def value(self, found: Any, r: Reading, times: np.ndarray) -> np.ndarray:
         """Of the frequency response, at frequency 0 with its sign; or of the eigenvalues."""
         if r.name == ABSCISSA:
-            return np.array(found.eigenvalues.real.max() if len(found.eigenvalues) else np.nan)
+            return _abscissa(found)
         out, into, at = r.of
         g = found.response([at], into, out)[0]
         return np.array(np.angle(g) if r.name == "phase" else g.real if at == 0.0 else abs(g))
+
+
+def _abscissa(found: LinearModel) -> np.ndarray:
+    """The fastest growth [1/s]: of multipliers from one instant to the next that of s in z = exp(s period)."""
+    w = found.eigenvalues
+    if not len(w):
+        return np.array(np.nan)
+    if found.period is None:
+        return np.array(w.real.max())
+    with np.errstate(divide="ignore"):  # what is gone after one period
+        return np.array(np.log(np.abs(w)).max() / found.period)

@@ -26,5 +26,5 @@ def implicit(method: str, c: Compiled, clock: ex.Clock, o: Integration) -> Impli
         return Variational(c, clock)
     index_3 = o.stabilization == "none"
     if method == ALPHA:
-        return Alpha(c, clock, RHO if o.rho_inf is None else o.rho_inf, index_3)
+        return Alpha(c, clock, RHO if o.rho_inf is None else float(o.rho_inf), index_3)
     return Implicit(c, clock, index_3)
