@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from ..math.scalar import real_parts
 from ..model.body import GROUND
 from ..model.model import Model
 from .numbers import Numbers
@@ -37,4 +36,4 @@ def tempo(given: Numbers, model: Model, gravity: np.ndarray, length: Any) -> Any
 
 def _size(x: np.ndarray) -> Any:
     """Length of a vector; zero of what is zero, where a root has no derivative."""
-    return np.sqrt((x**2).sum()) if real_parts(x).any() else 0.0
+    return np.sqrt((x**2).sum()) if any(e.real != 0.0 for e in x.tolist()) else 0.0
