@@ -40,6 +40,7 @@ from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
 USUAL = 501  # output times, where motions are looked at between their ends
+JUDGED = 17  # the same, where they are not: their energy balance is
 ANALYSES = {x.title: x for x in (Motion(), Kinematics(), Instant(), Rest(), Swings(), Answers())}
 EVERY_STUDY = ("vary", "of", "analysis", "parameters", "design", "samples", "seed", "file", "executor", "threads",
                "progress")  # fmt: skip
@@ -119,7 +120,7 @@ class StudyOptions(SimulateOptions):
         times = np.array([self.t or 0.0])
         if single.timed:
             end = float(self.t_end or 0.0)
-            outputs = self.outputs if self.outputs is not None else [end] if ends_only(asked) else USUAL
+            outputs = self.outputs if self.outputs is not None else JUDGED if ends_only(asked) else USUAL
             times = output_times(start_time(self.t_start, self.start), end, outputs)
         known = {f.name: getattr(self, f.name) for f in fields(self)}
         return Question(model, single, single.options(known, times, asked), tuple(self.vary), asked, times)
@@ -222,7 +223,7 @@ def _run(question: Question, found: Study, o: StudyOptions, tell: Any) -> None:
         return
     answers = question.empty(0)
     answers.values, answers.status = list(found.values.values()), found.status
-    answers.reasons, answers.remarks = found.reasons, found.remarks
+    answers.reasons, answers.remarks, answers.doubtful = found.reasons, found.remarks, found.doubtful
     total, saved = len(found.points), time.monotonic()
     try:
         with closing(computed(question, found.points, todo, o.executor, o.threads or cores())) as parts:

@@ -202,8 +202,8 @@ class Design(Model):
     ) -> Study:
         """Analyse at many values of parameters, on all cores: grids, samples, Monte Carlo, Sobol' indices.
 
-        Each run is to the last bit what the analysis by itself makes of it (``m.simulate(**study.question(k))``). One
-        that fails is left out, and the study says why.
+        Each run is to the last bit what the analysis by itself makes of it (``m.simulate(**study.question(k))``), and
+        doubtful where that is. One that fails is left out, and the study says why.
 
         Parameters
         ----------
@@ -227,7 +227,7 @@ class Design(Model):
         t_start : float or str [s], optional
             Their start: 0 if not given; where ``start`` ended if that is.
         outputs : int or sequence of float [s], optional
-            Output times, as for `simulate`; if not given 501, or the end alone where nothing else is looked at.
+            Output times, as for `simulate`; if not given 501, or 17 where ends are all that is looked at.
         t : float or str [s], optional
             Time of an instant, of an equilibrium or of small motions: 0 if not given.
         about : {"equilibrium"}, optional

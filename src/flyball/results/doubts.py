@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -25,6 +25,7 @@ FEW, EACH = (
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
+NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
 AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
@@ -49,7 +50,7 @@ def doubtful(result: Result) -> tuple[str, ...]:
     return tuple(text for text in (_balance(result), _violation(result)) if text)
 
 
-def balanced(result: Result) -> float:
+def balanced(result: Result) -> Any:
     """Part of the energy moved by which the balance of a sound motion may be off.
 
     Errors of steps add up: a motion of few steps comes out to some units of its tolerance, one of ten thousand to a
@@ -60,8 +61,8 @@ def balanced(result: Result) -> float:
     rtol = o.get("rtol")
     if rtol is None or o.get("step"):
         return UNBALANCED
-    expected = max(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
-    return min(expected, max(MOST, ROUGH * rtol))
+    expected = np.maximum(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
+    return np.minimum(expected, max(MOST, ROUGH * rtol))
 
 
 def energy_moved(result: Result) -> float:
@@ -69,7 +70,27 @@ def energy_moved(result: Result) -> float:
 
     The largest kinetic energy, and the ranges of gravity's and the springs' energies and of every work.
     """
-    return whole(result).moved(0, len(result.t))
+    return float(whole(result).moved(0, len(result.t)))
+
+
+def suspected(result: Result, runs: int) -> np.ndarray:
+    """Which of several motions may have a balance that is off, (runs,): of these more is to be looked at.
+
+    Parameters
+    ----------
+    result : Result
+        Motions with the same output times, one after the other, nothing exchanged at instants; the steps that its
+        health tells, and the length in its values, are theirs, (runs,).
+    runs : int
+        How many they are.
+    """
+    ledgers = [whole(result)]
+    ledgers += apart(result) if result.health.options.get("rtol") is not None else []
+    found = np.zeros(runs, bool)
+    for x in ledgers:
+        for _, _, lost, _, allowed in _excesses(x.of_runs(runs), len(result.t) // runs):
+            found |= ~(lost <= NEARLY * allowed)
+    return found
 
 
 def _balance(result: Result) -> str:
@@ -86,20 +107,27 @@ def _off(x: Ledger) -> tuple[float, str] | tuple[()]:
     What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
     """
     rows, t = len(x.result.t), x.result.t
+    for begin, end, lost, there, allowed in _excesses(x, rows):
+        if lost > allowed and x.known(begin, end):
+            when = "" if end - begin == rows else f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s"
+            return _told(x, when, float(lost), float(there), float(allowed))
+    return ()
+
+
+def _excesses(x: Ledger, rows: int) -> Iterator[tuple[int, int, Any, Any, Any]]:
+    """First row and last (not counted), what is lost there, moved and to be expected [J] (each (runs,) of several).
+
+    Of all rows, then of the stretches where more may be lost than that.
+    """
     part, moved, least = balanced(x.result), x.moved(0, rows), _rest(x)
-    drift = float(np.abs(x.balance).max(initial=0.0))
-    if drift > part * moved + least and x.known(0, rows):
-        return _told(x, "", drift, moved, part * moved + least)
-    for begin, end in _stretches(x.result):
-        lost = float(np.ptp(x.balance[begin:end]))
-        if lost <= least or lost <= part * (moved * float(x.kinetic[begin:end].max())) ** 0.5:
+    yield 0, rows, np.abs(x.balance).max(axis=-1, initial=0.0), moved, part * moved + least
+    for begin, end in _stretches(x.result, rows):
+        lost = np.ptp(x.balance[..., begin:end], axis=-1)
+        if np.all((lost <= least) | (lost <= part * (moved * x.kinetic[..., begin:end].max(axis=-1)) ** 0.5)):
             continue
         # velocities v are as far off as those of what moves most, u: by m v du
         there = x.moved(begin, end)
-        allowed = part * (moved * there) ** 0.5 + least
-        if lost > allowed and x.known(begin, end):
-            return _told(x, f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s", lost, there, allowed)
-    return ()
+        yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
 
 
 def _told(x: Ledger, when: str, lost: float, moved: float, allowed: float) -> tuple[float, str]:
@@ -110,32 +138,31 @@ def _told(x: Ledger, when: str, lost: float, moved: float, allowed: float) -> tu
     )
 
 
-def _stretches(result: Result) -> Iterable[tuple[int, int]]:
+def _stretches(result: Result, rows: int) -> Iterable[tuple[int, int]]:
     """Halves, quarters and so on of the rows of a motion that was integrated: what something else dissipated before,
     or moves after, does not speak for what happens in one.
     """
-    rows, pieces = len(result.t), 2
+    pieces = 2
     while result.health.options.get("rtol") is not None and pieces <= PIECES and rows >= ROWS * pieces:
         edges = [k * (rows - 1) // pieces for k in range(pieces + 1)]
         yield from ((a, b + 1) for a, b in itertools.pairwise(edges))
         pieces *= 2
 
 
-def _rest(x: Ledger) -> float:
+def _rest(x: Ledger) -> Any:
     """Energy [J] below which nothing is said to move: rounding of the potential energy, and a creep of all bodies.
 
     Where works are done, some of it perhaps between two rows, also what moves all bodies in the time there is to where
     rows have them.
     """
-    rounding = 1e-12 * float(np.abs(x.stored[0] + x.stored[1]).max(initial=0.0))
+    rounding = 1e-12 * np.abs(x.stored[0] + x.stored[1]).max(axis=-1, initial=0.0)
     t = x.result.t
-    least = rounding + float(x.mass.sum()) * (AT_REST * x.result.values.length) ** 2
+    least = rounding + sum(x.mass) * (AT_REST * x.result.values.length) ** 2
     span = float(np.ptp(t)) if len(t) else 0.0
     if not x.works or not span > 0.0:
         return least
-    r = x.result.records
-    went = (m * sum(np.ptp(p) ** 2 for p in r.body(b)[0]) for b, m in zip(x.bodies.tolist(), x.mass, strict=True))
-    return least + balanced(x.result) * float(sum(went)) / max(span, 1e-150) ** 2
+    went = sum(m * way for m, way in zip(x.mass, x.went, strict=True))
+    return least + balanced(x.result) * went / max(span, 1e-150) ** 2
 
 
 def _violation(result: Result) -> str:

@@ -27,23 +27,25 @@ TURN = 2.0 * np.pi
 class Records:
     """Records of bodies and frames at every output time, with true accelerations; arrays (n,) for each number.
 
-    ``wound``: body -> whole turns [rad] that its coordinates count and its angle does not (`Result.wound`).
+    ``wound``: body -> whole turns [rad] that its coordinates count and its angle does not (`Result.wound`). Without
+    ``vdot`` nobody will ask for accelerations.
     """
 
     def __init__(
-        self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray, wound: Mapping[str, float] | None = None
+        self, x: Values, q: np.ndarray, v: np.ndarray, vdot: np.ndarray | None, wound: Mapping[str, float] | None = None
     ) -> None:
         self.x, self.q = x, q
         self.n = len(q)
         S = x.system
         nb, nv = len(S.body_i), v.shape[1]
         numbers = [x for x in (S.body_x, S.frame_x, S.const) if x.dtype != object]  # objects: arrays over time
-        self.dtype = np.result_type(q, v, vdot, *numbers)  # complex for derivatives
+        self.dtype = np.result_type(q, v, *([] if vdot is None else [vdot]), *numbers)  # complex for derivatives
         self.W = SimpleNamespace(BK=self.zeros(nb, 24), X=self.zeros(nv, 6), O=self.zeros(nb, 3))
         for b in range(nb):
             pose(S, self.W, b, q.T)
             motion(S, self.W, b, v.T)
-        self._accelerate(vdot.T)
+        if vdot is not None:
+            self._accelerate(vdot.T)
         self._frames: dict[int, Record] = {}
         self._names = {b: name for name, b in x.structure.place.items() if b >= 0}
         self._wound = wound or {}

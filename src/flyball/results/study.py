@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .result import Result
 
 WAITING, DONE, FAILED = 0, 1, 2
+WORDS, DOUBTFUL = ("still to be done", "done", "failed"), "done, but doubtful"
 TIMES = {"motion": "outputs", "kinematics": "times"}  # analysis -> the option that its output times are
 TOLD = 6  # reasons in a text
 NO_CROSS = "only the runs of design='saltelli' tell indices; this is a study of design={!r}"
@@ -56,6 +57,8 @@ class Study:
         Why runs failed, by their numbers.
     remarks : dict of int to str
         What was noted about runs that are done.
+    doubtful : dict of int to str
+        Why runs that are done may not be what their tolerance asks for (`Health.doubtful`); it is among their remarks.
     options : dict
         How each run was computed.
     base : dict
@@ -83,6 +86,7 @@ class Study:
     analysis: str = "motion"
     reasons: dict[int, str] = field(default_factory=dict)
     remarks: dict[int, str] = field(default_factory=dict)
+    doubtful: dict[int, str] = field(default_factory=dict)
     start: Result | None = None
     seconds: float = 0.0
     message: str = ""
@@ -95,6 +99,13 @@ class Study:
     def done(self) -> np.ndarray:
         """Which runs are done and did not fail, (runs,)."""
         return self.status == DONE
+
+    @property
+    def words(self) -> np.ndarray:
+        """How each run is, (runs,) of str: done; done, but doubtful; failed; or still to be done."""
+        out = np.array(WORDS, object)[self.status]
+        out[list(self.doubtful)] = DOUBTFUL
+        return out.astype(str)
 
     @property
     def complete(self) -> bool:
@@ -194,7 +205,9 @@ class Study:
         what = "" if self.analysis == "motion" else f"{self.analysis}, "
         out = [("study", f"{self.name}, {what}{self.design}, {sizes}")]
         left = len(self) - done - failed
-        told = [f"{done} done"] + [f"{n} {what}" for n, what in ((failed, "failed"), (left, "still to be done")) if n]
+        doubted = f" ({len(self.doubtful)} of them doubtful)" if self.doubtful else ""
+        told = [f"{done} done{doubted}"]
+        told += [f"{n} {what}" for n, what in ((failed, "failed"), (left, "still to be done")) if n]
         out.append(("runs", ", ".join(told) + (f"; {self.message}" if self.message else "")))
         for k, name in enumerate(self.parameters):
             out.append((name, f"{span(self.points[:, k])} (in the model {self.base[name]:.6g})"))
@@ -208,11 +221,15 @@ class Study:
                 missed.insert(0, f"{text}, mean {y.mean():.6g}, standard deviation {y.std():.3g}")
             if missed:
                 out.append((name, "; ".join(missed)))
-        told_of = self._told_of(self.reasons)
-        out += [("failed", text) for text in told_of[:TOLD]]
-        if len(told_of) > TOLD:
-            out.append(("failed", f"and {len(told_of) - TOLD} other reasons: study.reasons"))
-        return out + [("remark", text) for text in self._told_of(self.remarks)[:TOLD]]
+        remarks = {k: text for k, text in self.remarks.items() if text != self.doubtful.get(k)}
+        out += self._listed("failed", self.reasons, "reasons")
+        out += self._listed("doubtful", self.doubtful, "doubtful")
+        return out + self._listed("remark", remarks, "remarks")
+
+    def _listed(self, label: str, texts: dict[int, str], name: str) -> list[tuple[str, str]]:
+        told = self._told_of(texts)
+        out = [(label, text) for text in told[:TOLD]]
+        return out + ([(label, f"and {len(told) - TOLD} others: study.{name}")] if len(told) > TOLD else [])
 
     def _told_of(self, texts: dict[int, str]) -> list[str]:
         """Each text once, with the first run that has it and how many there are."""
@@ -241,6 +258,7 @@ class Study:
             "status": self.status.tolist(),
             "reasons": {str(k): text for k, text in self.reasons.items()},
             "remarks": {str(k): text for k, text in self.remarks.items()},
+            "doubtful": {str(k): text for k, text in self.doubtful.items()},
             "message": self.message,
         }
 
@@ -249,13 +267,17 @@ class Study:
         return to_xarray(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """A table with a row for each run: parameters, and the quantities that are one number."""
+        """A table with a row for each run: parameters, and the quantities that are one number.
+
+        ``attrs["doubtful"]`` are the numbers of the runs that are.
+        """
         import pandas as pd
 
         columns = {name: self.points[:, k] for k, name in enumerate(self.parameters)}
         columns |= {name: x for name, x in self.values.items() if x.ndim == 1}
         frame = pd.DataFrame(columns, index=pd.RangeIndex(len(self), name=RUN))
         frame.attrs["units"] = dict(zip(self.of, self.units, strict=True))
+        frame.attrs["doubtful"] = sorted(self.doubtful)
         return frame
 
     def to_csv(self, path: str | os.PathLike) -> None:

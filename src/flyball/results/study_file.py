@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 FORMAT = 1
 RUN, TIME = "run", "time"
+DOUBTED = {"comment": "1: done, but perhaps not what its tolerance asks for"}
+BY_RUN = ("reasons", "remarks", "doubtful")
+"""Texts by the numbers of runs."""
 TOLD = ("name", "design", "parameters", "of", "units", "options", "base", "mark", "analysis", "seconds", "message")
 
 
@@ -38,7 +41,15 @@ def to_xarray(study: Study) -> xarray.Dataset:
         x = study[name]
         data[name] = ((*dims, TIME) if x.ndim > len(dims) else dims, x, {"units": unit} if unit else {})
     data["status"] = (dims, study.status.reshape(study.shape), {"comment": "0 still to be done, 1 done, 2 failed"})
+    data["doubtful"] = (dims, _doubted(study).reshape(study.shape), DOUBTED)
     return xr.Dataset(data, coords, attrs=_about(study))
+
+
+def _doubted(study: Study) -> np.ndarray:
+    """Which runs are doubtful, (runs,) of 0 and 1."""
+    out = np.zeros(len(study), np.int8)
+    out[list(study.doubtful)] = 1
+    return out
 
 
 def _about(study: Study) -> dict[str, str]:
@@ -62,7 +73,7 @@ def _write(study: Study, path: Path) -> None:
 
     texts = {k: getattr(study, k) for k in TOLD}
     texts["options"] = {k: _plain(x) for k, x in study.options.items()}
-    texts["reasons"], texts["remarks"] = study.reasons, study.remarks
+    texts |= {k: getattr(study, k) for k in BY_RUN}
     with h5netcdf.File(path, "w") as file:
         file.attrs.update(_about(study) | {"Conventions": "CF-1.11"})
         file.dimensions[RUN], file.dimensions[TIME] = len(study), len(study.t)
@@ -73,6 +84,7 @@ def _write(study: Study, path: Path) -> None:
             made = file.create_variable(safe(name), (RUN, TIME)[: x.ndim], data=np.ascontiguousarray(x))
             made.attrs["units"] = unit or "1"
         file.create_variable("status", (RUN,), data=study.status)
+        file.create_variable("doubtful", (RUN,), data=_doubted(study)).attrs.update(DOUBTED)
         group = file.create_group(GROUP)
         group.attrs["study"] = FORMAT
         group.create_variable("study", (), dtype=text_type(), data=np.array(json.dumps(texts), object))

@@ -17,7 +17,7 @@ from ..model.model import Model
 from .files import GROUP, sealed
 from .result import Result
 from .study import WAITING, Study
-from .study_file import FORMAT, TIME, safe
+from .study_file import BY_RUN, FORMAT, TIME, safe
 
 REMEDY = "give a file that a study with file= or Study.save wrote"
 
@@ -95,8 +95,8 @@ def _read(path: Path) -> Study:
         t = np.ascontiguousarray(file.variables[TIME][...])
     for name in ("parameters", "of", "units"):
         told[name] = tuple(told[name])
-    for name in ("reasons", "remarks"):
-        told[name] = {int(k): x for k, x in told[name].items()}
+    for name in BY_RUN:  # files of earlier versions have fewer
+        told[name] = {int(k): x for k, x in told.get(name, {}).items()}
     if (status == WAITING).any() and not told["message"]:
         told["message"] = "it ended before all runs were done"
     return Study(points=np.column_stack(columns), axes=tuple(axes), t=t, values=values, status=status, **told)

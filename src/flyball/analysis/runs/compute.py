@@ -43,12 +43,15 @@ class Question:
 
 @dataclass
 class Answers:
-    """Values (runs, ...) of each quantity, how far each run is; why some failed, and remarks, by their numbers."""
+    """Values (runs, ...) of each quantity, how far each run is; by numbers of runs why they failed or are doubtful,
+    and remarks.
+    """
 
     values: list[np.ndarray]
     status: np.ndarray
     reasons: dict[int, str] = field(default_factory=dict)
     remarks: dict[int, str] = field(default_factory=dict)
+    doubtful: dict[int, str] = field(default_factory=dict)
     seconds: float = 0.0  # that it took to find them
 
     def take(self, at: np.ndarray, other: Answers) -> None:
@@ -56,8 +59,8 @@ class Answers:
         for mine, its in zip(self.values, other.values, strict=True):
             mine[at] = its
         self.status[at] = other.status
-        self.reasons.update({int(at[k]): text for k, text in other.reasons.items()})
-        self.remarks.update({int(at[k]): text for k, text in other.remarks.items()})
+        for name in ("reasons", "remarks", "doubtful"):
+            getattr(self, name).update({int(at[k]): text for k, text in getattr(other, name).items()})
 
 
 def compute(question: Question, points: np.ndarray, stopped: Callable[[], bool] = lambda: False) -> Answers:
@@ -90,7 +93,9 @@ def _told(question: Question, point: np.ndarray, out: Answers, k: int) -> list[n
     single = question.single
     found = single.run(question.model, question.at(point))
     values = single.read(found, question.asked, question.times)
-    if remarks := single.remarks(found):
+    if doubts := single.doubtful(found):
+        out.doubtful[k] = "; ".join(doubts)
+    if remarks := (*single.remarks(found), *doubts):
         out.remarks[k] = "; ".join(map(str, remarks))
     return values
 

@@ -15,10 +15,12 @@ import numpy as np
 from ...errors import FlyballError
 from ...model.model import Model
 from ...model.touching import nothing_touches
+from ...numerics.integrators import clock as ex
 from ...numerics.integrators.tableaux import TABLEAUX
 from ...results.departure import changed_velocities, not_allowed
 from ...results.result import Result
-from ...tables.system import SEMIDEFINITE
+from ...results.study import DONE, WAITING
+from ...tables.system import SEMIDEFINITE, WORST_G
 from ...tables.values import Values, values
 from ..motion.choice import AUTO, SimulateOptions, chosen
 from ..motion.driven import leaves_no_freedom
@@ -27,9 +29,10 @@ from ..motion.later import solved
 from ..motion.reasons import remarks
 from ..motion.start import Start, begin, start_time
 from .codes import Codes
-from .compute import DONE, Answers, Question, alone
+from .compute import Answers, Question, alone
 from .desk import Desk, Loop
 from .drawn import Drawn, rests_as_drawn
+from .judged import Judge, Ran
 from .reading import FUNCTION
 from .soft import Filling, soft
 from .spread import Place, Spread
@@ -117,7 +120,7 @@ class Lean:
         self._own = threading.local()
         self.alone_count = 0  # runs that were computed by themselves after all
         q = of.question
-        self._reader = Reader(q, of.begun.wound)
+        self._reader, self._judge = Reader(q, of.begun.wound), Judge(of)
         self.alone = [k for k in range(len(q.asked)) if k not in self._reader.stacked]
         self.remarks = [
             *map(not_allowed, changed_velocities(of.begun.base.departures)), *nothing_touches(q.model)
@@ -133,6 +136,7 @@ class Lean:
         ny = len(self.of.begun.y)
         rows = np.zeros((len(points), len(q.times), 1 + ny))
         mine, places = np.zeros(len(points), bool), list[Place]()
+        steps, worst = np.zeros((2, len(points)))
         self.of.filling.also(points)
         for k, point in enumerate(points):
             if stopped():
@@ -147,6 +151,8 @@ class Lean:
                 continue
             loop = desk.loop
             rows[k] = loop.rows[: len(q.times), : 1 + ny]
+            steps[k] = loop.clock.count[ex.ACCEPTED]
+            worst[k] = loop.start.assembly.compiled.work.option[WORST_G]
             places.append(desk.filler.place)
             if found := (*self.remarks, *remarks(loop.start.assembly, loop.clock)):
                 out.remarks[k] = "; ".join(found)
@@ -154,7 +160,18 @@ class Lean:
                 self._whole(loop, point, out, k)
         self._reader.read(self.of.values, rows[mine], points[mine], places, np.flatnonzero(mine), out)
         out.status[mine] = DONE
+        if mine.any():
+            doubted = self._judge.suspected(Ran(points[mine], rows[mine], steps[mine], worst[mine]))
+            self._told(points, np.flatnonzero(mine)[doubted], out, stopped)
         return out
+
+    def _told(self, points: np.ndarray, some: np.ndarray, out: Answers, stopped) -> None:  # type: ignore[no-untyped-def]
+        """Runs whose balance may be off, by themselves: these say whether it is."""
+        for k in some.tolist():
+            if stopped():
+                out.status[k] = WAITING
+            else:
+                alone(self.of.question, points[k], out, k)
 
     def _whole(self, loop: Loop, point: np.ndarray, out: Answers, k: int) -> None:
         """What depends on forces is read of the run by itself."""

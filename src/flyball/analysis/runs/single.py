@@ -58,6 +58,10 @@ class Single:
         """What a single run would say besides."""
         return ()
 
+    def doubtful(self, found: Any) -> Sequence[str]:
+        """Reasons to think that the answer is not what its tolerance asks for."""
+        return ()
+
     def named(self, model: Model, text: Any) -> Reading:
         """A quantity by name.
 
@@ -118,6 +122,10 @@ class Motion(Timed):
         if not result.health.success:
             raise SimulationError(result.health.message, result)
         return result
+
+    def doubtful(self, found: Any) -> Sequence[str]:
+        """Those of its health."""
+        return found.health.doubtful
 
 
 class Kinematics(Timed):

@@ -10,13 +10,15 @@ from typing import Any
 import numpy as np
 
 from ...math.lanes import Lanes
+from ...model.model import Model
 from ...results.health import Health
+from ...results.records import Records
 from ...results.result import Result
 from ...tables.poses import Poses
 from ...tables.values import Values, values
 from .compute import Answers, Question
 from .readable import of_states
-from .reading import reduced
+from .reading import ends_only, reduced
 from .spread import TABLES, Group, Place
 
 AT_ONCE = 20_000  # times that are read at once: each takes some kilobytes
@@ -44,6 +46,8 @@ class Reader:
         """
         if not len(at) or not self.stacked:
             return
+        if ends_only(self.question.asked):
+            rows = rows[:, -1:]
         groups: dict[int, list[int]] = {}
         for k, (group, _) in enumerate(places):
             groups.setdefault(id(group), []).append(k)
@@ -79,20 +83,27 @@ class Reader:
 
     def _curves(self, x: Values, rows: np.ndarray) -> list[np.ndarray]:
         """What is asked for of states, (runs, times) each, as of one motion."""
-        q, s = self.question, x.structure
-        flat = rows.reshape(-1, rows.shape[2])
-        _, p, v, z = np.split(flat, np.cumsum([1, s.nq, s.nv]), axis=1)
-        none = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
-        p, v, z = (np.ascontiguousarray(x) for x in (p, v, z))
-        result = Result(q.model, x, flat[:, 0].copy(), p, v, z, *none, unjudged())
-        result.wound = dict(self.wound)
+        q = self.question
+        result = of_rows(q.model, x, rows, self.wound)
         return [result.curve(q.asked[i].name)[1].reshape(len(rows), -1) for i in self.stacked]
 
     def _write(self, curves: list[np.ndarray], at: np.ndarray, out: Answers) -> None:
         q = self.question
         for i, curve in zip(self.stacked, curves, strict=True):
             for k, y in zip(at, curve, strict=True):
-                out.values[i][k] = reduced(q.asked[i].how, q.times, np.ascontiguousarray(y), q.times)
+                t = q.times[-len(y) :]
+                out.values[i][k] = reduced(q.asked[i].how, t, np.ascontiguousarray(y), t)
+
+
+def of_rows(model: Model, x: Values, rows: np.ndarray, wound: Mapping[str, float]) -> Result:
+    """States of runs (runs, times, ...), one after the other, as a result without accelerations and reactions."""
+    s, flat = x.structure, rows.reshape(-1, rows.shape[2])
+    t, p, v, z = (np.ascontiguousarray(a) for a in np.split(flat, np.cumsum([1, s.nq, s.nv]), axis=1))
+    none = np.zeros((len(flat), s.nv)), np.zeros((len(flat), len(s.rows) + len(s.prescribed)))
+    result = Result(model, x, t[:, 0], p, v, z, *none, unjudged())
+    result.wound = dict(wound)
+    result.records = Records(x, p, v, None, wound)
+    return result
 
 
 def unjudged() -> Health:

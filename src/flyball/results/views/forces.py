@@ -28,15 +28,21 @@ class ForceView(View):
 
     def _between(self) -> tuple[tuple, tuple, tuple]:
         """(inputs, force on M, torque on M) over time, of a force between frames."""
-        e, r, S = self.element, self._result.records, self._x.system
+        e, S = self.element, self._x.system
         k = self._index()
-        F, M = r.frame(int(S.force_i[k, FORCE_F])), r.frame(int(S.force_i[k, FORCE_M]))
-        par = wide(S.force_x, k)
-        a, b = (np.broadcast_to(i, (r.n,)) for i in e.inputs(par, F, M))
+        F, M, par = self._frames
+        a, b = (np.broadcast_to(i, (self._result.records.n,)) for i in e.inputs(par, F, M))
         laws = tuple(self._law(int(S.force_i[k, FORCE_LAW + i]), a, b) for i in range(3))
         force, torque = e.wrench(par, F, M, laws, (a, b))
-        self._frames = F, M, par
         return (a, b), force, torque
+
+    @property
+    def _frames(self) -> tuple[tuple, tuple, Any]:
+        """Records of F and M over time, and its numbers, of a force between frames."""
+        r, S = self._result.records, self._x.system
+        k = self._index()
+        F, M = (r.frame(int(S.force_i[k, side])) for side in (FORCE_F, FORCE_M))
+        return F, M, wide(S.force_x, k)
 
     def acts(self) -> tuple[tuple[int, int], tuple, tuple, tuple]:
         """Of a force between frames: bodies of F and M, point, force and torque there on M's body over time."""
@@ -165,8 +171,9 @@ class ForceView(View):
         if isinstance(e, CoordinateForce):
             if not any(f is e for f in self._x.structure.forces):
                 return self._result.records.zeros()
-            return self._in_force() * e.energy(wide(self._x.system.force_x, self._index()), self._along()[0])
-        self._between()
+            S, k = self._x.system, self._index()
+            x = self._result.measured.quantity(int(S.force_i[k, FORCE_F]))[0]
+            return self._in_force() * e.energy(wide(S.force_x, k), x)
         F, M, par = self._frames
         return e.energy(par, F, M)
 
@@ -183,7 +190,8 @@ class ForceView(View):
             _, rate, effort, _ = self._whole_along()
             return rate * effort
         _, force, torque = self._between()
-        return power(self._frames[0], self._frames[1], force, torque)
+        F, M, _ = self._frames
+        return power(F, M, force, torque)
 
     @property
     def work(self) -> np.ndarray:
