@@ -135,7 +135,9 @@ def main() -> None:
     def end(run: Any) -> np.ndarray:
         return np.array([run[name].angle[-1] for name in JOINTS])
 
-    ours = [Flyball(model, end, method, arguments.coordinates) for method in ("dop853", "rk45", "radau")]
+    ours = [Flyball(model, end, method, arguments.coordinates) for method in ("rk45", "radau")]
+    ways = (True, False, "auto")  # auto last: then there is code that was made before
+    ours += [Flyball(model, end, "dop853", arguments.coordinates, specialize=way) for way in ways]
     ends = {"mujoco": mujoco_end, "exudyn": exudyn_end}
     peers = [Peer(name, setting, partial(ends[name], p, setting), first) for name, setting, first in PEERS]
     peers += [Peer("by hand", setting, partial(end_by_hand, setting), 1e-7) for setting in BY_HAND]

@@ -114,6 +114,7 @@ class Flyball:
     method: str = "dop853"
     coordinates: str = "auto"
     loosest: float = TOLERANCES[0]
+    specialize: bool | str = "auto"
 
 
 class Search:
@@ -186,9 +187,10 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
     """The loosest tolerance of the grid that meets the target, with default stabilization."""
     from flyball import FlyballError
 
-    row: dict[str, Any] = {"engine": "flyball", "setting": ours.method, "met": False, contest.key: OPEN, "failed": []}
+    setting = ours.method + {True: ", made code", False: ", tables"}.get(ours.specialize, "")
+    row: dict[str, Any] = {"engine": "flyball", "setting": setting, "met": False, contest.key: OPEN, "failed": []}
     for rtol in (r for r in TOLERANCES if r <= ours.loosest):
-        options = {"rtol": rtol, "method": ours.method, "coordinates": ours.coordinates}
+        options = {"rtol": rtol, "method": ours.method, "coordinates": ours.coordinates, "specialize": ours.specialize}
         outputs = contest.samples + 1
         try:
             run = simulate(ours.model, contest.t_end, outputs=outputs, **options)
@@ -210,8 +212,9 @@ def find_flyball(contest: Contest, ours: Flyball) -> dict[str, Any]:
 def clocks(model: Any, t_end: float, outputs: int, options: Mapping[str, Any]) -> dict[str, Callable[[], float]]:
     """What is timed of flyball: the compiled loop, if it is an explicit one, and the whole call."""
     out = {"call": lambda: timing.cpu(lambda: simulate(model, t_end, outputs=outputs, **options))}
-    if options["method"] in TABLEAUX:
-        out["kernel"] = Kernel(model, t_end, 2, **options).seconds
+    if options["method"] in TABLEAUX and options["specialize"] is not True:
+        kept = {k: x for k, x in options.items() if k != "specialize"}
+        out["kernel"] = Kernel(model, t_end, 2, **kept).seconds
     return out
 
 

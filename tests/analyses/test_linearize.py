@@ -307,3 +307,15 @@ def test_states_of_a_universal_joint_are_its_angles():
     model = m.linearize(outputs=["U.angle_1", "U.angle_2"], coordinates="joint")
     assert model.states[:2] == ("U.angle_1", "U.angle_2")
     np.testing.assert_allclose(model.C, np.eye(2, 4), atol=1e-12)
+
+
+@pytest.mark.parametrize("time", [1e-9, 1.0, 1e10])
+def test_what_is_still_is_told_by_the_mechanisms_own_pace(time):
+    """A pendulum swings through its lowest place at a hundredth of its pace, or at a part of 1e-12 of that."""
+    m = fb.Mechanism("slow", planar=True, gravity=(0, -G / time**2), parameters={"rate": 0.0})
+    m.add(fb.Body("bob", mass=1.0, inertia=0.1, position=(0, -1)), fb.Revolute("A", "ground", "bob", at=(0, 0)))
+    m.add(fb.Initial("A.angle", rate="rate"))
+    with pytest.raises(fb.AnalysisError, match="no steady one"):
+        m.linearize(parameters={"rate": 0.01 / time})
+    w = m.linearize(parameters={"rate": 1e-14 / time}).eigenvalues
+    np.testing.assert_allclose(np.abs(w) * time, np.sqrt(G / 1.1), rtol=1e-9)

@@ -158,3 +158,12 @@ def test_limits_that_cross_where_it_is_to_rest():
             fb.AnalysisError, match="at t = 0 s, PID 'pid' has no output: its limits cross, lower is 30"
         ):
             ask(parameters={"a": 30.0})
+
+
+@pytest.mark.parametrize("gains", [{}, {"ki": 10, "tracking": 1}])
+def test_what_a_limited_controller_cannot_hold_is_told_with_and_without_states(gains):
+    """3 N against 1 N at most: 2 N are left."""
+    pid = fb.PID("pid", setpoint="0", measured="A.displacement", kp=100, lower=-1, upper=1, **gains)
+    m = slide(pid, force="pid + 3").changed({"spring": None})
+    with pytest.raises(fb.NotConverged, match=r"2 N push along cart\.x and nothing holds against it"):
+        m.equilibrium()

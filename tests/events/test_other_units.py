@@ -139,3 +139,15 @@ def test_a_first_rate_in_words_tells_the_pace(rate):
     m.add(fb.Body("b", mass=1, inertia=0.1, position=(1, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
     m.add(fb.Initial("A.angle", rate=rate))
     assert m.simulate(0.5, outputs=2)["A.angle"][-1] == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("time", [1e-6, 1.0, 1e6])
+def test_a_start_against_a_freewheel_is_told_at_any_pace(time):
+    """A millionth of its own pace is beyond it, what is a millionth of that is rounding."""
+    u = scaled(1.0, 1.0, time)
+    m = begun(u, 0.1, position=(0.5, 0))
+    m.parameters["rate"] = 0.0
+    m.add(fb.Revolute("A", "ground", "b", at=(0, 0)), fb.OneWay("wheel", "A.angle"), fb.Initial("A.angle", rate="rate"))
+    with pytest.raises(fb.ModelError, match=r"OneWay 'wheel': the motion begins beyond it"):
+        m.simulate(u.T, parameters={"rate": -1e-6 / u.T})
+    assert m.simulate(1e-3 * u.T, parameters={"rate": -1e-12 / u.T}).health.success

@@ -52,6 +52,24 @@ def test_a_motion_that_is_short_or_not_stiff_does_not():
     assert bushing(0.0).simulate(0.01).health.method == ""
 
 
+def on_mounts(bodies):
+    """Some bodies of 1 kg, each on a mount that damps all at 2e4/s."""
+    m = fb.Mechanism("mounts", gravity=(0, 0, 0))
+    for k in range(bodies):
+        m.add(fb.Body(f"x{k}", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(k, 0, 0), velocity=(1.0, 0, 0)))
+        m.add(fb.SpringDamper(f"s{k}", "ground", f"x{k}", at=((k - 1, 0, 0), (k, 0, 0)), stiffness=1e4, damping=2e4))
+    return m
+
+
+def test_what_is_left_is_counted_by_what_it_costs():
+    """As many steps for sixteen bodies as for one, and each is dearer: they go over, one does not."""
+    one, many = (on_mounts(n).simulate(1.0, rtol=1e-3, outputs=3) for n in (1, 16))
+    assert one.health.method == ""
+    assert many.health.method.startswith("dop853; radau from t = 0.0")
+    rest = 1.0 / 2e4  # the way of 1 m/s until it is damped away; the spring brings it back in 2 s
+    assert np.abs(many["x7"].position[-1] - (7 + rest * np.exp(-0.5), 0, 0)).max() < 1e-5
+
+
 def test_it_comes_back_where_nothing_is_stiff_any_more():
     """The damper lets go: then it swings freely, with what energy there is."""
     off = fb.Event("off", "t - 0.5", do=[fb.Set("c", 0.0), fb.Impulse("s", "3e-3")])

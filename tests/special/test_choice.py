@@ -117,7 +117,7 @@ def test_short_motions_are_left_alone(maker):
 
 
 def test_a_long_motion_begins_anew_with_code_that_pays(maker):
-    """What is left after 16 steps is more than making costs; whatever the clock says, and told as if it began so."""
+    """What is left after 8 steps is more than making costs; whatever the clock says, and told as if it began so."""
     maker.price_of_making = 1e6
     first, again = (four_bar().simulate(20.0, outputs=3) for _ in range(2))
     assert maker.made == 2

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from ..compiler.bound import Moulded
 from ..constraints.registry import KINDS
 from ..equations.engine import POSITION, evaluate
 from ..equations.projection import NONE
-from ..equations.scratch import work
+from ..equations.scratch import scratch, work
 from ..equations.velocities import turned_angles, velocities
 from ..model.body import Body, Frame, Initial
 from ..model.model import Model
@@ -42,7 +43,7 @@ class Compiled:
 
     def __getstate__(self) -> dict[str, Any]:
         """Without scratch, and without addresses, which mean nothing in another process."""
-        return {k: x for k, x in vars(self).items() if k not in ("work", "system", "made")}
+        return {k: x for k, x in vars(self).items() if k not in ("work", "scratch", "system", "made")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         vars(self).update(state, system=state["values"].system, made=None)
@@ -50,6 +51,7 @@ class Compiled:
     def run_on(self, made: Any) -> None:
         """From now on code that was made for this mechanism does what it can for the engine, in scratch that is new."""
         x, before = self.values, vars(self).pop("work", None)
+        vars(self).pop("scratch", None)
         self.made, self.system = made, x.kept.get("made", id(made), 1, lambda: (made, made.system(x.system)))[1]
         if before is not None:
             self.work.option[:] = before.option
@@ -61,10 +63,18 @@ class Compiled:
     @cached_property
     def work(self) -> Work:
         """Scratch of its own."""
-        w = work(self.structure, self.system)
+        if self.system.body_x.dtype.kind not in "fc":
+            w = work(self.structure, self.system)
+        else:
+            w = self.scratch.fields
         w.option[STABILIZE] = NONE
         w.option[PASS] = 1e-13
         return w
+
+    @cached_property
+    def scratch(self) -> Moulded:
+        """The same as compiled code has it."""
+        return scratch(self.structure, self.system, self.system.body_x.dtype)
 
     @property
     def structure(self) -> Structure:

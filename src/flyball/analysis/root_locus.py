@@ -26,6 +26,7 @@ from .untouched import refuse_contact
 SAME = 1e-9  # of the stretch between two values: events closer together at one eigenvalue are one
 ROUNDED = 1e-13  # of the largest value: what is none
 ASIDE = (0.25, 0.0625, 0.015625, 0.00390625)  # of the way to the next value: samples beside where branches meet
+SOON = 2.0  # stretches between values: eigenvalues that are one, and apart again within these, only meet
 MEETINGS = 16  # places where branches meet that are shown finely
 
 
@@ -155,15 +156,25 @@ def _traced(done: RootLocus, points: np.ndarray, at: Callable[[float], Sample], 
 def _told(done: RootLocus, taken: Sequence[Sample]) -> None:
     """Write samples as branches."""
     order = sorted(taken, key=lambda x: x.place)
-    first = np.lexsort((order[0].w.real, order[0].w.imag))
-    rows, last = [order[0].w[first]], first
-    for a, b in pairwise(order):
-        last = match(a, b)[last]
-        rows.append(b.w[last])
+    base, last = order[0], np.lexsort((order[0].w.real, order[0].w.imag))
+    rows = [base.w[last]]
+    for k, x in enumerate(order[1:], 1):
+        own = match(base, x)[last]
+        rows.append(x.w[own])
+        if not _met(base, x, order[k + 1 :]):
+            base, last = x, own
     done.path, done.path_values = np.array(rows), np.array([x.value for x in order])
     given = [k for k, x in enumerate(order) if x.place == int(x.place)]
     done.values, done.eigenvalues = done.path_values[given], done.path[given]
     done.seen_from = tuple(dict.fromkeys(x.told for x in order if x.told))
+
+
+def _met(base: Sample, x: Sample, later: Sequence[Sample]) -> bool:
+    """Whether eigenvalues that are apart before and soon after are one at a sample, where none has its own shape."""
+    many = len(np.unique(x.w))
+    if many >= len(np.unique(base.w)):
+        return False
+    return any(len(np.unique(y.w)) > many for y in later if y.place - base.place <= SOON)
 
 
 def _events(search: Search, taken: Sequence[Sample], tell: Tell) -> list[Event]:

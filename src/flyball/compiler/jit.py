@@ -108,7 +108,7 @@ class Kernel:
     @property
     def cold(self) -> bool:
         """Whether a call compiles first: nothing of this version is in memory or in the cache."""
-        return not self.dispatcher.signatures and getattr(self.dispatcher._cache, "empty", False)
+        return not self.dispatcher.overloads and getattr(self.dispatcher._cache, "empty", False)
 
     def __call__(self, *args: Any) -> Any:
         """Run it, compiled."""

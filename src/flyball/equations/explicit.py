@@ -62,6 +62,6 @@ class Explicit:
     def __init__(self, R: Tableau) -> None:
         self.R, self.c, self.stages = R, R.c, int(R.order_i[1])
 
-    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
         """The door with these tuples bound to it."""
-        return Bound(explicit_steps, *map(Written, (S, W, self.R, own, going)))
+        return Bound(explicit_steps, *(Written(x, *known) for x in (S, W, self.R, own, going)))

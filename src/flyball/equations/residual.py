@@ -233,7 +233,12 @@ def through_stepped(address, S, W, bench, task):
 
 def address(S: Any, W: Any, bench: Bench) -> int:
     """Of the door to the residuals, for other loops."""
-    return stepped.address(S, W, bench, bench, bench)
+    return stepped.address(*asked(S, W, bench))
+
+
+def asked(S: Any, W: Any, bench: Bench) -> tuple[Any, ...]:
+    """What the door is asked with."""
+    return S, W, bench, bench, bench
 
 
 def residual_kernel(

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..compiler.bound import Mould, Moulded
 from ..laws.call import STACK_RESERVE
 from ..tables.reads import width
 from ..tables.specs import Structure
 from ..tables.system import (
     FLAT,
+    GROUND_FRAMES,
     INVERSE_JACOBIAN,
     INVERSE_SLOPES,
     LOWER,
@@ -24,10 +26,48 @@ from ..tables.system import (
 )
 from .kinematics import ground_frames
 
+MOST = 4  # kinds of scratch, and tables, of a structure that are known
+
 
 def work(s: Structure, system: System, dtype: Any = None) -> Work:
     """Scratch arrays for one run: of the tables' own kind of numbers, if not told."""
-    dtype = system.body_x.dtype if dtype is None else dtype
+    dtype = np.dtype(system.body_x.dtype if dtype is None else dtype)
+    if dtype.kind in "fc":
+        return scratch(s, system, dtype).fields  # type: ignore[no-any-return]
+    W = _new(s, system, dtype)
+    W.switch[LOWER], W.switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
+    ground_frames(system, W)
+    return W
+
+
+def scratch(s: Structure, system: System, dtype: Any) -> Moulded:
+    """The same as compiled code has it."""
+    key = np.dtype(dtype).char, int(system.flat[SCRATCH])
+    made = s.kept.get("scratch", key, MOST, lambda: Mould(_new(s, system, dtype))).new()
+    if len(system.switch_x):
+        switch = made.array("switch")
+        switch[LOWER], switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
+    if n := system.kinds[GROUND_FRAMES]:
+        _, at_rest = s.kept.get("ground", id(system), MOST, lambda: _on_ground(system))
+        made.array("FK")[:n] = at_rest
+    return made
+
+
+def _on_ground(system: System) -> tuple[System, np.ndarray]:
+    """Records of the frames on ground; with the tables that these are of, which are told by their address."""
+    W = Records(np.zeros((system.kinds[GROUND_FRAMES], 24), system.frame_x.dtype))
+    ground_frames(system, W)
+    return system, W.FK
+
+
+class Records(NamedTuple):
+    """Of frames."""
+
+    FK: np.ndarray
+
+
+def _new(s: Structure, system: System, dtype: Any) -> Work:
+    """Arrays of zeros."""
     nb, nf, nr, nv = len(system.body_i), len(system.frame_i), len(system.row_i), s.nv
     n, ny, nl, nw = len(system.ldl.perm), s.nq + nv + len(s.states), len(s.loads), len(s.switches)
     nc, ne = len(system.control_i), width(s)
@@ -35,13 +75,10 @@ def work(s: Structure, system: System, dtype: Any = None) -> Work:
     def z(*shape: int) -> np.ndarray:
         return np.zeros(shape, dtype)
 
-    W = Work(
+    return Work(
         z(nb, 24), z(nf, 24), z(nv, 14), z(nb, 3), z(nb, 6), z(nb, 30), z(len(system.mass_i)), z(len(system.col_i)),
         z(len(system.col_i)), z(len(s.terms) if s.loads or s.reads else 0, 6), z(9, nr), z(8, nv),
         z(INVERSE_JACOBIAN + nl, 2 * len(s.measured) + nl + ne + nc + nw), z(INVERSE_SLOPES + nw, nw),
         z(len(system.ldl.Ai) + 1), z(len(system.ldl.Li)), z(3, n), z(s.depth + 1 + STACK_RESERVE, 3), z(3, ny),
         np.zeros(11), np.zeros(MADE + FLAT, np.int64), z(system.flat[SCRATCH]),
     )  # fmt: skip
-    W.switch[LOWER], W.switch[UPPER] = system.switch_x[:, SWITCH_LOWER], system.switch_x[:, SWITCH_UPPER]
-    ground_frames(system, W)
-    return W

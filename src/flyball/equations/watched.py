@@ -7,11 +7,12 @@ another `Work`, whose measured quantities and multipliers are expected ones.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
 
-from ..compiler.bound import Bound
+from ..compiler.bound import Bound, Written
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..math.scalar import magnitude
@@ -20,7 +21,7 @@ from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, TERMS, watching
+from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, TERMS, Watch, watching
 from ..tables.system import (
     BIAS,
     G_BACK,
@@ -192,8 +193,8 @@ class Steps(Protocol):
     stages: int  # how many of these there are
     failed: Exception | None  # why it does not go on, where that is the method's own reason
 
-    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
-        """The door with these tuples bound to it."""
+    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
+        """The door with these tuples bound to it; ``known``: what is written of tuples in the last two."""
 
 
 def keeps(S: System) -> np.ndarray:
@@ -206,6 +207,31 @@ def keeps(S: System) -> np.ndarray:
     kept = np.isin(kinds, KEPT)
     kept[slips[S.switch_i[of[slips], SWITCH_PARTNER] < 0]] = True
     return np.where(kept, np.where(np.isin(kinds, FIRM), 2, 1), 0)
+
+
+def _desk(S: System, expected: Work, c: np.ndarray, stages: int) -> Watch:
+    """What a loop keeps that watches."""
+    nm = len(S.row_p) - 1 - len(S.row_i)
+    rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
+    columns = np.arange(2 * nm, expected.sensed.shape[1])
+    loads = columns[: len(columns) - len(S.switch_i)]
+    spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
+    there = expected.sensed, expected.row[LAM]
+    guarded = S.guard_i[:, GUARD_WAY], keeps(S)
+    return watching(*guarded, c, stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i))
+
+
+@lru_cache(maxsize=16)
+def _idle(c: bytes, stages: int) -> Written:
+    """What a loop keeps where there is nothing to watch, for all of them."""
+    none, empty = np.zeros(0, np.int64), (np.zeros((RETURNED + 1, 0)), np.zeros(0))
+    return Written(watching(none, none, np.frombuffer(c).copy(), stages, 0, none, none, empty))
+
+
+@lru_cache(maxsize=1)
+def _tableau() -> Written:
+    """A tableau that the engine does not look at."""
+    return Written(tableau("rk45"))
 
 
 class Loop:
@@ -224,18 +250,16 @@ class Loop:
     """
 
     def __init__(self, steps: Any, clock: Clock, S: System, W: Work, width: int, group: Sharing) -> None:
-        nm = len(S.row_p) - 1 - len(S.row_i)
         self.steps, self.clock, self.S, self.W = steps, clock, S, W
-        rows = np.unique(S.switch_i[S.switch_i[:, SWITCH_ROW] >= 0, SWITCH_ROW])
-        columns = np.arange(2 * nm, W.sensed.shape[1])
-        loads = columns[: len(columns) - len(S.switch_i)]
-        spots = [(VALUE, m) for m in columns] + [(RETURNED, m) for m in loads]
-        self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
-        there = self.expected.sensed, self.expected.row[LAM]
-        guarded = S.guard_i[:, GUARD_WAY], keeps(S)
-        self.desk = watching(
-            *guarded, steps.c, steps.stages, nm, rows, np.array(spots, int), there, 3 * len(S.switch_i)
-        )
+        self._known = [_tableau()]
+        if len(S.guard_i):
+            self.expected = W._replace(sensed=W.sensed.copy(), row=W.row.copy())
+            self.desk = _desk(S, self.expected, steps.c, steps.stages)
+        else:  # nobody looks at it, or writes to it
+            self.expected = W
+            idle = _idle(steps.c.tobytes(), steps.stages)
+            self.desk = idle.fields
+            self._known.append(idle)
         ny = clock.y.shape[1]
         own = Clock(
             clock.real.copy(), clock.count.copy(), clock.times, np.zeros((3, ny)), np.zeros((1, ny)), clock.accounts,
@@ -243,7 +267,7 @@ class Loop:
         )  # fmt: skip
         self.group, nv = group, W.vel.shape[1]
         sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
-        self.own = Own(own, sheet, tableau("rk45"), np.zeros(2, np.int64))
+        self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: Bound | None = None
 
     def go_on(self, S: System, W: Work, out: np.ndarray, sampling: Sampling | None = None) -> int:
@@ -254,7 +278,7 @@ class Loop:
         x = self.own
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
-            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group))
+            self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group), *self._known)
         doors = self._bound.asked, x.doors
         tables = S, W, x.R, x.clock, x.sheet
         if not len(S.guard_i) and sampling is not None:

@@ -26,12 +26,14 @@ class Kept:
     def get(self, kind: str, key: Hashable, most: int, make: Callable[[], T]) -> T:
         """What ``make`` returns, made now or earlier; of each kind the ``most`` used last are kept."""
         with self._lock:
-            known = self._found.setdefault(kind, OrderedDict())
-            if key in known:
-                known.move_to_end(key)
+            known = self._found.get(kind)
+            if known is not None and key in known:
+                if most > 1:
+                    known.move_to_end(key)
                 return known[key]
         made = make()
         with self._lock:
+            known = self._found.setdefault(kind, OrderedDict())
             known[key] = made
             while len(known) > most:
                 known.popitem(last=False)

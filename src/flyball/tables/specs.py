@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -105,12 +106,12 @@ class Structure:
     ldl: Pattern = None  # type: ignore[assignment]
     kept: Kept = field(default_factory=Kept, init=False)  # values of it, what they cost; a changed copy has its own
 
-    @property
+    @cached_property
     def nq(self) -> int:
         """Number of coordinates."""
         return int(self.tables["body_i"][:, 4].sum())
 
-    @property
+    @cached_property
     def nv(self) -> int:
         """Number of velocities."""
         return int(self.tables["body_i"][:, 5].sum())

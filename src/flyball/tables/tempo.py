@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ..math.scalar import real_parts
+from ..math.lanes import deciding
+from ..math.products import inner
 from ..model.body import GROUND
 from ..model.expressions import number
 from ..model.model import Model
@@ -31,12 +32,13 @@ def tempo(given: Numbers, model: Model, gravity: np.ndarray, length: Any) -> Any
     for e in model.initial:
         if (rate := getattr(given.of.get(e.name), "rate", None)) is not None:
             unit = model.unit(e.name, e)
-            size = _size(np.array([number(rate, given.env, f"{unit}/s", f"rate of {e.title}")]))
+            told = number(rate, given.env, f"{unit}/s", f"rate of {e.title}")
+            size = _size(np.array([told, 0.0, 0.0]))
             speeds.append(size / length if unit == "m" else size)
     fastest = max(speeds, key=lambda x: x.real, default=0.0)
     return fastest if fastest.real > 0.0 else A_SECOND
 
 
 def _size(x: np.ndarray) -> Any:
-    """Length of a vector; zero of what is zero, where a root has no derivative."""
-    return np.sqrt((x**2).sum()) if real_parts(x).any() else 0.0
+    """Length of a vector (3,); zero of what is zero, where a root has no derivative."""
+    return np.sqrt(inner(x, x)) if deciding(x).any() else 0.0

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..constraints.registry import KINDS
 from ..math.lanes import has_lanes, over_lanes
-from ..math.scalar import real_parts
+from ..math.scalar import real_parts, sqrt
 from ..model.body import GROUND
 from ..model.coupling import Coupling
 from ..model.joint import Joint
@@ -173,13 +173,13 @@ def _length(s: Structure, frame_x: np.ndarray, bodies: Mapping[str, SimpleNamesp
 def _reach(on_bodies: np.ndarray, on_ground: np.ndarray, centres: np.ndarray) -> Any:
     """The same by places alone, (..., k, 3) each; 0 where they are all one."""
     places = np.concatenate([on_ground, centres], axis=-2)
-    nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)
+    nothing = NO_LENGTH * np.abs(real_parts(places)).max(axis=(-2, -1), initial=0.0)[..., None]
     first = _longest(np.concatenate([on_bodies, centres - centres.mean(axis=-2, keepdims=True)], axis=-2))
     if (real_parts(first) > nothing).all():
-        return first
+        return first[..., 0][()]
     other = _longest(places - places.mean(axis=-2, keepdims=True))
     other = np.where(real_parts(other) > nothing, other, 0.0)
-    return np.where(real_parts(first) > nothing, first, other)[()]
+    return np.where(real_parts(first) > nothing, first, other)[..., 0][()]
 
 
 def _units(s: Structure, length: Any) -> list[Any]:
@@ -188,10 +188,11 @@ def _units(s: Structure, length: Any) -> list[Any]:
     return [length if m in metric else 1.0 for m in range(len(s.measured))]
 
 
-def _longest(ways: np.ndarray) -> Any:
+def _longest(ways: np.ndarray) -> np.ndarray:
+    """Length (..., 1) of the longest of some ways (..., k, 3)."""
     at = np.argmax((real_parts(ways) ** 2).sum(axis=-1), axis=-1)
     longest = np.take_along_axis(ways, at[..., None, None], axis=-2)[..., 0, :]
-    return np.sqrt((longest**2).sum(axis=-1))
+    return sqrt((longest**2).sum(axis=-1, keepdims=True))
 
 
 def _constants(s: Structure, numbers: Mapping, env: Mapping[str, Any], dtype: Any) -> tuple[np.ndarray, dict[str, int]]:

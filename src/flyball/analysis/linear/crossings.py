@@ -210,7 +210,8 @@ class Search:
             mean = known.get(x.place)
             if mean is None:
                 mean = _between(known, x.place)
-            w = x.raw[np.argsort(np.abs(x.raw - mean))[:2]]
+            moving = x.raw[np.argsort(np.abs(x.raw))[self.always :]]
+            w = moving[np.argsort(np.abs(moving - mean))[:2]]
             known.setdefault(x.place, complex(w.mean()))
             upper = complex(0.0, abs(w.mean().imag)) if what == "pairs meet" else complex(w.mean().real)
             return float((((w[0] - w[1]) / 2.0) ** 2).real), upper

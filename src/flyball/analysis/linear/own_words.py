@@ -67,9 +67,9 @@ def refusal(x: Rest, other: Slid) -> NotConverged:
     rows = of_states(other, x.c.structure)
     left = np.abs(best.r)
     own = {name: value for name, value in error.residuals.items() if not of_slides(name, other.slides)} | rates
-    k = int(np.argmax(left[rows]))
-    if left[rows[k]] < left.max(initial=0.0):
+    if not rows or left[rows].max() < left.max():  # controllers without states are at rest by themselves
         return NotConverged(told(error.args[0], other), own)
+    k = int(np.argmax(left[rows]))
     return NotConverged(
         f"no equilibrium of {x.c.structure.model.name!r} was found: where the search ended, "
         f"{changing(other, rates, [*rates][k])}, and nothing brings that to rest. Give a better guess, or look whether "

@@ -16,7 +16,7 @@ from ...equations.tree import normalise, rates
 from ...errors import AnalysisError
 from ...laws.opcodes import INPUT
 from ...tables.names import velocity_names
-from ...tables.system import FORCE_LAW, System
+from ...tables.system import FORCE_LAW, TEMPO, System
 from .balance import acting, at_rest, rounding
 from .derivatives import Equations, State
 from .frames import frames, generator, kinematic
@@ -52,9 +52,9 @@ def is_steady(x: State, e: Equations, f: Free, frame: Frame) -> bool:
 
 
 def still(x: State) -> bool:
-    """Whether nothing moves, compared with what gravity or other forces give."""
-    scale = x.c.sizes / x.c.values.length
-    given = np.sqrt(1.0 + np.abs(x.vdot / scale).max(initial=0.0))
+    """Whether nothing moves, compared with the mechanism's own rate, or with what forces give."""
+    scale, pace = x.c.sizes / x.c.values.length, float(x.c.values.system.glob[TEMPO].real)
+    given = np.sqrt(pace**2 + np.abs(x.vdot / scale).max(initial=0.0))
     return not (np.abs(x.v) / scale).max(initial=0.0) > STILL * given
 
 

@@ -27,11 +27,12 @@ from ..compiled import Compiled
 from .account import SPENT, kind
 
 AUTO = "auto"
-FIRST, AGAIN = 16, 4  # steps after which auto chooses, and how many times more until it does again
+FIRST, AGAIN = 8, 4  # steps after which auto chooses, and how many times more until it does again
 GAIN = 3.0  # times faster
 MARGIN = 1.25  # times what it takes to make or load code, that it must save
 MANY = 3.0  # of what earlier motions took, the part that counts: each may have been the last
-THERE = 2e6  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do
+THERE = 5e5  # what code costs that is there [ns], in memory as on disk: processes that begin decide as others do.
+# (To load it takes a process 3 ms, and 10 to know what it looks for, once for all its motions)
 LONGEST = 100_000  # steps in one call of the compiled loop
 FAILED = (ex.STUCK, ex.NOT_FINITE, ex.UNREPORTED)
 TABLES, MADE = "table-driven", "made for this mechanism"

@@ -17,14 +17,16 @@ from ...equations.engine import MOTION, evaluate
 from ...numerics.integrators import clock as ex
 from ...tables.system import MODE, OFF, SWITCH_KIND, VALUE
 from ..compiled import Compiled
+from .account import kind
 
 AUTO, EXPLICIT, IMPLICIT = "auto", "dop853", "radau"
 NEVER = 2**60  # steps
 STAGES = 12  # of a step of the explicit method
-EVERY = 250  # steps of it between two looks
+EVERY = 100  # steps of it between two looks
 SELDOM = 60  # steps of the implicit method
 IN_A_ROW = 2  # looks that say the same
-MANY = 300_000  # evaluations that the explicit method has left at least: the implicit one may have to be compiled first
+LONG = 8e7  # that the explicit method has left at least [ns], as estimated: the implicit one may have to be compiled
+LEAST = 270.0  # that an evaluation takes [ns], with the loop about it
 EDGE = 3.5  # h rho of wide steps that are hardly stable any more
 CALM = 1.2  # h rho of implicit steps that the explicit method could take too
 ROUNDS, LATEST = 14, 8  # of the power method; of these the last count
@@ -132,7 +134,8 @@ class Pace:
     def _speaks_for_another(self, c: Compiled, clock: ex.Clock, width: float, now: str) -> bool:
         if now == EXPLICIT:
             left = STAGES * (self.t_end - float(clock.real[ex.T])) / width
-            return left >= MANY and width * spectral_radius(c, clock) >= EDGE
+            each = max(LEAST, kind(c.structure)[1])
+            return left * each >= LONG and width * spectral_radius(c, clock) >= EDGE
         return width * spectral_radius(c, clock) <= CALM
 
     def _since(self, clock: ex.Clock) -> int:

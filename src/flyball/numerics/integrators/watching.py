@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -61,16 +62,19 @@ class Watch(NamedTuple):
     lam: np.ndarray  # multipliers expected
 
 
+@lru_cache(maxsize=1)
 def nodes() -> np.ndarray:
     """Places of a panel's nodes in it: Chebyshev's, ends included."""
     return 0.5 - 0.5 * np.cos(np.pi * np.arange(NODES) / (NODES - 1))
 
 
+@lru_cache(maxsize=1)
 def basis() -> np.ndarray:
     """What takes values at the nodes to powers of the place in the panel."""
     return np.ascontiguousarray(np.linalg.inv(np.vander(nodes(), increasing=True)))
 
 
+@lru_cache(maxsize=1)
 def checks() -> np.ndarray:
     """What takes values at the nodes to those of the polynomial where it is checked."""
     return np.ascontiguousarray(np.vander(CHECKED, NODES, increasing=True) @ basis())

@@ -44,7 +44,7 @@ AGAIN = 5  # times that ways of sliding are decided again for the same modes
 RATES = (G_SLIDES, G_BACK, G_TURNS, G_PRESS_LOWER, G_PRESS_UPPER)  # guards of rates, or whose meaning they decide
 HOLDING = (G_PULL, G_HOLDS, G_CONE)  # guards of what holds, by the forces that it carries
 BROKEN = 1e-8  # of the forces that a force is the difference of: beyond what rounding makes
-VIOLATED = 1e-9  # of the mechanism's length or a radian (a second): a start beyond its limit
+VIOLATED = 1e-9  # of the mechanism's length or a radian, of rates at its own rate: a start beyond its limit
 SUNK = 1e-7  # of the same: what is open and past its bound has gone through it
 
 
@@ -121,7 +121,8 @@ def refuse_violated(n: Instant) -> None:
     """Refuse a start beyond a limit."""
     for s, kind in enumerate(n.kinds):
         lower, upper = n.W.switch[LOWER, s], n.W.switch[UPPER, s]
-        past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else -n.rate[s] if kind == ONE_WAY else 0.0
+        back = -n.rate[s] / n.tempo if kind == ONE_WAY else 0.0
+        past = max(lower - n.x[s], n.x[s] - upper) if kind == STOP else back
         if past > VIOLATED * n.unit[s]:
             raise beyond(n, s)
 

@@ -11,7 +11,7 @@ from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
 from ....numerics.lu import Rows
 from ...compiled import Compiled
-from .loop import Implicit
+from .loop import DESK, EPS, Implicit
 
 
 class Desk(NamedTuple):
@@ -68,10 +68,14 @@ class Alpha(Implicit):
         self.rho = rho
         super().__init__(c, clock, index_3)
 
-    def _desk(self, nz: int, turns: bool) -> Desk:  # type: ignore[override]
-        w = super()._desk(nz, turns)
-        nv, nx = self.layout.nv, self.layout.nx
+    def _settle(self, real: np.ndarray, turns: bool) -> None:
+        super()._settle(real, turns)
         steps = float(self.clock.real[ex.SPAN] / self.clock.real[ex.STEP])  # what each leaves to its iteration adds up
-        w.real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / w.real[ds.RTOL], min(0.1, 1.0 / steps))
+        real[ds.NEWTON] = max(10.0 * EPS / real[ds.RTOL], min(0.1, 1.0 / steps))
+        self.own[DESK].array("rho")[0] = self.rho
+
+    def _desk(self, nz: int, springy: np.ndarray) -> Desk:  # type: ignore[override]
+        w = super()._desk(nz, springy)
+        nv, nx = self.layout.nv, self.layout.nx
         kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
-        return Desk(**kept, rho=np.array([self.rho]), past=np.zeros((4, nv + nx)), ends=np.zeros((3, nv)))
+        return Desk(**kept, rho=np.zeros(1), past=np.zeros((4, nv + nx)), ends=np.zeros((3, nv)))

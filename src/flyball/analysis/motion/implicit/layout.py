@@ -29,6 +29,7 @@ from ...compiled import Compiled
 from ...linear.loads import pressing
 from .parts import Parts
 
+MANY = 50  # products of a factor, by unknowns, from which on it costs more than a step
 NONE, SLIGHT = 1e-14, 1e-8  # part of a body's largest inertia that is none, and what is put in its place
 THIN = 1e-6  # part of the largest inertia (turns by the mechanism's length) below which the metric sees none
 
@@ -61,6 +62,8 @@ class Layout:
         self.turns = np.array([w for w in (quaternion_at(S, b)[1] for b in range(len(S.body_i))) if w >= 0], np.int64)
         self.row_p, self.col_i = S.row_p[: self.nr + 1], S.col_i[: S.row_p[self.nr]]
         self._entries()
+        P = self.P
+        self.dear = bool((np.diff(P.Up)[P.Lj]).sum() > MANY * self.n)
 
     def _entries(self) -> None:
         """Entries (row, column, number) of F, of F' and of the regularisation; which numbers stand where."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ....compiler.bound import Bound, Written
+from ....compiler.bound import Bound, Joined, Mould, Written
 from ....equations import residual
 from ....equations.callbacks import Going, Own
 from ....equations.implicit import SIZES, Means, Plan, radau_steps
 from ....equations.residual import Bench
-from ....equations.scratch import work
+from ....equations.scratch import scratch
 from ....errors import SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
@@ -25,7 +25,8 @@ SMALL, LARGE = 1e-7, 1e-6  # relative corrections that are taken for rounding if
 # are looked at, and where they are not
 CHEAP, DEAR, FEW = 1e-3, 0.1, 12  # rates of the iteration up to which a Jacobian serves on, where it takes few
 # evaluations and where it takes more
-MANY = 50  # products of a factor, by unknowns, from which on it costs more than a step
+EPS = float(np.finfo(float).eps)
+PLAN, DESK = 3, 4  # of what steps have of their own
 SEEN = np.array([0.0, 0.0, 0.25, 0.6, 0.857])  # places in a step at which guards are seen, behind two that are not
 
 
@@ -46,30 +47,45 @@ class Implicit:
     def __init__(self, c: Compiled, clock: ex.Clock, index_3: bool = False) -> None:
         refuse_functions(c.structure)
         s, S = c.structure, c.system
-        self.clock = clock
+        self.clock, self.compiled = clock, c
         self.c, self.stages = SEEN, len(SEEN)
         self.layout = x = layout(s, S, index_3)
         self.width, self.system = x.width, S
-        y = clock.y[ex.NOW].copy()
-        SC = self._tables(S)[1].fields
-        WC = work(s, SC, complex)
-        plan = Plan(
-            x.first, x.pick, x.mass.pick, metric(c, float(clock.real[ex.T]), y), x.valued, x.valued.copy(), x.turns,
-            x.pressing, np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative, light(c), x.own_mass,
-        )  # fmt: skip
-        self.springy = x.spring[plan.light[x.spring[:, 0]] == 0.0] if len(plan.light) else x.spring
-        desk = self._desk(len(s.states), len(S.angle_i) > 0)
-        self.means = Means(SC, WC, *self._benches(clock.y.shape[1]), plan, desk)
+        self.light = c.values.kept.get("light", None, 1, lambda: light(c))
+        key = type(self).__name__, index_3, self.light.tobytes()
+        moulds = s.kept.get("implicit steps", key, 2, lambda: self._moulds(clock.y.shape[1]))
+        self.own = [mould.new() for mould in moulds]
+        self.own[PLAN].array("metric")[:] = metric(c, float(clock.real[ex.T]), clock.y[ex.NOW])
+        self.count = self.own[DESK].array("count")
+        self._settle(self.own[DESK].array("real"), len(S.angle_i) > 0)
+        self.scratch = scratch(s, self._tables(S)[1].fields, complex)
 
-    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
         """The door with these tuples bound to it."""
         if S is not self.system:  # other values of parameters: masses too, perhaps
-            self.system, self.means = S, self.means._replace(SC=self._tables(S)[1].fields)
-            self.means.desk.count[ds.JACOBIANS] = 0
-        M = self.means
-        own.doors[1] = residual.address(M.SC, M.WC, M.moved)
+            self.system = S
+            self.count[ds.JACOBIANS] = 0
         real, stepped = self._tables(S)
-        return Bound(self.door, real, Written(W), Written(M, stepped), Written(own), Written(going))
+        means = Joined(Means, stepped, self.scratch, *self.own)
+        own.doors[1] = residual.stepped.address(*(() if residual.stepped.used else residual.asked(*means.fields[:3])))
+        c = self.compiled
+        engine = c.scratch if W is c.work else Written(W)
+        return Bound(self.door, real, engine, means, Written(own, *known), Written(going, *known))
+
+    def _moulds(self, ny: int) -> list[Mould]:
+        """What steps work with besides tables and scratch, as it is new: benches, plan, desk."""
+        x, S = self.layout, self.system
+        still = [y for y in (*vars(x).values(), *x.terms, *x.mass, *x.P, *x.whole_P)
+                 if isinstance(y, np.ndarray)]  # fmt: skip
+        plan = Plan(
+            x.first, x.pick, x.mass.pick, np.ones(x.nv), x.valued, x.valued.copy(), x.turns, x.pressing,
+            np.array([int(S.kinds[SOLVER] == SCHUR)], np.int64), x.negative, self.light, x.own_mass,
+        )  # fmt: skip
+        springy = x.spring[self.light[x.spring[:, 0]] == 0.0] if len(self.light) else x.spring
+        desk = self._desk(len(self.compiled.structure.states), springy)
+        still += [self.light, springy]
+        benches = self._benches(ny)
+        return [*(Mould(b, [b.steps]) for b in benches), Mould(plan, still), Mould(desk, still)]
 
     def _tables(self, S: System) -> tuple[Written, Written]:
         """The same for every run with them: tables, and these in complex numbers, as compiled code has them."""
@@ -103,25 +119,27 @@ class Implicit:
             out.append(Bench(t, y, vdot, lam, steps, found))
         return out[0], out[1], out[2]
 
-    def _desk(self, nz: int, turns: bool) -> Desk:
-        x, clock = self.layout, self.clock
-        step = float(clock.real[ex.STEP])
-        nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
-        n = x.n
-        real = np.zeros(ds.REALS)
-        rtol = float(clock.real[ex.RTOL])
-        real[ds.RTOL] = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
-        real[ds.ATOL] = real[ds.RTOL] * clock.real[ex.ATOL] / rtol
-        near = min(0.03, real[ds.RTOL] ** 0.5) if step == 0.0 else 0.01
-        real[ds.NEWTON] = max(10.0 * np.finfo(float).eps / real[ds.RTOL], near)
-        real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / real[ds.RTOL])
+    def _settle(self, real: np.ndarray, turns: bool) -> None:
+        """Put the tolerances of a run, and what it counts by, on its desk."""
+        x, count, step = self.layout, self.count, float(self.clock.real[ex.STEP])
+        rtol, atol = self.clock.real[[ex.RTOL, ex.ATOL]].tolist()
+        own = 0.1 * rtol ** (2.0 / 3.0) if step == 0.0 else rtol
+        near = min(0.03, own**0.5) if step == 0.0 else 0.01
+        real[ds.RTOL], real[ds.ATOL] = own, own * atol / rtol
+        real[ds.NEWTON] = max(10.0 * EPS / own, near)
+        real[ds.ROUGH] = max(0.1, (SMALL if step == 0.0 else LARGE) / own)
         real[ds.SOFT] = SOFTER if len(x.pressing) else SOFT
         real[ds.SERVES] = CHEAP if x.groups <= FEW else DEAR
-        dear = (np.diff(P.Up)[P.Lj]).sum() > MANY * n
-        real[ds.STAYS] = 2.0 if dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
-        count = np.zeros(ds.COUNTS, np.int64)
+        real[ds.STAYS] = 2.0 if x.dear else 1.2  # Hairer and Wanner (1996), IV.8, of large systems and of others
         count[ds.LEAST], count[ds.INDEX_3] = 2 if turns else 1, int(x.index_3)
         count[ds.SHARED] = int(x.first[SIZES]) if len(x.pressing) else 0
+
+    def _desk(self, nz: int, springy: np.ndarray) -> Desk:
+        """The desk of a run as it is new."""
+        x = self.layout
+        nv, nr, nx, P = x.nv, x.nr, x.nx, x.P
+        n = x.n
+        real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
         J = np.zeros((4, int(x.first[-1]) + 1 + len(x.negative)))
         J[:, 0], J[:, x.first[-1]] = 1.0, -1.0
         Q = x.whole_P
@@ -136,7 +154,7 @@ class Implicit:
         return Desk(
             count, real, z(4, nv), z(4, nv), z(4, nv), z(4, nv), z(4, nr), z(nr), z(3, nr), z(4, nr), z(4, nz),
             z(4, nz), z(4, nx), z(4, n), z(4, nv), z(3, nr), z(4, nx), z(2, nv), z(nx), self._plain(), z(3, n), w(3, n),
-            J, self.springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
+            J, springy, x.put, x.part, z(nA), z(nL), z(nU), z(n), z(n), w(nA), w(nL), w(nU), w(n), w(n), P,
             x.whole_put, z(3, 3 * n), z(len(Q.Aj)), z(len(Q.Lj)), z(len(Q.Uj)), z(3 * n), z(3 * n), Q,
         )  # fmt: skip
 

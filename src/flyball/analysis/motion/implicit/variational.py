@@ -81,9 +81,9 @@ class Variational:
         )  # fmt: skip
         self.means = Means(Turns(np.array(turns, np.int64)), desk)
 
-    def bind(self, S: System, W: Work, own: Own, going: Going) -> Bound:
+    def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
         """The door with these tuples bound to it."""
-        return Bound(variational_steps, *map(Written, (S, W, self.means, own, going)))
+        return Bound(variational_steps, *(Written(x, *known) for x in (S, W, self.means, own, going)))
 
     @property
     def failed(self) -> SimulationError | None:

@@ -1,0 +1,75 @@
+"""Tuples of arrays that are laid out once and copied for each run: as new, of one's own, and as compiled code has them."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flyball.compiler.bound import Joined, Mould, Written
+
+
+class Inner(NamedTuple):
+    n: np.ndarray
+    x: np.ndarray
+
+
+class Outer(NamedTuple):
+    a: np.ndarray
+    inner: Inner
+    none: np.ndarray
+    table: np.ndarray
+
+
+def outer() -> Outer:
+    return Outer(
+        np.arange(6.0).reshape(2, 3), Inner(np.arange(3), np.full(2, 1j)), np.zeros((0, 4)), np.arange(4.0)
+    )  # fmt: skip
+
+
+def leaves(fields):
+    return [y for x in fields for y in (leaves(x) if isinstance(x, tuple) else [x])]
+
+
+def test_each_is_as_new_and_its_own():
+    new = outer()
+    mould = Mould(new, [new.table])
+    first = mould.new()
+    for mine, at_first in zip(leaves(first.fields), leaves(outer()), strict=True):
+        assert mine.dtype == at_first.dtype
+        assert mine.shape == at_first.shape
+        assert mine.flags.c_contiguous
+        assert mine.flags.aligned
+        assert np.array_equal(mine, at_first)
+    for x in leaves(first.fields)[:-1]:
+        x[...] = 7
+    new.a[...] = 9  # what it was made of has no say any more
+    second = mould.new()
+    for mine, at_first in zip(leaves(second.fields), leaves(outer()), strict=True):
+        assert np.array_equal(mine, at_first)
+    assert first.fields.table is second.fields.table is new.table
+    first.array("a")[0, 0] = 5.0
+    assert first.fields.a[0, 0] == 5.0
+    assert second.fields.a[0, 0] == 0.0
+
+
+def test_compiled_code_is_told_where_they_are():
+    """The same numbers as of the arrays themselves, looked at one by one."""
+    new = outer()
+    made = Mould(new, [new.table]).new()
+    seen = Written(made.fields)
+    assert np.array_equal(made.numbers, seen.numbers)
+    assert made.kinds == seen.kinds
+    assert made.kind == seen.kind
+
+
+class Both(NamedTuple):
+    left: Inner
+    right: Outer
+
+
+def test_joined_are_as_if_written_together():
+    left, right = Mould(outer().inner).new(), Mould(outer()).new()
+    both = Joined(Both, left, right)
+    seen = Written(Both(left.fields, right.fields), left)
+    assert np.array_equal(both.numbers, seen.numbers)
+    assert both.kinds == seen.kinds
+    assert both.fields.right is right.fields
