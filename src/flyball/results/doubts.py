@@ -11,7 +11,10 @@ import numpy as np
 from ..equations.loads import wide
 from ..tables.reads import read
 from ..tables.system import FORCE_F
+from .energy import gained
+from .lag import late
 from .ledger import Ledger, apart, whole
+from .residue import missed
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -24,7 +27,9 @@ FEW, EACH = (
 )  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
+ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
+SEEN = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
 AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
@@ -46,7 +51,8 @@ def warnings(result: Result) -> tuple[str, ...]:
 
 def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
-    return tuple(text for text in (_balance(result), _violation(result)) if text)
+    balance = _balance(result) or late(whole(result))
+    return tuple(text for text in (balance, missed(result), _violation(result)) if text)
 
 
 def balanced(result: Result) -> float:
@@ -61,7 +67,7 @@ def balanced(result: Result) -> float:
     if rtol is None or o.get("step"):
         return UNBALANCED
     expected = max(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
-    return min(expected, max(MOST, ROUGH * rtol))
+    return min(expected, max(MOST, min(ROUGH * rtol, ROUGHEST)))
 
 
 def energy_moved(result: Result) -> float:
@@ -86,16 +92,17 @@ def _off(x: Ledger) -> tuple[float, str] | tuple[()]:
     What moves together is as accurate as the energy of all of it, and what nothing connects with others as its own.
     """
     rows, t = len(x.result.t), x.result.t
-    part, moved, least = balanced(x.result), x.moved(0, rows), _rest(x)
+    unseen = _unseen(x)
+    part, moved, least = balanced(x.result), x.moved(0, rows) + float(unseen.max(initial=0.0)), _rest(x)
     drift = float(np.abs(x.balance).max(initial=0.0))
     if drift > part * moved + least and x.known(0, rows):
         return _told(x, "", drift, moved, part * moved + least)
     for begin, end in _stretches(x.result):
         lost = float(np.ptp(x.balance[begin:end]))
-        if lost <= least or lost <= part * (moved * float(x.kinetic[begin:end].max())) ** 0.5:
+        if lost <= least or lost <= part * (moved * float((x.kinetic + unseen)[begin:end].max())) ** 0.5:
             continue
         # velocities v are as far off as those of what moves most, u: by m v du
-        there = x.moved(begin, end)
+        there = x.moved(begin, end) + float(unseen[begin:end].max())
         allowed = part * (moved * there) ** 0.5 + least
         if lost > allowed and x.known(begin, end):
             return _told(x, f" between t = {t[begin]:.6g} and {t[end - 1]:.6g} s", lost, there, allowed)
@@ -119,6 +126,19 @@ def _stretches(result: Result) -> Iterable[tuple[int, int]]:
         edges = [k * (rows - 1) // pieces for k in range(pieces + 1)]
         yield from ((a, b + 1) for a, b in itertools.pairwise(edges))
         pieces *= 2
+
+
+def _unseen(x: Ledger) -> np.ndarray:
+    """Kinetic energy [J] that is moved about every output time and stands in none: rows once a turn see bodies at rest.
+
+    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have.
+    """
+    r, steps = x.result, x.result.health.steps
+    none = r.records.zeros()
+    if steps <= len(r.t) or r.health.options.get("step"):
+        return none
+    found = gained(r, x.bodies.tolist(), float(np.ptp(r.t)) / steps)
+    return found if SEEN * found.max() > x.moved(0, len(r.t)) else none
 
 
 def _rest(x: Ledger) -> float:
