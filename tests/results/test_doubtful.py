@@ -1,6 +1,7 @@
 """Motions that are not what their tolerance asks for say so, everywhere; sound ones do not."""
 
 import json
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from typer.testing import CliRunner
 
 import flyball as fb
 from flyball.cli import app
+from flyball.results.ledger import apart
 from tests.mechanisms import example
 
 
@@ -121,3 +123,102 @@ def test_parts_with_works_and_events_are_sound(method, rtol):
     m.add(fb.Event("blow", "t > 0.5", do=[fb.Impulse("c", (1e-4, 0))]))
     r = m.simulate(1.0, outputs=101, method=method, rtol=rtol)
     assert not r.health.doubtful
+
+
+def pendulum() -> fb.Mechanism:
+    m = fb.Mechanism("pendulum", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("b", mass=1, inertia=1 / 12, position=(0.5, 0)), fb.Revolute("A", "ground", "b", at=(0, 0)))
+    return m
+
+
+@pytest.mark.parametrize("rtol", [0.11, 2, 50.0])
+def test_no_motion_comes_of_a_tolerance_as_large_as_the_motion(rtol):
+    with pytest.raises(fb.ModelError, match=r"rtol must not be larger than 0\.1, got "):
+        pendulum().simulate(1.0, rtol=rtol)
+
+
+def test_no_tolerance_excuses_a_loss_of_some_per_cent():
+    rough = pendulum().simulate(10.0, rtol=0.1)
+    assert np.abs(rough["b"].position - pendulum().simulate(10.0, rtol=1e-9)["b"].position).max() > 0.2
+    (text,) = rough.health.doubtful
+    assert text.startswith("the energy balance is off by ")
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+def test_turning_back_makes_nothing_late(method):
+    """At its turning points a pendulum has no kinetic energy, and yet is in time."""
+    exact = pendulum().simulate(10.0, rtol=1e-10)
+    r = pendulum().simulate(10.0, rtol=1e-3, method=method)
+    assert np.abs(r["b"].position - exact["b"].position).max() < 1e-2
+    assert not r.health.doubtful
+
+
+def four_bar() -> fb.Mechanism:
+    """A parallelogram that all but stops upright, 1 J of 80."""
+    m = fb.Mechanism("four_bar", planar=True, gravity=(0, -9.81))
+    for name, at in (("crank", (0, 0.5)), ("coupler", (0.5, 1)), ("rocker", (1, 0.5))):
+        m.add(fb.Body(name, mass=1, inertia=1 / 12, position=at))
+    m.add(fb.Revolute("A", "ground", "crank", at=(0, 0)), fb.Revolute("B", "crank", "coupler", at=(0, 1)))
+    m.add(fb.Revolute("C", "coupler", "rocker", at=(1, 1)), fb.Revolute("D", "ground", "rocker", at=(1, 0)))
+    m.add(fb.Initial("A.angle", rate=-1))
+    return m
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3])
+def test_how_late_a_motion_comes_is_known_from_its_energy(rtol):
+    """A thousandth of the energy moved is a tenth of what goes over the top."""
+    exact = four_bar().simulate(10.0, rtol=1e-10)
+    r = four_bar().simulate(10.0, rtol=rtol, method="radau")
+    (text,) = r.health.doubtful
+    name, told = re.search(r"'(\w+)' off by about ([\d.]+) m", text).groups()
+    off = np.linalg.norm(r[name].position - exact[name].position, axis=1).max()
+    assert off > 0.1
+    assert float(told) == pytest.approx(off, rel=0.3)
+
+
+@pytest.mark.parametrize("method", ["dop853", "radau"])
+def test_a_motion_in_time_is_not_called_late(method):
+    assert not four_bar().simulate(10.0, rtol=1e-5, method=method).health.doubtful
+
+
+def bushed() -> fb.Mechanism:
+    """Two bars on a bushing of 1e7 N/m: a hundredth of a millimetre are 100 N."""
+    m = fb.Mechanism("bushed", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("a", mass=1, inertia=1 / 12, position=(0.5, 0)))
+    m.add(fb.Body("b", mass=1, inertia=1 / 12, position=(1.5, 0)), fb.Revolute("A", "ground", "a", at=(0, 0)))
+    m.add(fb.Bushing("s", "a", "b", at=(1, 0), stiffness=1e7, damping=3))
+    return m
+
+
+def test_accelerations_that_are_not_the_rates_of_velocities():
+    """Positions are right to 1e-4 and the balance to 1e-4, and the reaction is off by more than there is of it."""
+    exact = bushed().simulate(2.0, method="radau", rtol=1e-8)
+    rough = bushed().simulate(2.0, method="radau", rtol=1e-2)
+    assert np.abs(rough["b"].position - exact["b"].position).max() < 1e-3
+    assert rough.health.energy_drift < 1e-2
+    assert np.abs(rough["A"].force - exact["A"].force).max() > np.abs(exact["A"].force).max()
+    (text,) = rough.health.doubtful
+    assert text.startswith("accelerations, and forces and reactions with them, are rough: that of 'b' misses ")
+    fine = bushed().simulate(2.0, method="radau", rtol=1e-5)
+    assert np.abs(fine["A"].force - exact["A"].force).max() < 0.1 * np.abs(exact["A"].force).max()
+    assert not fine.health.doubtful
+
+
+@pytest.mark.parametrize("outputs", [21, 101, 1001])
+@pytest.mark.parametrize("rtol", [1e-5, 1e-8])
+def test_what_swings_between_output_times_is_not_rough(outputs, rtol):
+    """Just once from one to the next of 101: velocities do not change then, and accelerations are large."""
+    m = fb.Mechanism("swing", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1, inertia=1), fb.Prismatic("A", "ground", "b", at=(0, 0), axis=(1, 0)))
+    m.add(fb.CoordinateSpring("k", "A.displacement", stiffness=(2 * np.pi) ** 2), fb.Initial("A.displacement", value=1))
+    assert not m.simulate(100.0, outputs=outputs, rtol=rtol).health.doubtful
+
+
+def test_parts_of_massless_links_have_names():
+    """A joint of two freedoms is two rows of the body table, the first of which is no body."""
+    m = fb.Mechanism("links", gravity=(0, 0, -9.81))
+    for n in "ab":
+        m.add(
+            fb.Body(n, mass=1, inertia=(1, 1, 1)), fb.Cylindrical(n.upper(), "ground", n, at=(0, 0, 0), axis=(0, 0, 1))
+        )
+    assert [x.of for x in apart(m.simulate(0.1, outputs=3, coordinates="joint"))] == [" of 'a'", " of 'b'"]

@@ -78,7 +78,7 @@ class Motions(Model):
             where bodies may touch at many places, or in ways that it does not know: ``health.method`` says which,
             from when on, and why.
         rtol : float [1]
-            Tolerance of the error of a step relative to the state; 1e-13 at least.
+            Tolerance of the error of a step relative to the state; 1e-13 at least, 0.1 at most.
         atol : float [m, rad, m/s, rad/s], optional
             Tolerance of the error of a step where the state is small. If not given a hundredth of ``rtol``, and less
             for mechanisms smaller than a metre: that times their length [m]; never less than rounding.

@@ -11,7 +11,10 @@ import numpy as np
 from ..equations.loads import wide
 from ..tables.reads import read
 from ..tables.system import FORCE_F
+from .energy import gained
+from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
+from .residue import missed
 
 if TYPE_CHECKING:
     from ..model.model import Model
@@ -24,8 +27,11 @@ FEW, EACH = (
 )  # times rtol that the balance of a sound motion may be off: of a short one, and more with each step
 FINE = 3e-2  # times the root of rtol, the same where rtol is so small that a digit more or less is no matter
 MOST, ROUGH = 1e-2, 5.0  # part of the energy moved that no number of steps excuses, or so many times a rough rtol
+ROUGHEST = 2e-2  # part of the energy moved that no tolerance excuses
 PIECES, ROWS = 64, 4  # stretches that the balance is judged by at most, and rows of output in each at least
 NEARLY = 0.99  # part of what is to be expected from which on a motion among many is looked at by itself
+LOOSE = 1e-5  # rtol above which each of many is
+SEEN = 0.1  # part of the energy that accelerations tell of; where less stands in rows they miss the motion
 OPEN = 1e-6  # part of the mechanism's length above which violated constraints are
 UNSOLVED = 1e-6  # part of the accelerations by which they may miss the constraints
 AT_REST = 1e-7  # lengths of the mechanism a second that count as rest
@@ -47,7 +53,8 @@ def warnings(result: Result) -> tuple[str, ...]:
 
 def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
-    return tuple(text for text in (_balance(result), _violation(result)) if text)
+    balance = _balance(result) or late(whole(result))
+    return tuple(text for text in (balance, missed(result), _violation(result)) if text)
 
 
 def balanced(result: Result) -> Any:
@@ -62,7 +69,7 @@ def balanced(result: Result) -> Any:
     if rtol is None or o.get("step"):
         return UNBALANCED
     expected = np.maximum(FINE * rtol**0.5, rtol * (FEW + EACH * result.health.steps))
-    return np.minimum(expected, max(MOST, ROUGH * rtol))
+    return np.minimum(expected, max(MOST, min(ROUGH * rtol, ROUGHEST)))
 
 
 def energy_moved(result: Result) -> float:
@@ -86,7 +93,8 @@ def suspected(result: Result, runs: int) -> np.ndarray:
     """
     ledgers = [whole(result)]
     ledgers += apart(result) if result.health.options.get("rtol") is not None else []
-    found = np.zeros(runs, bool)
+    rtol = result.health.options.get("rtol")
+    found = np.full(runs, rtol is not None and rtol > LOOSE) | perhaps_late(ledgers[0].of_runs(runs))
     for x in ledgers:
         for _, _, lost, _, allowed in _excesses(x.of_runs(runs), len(result.t) // runs):
             found |= ~(lost <= NEARLY * allowed)
@@ -119,14 +127,17 @@ def _excesses(x: Ledger, rows: int) -> Iterator[tuple[int, int, Any, Any, Any]]:
 
     Of all rows, then of the stretches where more may be lost than that.
     """
-    part, moved, least = balanced(x.result), x.moved(0, rows), _rest(x)
+    unseen = _unseen(x)
+    part, moved, least = balanced(x.result), x.moved(0, rows) + unseen.max(axis=-1, initial=0.0), _rest(x)
     yield 0, rows, np.abs(x.balance).max(axis=-1, initial=0.0), moved, part * moved + least
     for begin, end in _stretches(x.result, rows):
         lost = np.ptp(x.balance[..., begin:end], axis=-1)
-        if np.all((lost <= least) | (lost <= part * (moved * x.kinetic[..., begin:end].max(axis=-1)) ** 0.5)):
+        if np.all(
+            (lost <= least) | (lost <= part * (moved * (x.kinetic + unseen)[..., begin:end].max(axis=-1)) ** 0.5)
+        ):
             continue
         # velocities v are as far off as those of what moves most, u: by m v du
-        there = x.moved(begin, end)
+        there = x.moved(begin, end) + unseen[..., begin:end].max(axis=-1)
         yield begin, end, lost, there, part * (moved * there) ** 0.5 + least
 
 
@@ -147,6 +158,20 @@ def _stretches(result: Result, rows: int) -> Iterable[tuple[int, int]]:
         edges = [k * (rows - 1) // pieces for k in range(pieces + 1)]
         yield from ((a, b + 1) for a, b in itertools.pairwise(edges))
         pieces *= 2
+
+
+def _unseen(x: Ledger) -> np.ndarray:
+    """Kinetic energy [J] that is moved about every output time and stands in none: rows once a turn see bodies at rest.
+
+    What accelerations make of them within a step, where steps outnumber rows and that is much more than rows have. Of
+    several motions, which are looked at one by one where they need this: nothing.
+    """
+    r = x.result
+    none = np.zeros_like(x.kinetic)
+    if x.runs or r.health.steps <= len(r.t) or r.health.options.get("step"):
+        return none
+    found = gained(r, x.bodies.tolist(), float(np.ptp(r.t)) / r.health.steps)
+    return found if SEEN * found.max() > x.moved(0, len(r.t)) else none
 
 
 def _rest(x: Ledger) -> Any:

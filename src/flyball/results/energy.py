@@ -28,11 +28,22 @@ STORED = "contact_elastic"
 
 def kinetic(result: Result, bodies: Iterable[int]) -> np.ndarray:
     """Sum of m v^2 / 2 + w . I w / 2 over rows of the body table [J]."""
+    return _of_speeds(result, bodies, (2, 3))
+
+
+def gained(result: Result, bodies: Iterable[int], time: float) -> np.ndarray:
+    """Kinetic energy [J] that the accelerations at every output time give bodies at rest in a time [s]."""
+    return time**2 * _of_speeds(result, bodies, (4, 5))
+
+
+def _of_speeds(result: Result, bodies: Iterable[int], of: tuple[int, int]) -> np.ndarray:
+    """The same of what stands at these two places of a body's record: its velocities, or its accelerations."""
     r, S = result.records, result.values.system
     total = r.zeros()
     for b in bodies:
-        _, R, w, v, _, _ = r.body(b)
-        w_B = mtv(R, w)
+        record = r.body(b)
+        w, v = (record[k] for k in of)
+        w_B = mtv(record[1], w)
         total += 0.5 * S.body_x[b, MASS] * dot(v, v) + 0.5 * dot(w_B, mv(load9(S.body_x, b, INERTIA), w_B))
     return total
 

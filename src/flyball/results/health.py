@@ -100,7 +100,7 @@ class Health:
 
     @property
     def doubtful(self) -> tuple[str, ...]:
-        """Reasons to think that the motion is not what its tolerance asks for: its energy balance, its constraints."""
+        """Reasons to think that the motion is not what its tolerance asks for: energy, accelerations, constraints."""
         return tuple(self._found("doubtful")) if "doubtful" in self.late else ()
 
     @property

@@ -82,7 +82,8 @@ class Ledger:
         if len(self.bodies) == len(self.result.values.system.body_i):
             return ""
         place = {b: name for name, b in self.result.values.structure.place.items()}
-        name, more = place[int(self.bodies[0])], len(self.bodies) - 1
+        names = [place[b] for b in self.bodies.tolist() if b in place]  # massless links have none
+        name, more = names[0], len(names) - 1
         others = f" and the {more} bodies" if more > 1 else " and the body"
         return f" of {name!r}" + (f"{others} connected with it" if more else "")
 

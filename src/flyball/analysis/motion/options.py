@@ -32,6 +32,7 @@ MEMORY = 2**36  # [bytes] of a machine that does not say how much it has
 RATE = 10.0  # [1/s] of Baumgarte's method, where none is given
 FINEST = 1e-13  # relative tolerance below which rounding decides
 SMALL = 1e-2  # part of a coordinate's size below which its error is held to atol, where that is not given
+COARSEST = 0.1  # tolerance above which what comes out is no motion of the mechanism
 LEAST_ATOL = 1e-14  # part of the mechanism's length [m], or of a radian, that rounding leaves
 
 
@@ -65,6 +66,11 @@ class Integration(Options):
         if self.rtol < FINEST:
             raise ModelError(
                 f"rtol must not be smaller than {FINEST:g}, got {self.rtol!r}: rounding is larger than that"
+            )
+        if self.rtol > COARSEST:
+            raise ModelError(
+                f"rtol must not be larger than {COARSEST:g}, got {self.rtol!r}: every step might be off by that "
+                f"part of the motion"
             )
         known_coordinates(self.coordinates)
         if self.stabilization not in STABILIZATION:
