@@ -15,7 +15,7 @@ LAST, BEST, BEST_H, PARDON = range(11, 15)
 WIDE, BEFORE, BACK, EXCESS, EXCESS_AT, BLURRED_AT = range(15, 21)
 # (fixed width of steps, 0: adaptive; of the step in the making its width, its error in units of the tolerance, and a
 # part of it that is asked for; a width at which the state within may be told, where it cannot: 0 if that is not known;
-# the widest that is tried as that was so of late: 0 if any; at which step it was)
+# the widest that is tried as that was so of late: 0 if any; at which step it last was, from 1 on)
 STEP, TRIED, ERROR, PART, CLEARER, CALM, CALM_SINCE, REALS = range(21, 29)
 # entries of Clock.count
 ACCEPTED, REJECTED, NEXT, QUOTA, STATUS, STARTED, CONTROLLED, LIMIT, POSITIONS = range(9)

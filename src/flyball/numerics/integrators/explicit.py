@@ -40,7 +40,8 @@ from .step import astray, attempt, defect, extend, first_step, interpolate, stre
 
 FAR = 4.0  # times the error of a step, if that is more than the tolerance, that the dense output may be off by
 FARTHER = 8.0  # the same where accuracy limits steps, and of the tolerance: so it is there, now and then
-EDGE = 3.0  # h |lambda| of steps that stability may limit
+EDGE = 3.5  # h |lambda| of steps that stability may limit
+SOON = 20  # steps from one that is so refused to the next, by which the width of those to come is bounded
 EXTENDED_TO, CLEAR = 1, 2  # what c.count[EXTENDED] says: the stages of dense output are there; it is good
 
 
@@ -82,7 +83,7 @@ def clear(R, c):
     """Whether the dense output is as good as steps are. If not, c.real[CLEARER] is a width at which it may be.
 
     Where stability limits steps, not accuracy, their ends are good and the dense output may be far off. A step that is
-    read within has to be narrower there, and the next ones are no wider (c.real[CALM]): they may be read too. Elsewhere
+    read within has to be narrower there, and where that comes again so have the next ones (c.real[CALM]). Elsewhere
     it is off by a few tolerances, and steps are as they would be. Steps of fixed width are not judged.
     """
     if c.real[STEP] > 0.0:
@@ -97,7 +98,10 @@ def clear(R, c):
         return True
     c.real[CLEARER] = h * max(0.2, SAFETY * (gap / most) ** (-1.0 / R.order_i[0]))
     if limited:
-        c.real[CALM], c.real[CALM_SINCE] = SAFETY * h, c.count[ACCEPTED]
+        now = c.count[ACCEPTED] + 1
+        if c.real[CALM_SINCE] > 0.0 and 0.0 < now - c.real[CALM_SINCE] <= SOON:
+            c.real[CALM] = SAFETY * h
+        c.real[CALM_SINCE] = now
     return False
 
 

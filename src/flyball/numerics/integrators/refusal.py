@@ -78,7 +78,7 @@ def enter(R, c, t, h, error):
     c.real[H] = h * (min(grow, max(0.2, SAFETY * error ** (-1.0 / R.order_i[0]))) if error > 0.0 else grow)
     if c.real[CALM] > 0.0:
         c.real[H] = min(c.real[H], c.real[CALM])
-        c.real[CALM] *= 1.0 + BOLDER * (c.count[ACCEPTED] - c.real[CALM_SINCE])
+        c.real[CALM] *= 1.0 + BOLDER * (c.count[ACCEPTED] + 1 - c.real[CALM_SINCE])
     if c.real[STEP] > 0.0:
         c.real[H] = c.real[STEP]
     c.real[T] = t
