@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import scipy.linalg
 
 import flyball as fb
 from tests.control.slide import slide
@@ -57,3 +58,25 @@ def test_a_strong_damper_hides_no_slow_motion_without_controllers(law, said):
     e = m.equilibrium()
     assert e.stability == said
     assert m.modes(about=e).kinds == ("decay" if said == "stable" else "unstable", "decay")
+
+
+@pytest.mark.parametrize("goal", [0.0, 0.2, 0.123, 1e-9])
+@pytest.mark.parametrize("kd", [12.0, 3.7])
+def test_at_rest_without_loads(kd, goal):
+    """Where nothing acts what is left is rounding: no rest was found, or a state's effect was lost in the linear model.
+
+    Multipliers by the exponential of the slide with its lag, and by the formulas of the sampled PID.
+    """
+    m = fb.Mechanism("slide", planar=True, parameters={"goal": goal})
+    m.add(fb.Body("cart", mass=2, inertia=1), fb.Prismatic("A", "ground", "cart", at=(0, 0), axis=(1, 0)))
+    gains = {"kp": 80, "ki": 60, "kd": kd, "filter": 0.02, "period": 0.01}
+    m.add(fb.PID("pid", setpoint="goal", measured="A.displacement", **gains))
+    m.add(fb.Lag("f", of="A.rate", time=0.1), fb.Actuator("drive", "A.displacement", force="pid - 20*f"))
+    e = m.equilibrium()
+    assert (e.stability, e["A.displacement"]) == ("stable", pytest.approx(goal, abs=1e-15))
+    w = m.linearize(["goal"], ["A.displacement"], about=e).eigenvalues
+    F, T, E = 0.02, 0.01, scipy.linalg.expm(0.01 * np.array([[0, 1, 0, 0], [0, 0, -10, 0.5], [0, 10, -10, 0], [0] * 4]))
+    X = np.eye(6)  # x, v, f; integral, what the derivative was, what was measured
+    d = F / (F + T) * X[4] - kd / (F + T) * (X[0] + X[5])
+    A = np.vstack([E[:3, :3] @ X[:3] + np.outer(E[:3, 3], X[3] - 80 * X[0] + d), X[3] - 60 * T * X[0], d, -X[0]])
+    np.testing.assert_allclose(np.sort_complex(w), np.sort_complex(np.linalg.eigvals(A)), atol=1e-9)

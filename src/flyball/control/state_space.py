@@ -37,7 +37,7 @@ class StateSpace(Controller):
     """A linear system x' = A x + B u, y = C x + D u; sampled, with a period, x_(k+1) = A x_k + B u_k.
 
     Outputs are ``K.output``, or ``K.output1``, ``K.output2``, ... where there are several; laws name a single one by
-    the system's name. States are ``K.x1``, ``K.x2``, ...
+    the system's name. States are ``K.x1``, ``K.x2``, ...; of one only ``K.x``.
 
     Parameters
     ----------

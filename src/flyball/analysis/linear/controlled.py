@@ -11,6 +11,7 @@ from ...model.model import Model
 from ...model.touching import holds_at_times
 from ..assembly.start import Assembly
 from ..compiled import Compiled
+from .balance import acting, rounding
 from .derivatives import State
 from .free import free
 from .natural import natural_scales
@@ -19,6 +20,7 @@ from .rest import Rest
 from .search import newton_to
 from .sliders import Scale, Slid, slid, states, there
 
+ROUNDED = np.finfo(float).eps  # of a large change of a state: less is none
 PASSES = 4  # searches, each in the natural sizes of where the one before ended
 FLAT = 1e-8  # singular values below this part of the largest are none
 ALIKE = 30.0  # times that natural sizes may differ from those that were searched in
@@ -61,12 +63,12 @@ def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str,
     NotConverged
         With what is left.
     """
-    scales = None
+    scales, still = None, False
     for _ in range(PASSES):
         c.z[: len(at)] = [*at.values()]
         x = State.resting(c, t, q)
         before, scales = scales, natural_scales(model, at, x, places=True)
-        if before is not None and _alike(before, scales):
+        if before is not None and (still or _alike(before, scales)):
             break
         other, begin = resting_copy(model, at, x, scales)
         with in_own_words(other):
@@ -74,7 +76,9 @@ def found_rest(model: Model, c: Compiled, t: float, q: np.ndarray, at: dict[str,
         if found is None:
             raise refusal(last, other)
         q, _ = c.take(found.c, found.t, found.q, np.zeros(found.c.structure.nv))
-        at = dict(zip(at, states(other, at, found), strict=True))
+        now = dict(zip(at, states(other, at, found), strict=True))
+        at = {name: z if abs(z) > ROUNDED * scales[name].size else 0.0 for name, z in now.items()}
+        still = bool((acting(found.equations) <= rounding(found.equations)).all())  # sizes by rounding would be none
     return q
 
 
