@@ -181,6 +181,15 @@ def test_a_motion_in_time_is_not_called_late(method):
     assert not four_bar().simulate(10.0, rtol=1e-5, method=method).health.doubtful
 
 
+@pytest.mark.parametrize("rtol", [1e-3, 1e-7])
+def test_what_turns_about_its_centre_is_not_late(rtol):
+    """Its centre goes no way but that of rounding."""
+    m = fb.Mechanism("wheel", planar=True, gravity=(0, 0))
+    m.add(fb.Body("b", mass=1, inertia=1, position=(0.1, 0.3)), fb.Revolute("A", "ground", "b", at=(0.1, 0.3)))
+    m.add(fb.CoordinateSpring("k", "A.angle", stiffness=1), fb.Initial("A.angle", rate=1))
+    assert not m.simulate(1.0, outputs=101, method="radau", rtol=rtol).health.doubtful
+
+
 def bushed() -> fb.Mechanism:
     """Two bars on a bushing of 1e7 N/m: a hundredth of a millimetre are 100 N."""
     m = fb.Mechanism("bushed", planar=True, gravity=(0, -9.81))

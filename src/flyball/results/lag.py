@@ -14,7 +14,8 @@ import numpy as np
 if TYPE_CHECKING:
     from .ledger import Ledger
 
-LATE = 0.05  # part of the way of a body by which it may be off
+LATE = 0.05  # part of the longest way of a body by which one may be off
+STILL = 1e-6  # part of the mechanism's length that is no way
 TURNING = 0.1  # part of the largest kinetic energy below which a motion that comes back is at its turning point
 
 
@@ -30,14 +31,14 @@ def late(x: Ledger) -> str:
     faster = x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
     faster[_turns(x)] = 0.0
     lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(r.t))]
-    worst, name, off = 0.0, "", 0.0
+    off, name, way = 0.0, "", STILL * r.values.length
     for body, b in r.values.structure.place.items():
         if b < 0:
             continue
         p, _, _, v, _, _ = r.records.body(b)
-        way, by = float(np.linalg.norm(np.ptp(p, axis=1))), float((np.abs(lag) * np.linalg.norm(v, axis=0)).max())
-        worst, name, off = max((worst, name, off), (by / max(way, 1e-150), body, by))
-    if not worst > LATE or r.health.freedoms != 1:
+        way = max(way, float(np.linalg.norm(np.ptp(p, axis=1))))
+        off, name = max((off, name), (float((np.abs(lag) * np.linalg.norm(v, axis=0)).max()), body))
+    if not off > LATE * way or r.health.freedoms != 1:
         return ""
     finer = "shorter step" if r.health.options.get("step") else "smaller rtol"
     return (
