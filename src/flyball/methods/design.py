@@ -216,7 +216,8 @@ class Design(Model):
             ``rms``, over the output times. Of an equilibrium also ``"least"`` (its least stiffness) and ``"stable"``
             (1 or 0); of modes ``"frequency[0]"``, ``"omega[0]"``, ``"damping_ratio[0]"``, slowest first, and
             ``"stable"``; of linear models ``"gain(output, input)"``, with an angular frequency [rad/s] as third
-            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s]. Or name -> function of a
+            also ``phase``, and ``"abscissa"``, the largest real part of an eigenvalue [1/s] (with sampled controllers
+            ln of the largest multiplier, over the period). Or name -> function of a
             run's answer that returns a number.
         analysis : {"motion", "kinematics", "instant", "equilibrium", "modes", "linearize"} or callable
             What each run is: `simulate`, `kinematics`, `assemble` with accelerations and reactions, `equilibrium`,
@@ -289,6 +290,11 @@ class Design(Model):
             something that the mechanism has, or the file is of another study.
         AnalysisError
             If the executor fails.
+
+        Warns
+        -----
+        Interrupted
+            If the user interrupts it: what was computed is returned, and ``complete`` is false.
         """
         from ..analysis.study import StudyOptions, study
 

@@ -175,6 +175,17 @@ class Swings(Small):
         return np.array(numbers[k] if k < len(numbers) else np.nan)
 
 
+def _abscissa(found: LinearModel) -> float:
+    """Largest growth [1/s]; of multipliers from one sample to the next that of what they grow by in a period."""
+    x = found.eigenvalues
+    if not len(x):
+        return np.nan
+    if found.period is None:
+        return float(x.real.max())
+    most = float(np.abs(x).max())
+    return float(np.log(most) / found.period) if most > 0.0 else -np.inf
+
+
 class Answers(Small):
     """`Mechanism.linearize`: eigenvalues, and what outputs answer to inputs."""
 
@@ -202,7 +213,7 @@ class Answers(Small):
     def value(self, found: Any, r: Reading, times: np.ndarray) -> np.ndarray:
         """Of the frequency response, at frequency 0 with its sign; or of the eigenvalues."""
         if r.name == ABSCISSA:
-            return np.array(found.eigenvalues.real.max() if len(found.eigenvalues) else np.nan)
+            return np.array(_abscissa(found))
         out, into, at = r.of
         g = found.response([at], into, out)[0]
         return np.array(np.angle(g) if r.name == "phase" else g.real if at == 0.0 else abs(g))
