@@ -98,6 +98,7 @@ if TYPE_CHECKING:  # for editors and type checkers: what `__getattr__` finds
     from .errors import AssemblyError as AssemblyError
     from .errors import ExpressionError as ExpressionError
     from .errors import FlyballError as FlyballError
+    from .errors import Interrupted as Interrupted
     from .errors import MobilityError as MobilityError
     from .errors import ModelError as ModelError
     from .errors import NotConverged as NotConverged
@@ -185,6 +186,7 @@ _HOME = {
     "Table": "model.table",
     "load": "files",
     "PerformanceNotice": "errors",
+    "Interrupted": "errors",
     "StartWarning": "errors",
     "load_result": "files",
     "load_study": "analysis.study",

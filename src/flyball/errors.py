@@ -57,6 +57,13 @@ class StartWarning(UserWarning):
     """A velocity that was described is not the one that a motion starts with: the constraints do not allow it."""
 
 
+class Interrupted(UserWarning):
+    """The user interrupted an analysis: what it returns is the part that was computed, and says so.
+
+    ``warnings.simplefilter("error", fb.Interrupted)`` makes an exception of it, for scripts that must not go on.
+    """
+
+
 class SingularOrientationError(FlyballError, ValueError):
     """Coordinates of an orientation do not exist, or have no finite rates, where it was asked for them.
 

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import FlyballError, ModelError, SimulationError
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError, warn
 from ..model.model import Model
 from ..results.result import Result
 from ..results.study_reading import fingerprint
@@ -44,8 +44,14 @@ class CheckpointOptions(SimulateOptions):
 
 def checkpointed(model: Model, o: CheckpointOptions) -> Result:
     """The motion; kept in a file on the way if that is asked for."""
-    if o.checkpoint is None:
-        return simulate(model, o)
+    result = simulate(model, o) if o.checkpoint is None else _kept(model, o)
+    if not result.health.success:
+        warn(result.health.message, Interrupted)
+    return result
+
+
+def _kept(model: Model, o: CheckpointOptions) -> Result:
+    assert o.checkpoint is not None
     cls, model = type(model), model.snapshot()
     t_start = start_time(o.t_start, o.start)
     span = (t_start, o.t_end, output_times(t_start, o.t_end, o.outputs))
@@ -108,8 +114,11 @@ class _Motion:
             kept.finish(result)
         else:  # interrupted: what goes on does so from where the last part ended
             kept.write()
-            t = kept.parts[-1].final[0] if kept.parts else self.span[0]
-            result.health.message += f"; the same call goes on from t = {t:.6g} s, with {kept.path}"
+            result.health.message += (
+                f"; the same call goes on from t = {kept.parts[-1].final[0]:.6g} s, with {kept.path}"
+                if kept.parts
+                else f"; no part of it had ended yet, so nothing is in {kept.path}: the same call begins anew"
+            )
         return result
 
     def _part(self, o: SimulateOptions, why: str) -> tuple[Result, bool]:

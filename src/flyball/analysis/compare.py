@@ -182,6 +182,8 @@ def _known(names: Sequence[str] | None) -> tuple[str, ...]:
     if names is None:
         return tuple(WAYS)
     wanted = (names,) if isinstance(names, str) else tuple(names)
+    if not wanted:
+        raise ModelError(f"formulations names none: nothing would be compared; {listing(list(ALL))}")
     for name in wanted:
         if name not in ALL:
             raise ModelError(f"there is no formulation {name!r}{suggest(str(name), ALL)}; {listing(list(ALL))}")

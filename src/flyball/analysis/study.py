@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+import os
 import time
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, FlyballError, ModelError, StartWarning
+from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, StartWarning, warn
 from ..model.model import Model
 from ..model.words import listing, suggest
 from ..results.study import WAITING, Study
@@ -36,6 +37,7 @@ from .runs.instants import Answers, Instant, Rest, Swings
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
 from .runs.single import Kinematics, Motion, Own, Single
+from .runs.soft import unused
 from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file
@@ -91,6 +93,8 @@ class StudyOptions(SimulateOptions):
             count(self.threads, "threads")
             if self.executor is not None:
                 raise ModelError("threads does nothing where an executor computes the runs; leave one of them out")
+        if self.file is not None and not Path(self.file).absolute().parent.is_dir():
+            raise ModelError(f"file={os.fspath(self.file)!r}: there is no such folder")
         if self.executor is not None and not isinstance(self.executor, Executor):
             raise ModelError(
                 f"executor is one of concurrent.futures (of Dask: client.get_executor()), not {self.executor!r}"
@@ -116,6 +120,10 @@ class StudyOptions(SimulateOptions):
         """What each run is asked."""
         single = self.single
         single.refuse(model)
+        if not callable(self.analysis) and not isinstance(self.of, Mapping) and (idle := unused(model, [*self.vary])):
+            raise ModelError(
+                f"vary {idle[0]!r}: nothing of {model.name!r} depends on it, and all runs would be the same"
+            )
         asked = readings(self.of, partial(single.named, model))
         times = np.array([self.t or 0.0])
         if single.timed:
@@ -145,6 +153,9 @@ def study(model: Model, o: StudyOptions) -> Study:
     found.seconds += time.perf_counter() - started
     if o.file is not None:
         save_study(found, o.file)
+    if not found.complete:
+        missing = int((found.status == WAITING).sum())
+        warn(f"the study was {found.message}; {missing} of {len(found)} runs are missing", Interrupted)
     return found
 
 

@@ -73,13 +73,20 @@ def result_file(path: Path, unit: str, flag: str) -> Any:
     return load_result(path)
 
 
+def once(out: Mapping[str, Any], name: str, flag: str, text: str) -> None:
+    """Refuse what is given twice: one of both would count."""
+    if name in out:
+        raise ModelError(f"{flag} {text!r}: {name!r} is given twice; give it once")
+
+
 def assigned(texts: list[str], unit: str, flag: str) -> dict[str, str]:
     """Names and what they are given, each as ``name=text``."""
-    out = {}
+    out: dict[str, str] = {}
     for text in texts:
         name, equals, value = (x.strip() for x in text.partition("="))
         if not equals or not value:
             raise ModelError(f'{flag} {text!r}: write name=value, for instance {flag} "A.angle=0.3*sin(2*t)"')
+        once(out, name, flag, text)
         out[name] = value
     return out
 

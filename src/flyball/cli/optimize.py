@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import ModelError
 from ..methods.design import Design
 from .asking import DERIVATIVES, Asked, command
-from .flags import Flag, quantity, values
+from .flags import Flag, once, quantity, values
 
 
 def _bounds(texts: list[str], unit: str, flag: str) -> dict[str, tuple[str | None, str | None]]:
@@ -19,6 +19,7 @@ def _bounds(texts: list[str], unit: str, flag: str) -> dict[str, tuple[str | Non
         low, colon, high = bounds.partition(":")
         if equals and not colon:
             raise ModelError(f"{flag} {text!r}: write name=low:high, for instance {flag} crank=0.1:0.3")
+        once(out, name.strip(), flag, text)
         out[name.strip()] = (low.strip() or None, high.strip() or None)
     return out
 

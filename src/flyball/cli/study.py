@@ -10,8 +10,8 @@ import typer
 from ..errors import ModelError
 from ..methods.design import Design
 from .asking import Asked, command
-from .common import INTERRUPTED, Plot, table
-from .flags import MANY, Flag, values
+from .common import FAILED, INTERRUPTED, Plot, table
+from .flags import MANY, Flag, once, values
 
 
 def _varied(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def _varied(texts: list[str], unit: str, flag: str) -> dict[str, Any]:
                 f"{flag} {text!r}: write name=values, for instance {flag} k=1e3:1e5:20; for samples name=low:high or "
                 f"name=normal(mean, sd)"
             )
+        once(out, name, flag, text)
         if "(" in told:
             out[name] = told
         elif told.count(MANY) == 1:
@@ -72,3 +73,5 @@ def study(
     asked.say(found)
     if not found.complete:
         raise typer.Exit(INTERRUPTED)
+    if not found.done.any():
+        raise typer.Exit(FAILED)

@@ -290,6 +290,11 @@ class Design(Model):
             something that the mechanism has, or the file is of another study.
         AnalysisError
             If the executor fails.
+
+        Warns
+        -----
+        Interrupted
+            If the user interrupts it: what was computed is returned, and ``complete`` is false.
         """
         from ..analysis.study import StudyOptions, study
 

@@ -125,6 +125,11 @@ class Motions(Model):
             If the start cannot be made consistent.
         SimulationError
             If the integration cannot go on; its ``result`` holds the motion up to then.
+
+        Warns
+        -----
+        Interrupted
+            If the user interrupts it: the part up to then is returned, and ``health.success`` is false.
         """
         from ..analysis.checkpointed import CheckpointOptions, checkpointed
 

@@ -137,6 +137,9 @@ def words(value: Any) -> Iterator[str]:
     elif isinstance(value, (tuple, list)):
         for x in value:
             yield from words(x)
+    elif isinstance(value, Mapping):
+        for x in value.values():
+            yield from words(x)
     elif isinstance(value, Expression):
         yield from value.names
     elif is_dataclass(value):

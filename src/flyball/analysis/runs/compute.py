@@ -102,4 +102,5 @@ def _told(question: Question, point: np.ndarray, out: Answers, k: int) -> list[n
 
 def _reason(error: Exception) -> str:
     text = str(error) or type(error).__name__
+    text = text.replace("about=m.equilibrium()", "about='equilibrium'")  # which studies take
     return text if isinstance(error, FlyballError) else f"{type(error).__name__}: {text}"

@@ -88,7 +88,7 @@ def _number(model: Model, name: str, given: Any) -> float:
     """A finite value of a parameter in SI units."""
     value = model.environment({name: given})[name] if isinstance(given, str) else given
     try:
-        found = float(value)
+        found = float("nan") if isinstance(value, (bool, np.bool_)) else float(value)
     except (TypeError, ValueError):
         found = float("nan")
     if not np.isfinite(found):

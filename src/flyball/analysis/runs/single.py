@@ -180,5 +180,6 @@ def _of_function(r: Reading, found: Any) -> np.ndarray:
     """What a user's function makes of an answer: one number."""
     y = np.asarray(r.function(found))  # type: ignore[misc]
     if y.ndim or y.dtype.kind not in "fiub":
-        raise ModelError(f"the function {r.title!r} returned {y!r}; one number is wanted")
+        what = f"an array of {' x '.join(map(str, y.shape))}" if y.ndim else repr(y.item())
+        raise ModelError(f"the function {r.title!r} returned {what}; one number is wanted")
     return y.astype(float)
