@@ -62,7 +62,9 @@ def residual(r):
 @pytest.mark.parametrize("name", FILES)
 def test_examples(name):
     r = mechanism(name).simulate(0.05, outputs=5, coordinates="absolute")
-    assert residual(r) < 1e-12
+    assert (
+        residual(r) < 1e-11
+    )  # accelerations are solved for to 1e-13: of wrenches, by the processor, some 1e-12 is left
 
 
 @pytest.mark.parametrize(("where", "name"), CASES, ids=lambda x: x)
