@@ -265,7 +265,7 @@ def test_what_fails_is_a_row():
     c = m.compare(5.0, outputs=51, repeats=1)
     for f in c:
         assert not f.success
-        assert f.t[-1] < 1.0
+        assert f.t[-1] < 1.0 or f.name == "none"  # which drifts apart beyond it
         assert np.isnan(f.cpu)
         assert np.isnan(f.difference)
     assert "pusher" in c["projection"].message

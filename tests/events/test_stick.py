@@ -264,7 +264,7 @@ def test_the_regularised_law_tends_to_it(seed):
     assert {name for e in true.events for name in e.name.split(", ")} == {"slides", "turns"}
     gaps = []
     for v in (1e-3, 1e-5):
-        r = shaken(seed, stick_speed=v).simulate(2.0, outputs=41, rtol=1e-7, atol=1e-9)
+        r = shaken(seed, stick_speed=v).simulate(2.0, outputs=41, rtol=1e-8, atol=1e-10)
         gaps.append(max(np.abs(r[j] - true[j]).max() for j in ("rail.displacement", "hinge.angle")))
         assert r["turns"].work[-1] == pytest.approx(true["turns"].work[-1], rel=300 * v + 1e-5)
     assert gaps[1] < 1e-4

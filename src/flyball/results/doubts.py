@@ -168,10 +168,10 @@ def _unseen(x: Ledger) -> np.ndarray:
     """
     r = x.result
     none = np.zeros_like(x.kinetic)
-    if x.runs or r.health.steps <= len(r.t) or r.health.options.get("step"):
+    if x.runs or not len(r.t) or r.health.steps <= len(r.t) or r.health.options.get("step"):
         return none
     found = gained(r, x.bodies.tolist(), float(np.ptp(r.t)) / r.health.steps)
-    return found if SEEN * found.max() > x.moved(0, len(r.t)) else none
+    return found if SEEN * found.max(initial=0.0) > x.moved(0, len(r.t)) else none
 
 
 def _rest(x: Ledger) -> Any:
