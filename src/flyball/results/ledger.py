@@ -137,15 +137,22 @@ def apart(result: Result) -> list[Ledger]:
 
 def connected(S: System) -> np.ndarray:
     """The part to which each row of the body table belongs, (nb,): joints, couplings and forces connect them."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     nb = len(S.body_i)
+    first = list(range(nb))  # of what each hangs together with, as far as it is known: a body before it, or itself
+
+    def root(b: int) -> int:
+        while first[b] != b:
+            first[b] = first[first[b]]
+            b = first[b]
+        return b
+
     pairs = [(b, int(row[PARENT])) for b, row in enumerate(S.body_i) if row[PARENT] >= 0]
     some = [*(_of_line(S, k) for k in range(len(S.row_i))), *(_of_force(S, k) for k in range(len(S.force_i)))]
     pairs += [(int(bodies[0]), int(b)) for bodies in some for b in bodies[1:]]
-    i, j = np.array(pairs, np.int64).reshape(-1, 2).T
-    return connected_components(coo_matrix((np.ones(len(i)), (i, j)), shape=(nb, nb)), directed=False)[1]
+    for i, j in pairs:
+        i, j = sorted((root(i), root(j)))
+        first[j] = i
+    return np.unique([root(b) for b in range(nb)], return_inverse=True)[1]
 
 
 def _of_line(S: System, k: int) -> np.ndarray:
