@@ -28,7 +28,7 @@ def late(x: Ledger) -> str:
     unknown = x.works or r.exchanged or r.bulk or r.pieces
     if unknown or not 1 < r.health.steps <= len(r.t) or not x.kinetic.max() > 0.0:
         return ""
-    faster = x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
+    faster = _faster(x)
     faster[_turns(x)] = 0.0
     lag = np.r_[0.0, np.cumsum(0.5 * (faster[1:] + faster[:-1]) * np.diff(r.t))]
     off, name, way = 0.0, "", STILL * r.values.length
@@ -53,9 +53,14 @@ def perhaps_late(x: Ledger) -> np.ndarray:
     if x.works or x.result.exchanged or x.result.bulk:
         return np.zeros(len(x.kinetic), bool)
     width = np.diff(x.result.t[: x.kinetic.shape[-1]])
-    faster = np.abs(x.balance) / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
+    faster = np.abs(_faster(x))
     lag = (0.5 * (faster[:, 1:] + faster[:, :-1]) * width).sum(axis=-1)
     return lag > LATE * width.mean() if len(width) else lag > 0.0
+
+
+def _faster(x: Ledger) -> np.ndarray:
+    """Part by which it is too fast at every output time, dE / 2T: half of what moves at most."""
+    return x.balance / (2.0 * (x.kinetic + np.abs(x.balance)) + 1e-300)
 
 
 def _turns(x: Ledger) -> np.ndarray:
