@@ -82,6 +82,10 @@ def wired(model: Model) -> list[Wired]:
     ModelError
         If signals of sampled controllers depend on each other in a ring.
     """
+    return model.kept.get("wired", None, 1, lambda: _wired(model)) if model.frozen else _wired(model)
+
+
+def _wired(model: Model) -> list[Wired]:
     wiring = _wiring(model)
     every = controllers(model).values()
 
