@@ -189,8 +189,9 @@ def checksum(stored: Mapping[str, Any]) -> str:
     digest = hashlib.sha256(str(FORMAT).encode())
     for name in sorted(stored):
         value = stored[name]
-        shape, data = "text", str(value).encode()
-        if not isinstance(value, str):
+        if isinstance(value, str):
+            shape, data = "text", value.encode()
+        else:
             numbers = np.ascontiguousarray(value, "<f8")
             shape, data = str(numbers.shape), numbers.tobytes()
         digest.update(f"{name} {shape} {len(data)}\n".encode() + data)
