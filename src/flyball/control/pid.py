@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from ..errors import ModelError
 from ..model.controller import Controller, ControlState
@@ -68,6 +68,8 @@ class PID(Controller):
     bias: Law = 0.0
     initial: Annotated[Number, Unit(None)] = 0.0
     initial_measured: Annotated[Number, Unit(None)] = 0.0
+
+    compared: ClassVar[tuple[str, ...]] = ("setpoint", "measured")
 
     @property
     def windup(self) -> str:

@@ -102,6 +102,11 @@ class StateSpace(Controller):
         """Numbers of states, inputs, outputs."""
         return len(self.A), len(self.inputs), len(self.D) or len(self.C)
 
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """As given, else output, or output1, output2, ..."""
+        return self.outputs or numbered(OUTPUT, self.sizes[2])
+
     def check(self, n: SimpleNamespace) -> None:
         """Refuse matrices whose sizes do not fit."""
         super().check(n)
@@ -160,9 +165,8 @@ class StateSpace(Controller):
         """The outputs, and the inputs."""
         _, inputs, outputs = self.sizes
         u = tuple(f"u_{j}" for j in range(inputs))
-        names = self.outputs or numbered(OUTPUT, outputs)
         y = (" + ".join([*self._row("C", i, self._x), *self._row("D", i, u)]) or "0" for i in range(outputs))
-        return dict(zip(names, y, strict=True)) | dict(zip(numbered("input", inputs), u, strict=True))
+        return dict(zip(self.output_names, y, strict=True)) | dict(zip(numbered("input", inputs), u, strict=True))
 
     def states(self, n: SimpleNamespace) -> tuple[ControlState, ...]:
         """The states x."""

@@ -50,11 +50,18 @@ class Controller(Element, ABC):
     offset: Annotated[Number, Unit("s")] = 0.0
 
     category: ClassVar[str] = "controllers"
+    compared: ClassVar[tuple[str, ...]] = ()
+    """Signals that pictures show beside one another: what is to be followed, and what follows."""
 
     @property
     def sampled(self) -> bool:
         """Whether it acts at instants: offset, offset + period, offset + 2 period, ..."""
         return self.period is not None
+
+    @property
+    def output_names(self) -> tuple[str, ...]:
+        """Those of its signals that it is there for."""
+        return (OUTPUT,)
 
     @property
     def holds(self) -> bool:

@@ -23,6 +23,7 @@ import numpy as np
 from ..errors import ModelError
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
+from .numbers import with_unit
 from .stored_contacts import packed
 from .stored_events import packed as events_packed
 from .stored_stretches import packed as stretches_packed
@@ -83,7 +84,7 @@ def to_dataframe(result: Result) -> pandas.DataFrame:
 def to_csv(result: Result, path: str | os.PathLike) -> None:
     """All curves as a table with a header such as ``slider.x [m]``; numbers are written exactly."""
     channels = result.channels()
-    header = [f"{TIME} [s]", *(f"{k} [{unit}]" for k, (unit, _) in channels.items())]
+    header = [f"{TIME} [s]", *(with_unit(k, unit) for k, (unit, _) in channels.items())]
     columns = [result.t.tolist(), *(np.asarray(v).tolist() for _, v in channels.values())]
 
     def write(part: Path) -> None:

@@ -15,7 +15,7 @@ from ..math.vec import cross, sub
 from ..model.coupling import Coupling
 from ..model.joint import Joint
 from ..model.model import listing, suggest
-from .numbers import number, span
+from .numbers import number, span, with_unit
 
 if TYPE_CHECKING:
     from .result import Result
@@ -274,7 +274,7 @@ class InverseDynamics:
         try:
             with open(path, "w", encoding="utf-8", newline="") as file:
                 out = csv.writer(file)
-                out.writerow(["time [s]", *(f"{k} [{unit}]" for k, (unit, _) in curves.items())])
+                out.writerow(["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())])
                 out.writerows([["" if x != x else repr(x) for x in row] for row in rows.tolist()])
         except OSError as error:
             raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
