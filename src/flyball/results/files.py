@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import cannot_write
 from ..model.quantities import ENERGY
 from .labels import TIME, coordinates, labelled
 from .numbers import with_unit
@@ -114,7 +114,7 @@ def replaced(path: str | os.PathLike, write: Callable[[Path], None]) -> None:
         write(part)
         part.replace(path)
     except OSError as error:
-        raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror or error}") from None
+        raise cannot_write(path, error) from None
     finally:
         part.unlink(missing_ok=True)
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, cannot_write
 from ..math.vec import cross, sub
 from ..model.coupling import Coupling
 from ..model.joint import Joint
@@ -277,7 +277,7 @@ class InverseDynamics:
                 out.writerow(["time [s]", *(with_unit(k, unit) for k, (unit, _) in curves.items())])
                 out.writerows([["" if x != x else repr(x) for x in row] for row in rows.tolist()])
         except OSError as error:
-            raise ModelError(f"cannot write {os.fspath(path)!r}: {error.strerror}") from None
+            raise cannot_write(path, error) from None
 
     def plot(self, path: str | os.PathLike | None = None) -> Any:
         """Efforts and reactions over time; returns the Matplotlib figure, or writes it to ``path``."""

@@ -11,12 +11,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import ModelError
+from ..errors import ModelError, cannot_write
 from ..results.numbers import with_unit
 from .figures import hidden
 from .marks import draw_marks
 from .recording import Mark, Panel
-from .writing import cannot
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -118,7 +117,7 @@ def handed_out(drawing: Drawing, path: str | os.PathLike | None) -> Drawing | No
             drawing.align_ylabels()
             drawing.savefig(path, metadata=dated[path.suffix.lower()])
     except OSError as error:
-        raise cannot(path, error) from None
+        raise cannot_write(path, error) from None
     return None
 
 
