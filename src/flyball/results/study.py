@@ -295,8 +295,8 @@ class Study:
         """Quantities over one parameter, as a surface over two, or scattered over each of more.
 
         Curves of few runs are told by a legend, of up to 40 by the colour of the parameter that tells most of them; of
-        more, what half and nine tenths of the runs stay within. Axes are logarithmic where values are spread so. Returns
-        the Matplotlib figure, or writes it to ``path``.
+        more, what half and nine tenths of the runs stay within. Axes are logarithmic where values are spread so.
+        Returns the Matplotlib figure, or writes it to ``path``.
         """
         from ..view.study import study
 
