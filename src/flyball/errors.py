@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import os
 import sys
 import warnings
 from pathlib import Path
@@ -25,6 +26,18 @@ class UnitError(ModelError):
 
 class ExpressionError(ModelError):
     """An expression cannot be read, or uses a name that is not known."""
+
+
+def cannot_write(path: str | os.PathLike, error: OSError) -> ModelError:
+    """The error to raise where a file cannot be written."""
+    path = Path(path)
+    if not path.parent.is_dir():
+        why = f"there is no folder {os.fspath(path.parent)!r}; make it first, or write elsewhere"
+    elif path.is_dir():
+        why = f"it is a folder; name a file in it, for instance {os.fspath(path / 'page.html')!r}"
+    else:
+        why = error.strerror or str(error)
+    return ModelError(f"cannot write {os.fspath(path)!r}: {why}")
 
 
 def warn(text: str, category: type[Warning]) -> None:

@@ -17,6 +17,7 @@ from ..errors import AnalysisError, ModelError, NotConverged
 from ..model.model import Model, listing, suggest
 from ..results.equilibria import EquilibriumSeries, Jump
 from ..results.equilibrium import UNSTABLE, Equilibrium
+from ..tables.numbers import unused
 from .compiled import compiled
 from .equilibrium import equilibrium as single
 from .equilibrium import resting
@@ -88,6 +89,8 @@ def checked(
     known = [*model.parameters, "t"]
     if parameter not in known:
         raise ModelError(f"{model.name!r} has no parameter {parameter!r}{suggest(parameter, known)}; {listing(known)}")
+    if parameter != "t" and unused(model, [parameter]):
+        raise ModelError(f"nothing of {model.name!r} depends on {parameter!r}: all its values would give the same")
     points = np.atleast_1d(np.asarray(values, float))
     if points.ndim != 1 or not len(points) or not np.isfinite(points).all():
         raise ModelError(f"values of {parameter!r} must be finite numbers in SI units, one at least, got {values!r}")

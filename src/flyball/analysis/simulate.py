@@ -40,6 +40,7 @@ from .motion.later import open_until_asked, solved
 from .motion.options import STABILIZATION, Integration, output_times, refuse_unheld
 from .motion.outcome import outcome
 from .motion.part import Part, whole
+from .motion.samples import refuse_too_often
 from .motion.start import Start, begin, start_time
 from .motion.stiff import EXPLICIT, Pace
 from .motion.touches import with_places
@@ -149,6 +150,8 @@ def moved(
         partition.choose(begun.base.compiled.structure.model, begun)
     c, engine = begun.assembly.compiled, begun.engine or Engine(begun.assembly.compiled, False)
     begun.part.begin(c.structure)
+    if task == INTEGRATE:
+        refuse_too_often(c, (begun.base.t, float(t_end)), o.max_steps)
     known = breaks(c, begun.base.t, float(t_end)) if task == INTEGRATE else NO_BREAKS
     sampled = sampled_laws(c, known)
     clock = clock_for(begun, begun.base.t, float(t_end), times, o, sampled)

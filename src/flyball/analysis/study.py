@@ -23,6 +23,7 @@ from ..model.words import listing, suggest
 from ..results.study import WAITING, Study
 from ..results.study_file import save_study
 from ..results.study_reading import fingerprint, stored
+from ..tables.numbers import unused
 from .motion.choice import IMPULSE, SimulateOptions
 from .motion.engines import AUTO, worth_making
 from .motion.implicit.suited import IMPLICIT
@@ -37,7 +38,6 @@ from .runs.instants import Answers, Instant, Rest, Swings
 from .runs.pool import computed, cores
 from .runs.reading import ends_only, readings
 from .runs.single import Kinematics, Motion, Own, Single
-from .runs.soft import unused
 from .simulate import simulate
 
 EVERY = 20.0  # seconds between two states of the file

@@ -43,16 +43,6 @@ def derived(model: Model, names: Sequence[str]) -> list[tuple[str, Expression]]:
     return order
 
 
-def unused(model: Model, names: Sequence[str]) -> list[str]:
-    """Those of some parameters that nothing of the model has, by itself or through other parameters."""
-    todo = {*words(model.gravity), *(w for e in model.elements() for w in words(e))} & model.parameters.keys()
-    used: set[str] = set()
-    while todo:
-        used |= todo
-        todo = ({w for name in todo for w in words(model.parameters[name])} & model.parameters.keys()) - used
-    return [name for name in names if name not in used]
-
-
 def soft(model: Model, names: Sequence[str]) -> list[Element] | None:
     """The forces and controllers whose numbers change with these parameters; None if something else does."""
     reached = {*names, *(k for k, _ in derived(model, names))}
