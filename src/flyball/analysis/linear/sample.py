@@ -16,7 +16,7 @@ from .free import Free
 from .reduced import Frame, Reduced
 from .spectrum import spectrum
 
-UNDAMPED = 1e-8  # real parts below this part of an eigenvalue are none
+BESIDE = 1e-8  # part of an eigenvalue within which one is followed as on the axis: nearer, crossings are not told apart
 
 
 @dataclass
@@ -51,7 +51,7 @@ class Sample:
         ``""`` stands for the lower one of a pair.
         """
         w = self.w
-        real = np.where(np.abs(w.real) > UNDAMPED * np.abs(w), w.real, 0.0)
+        real = np.where(np.abs(w.real) > BESIDE * np.abs(w), w.real, 0.0)
         alone = np.where(real > 0.0, "+real", "-real")
         pair = np.where(real > 0.0, "+pair", np.where(real < 0.0, "-pair", "axis"))
         return np.where(w == 0.0, "zero", np.where(w.imag == 0.0, alone, np.where(w.imag > 0.0, pair, "")))
@@ -59,7 +59,7 @@ class Sample:
     @cached_property
     def sides(self) -> np.ndarray:
         """Which half plane each eigenvalue lies in, (n,): 1, -1, or 0 for the axis."""
-        return np.where(np.abs(self.w.real) > UNDAMPED * np.abs(self.w), np.sign(self.w.real), 0.0).astype(int)
+        return np.where(np.abs(self.w.real) > BESIDE * np.abs(self.w), np.sign(self.w.real), 0.0).astype(int)
 
     @cached_property
     def counts(self) -> dict[str, int]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...results.equilibrium import MARGINAL, STABLE, UNSTABLE
+from ...results.growth import growth
 from .derivatives import Equations
 from .free import Free, free
 from .kinks import kinks, refuse_kinks
@@ -87,13 +88,7 @@ def by_eigenvalues(own: Spectrum, *, discrete: bool = False) -> str:
     discrete : bool
         Whether they are multipliers from one instant to the next, which must not exceed 1 in size.
     """
-    w, blur = own.values, own.blur
-    if discrete:
-        grows = np.abs(w) - 1.0
-        grows[np.abs(grows) <= blur] = 0.0
-    else:
-        grows = w.real  # without what is rounding
-    most = float(grows.max(initial=-1.0))
+    most = growth(own.values, own.blur, discrete=discrete)
     return UNSTABLE if most > 0.0 else MARGINAL if most == 0.0 else STABLE
 
 
