@@ -34,7 +34,7 @@ def test_an_interrupt_keeps_the_best(how):
         if done > 0.03:
             raise KeyboardInterrupt
 
-    with pytest.raises(fb.Interrupted, match="interrupted by the user after [4-9] analyses") as ended:
+    with pytest.raises(fb.Interrupted, match=r"interrupted by the user after [4-9] analyses") as ended:
         spring().optimize(["b.y"], ["k"], analysis="equilibrium", progress=stop, evaluations=100, **how)
     best = ended.value.result
     assert not best.success

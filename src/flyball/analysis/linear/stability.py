@@ -17,6 +17,8 @@ from .sides import from_all_sides
 from .spectrum import Spectrum, spectrum
 from .stiffness import NEUTRAL, stiffness
 
+DRIVEN = 1e-12  # of the largest damping: what is negative beyond is no rounding
+
 
 @dataclass
 class Stability:
@@ -76,7 +78,16 @@ def _judged(x: Rest) -> Stability:
     if not s.potential:  # flutter shows in the motion
         refuse_kinks(e, still, f.Zv)
         kind = _by_motion(e, f)
+    elif kind == STABLE and _drives(e, f) and _by_motion(e, f) == UNSTABLE:
+        kind = UNSTABLE
     return Stability(kind, f, s.matrix, s.along[:, k], float(s.parts[k]))
+
+
+def _drives(e: Equations, f: Free) -> bool:
+    """Whether forces that follow velocities give energy to some motion: a negative damper."""
+    D = f.Zv.T @ e.by_velocity[e.at["r"]] @ f.Zv
+    d = np.linalg.eigvalsh(0.5 * (D + D.T))
+    return bool(len(d) and d[0] < -DRIVEN * np.abs(d).max())
 
 
 def by_eigenvalues(own: Spectrum, *, discrete: bool = False) -> str:
