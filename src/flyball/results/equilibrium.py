@@ -30,10 +30,10 @@ class Equilibrium:
     ----------
     stability : str
         ``"stable"``, ``"marginal"`` (a direction without stiffness) or ``"unstable"``, by the constrained stiffness,
-        in which reactions turn with the bodies; where forces have no potential, or drive motions on, by the eigenvalues too; with
-        controllers by those of the closed loop alone. With contact it
-        is judged while closed contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide,
-        and ``"not judged"`` where ``notes`` say why.
+        in which reactions turn with the bodies; where forces have no potential, or drive motions on, by the
+        eigenvalues too; with controllers by those of the closed loop alone. With contact it is judged while closed
+        contacts stay closed and stick: ``"marginal"`` where one is about to part or to slide, and ``"not judged"``
+        where ``notes`` say why.
     judged_by : str
         What says so, with controllers.
     freedoms : tuple of str
