@@ -70,11 +70,15 @@ class StartWarning(UserWarning):
     """A velocity that was described is not the one that a motion starts with: the constraints do not allow it."""
 
 
-class Interrupted(UserWarning):
-    """The user interrupted an analysis: what it returns is the part that was computed, and says so.
+class Interrupted(KeyboardInterrupt):
+    """The user interrupted an analysis. ``result`` holds what was computed up to then.
 
-    ``warnings.simplefilter("error", fb.Interrupted)`` makes an exception of it, for scripts that must not go on.
+    It is a ``KeyboardInterrupt``: scripts and loops end by it, as by any other.
     """
+
+    def __init__(self, message: str, result: Any = None) -> None:
+        super().__init__(message if result is None else f"{message} (``result`` of this exception has it)")
+        self.result = result
 
 
 class SingularOrientationError(FlyballError, ValueError):

@@ -47,7 +47,9 @@ def test_an_interrupted_study_goes_on(tmp_path):
         if done > 0.4:
             raise KeyboardInterrupt
 
-    part = ask(file, progress=interrupt)
+    with pytest.raises(fb.Interrupted) as ended:
+        ask(file, progress=interrupt)
+    part = ended.value.result
     n = int(part.done.sum())
     assert 0.4 * 200 < n < 200
     assert not part.complete

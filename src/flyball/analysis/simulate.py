@@ -11,7 +11,7 @@ from ..constraints.modes import BRANCH, FRICTION
 from ..equations.engine import FOLLOW, INTEGRATE, motion_kernel
 from ..equations.projection import TIGHT_G, TIGHT_V
 from ..equations.within import ROWS, breaking, kept
-from ..errors import FlyballError, ModelError, SimulationError, StartWarning, warn
+from ..errors import FlyballError, Interrupted, ModelError, SimulationError, StartWarning, warn
 from ..laws.breaks import NO_BREAKS
 from ..laws.functions import forget, interrupts_kept
 from ..model.model import Model
@@ -75,14 +75,23 @@ Span = tuple[float, float, np.ndarray]
 
 
 def told(model: Model, o: SimulateOptions, span: Span, why: str, auto: bool, part: Part | None = None) -> Result:
-    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change."""
+    """The motion, or a part of it, which says by what it was computed, and why; ``auto``: methods may change.
+
+    Raises
+    ------
+    Interrupted
+        If the user ends it.
+    """
+    part = part or whole()
     try:
-        result = _computed(model, o, span, auto, part or whole())
+        result = _computed(model, o, span, auto, part)
     except SimulationError as error:
         if isinstance(error.result, Result):
             _tell(error.result, why)
         raise
     _tell(result, why)
+    if not result.health.success and not part.paused:
+        raise Interrupted(result.health.message, result)
     return result
 
 

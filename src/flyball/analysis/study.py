@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, StartWarning, warn
+from ..errors import AnalysisError, FlyballError, Interrupted, ModelError, StartWarning
 from ..model.model import Model
 from ..model.words import listing, suggest
 from ..results.study import WAITING, Study
@@ -155,7 +155,7 @@ def study(model: Model, o: StudyOptions) -> Study:
         save_study(found, o.file)
     if not found.complete:
         missing = int((found.status == WAITING).sum())
-        warn(f"the study was {found.message}; {missing} of {len(found)} runs are missing", Interrupted)
+        raise Interrupted(f"the study was {found.message}; {missing} of {len(found)} runs are missing", found)
     return found
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -116,6 +117,12 @@ class PID(Controller):
         """Limits that follow expressions may cross."""
         plain = isinstance(self.lower, float) and isinstance(self.upper, float)
         return None if plain or self.lower is None or self.upper is None else ("lower", "upper")
+
+    def unlimited(self) -> PID:
+        """Without limits nothing winds up."""
+        if not self._limited:
+            return self
+        return replace(self, lower=None, upper=None, anti_windup=None, tracking=None)
 
     def given(self) -> dict[str, Any]:
         """Inputs, gains, limits."""

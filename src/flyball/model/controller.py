@@ -87,6 +87,10 @@ class Controller(Element, ABC):
         """Two of what it is given of which the first must not exceed the second; it has no output where it does."""
         return None
 
+    def unlimited(self) -> Controller:
+        """The same without limits of its output; itself where it has none."""
+        return self
+
     @abstractmethod
     def given(self) -> dict[str, Any]:
         """Laws of the user's by the names that formulas know them by: inputs, gains, limits."""
