@@ -7,6 +7,7 @@ import pytest
 
 import flyball as fb
 from flyball.compiler import ways
+from flyball.compiler.lean import leanly
 from flyball.compiler.link import linked_as_a_whole
 from flyball.compiler.quick import quickly
 from flyball.compiler.stamp import PACKAGE
@@ -50,7 +51,8 @@ def test_where_internals_differ_compilation_takes_the_usual_way(asked_anew, monk
 
 
 def test_nothing_stays_patched():
-    from numba.core import codegen, ir
+    from llvmlite.ir import IRBuilder
+    from numba.core import base, callconv, cgutils, codegen, ir, lowering
     from numba.core.postproc import PostProcessor
     from numba.core.targetconfig import TargetConfig
     from numba.core.typing.context import BaseContext
@@ -59,10 +61,15 @@ def test_nothing_stays_patched():
         library, target = codegen.CPUCodeLibrary, codegen.JITCPUCodegen
         quick = TargetConfig.values, TargetConfig.__eq__, TargetConfig.__hash__, ir.Inst._rec_list_vars
         found = BaseContext.resolve_function_type, PostProcessor.run
-        return [library.finalize, library._optimize_functions, target.set_env, *quick, *found]
+        lower = lowering.Lower.storevar, lowering.Lower.alloca_lltype, lowering.Lower.lower_normal_function
+        called = base.user_function, callconv.CPUCallConv._return_errcode_raw, cgutils.alloca_once
+        target_of = base.BaseContext
+        chosen = target_of.get_function, target_of.cast, target_of.pair_first, target_of.pair_second
+        lean = *lower, *called, *chosen, IRBuilder.insert_value, IRBuilder.extract_value
+        return [library.finalize, library._optimize_functions, target.set_env, *quick, *found, *lean]
 
     before = patched()
-    with linked_as_a_whole("nothing"), quickly():
+    with linked_as_a_whole("nothing"), quickly(), leanly():
         assert all(now is not then for now, then in zip(patched(), before, strict=True))
     assert patched() == before
 

@@ -13,7 +13,7 @@ import hashlib
 from typing import Any
 
 from .jit import on_numba
-from .table import parts, table_type
+from .table import offset, parts, table_type
 
 
 def held(fields):  # type: ignore[no-untyped-def]
@@ -69,12 +69,13 @@ def _register() -> None:
 
     @lower_getattr_generic(Held)
     def read(context: Any, builder: Any, typ: Any, value: Any, name: str) -> Any:
-        address = builder.bitcast(value, context.get_value_type(typ.whole).as_pointer())
         k = typ.whole.fields.index(name)
-        field = cgutils.gep_inbounds(builder, address, 0, k)
+        whole = context.get_value_type(typ.whole)
+        field = builder.gep(value, [ir.IntType(64)(offset(context, whole, k))], inbounds=True)
         if is_table(typ.whole[k]) or isinstance(typ.whole[k], types.BaseNamedTuple):
-            return builder.bitcast(field, cgutils.voidptr_t)
-        return parts(builder, field)
+            return field
+        of = whole.element if isinstance(whole, ir.ArrayType) else whole.elements[k]
+        return parts(builder, builder.bitcast(field, of.as_pointer()))
 
     def is_table(typ: Any) -> bool:
         return isinstance(typ, types.Array) and typ.layout == "C"

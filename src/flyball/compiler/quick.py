@@ -131,13 +131,16 @@ def _remembered(original: Any) -> Any:
 def _lifetimes_when_asked(postproc: Any) -> Any:
     """``PostProcessor.run``: when variables live is found when asked for, and not after each of eight passes.
 
-    What is alive on entry of a block is asked of generators only.
+    What is alive on entry of a block is asked of generators only; ends of lifetimes where arrays are counted.
     """
+    from numba.core.targetconfig import ConfigStack
+
     original = postproc.PostProcessor.run
 
     def run(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
         made = self.func_ir
-        if emit_dels or made.is_generator:
+        flags = ConfigStack.top_or_none()
+        if made.is_generator or (emit_dels and (flags is None or flags.nrt)):
             original(self, emit_dels, extend_lifetimes)
             return
         made.blocks = postproc.transforms.canonicalize_cfg(made.blocks)

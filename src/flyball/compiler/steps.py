@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from .lean import struct
+
 
 @contextmanager
 def products_of_first_order() -> Iterator[None]:
@@ -33,8 +35,6 @@ def products_of_first_order() -> Iterator[None]:
 
 
 def _product(context: Any, builder: Any, sig: Any, args: Any) -> Any:
-    x, y = (context.make_complex(builder, of, value) for of, value in zip(sig.args, args, strict=True))
-    out = context.make_complex(builder, sig.return_type)
-    out.real = builder.fmul(x.real, y.real)
-    out.imag = builder.fadd(builder.fmul(x.real, y.imag), builder.fmul(x.imag, y.real))
-    return out._getvalue()
+    (a, b), (c, d) = ([builder.extract_value(x, k) for k in range(2)] for x in args)
+    moved = builder.fadd(builder.fmul(a, d), builder.fmul(b, c))
+    return struct(context, builder, sig.return_type, (builder.fmul(a, c), moved))

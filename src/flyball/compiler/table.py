@@ -19,6 +19,21 @@ def table_type(array: Any) -> Any:
     return _TYPES[0](array)
 
 
+_OFFSETS: dict[tuple[Any, int], int] = {}
+
+
+def offset(context: Any, of: Any, k: int) -> int:
+    """Bytes from the begin of a structure, or of an array, to its member k."""
+    from llvmlite import ir
+
+    if isinstance(of, ir.ArrayType):
+        return k * offset(context, ir.LiteralStructType([of.element] * 2), 1)
+    key = of, k
+    if key not in _OFFSETS:
+        _OFFSETS[key] = of.get_element_offset(context.target_data, k)
+    return _OFFSETS[key]
+
+
 def parts(builder: Any, address: Any, skipped: int = 0) -> Any:
     """Read what stands at an address number by number: the optimiser splits no larger reads.
 
@@ -42,22 +57,27 @@ class _Place:
     """Where a table's numbers are: code that finds them."""
 
     def __init__(self, context: Any, builder: Any, typ: Any, value: Any) -> None:
-        self.context, self.builder, self.array = context, builder, typ.array
-        self.address = builder.bitcast(value, context.get_value_type(typ.array).as_pointer())
+        self.context, self.builder, self.array, self.address = context, builder, typ.array, value
 
     def at(self, name: str, *k: int) -> Any:
         """The address of a part of the array's description."""
-        from numba.core import cgutils
+        from llvmlite import ir
 
+        whole = self.context.get_value_type(self.array)
         position = self.context.data_model_manager[self.array].get_field_position(name)
-        return cgutils.gep_inbounds(self.builder, self.address, 0, position, *k)
+        part, at = whole.elements[position], offset(self.context, whole, position)
+        for i in k:
+            part, at = part.element, at + offset(self.context, part, i)
+        place = self.builder.gep(self.address, [ir.IntType(64)(at)], inbounds=True) if at else self.address
+        return self.builder.bitcast(place, part.as_pointer())
 
     def read(self, name: str, *k: int) -> Any:
         return parts(self.builder, self.at(name, *k))
 
     def whole(self) -> Any:
         """The array as Numba has it, without owners: nobody counts references here."""
-        return parts(self.builder, self.address, 2)
+        of = self.context.get_value_type(self.array).as_pointer()
+        return parts(self.builder, self.builder.bitcast(self.address, of), 2)
 
     def indices(self, typ: Any, value: Any) -> list[Any] | None:
         """Integers of an index, counted from the end where negative; None if it holds anything else."""

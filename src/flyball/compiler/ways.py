@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Any
 
 from ..errors import PerformanceNotice
+from .lean import leanly
 from .link import linked_as_a_whole
 from .quick import quickly
 
@@ -22,7 +23,7 @@ def optimise_once(top: str) -> Iterator[None]:
     if not ours():
         yield
         return
-    with linked_as_a_whole(top), quickly():
+    with linked_as_a_whole(top), quickly(), leanly():
         yield
 
 
@@ -48,16 +49,31 @@ def ours() -> bool:
 
 
 def _probe() -> float:
-    """2 * 3 + 1, by a kernel of its own that calls a function of its own, linked our way."""
+    """7, by a kernel of its own that calls functions of its own, linked our way: one in a loop, one that fails."""
     from numba import njit
     from numba.extending import register_jitable
 
     @register_jitable
-    def more(x: Any) -> Any:
-        return x + 1.0
+    def more(x: Any, pair: Any) -> Any:
+        return x + pair[1]
 
-    def probe_kernel(a: Any, b: Any) -> Any:
-        return more(a * b)
+    @register_jitable
+    def root(x: Any) -> Any:
+        if x < 0.0:
+            raise ValueError
+        return x**0.5
 
-    with linked_as_a_whole(probe_kernel.__qualname__), quickly():
-        return njit(probe_kernel)(2.0, 3.0)
+    def probe_kernel(a: Any, n: Any) -> Any:
+        total = 0j
+        for i in range(1, n):
+            total = more(total + a * i, (i, 1.0)) - 1j
+        return root(total.real + 1.0) + (total + 1j).imag  # 5 - 3
+
+    with linked_as_a_whole(probe_kernel.__qualname__), quickly(), leanly():
+        kernel = njit(probe_kernel)
+        found = kernel(2.0, 5)  # 2 (1 + 2 + 3 + 4) + 4 - 4 i
+        try:
+            kernel(-2.0, 5)
+        except ValueError:
+            return found + 5.0
+    return 0.0

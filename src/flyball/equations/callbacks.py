@@ -9,11 +9,11 @@ import numpy as np
 from ..compiler.jit import formula
 from ..numerics.integrators.clock import Clock, T
 from ..numerics.integrators.tableaux import Tableau
-from ..numerics.integrators.watching import TERMS, Watch
+from ..numerics.integrators.watching import Watch
 from ..tables.system import G_SHARED, GUARD_KIND, LAM
 from .asking import GROUP, OWN, S_, SHEET, W_
 from .engine import Sheet
-from .sharing import Sharing, margin, terms
+from .sharing import Sharing, guard_of_group
 
 
 class Own(NamedTuple):
@@ -51,8 +51,7 @@ def meet(A, K, j):
     for i in range(last + 1):
         K.met_g[j, i] = A[SHEET].rows[0, i]
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
-        K.met_g[j, last] = margin(S, A[W_], A[OWN].real[T], A[GROUP])
-        K.count[TERMS] = terms(A[GROUP], K.met_g[j], last + 1)
+        guard_of_group(S, A[W_], A[OWN].real[T], A[GROUP], K, -1 - j)
     for k in range(K.stages.shape[0]):
         if K.stages[k] == K.met[j]:
             levels(A, K, 1 + k)

@@ -16,12 +16,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiler.door import enter
+from ..compiler.door import door, enter
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
 from ..constraints.modes import FRICTION, SLIP
 from ..math.scalar import magnitude, sqrt
 from ..numerics.cone.shares import CELLS, OPEN, Shares, best, room
+from ..numerics.integrators.watching import TERMS
 from ..tables.system import (
     LAM,
     SHARED,
@@ -49,12 +50,16 @@ class Sharing(NamedTuple):
     null: np.ndarray  # (ns, nr): multipliers in balance by themselves, the first Q.count[OPEN] rows in use
     bend: np.ndarray  # (ns, ns): how the most that the friction of a switch holds follows each of them
     size: np.ndarray  # (1,): the largest force of the group, by its weight
+    t: np.ndarray  # (1,): the time at which its guard is asked for [s]
+    door: np.ndarray  # (1,): address of `shares`, once there is a group
     Q: Shares
 
 
 def sharing(ns: int, nr: int) -> Sharing:
     """No group, and room for one."""
-    return Sharing(np.zeros((ns, nr)), np.zeros((ns, ns)), np.zeros(1), room(ns, ns))
+    return Sharing(
+        np.zeros((ns, nr)), np.zeros((ns, ns)), np.zeros(1), np.zeros(1), np.zeros(1, np.int64), room(ns, ns)
+    )
 
 
 @formula
@@ -127,6 +132,38 @@ def terms(G, out, first):
             out[first + n] = G.Q.D[c, i, 0]
             n += 1
     return n
+
+
+@formula
+def guard_of_group(S, W, t, G, K, row):
+    """The guard of the group by W, the last of a row of guards, and behind it its terms: row of ``K.g``, or -1 - j.
+
+    -1 - j: place j of those within a step, ``K.met_g[j]``. Behind a door, so that loops do not contain all laws.
+    """
+    if G.Q.count[OPEN] > 0:
+        G.t[0] = t
+        enter(G.door[0], S, W, G, K, K, row)
+    elif row >= 0:
+        K.g[row, K.way.shape[0] - 1] = NOT_WATCHED
+        K.count[TERMS] = 0
+    else:
+        K.met_g[-1 - row, K.way.shape[0] - 1] = NOT_WATCHED
+        K.count[TERMS] = 0
+
+
+@formula
+def written(S, W, G, K, row):
+    """`margin` and `terms` into that row."""
+    out, last = K.g[row] if row >= 0 else K.met_g[-1 - row], K.way.shape[0] - 1
+    out[last] = margin(S, W, G.t[0], G)
+    K.count[TERMS] = terms(G, out, last + 1)
+    return 0
+
+
+@door
+def shares(S, W, G, K, _, row):
+    """`written` behind an address."""
+    return written(S, W, G, K, row)
 
 
 @formula

@@ -15,12 +15,13 @@ import numpy as np
 from ..compiler.bound import Bound, Written
 from ..compiler.held import held
 from ..compiler.jit import formula, kernel
+from ..numerics.cone.shares import OPEN
 from ..numerics.integrators.clock import SPAN, Clock, T
 from ..numerics.integrators.expected import expect
 from ..numerics.integrators.loop import advance, nothing, whole
 from ..numerics.integrators.tableaux import Tableau, tableau
 from ..numerics.integrators.watched import begun, onward
-from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, TERMS, Watch, watching
+from ..numerics.integrators.watching import ASTRAY, GRAIN_END, GRAIN_START, START, Watch, watching
 from ..tables.system import (
     BIAS,
     G_BACK,
@@ -48,7 +49,7 @@ from .pace import quickest
 from .rows import measured
 from .sampled import Sampling
 from .sampled import advance as from_instant_to_instant
-from .sharing import GRAIN, Sharing, margin, renewed, terms
+from .sharing import GRAIN, Sharing, guard_of_group, renewed, shares
 from .tasks import MOTION
 
 EXPECTED = 7
@@ -63,8 +64,7 @@ def all_guards(A, W, t, K, row):
     guards(S, W, t, out)
     kept_at_zero(S, W, K, out)
     if S.guard_i[last, GUARD_KIND] == G_SHARED:
-        out[last] = margin(S, W, t, A[GROUP])
-        K.count[TERMS] = terms(A[GROUP], out, last + 1)
+        guard_of_group(S, W, t, A[GROUP], K, row)
 
 
 @formula
@@ -257,6 +257,7 @@ class Loop:
             clock.seen,
         )  # fmt: skip
         self.group, nv = group, W.vel.shape[1]
+        shares.expects(S, W, group, self.desk, self.desk)
         sheet = Sheet(np.zeros((4, max(width, len(S.guard_i), nv, len(S.row_i), 1))))
         self.own = Own(own, sheet, self._known[0].fields, np.zeros(2, np.int64))
         self._bound: Bound | None = None
@@ -270,6 +271,8 @@ class Loop:
         if self._bound is None or S is not self.S:
             x.doors[0] = engine.address(S, W, x.R, x.clock, x.sheet)
             self.S, self._bound = S, self.steps.bind(S, W, x, Going(self.clock, self.desk, self.group), *self._known)
+        if self.group.Q.count[OPEN] and not self.group.door[0]:
+            self.group.door[0] = shares.address(S, W, self.group, self.desk, self.desk)
         doors = self._bound.asked, x.doors
         tables = S, W, x.R, x.clock, x.sheet
         if not len(S.guard_i) and sampling is not None:

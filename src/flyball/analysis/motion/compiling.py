@@ -15,12 +15,12 @@ from ...model.model import Model
 from ...tables.switches import declared
 from .implicit.suited import ALPHA, RADAU, VARIATIONAL
 
-ENGINE = Part("the equations of motion", 22.0, (engine,))
+ENGINE = Part("the equations of motion", 18.0, (engine,))
 EVENTS = Part("what finds events and decides what happens there", 15.0, (watched_kernel, explicit_steps, instant))
-DERIVATIVES = Part("the derivatives of the equations", 15.0, (stepped,))
+DERIVATIVES = Part("the derivatives of the equations", 12.0, (stepped,))
 LOOP = Part("the loop of implicit methods", 2.0, (unwatched_kernel,))
 STAGES = {
-    RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 7.0, (radau_steps,))),
+    RADAU: (DERIVATIVES, LOOP, Part("the implicit method", 6.0, (radau_steps,))),
     ALPHA: (DERIVATIVES, LOOP, Part("the generalised-alpha method", 5.0, (alpha_steps,))),
     VARIATIONAL: (LOOP, Part("the variational method", 4.0, (variational_steps,))),
 }
