@@ -109,7 +109,9 @@ def test_the_bar_is_gone_after_an_interrupt_and_the_motion_up_to_then_is_kept(er
 
     monkeypatch.setattr(progress._Terminal, "draw", draw)
     if error is KeyboardInterrupt:
-        r = pendulum().simulate(50.0, rtol=1e-12, max_step=1e-4)
+        with pytest.raises(fb.Interrupted) as ended:
+            pendulum().simulate(50.0, rtol=1e-12, max_step=1e-4)
+        r = ended.value.result
         assert not r.health.success
         assert 0.0 < r.final[0] < 50.0
         assert "interrupted" in r.health.message
