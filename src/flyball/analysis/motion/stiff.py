@@ -24,7 +24,7 @@ AUTO, EXPLICIT, IMPLICIT = "auto", "dop853", "radau"
 NEVER = 2**60  # steps
 STAGES = 12  # of a step of the explicit method
 EVERY = 100  # steps of it between two looks
-LOOK, LITTLE = 5e5, 0.01  # what a look takes [ns], and part of the time that looks may take where they find nothing
+LOOK, LITTLE = 8e5, 0.01  # what a look takes [ns], and part of the time that looks may take where they find nothing
 SELDOM = 60  # steps of the implicit method
 IN_A_ROW = 2  # looks that say the same
 LONG = 8e7  # that the explicit method has left at least [ns], as estimated: the implicit one may have to be compiled
@@ -32,10 +32,8 @@ LEAST = 270.0  # that an evaluation takes [ns], with the loop about it
 EDGE = 3.5  # h rho of wide steps that are hardly stable any more
 WHOLE = 0.3  # part of the state; what swings so far is the motion itself, at whatever tolerance
 ROUGH = 0.3  # h rho of steps that rounding may limit, with what is fast
-STILL, PART = (
-    20.0,
-    1e-3,
-)  # tolerances by h rho = EDGE, and part of the state, that what swings too little to limit may be
+STILL = 20.0  # tolerances; what swings less, by h rho = EDGE, limits no steps (by less: by the cube of that, or more)
+PART = 1e-3  # part of the state; the same where tolerances are loose
 GONE = 3.0  # -ln of what is left of a swing since the last look, where none can have lasted
 OFTEN = 0.05  # part of steps that are refused where rounding limits them
 CALM = 1.2  # h rho of implicit steps that the explicit method could take too
