@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 import flyball as fb
-from flyball.analysis.motion import stiff
+from flyball.analysis.motion.fastest import fastest
 from flyball.analysis.motion.start import begin
+from flyball.numerics.arnoldi import largest
 from flyball.numerics.integrators import clock as ex
 
 
@@ -24,12 +25,90 @@ def clock_at(start):
     return ex.Clock(real, np.zeros(ex.COUNTS, np.int64), np.zeros(0), y, np.zeros((1, len(start.y))), np.zeros(0, int))
 
 
-@pytest.mark.parametrize(("damping", "rho"), [(0.0, 1e3 * 1e1**1.5), (1000.0, 998999.0), (10.0, 1e3 * 1e1**1.5)])
-def test_spectral_radius(damping, rho):
-    """Largest root of m s^2 + c s + k = 0, by the power method within some tenths."""
+@pytest.mark.parametrize("damping", [0.0, 10.0, 50.0, 1000.0])
+def test_fastest_eigenvalue(damping):
+    """Root of m s^2 + c s + k = 0, with its damping: a pair but for the last."""
     start = begin(bushing(damping).snapshot(), 0.0, None, None, "joint")
-    found = stiff.spectral_radius(start.assembly.compiled, clock_at(start))
-    assert rho / 1.5 < found < 1.5 * rho
+    found = fastest(start.assembly.compiled, clock_at(start), 1e4)
+    roots = np.roots([1e-3, damping, 1e6])
+    root = roots[np.argmax(np.abs(roots))]
+    assert complex(found.real, abs(found.imag)) == pytest.approx(complex(root.real, abs(root.imag)), rel=1e-5)
+
+
+def test_largest_eigenvalue_of_a_matrix():
+    """As of all its eigenvalues; and of one whose start spans two directions only, by three products."""
+    matrix = np.random.default_rng(1).normal(size=(7, 7))
+    values = np.linalg.eigvals(matrix)
+    assert abs(largest(lambda x: matrix @ x, np.ones(7), 7)) == pytest.approx(np.abs(values).max(), rel=1e-9)
+    pair = np.diag(np.arange(1.0, 7.0))
+    pair[:2, :2] = [[-3.0, 9.0], [-9.0, -3.0]]
+    found = largest(lambda x: pair @ x, np.eye(6)[0], 5)
+    assert (found.real, abs(found.imag)) == pytest.approx((-3.0, 9.0))
+    assert largest(lambda x: x * np.nan, np.ones(3), 2) == 0.0
+
+
+def on_a_tip(mass, stiffness, ratio, *more):
+    """A pendulum of 1 kg, with a light body at its end on a spring of that damping ratio along it."""
+    m = fb.Mechanism("tip", planar=True, gravity=(0, -9.81))
+    m.add(fb.Body("big", mass=1, inertia=0.1, position=(1, 0)))
+    m.add(fb.Body("tip", mass=mass, inertia=mass * 1e-2, position=(2, 0)))
+    m.add(fb.Revolute("A", "ground", "big", at=(0, 0)), fb.Prismatic("P", "big", "tip", at=(2, 0), axis=(1, 0)))
+    damping = 2 * ratio * np.sqrt(stiffness * mass)
+    m.add(fb.CoordinateSpring("k", "P.displacement", stiffness=stiffness, damping=damping), *more)
+    return m
+
+
+TIPS = [(1e-3, 1e7), (1e-3, 1e8), (1e-3, 1e9), (1e-6, 1e6), (1e-2, 1e8), (1e-8, 1e3)]  # kg, N/m: 1e5 to 1e6 rad/s
+
+
+@pytest.mark.parametrize("ratio", [0.05, 0.2, 0.5, 0.7, 0.9, 1.5])
+def test_damped_pairs_are_seen(ratio):
+    """Whatever their damping: what is found costs two hundred steps or so, not 2e5; as `radau` by itself, closely."""
+    for mass, stiffness in TIPS:
+        both = {x: on_a_tip(mass, stiffness, ratio).simulate(5.0, outputs=21, method=x) for x in ("auto", "radau")}
+        assert both["auto"].health.steps < 3 * both["radau"].health.steps + 150
+        fine = on_a_tip(mass, stiffness, ratio).simulate(5.0, outputs=21, method="radau", rtol=1e-10)
+        assert both["auto"]["big"].position == pytest.approx(fine["big"].position, abs=1e-4)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 0.9])
+def test_steps_that_rounding_limits_are_seen(ratio):
+    """By tight tolerances: a fraction of what is stable, for ever (2e6 steps)."""
+    for mass, stiffness in TIPS[1:4]:
+        r = on_a_tip(mass, stiffness, ratio).simulate(2.0, outputs=21, rtol=1e-9)
+        assert "where it is stiff" in r.health.method
+        assert r.health.steps < 3000
+        fine = on_a_tip(mass, stiffness, ratio).simulate(2.0, outputs=21, rtol=1e-11, method="radau")
+        assert r["big"].position == pytest.approx(fine["big"].position, abs=1e-7)
+
+
+@pytest.mark.parametrize("rtol", [1e-3, 1e-6, 1e-9])
+@pytest.mark.parametrize("ratio", [0.05, 0.2, 0.7])
+def test_what_is_driven_as_fast_as_it_swings_stays_explicit(ratio, rtol):
+    """Though damped: swings of 4 to 50 mm have to be followed."""
+    push = fb.CoordinateSpring("f", "P.displacement", force="5e4*sin(1e5*t)")
+    with pytest.raises(fb.SimulationError) as caught:
+        on_a_tip(1e-3, 1e7, ratio, push).simulate(2.0, outputs=3, rtol=rtol, max_steps=4000)
+    assert caught.value.result.health.method == ""
+
+
+@pytest.mark.parametrize(("ratio", "rtol"), [(0.0, 1e-3), (0.0, 1e-6), (0.0, 1e-9), (1e-3, 1e-6), (0.01, 1e-9)])
+def test_a_fast_swing_stays_explicit(ratio, rtol):
+    """10 mm that last."""
+    with pytest.raises(fb.SimulationError) as caught:
+        on_a_tip(1e-3, 1e7, ratio, fb.Initial("P.displacement", value=0.01)).simulate(
+            2.0, outputs=3, rtol=rtol, max_steps=1500
+        )
+    assert caught.value.result.health.method == ""
+
+
+def test_a_weakly_damped_swing_is_followed_until_it_is_gone():
+    """A hundredth of critical: 10 mm fall by exp(-1e3 t)."""
+    r = on_a_tip(1e-3, 1e7, 0.01, fb.Initial("P.displacement", value=0.01)).simulate(2.0, outputs=21)
+    told = r.health.method
+    assert told.startswith("dop853; radau from t = ")
+    gone = float(told.split("t = ")[1].split()[0])
+    assert 1e3 * np.exp(-1e3 * gone) < 1e-6
 
 
 def test_a_stiff_motion_goes_over_and_says_so():

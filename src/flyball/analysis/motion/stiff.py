@@ -2,38 +2,52 @@
 
 Looked at after counts of steps, never by a clock, so that the same call gives the same motion. A motion is stiff where
 steps of an explicit method are as wide as it is stable and no wider: h rho near the edge of its region of stability,
-rho being the spectral radius of the right-hand side (Hairer and Wanner 1996, section IV.2), which is found by the power
-method on differences of it (Sommeijer, Shampine and Verwer 1998).
+rho being the largest |eigenvalue| of the right-hand side (Hairer and Wanner 1996, section IV.2); for dop853 that is at
+6 to 6.8 in all directions. By tight tolerances steps do not get there: rounding of what is fast is an error at each.
+That is told from a motion that is as fast by three things: steps are refused, a swing would have been damped away
+since the last look, and none is there that matters.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-
-import numpy as np
+from typing import NamedTuple
 
 from ...constraints.modes import BRANCH
-from ...equations.engine import MOTION, evaluate
 from ...numerics.integrators import clock as ex
-from ...tables.system import MODE, OFF, SWITCH_KIND, VALUE
+from ...tables.system import MODE, OFF, SWITCH_KIND
 from ..compiled import Compiled
 from .account import kind
+from .fastest import bend, fastest
 
 AUTO, EXPLICIT, IMPLICIT = "auto", "dop853", "radau"
 NEVER = 2**60  # steps
 STAGES = 12  # of a step of the explicit method
 EVERY = 100  # steps of it between two looks
+LOOK, LITTLE = 8e5, 0.01  # what a look takes [ns], and part of the time that looks may take where they find nothing
 SELDOM = 60  # steps of the implicit method
 IN_A_ROW = 2  # looks that say the same
 LONG = 8e7  # that the explicit method has left at least [ns], as estimated: the implicit one may have to be compiled
 LEAST = 270.0  # that an evaluation takes [ns], with the loop about it
 EDGE = 3.5  # h rho of wide steps that are hardly stable any more
+WHOLE = 0.3  # part of the state; what swings so far is the motion itself, at whatever tolerance
+ROUGH = 0.3  # h rho of steps that rounding may limit, with what is fast
+STILL = 20.0  # tolerances; what swings less, by h rho = EDGE, limits no steps (by less: by the cube of that, or more)
+PART = 1e-3  # part of the state; the same where tolerances are loose
+GONE = 3.0  # -ln of what is left of a swing since the last look, where none can have lasted
+OFTEN = 0.05  # part of steps that are refused where rounding limits them
 CALM = 1.2  # h rho of implicit steps that the explicit method could take too
-ROUNDS, LATEST = 14, 8  # of the power method; of these the last count
-SMALL = 1e-7  # differences, as part of the state
 PATIENCE = 8  # times as long it takes to go back to the implicit method once more
 STIFF, NOT_STIFF, STRUCK = "where it is stiff", "where it is not stiff any more", "as velocities jumped"
 TOLD = 5  # changes of the method that are told one by one
+
+
+class Lately(NamedTuple):
+    """Steps since the last look."""
+
+    width: float  # of those accepted, on average [s]
+    refused: float  # part of them
+    time: float  # [s]
 
 
 class Pace:
@@ -65,7 +79,7 @@ class Pace:
         self.told: list[str] = []
         self.asked = self.back = self.now = ""
         self._goes_on = False
-        self.every, self.row = EVERY, 0
+        self.every, self.often, self.row, self.rate = EVERY, EVERY, 0, 0.0
         self.last: tuple[int, int, float] | None = None
 
     def limited(self, clock: ex.Clock, steps: int) -> int:
@@ -78,13 +92,14 @@ class Pace:
         """The method to go on by, where that is another one; if it is time to look."""
         if not self.mixed or self.last is None or self._since(clock) < self.every:
             return ""
-        done = int(clock.count[ex.ACCEPTED]) - self.last[1]
-        width = (float(clock.real[ex.T]) - self.last[2]) / max(done, 1)
+        lately = self._lately(clock)
         self._mark(clock)
-        if not width > 0.0 or not self._speaks_for_another(c, clock, width, now):
+        if not lately.width > 0.0 or not self._speaks_for_another(c, clock, lately, now):
             self.row = 0
+            if now == EXPLICIT:
+                self.every = max(self.every, min(2 * self.every, int(LOOK / (LITTLE * STAGES * each(c)))))
             return ""
-        self.row += 1
+        self.row, self.every = self.row + 1, self.often
         if self.row < IN_A_ROW:
             return ""
         if now == EXPLICIT and (why := self.why_not()):
@@ -123,7 +138,7 @@ class Pace:
             self.told.append(f"{to} from t = {clock.real[ex.T]:.6g} s on, {why}")
         self._goes_on = False
         again = sum(x.endswith(NOT_STIFF) for x in self.told)
-        self.every = SELDOM if to == IMPLICIT else EVERY * PATIENCE ** min(again, 6)
+        self.every = self.often = SELDOM if to == IMPLICIT else EVERY * PATIENCE ** min(again, 6)
         self.row, self.asked = 0, ""
         self._mark(clock)
 
@@ -131,12 +146,21 @@ class Pace:
         """It goes on by what it goes on by now, to the end."""
         self.every = NEVER
 
-    def _speaks_for_another(self, c: Compiled, clock: ex.Clock, width: float, now: str) -> bool:
+    def _speaks_for_another(self, c: Compiled, clock: ex.Clock, lately: Lately, now: str) -> bool:
         if now == EXPLICIT:
-            left = STAGES * (self.t_end - float(clock.real[ex.T])) / width
-            each = max(LEAST, kind(c.structure)[1])
-            return left * each >= LONG and width * spectral_radius(c, clock) >= EDGE
-        return width * spectral_radius(c, clock) <= CALM
+            left = STAGES * (self.t_end - float(clock.real[ex.T])) / (lately.width * (1.0 - lately.refused))
+            if left * each(c) < LONG:
+                return False
+            fast = fastest(c, clock, 1.0 / lately.width)
+            self.rate = abs(fast)
+            return limited_by(fast, clock, lately)
+        return lately.width * abs(fastest(c, clock, self.rate or 1.0 / lately.width)) <= CALM
+
+    def _lately(self, clock: ex.Clock) -> Lately:
+        assert self.last is not None
+        tried, done = self._since(clock), int(clock.count[ex.ACCEPTED]) - self.last[1]
+        time = float(clock.real[ex.T]) - self.last[2]
+        return Lately(time / max(done, 1), (tried - done) / max(tried, 1), time)
 
     def _since(self, clock: ex.Clock) -> int:
         assert self.last is not None
@@ -147,37 +171,24 @@ class Pace:
         self.last = done + int(clock.count[ex.REJECTED]), done, float(clock.real[ex.T])
 
 
-def spectral_radius(c: Compiled, clock: ex.Clock) -> float:
-    """Of the derivatives of (q, v, x)' by these at the state of a motion, its modes being what they are [1/s].
+def each(c: Compiled) -> float:
+    """What an evaluation takes, as estimated [ns]."""
+    return max(LEAST, kind(c.structure)[1])
 
-    x are states of controllers.
 
-    About: within some tenths. Nothing of the motion's own scratch is touched.
+def limited_by(fast: complex, clock: ex.Clock, lately: Lately) -> bool:
+    """Whether that eigenvalue, by which nothing moves that matters, limits explicit steps.
+
+    Either these are as wide as is stable, or they are refused though nothing swings that fast: rounding does.
     """
-    s, t, y = c.structure, float(clock.real[ex.T]), clock.y[ex.NOW].copy()
-    other = c.again()
-    other.work.switch[:], other.work.option[:] = c.work.switch, c.work.option
-    other.work.sensed[VALUE] = c.work.sensed[VALUE]
-    n = s.nq + s.nv + len(s.controls) - len(s.sampled)
-
-    def rates(x: np.ndarray) -> np.ndarray:
-        status, dy = evaluate(other.values.system, other.work, t, x, MOTION)
-        return dy[:n].copy() if status == 0 else np.full(n, np.nan)
-
-    size = np.maximum(np.abs(y[:n]), 1.0)
-    way = size * np.random.default_rng(0).uniform(0.5, 1.0, n)
-    here, grown = rates(y.copy()), []
-    for _ in range(ROUNDS):
-        way *= SMALL / np.max(np.abs(way) / size)
-        x = y.copy()
-        x[:n] += way
-        before = np.sqrt(np.square(way / size).sum())
-        way = rates(x) - here
-        after = np.sqrt(np.square(way / size).sum())
-        if not 0.0 < after < np.inf:
-            return 0.0
-        grown.append(after / before)
-    return float(np.exp(np.mean(np.log(grown[-LATEST:]))))
+    stretch, rtol = lately.width * abs(fast), float(clock.real[ex.RTOL])
+    if stretch < ROUGH:
+        return False
+    swing = bend(clock) / abs(fast)
+    if stretch >= EDGE:
+        return swing * rtol < WHOLE
+    gone = -fast.real * lately.time > GONE
+    return gone and lately.refused >= OFTEN and swing < min(STILL * (EDGE / stretch) ** 3, PART / rtol)
 
 
 def on_corner(c: Compiled) -> bool:
