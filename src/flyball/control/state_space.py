@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from ..model.controller import OUTPUT, Controller, ControlState, numbered
+from ..model.controller import OUTPUT, Controller, ControlState, numbered, refuse_equal
 from ..model.element import Laws, Numbers, Unit, element, plain, si_numbers
 from .systems import matrices
 
@@ -130,6 +130,7 @@ class StateSpace(Controller):
                 )
         if self.outputs and len(self.outputs) != outputs:
             raise ModelError(f"{self.title}: it has {outputs} outputs, and {len(self.outputs)} names for them")
+        refuse_equal(self, (*self.outputs, *numbered("input", inputs), *self._x))
         if self.initial and len(self.initial) != states:
             raise ModelError(f"{self.title}: it has {states} states, and {len(self.initial)} initial values")
 

@@ -36,7 +36,9 @@ class Transfer(Controller):
     def check(self, n: SimpleNamespace) -> None:
         """Refuse what is not proper."""
         super().check(n)
-        if not n.den or n.den[0] == 0.0:
+        if not n.den:
+            raise ModelError(f"{self.title}: den has no coefficients; den=[1] makes num=[k] a gain")
+        if n.den[0] == 0.0:
             raise ModelError(f"{self.title}: the first coefficient of den is zero; leave leading zeros out")
         if not self.num:
             raise ModelError(f"{self.title}: num has no coefficients; num=[0] says nothing")

@@ -93,6 +93,22 @@ def numbered(letter: str, count: int) -> tuple[str, ...]:
     return (letter,) if count == 1 else tuple(f"{letter}{k + 1}" for k in range(count))
 
 
+def naming(e: Controller, name: str) -> str:
+    """What messages call something of a controller by the name that its formulas have for it: what it is given, a
+    signal or a state.
+    """
+    letter, _, place = name.partition("_")
+    if name == "of":
+        name = "input"
+    elif letter == "u" and place.isdigit():
+        name = f"input {int(place) + 1}"
+    elif len(letter) == 1 and (places := place.split("_")) and all(x.isdigit() for x in places):
+        name = f"{letter}[{', '.join(places)}]"
+    elif letter in ("num", "den") and place.isdigit():
+        name = f"{letter}[{place}]"
+    return f"{name} of {e.title}"
+
+
 def refuse_equal(e: Controller, names: Any) -> None:
     """Refuse states and signals of one name, and names that are no plain words."""
     seen: set[str] = set()

@@ -11,7 +11,7 @@ from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ExpressionError, ModelError
-from .controller import OUTPUT, Controller, refuse_equal
+from .controller import OUTPUT, Controller, naming, refuse_equal
 from .element import LawOf, resolve
 from .expressions import Expression
 from .function import called
@@ -65,12 +65,12 @@ def inlined(model: Model, law: Expression, of: LawOf) -> Expression:
 
 def signal(model: Model, e: Controller, name: str) -> Expression:
     """A signal of a controller, or a state, as a law."""
-    return Expression(f"{e.name}.{name}", _wiring(model).signal(e, name), None, f"{name} of {e.title}")
+    return Expression(f"{e.name}.{name}", _wiring(model).signal(e, name), None, naming(e, name))
 
 
 def given(model: Model, e: Controller, name: str) -> Expression:
     """What a controller is given, as a law."""
-    return Expression(name, _wiring(model).template(e, name), None, f"{name} of {e.title}")
+    return Expression(name, _wiring(model).template(e, name), None, naming(e, name))
 
 
 def wired(model: Model) -> list[Wired]:
@@ -86,7 +86,7 @@ def wired(model: Model) -> list[Wired]:
     every = controllers(model).values()
 
     def made(e: Controller, name: str, text: str, signal: bool = False) -> Wired:
-        return Wired(e, name, Expression(text, wiring.template(e, text), None, f"{name} of {e.title}"), signal)
+        return Wired(e, name, Expression(text, wiring.template(e, text), None, naming(e, name)), signal)
 
     rates = [made(e, x.name, x.law) for e in every if not e.sampled for x in wiring.states[e.name]]
     held = [made(e, name, text, True) for e in every if e.holds for name, text in e.signals().items()]
@@ -125,7 +125,7 @@ def check(model: Model, e: Controller) -> None:
     refuse_equal(e, own)
     for name, law in e.given().items():
         if law is not None:
-            model.law(law, GIVEN, f"{name} of {e.title}")
+            model.law(law, GIVEN, naming(e, name))
     wiring = _wiring(model)
     for name in e.signals():
         wiring.signal(e, name)
@@ -184,7 +184,7 @@ class _Wiring:
         def found(node: Node) -> Node | None:
             name = node.value
             if name in given:
-                return self.law(given[name], f"{name} of {e.title}")
+                return self.law(given[name], naming(e, name))
             return self.signal(e, name) if name in own else None
 
         return self.limited(_at(_replaced(tree, found), 0), e.title)
