@@ -37,9 +37,9 @@ def overturned(result: Result) -> str:
         if i < 0:
             continue
         pieces = result.pieces or (result,)
-        size = sum(_off(x, i, 1) for x in pieces).max()
+        size = sum(float(_off(x, i, 1)[0]) for x in pieces)
         fastest = max(float(np.linalg.norm(x.v[:, i : i + 3], axis=1).max(initial=0.0)) for x in pieces)
-        off, name, turn = max((off, name, turn), (float(size), body, fastest * result.health.options["step"]))
+        off, name, turn = max((off, name, turn), (size, body, fastest * result.health.options["step"]))
     if not off > FAR:
         return ""
     return (
