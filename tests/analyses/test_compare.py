@@ -255,6 +255,14 @@ def test_all_that_stay_closed_give_the_same_motion():
     assert all(f.success and f.cpu > 0.0 and f.steps > 0 and f.factorisations > 0 for f in c)
 
 
+def test_a_difference_is_the_largest_on_the_way():
+    m = bricard()
+    f = m.compare(2.0, rtol=1e-6, outputs=41, formulations=["projection"], repeats=0)["projection"]
+    exact = m.simulate(2.0, rtol=1e-12, outputs=41)
+    way = np.max([np.linalg.norm(f.result[b.name].position - exact[b.name].position, axis=1) for b in m.bodies], axis=0)
+    assert 0.99 * way.max() < f.difference < 20 * way.max()
+
+
 # ---------------------------------------------------------------------------------------------- failures and the table
 
 

@@ -229,3 +229,29 @@ def test_units_of_limits_and_of_set_points_are_compared():
 def test_an_entry_of_a_matrix_is_named(made, said):
     with pytest.raises(fb.ModelError, match=said):
         slide(made(), force="K")
+
+
+def test_outputs_of_one_name():
+    """Of two outputs called alike there was one, the second; an output called as an input is took its place."""
+    for names, said in ((("a", "a"), "'a'"), (("a", "input"), "'input'"), (("x", "b"), "'x'")):
+        with pytest.raises(fb.ModelError, match=f"StateSpace 'K': two of its signals or states are called {said}"):
+            slide(fb.StateSpace("K", inputs=["t"], A=-1, B=1, C=[[1], [2]], outputs=names), force="0")
+
+
+@pytest.mark.parametrize(
+    ("controller", "said"),
+    [
+        (fb.Lag("g", of="cart.ax", time=1), "^input of Lag 'g': 'cart.ax' is known only after"),
+        (fb.Lag("g", of="1", time=1, gain="cart.ax"), "^gain of Lag 'g': 'cart.ax' is known only after"),
+        (fb.StateSpace("g", inputs=["t", "cart.ax"], D=[[1, 1]]), "^input 2 of StateSpace 'g': 'cart.ax'"),
+        (
+            fb.StateSpace("g", inputs=["t", "t"], D=[[1, "nothing"]]),
+            r"^row 1, column 2 of D of StateSpace 'g': unknown name",
+        ),
+        (fb.Transfer("g", of="1", num=[1], den=[]), "^Transfer 'g': den has no coefficients"),
+        (fb.Transfer("g", of="1", num=[1], den=[0, 1]), "^Transfer 'g': the first coefficient of den is zero"),
+    ],
+)
+def test_messages_name_what_was_written(controller, said):
+    with pytest.raises(fb.FlyballError, match=said):
+        slide(controller, force="0")

@@ -217,3 +217,24 @@ def test_refused(make, said):
         fb.StateSpace.from_control("b", ct.ss([[0.5]], [[1]], [[1]], [[0]]), inputs="1", period=T)
     with pytest.raises(fb.ModelError, match=r"own period is 0\.1 s, and period=0\.2 is given"):
         fb.StateSpace.from_control("b", ct.ss([[0.5]], [[1]], [[1]], [[0]], 0.1), inputs="1", period=0.2)
+
+
+@pytest.mark.parametrize(("slow", "fast"), [(3, 1), (1, 1), (1, 3)])
+def test_a_state_read_at_the_instant_at_which_it_steps_is_what_it_was(slow, fast):
+    """All step at once; a signal that is said by D is known at once."""
+    m = slide(
+        fb.State("count", next="count + 1", period=slow * T),
+        fb.State("seen", next="count", period=fast * T),
+        fb.StateSpace("held", inputs=["count"], D=1, period=fast * T),
+        fb.StateSpace("now", inputs=["t"], D=1, period=slow * T),
+        fb.StateSpace("after", inputs=["now"], D=1, period=fast * T),
+        force="0*held",
+    )
+    t = T * (np.arange(12) + 0.5)
+    r = m.simulate(12 * T, outputs=np.r_[0.0, t])
+    at = fast * (np.arange(12) // fast)  # the last instant of the reader
+    before = -(-at // slow)  # how often it had stepped before
+    assert (r["count.output"][1:] == np.arange(12) // slow + 1).all()
+    assert (r["seen.output"][1:] == before).all()
+    assert (r["held.output"][1:] == before).all()
+    assert r["after.output"][1:] == pytest.approx(T * slow * (at // slow))

@@ -188,7 +188,7 @@ PLANAR = {
     "CoordinateSpring negative": ({"coordinate": "cart.x", "stiffness": -1}, "stiffness is -1; it must be zero or gr"),
     "CoordinateSpring unit": ({"coordinate": "S.displacement", "stiffness": "1 kg"}, "'1 kg': expected a stiffness"),
     "CoordinateSpring torsion": ({"coordinate": "A.angle", "stiffness": "1 N/m"}, "expected a torsional stiffness"),
-    "CoordinateSpring rest": ({"coordinate": "A.angle", "rest": "3 mm"}, "rest of.*expected an angle"),
+    "CoordinateSpring rest": ({"coordinate": "A.angle", "stiffness": 1, "rest": "3 mm"}, "rest of.*expected an angle"),
     "CoordinateSpring of a force": ({"coordinate": "spring.length"}, "'spring' is a SpringDamper, no joint"),
     "Actuator name": (
         {"coordinate": "cart.x", "force": "foo*t"},

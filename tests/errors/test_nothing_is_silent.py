@@ -151,3 +151,19 @@ def test_parameters_and_times_that_are_none():
     with pytest.raises(fb.ModelError, match="t_end"):
         m.simulate(None)
     assert m.simulate(1e-300, outputs=2).t[-1] == 1e-300
+
+
+@pytest.mark.parametrize(
+    "spring",
+    [
+        fb.SpringDamper("s", "ground", "b", at=((0, 1), (0, 0)), length=0.5),
+        fb.SpringDamper("s", "ground", "b", at=((0, 1), (0, 0)), length=0.5, damping=1),
+        fb.CoordinateSpring("s", "b.x", rest=1, force="1"),
+        fb.TorsionalSpringDamper("s", "J", angle="10 deg", damping=2),
+    ],
+)
+def test_where_a_spring_without_stiffness_carries_nothing(spring):
+    m = block()
+    m.add(fb.Revolute("J", "ground", "b", at=(0, 0)))
+    with pytest.raises(fb.ModelError, match=r"'s': (length|rest|angle) has no effect without stiffness"):
+        m.add(spring)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
@@ -128,6 +130,8 @@ def test_corners_of_laws_cost_their_own_steps_only():
 def test_health_says_that_a_guard_is_no_proof():
     run = ball(note("S.displacement + 1")).simulate(0.2)
     assert "1 guard at" in run.health.watched
+    average, least = map(int, re.findall(r"(\d+) (?:places|at least)", run.health.watched))
+    assert average >= least
     assert "is not seen" in run.health.watched
     assert ("watched", run.health.watched) in run.health.lines()
     assert ball().simulate(0.2).health.watched == ""

@@ -116,3 +116,15 @@ def test_a_stack_is_pushed_away():
         m.add(fb.Body(f"b{k}", shape=fb.Box(edges=(0.3, 0.2, 0.2), mass=1), position=(0.01 * k, 0.1 + 0.2 * k)))
     m.add(fb.PointForce("push", "b0", at=(0, 0.1), force=("12*t", 0)))
     of_order_2(m, ALPHA, 4e-3, 1.0, 1e-5)
+
+
+@pytest.mark.parametrize("step", [1e-3, 7e-3])
+@pytest.mark.parametrize("method", [ALPHA, VARIATIONAL, "radau"])
+def test_a_driver_whose_law_jumps_is_named(method, step):
+    """A shorter step would not do."""
+    m = swing(fb.Driver("D", "A.angle", "where(t < 0.5, 0, t - 0.5)"))
+    with pytest.raises(fb.SimulationError, match=r"Driver 'D' cannot be followed beyond t = 0\.5 s: its law jumps in its "
+                                                 r"rate, from 0 to 1, which asks for an infinite force") as e:  # fmt: skip
+        m.simulate(1.0, outputs=3, method=method, step=step)
+    assert "step;" not in str(e.value)
+    assert e.value.result.t[-1] <= 0.5

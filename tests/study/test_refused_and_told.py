@@ -89,3 +89,32 @@ def test_an_interrupt_is_loud(tmp_path):
     with pytest.raises(KeyboardInterrupt, match=r"\d+ of 200 runs are missing"):
         m.study({"k": np.linspace(50, 150, 200)}, ["end(b.x)"], t_end=0.1, progress=stop, file=tmp_path / "s.nc")
     assert not fb.load_study(tmp_path / "s.nc").complete
+
+
+def test_a_pair_is_a_range():
+    """Elsewhere (low, high) is; of a grid it was two values, without a word."""
+    m = oscillator()
+    for design in ("grid", "list"):
+        with pytest.raises(fb.ModelError, match=r"vary 'k': \(50.0, 200.0\) is a range.*give a list, \[50.0, 200.0\]"):
+            m.study({"k": (50.0, 200.0)}, ["end(b.x)"], t_end=1, design=design)
+    assert len(m.study({"k": [50.0, 200.0]}, ["end(b.x)"], t_end=1)) == 2
+
+
+def test_several_distributions_in_place_of_one():
+    from scipy import stats
+
+    with pytest.raises(fb.ModelError, match="vary 'k': 2 distributions are given in place of one"):
+        oscillator().study({"k": stats.norm(100, [1, 2])}, ["end(b.x)"], t_end=1, design="sobol", samples=4)
+
+
+def test_indices_say_of_how_many_samples_they_are():
+    """A spring of less than nothing fails: of 64 samples some have a run that did, and 32 of the rest are taken."""
+    m = oscillator()
+    s = m.study({"k": (-10.0, 200.0), "x0": (0.1, 0.2)}, ["max(b.x)"], t_end=1, design="saltelli", samples=64)
+    y = s["max(b.x)"].reshape(4, 64)
+    whole = int(np.isfinite(y).all(axis=0).sum())
+    found = s.indices()
+    assert 32 <= whole < 64
+    assert (found.samples, found.left_out) == (32, 64 - whole)
+    assert f"left out         {64 - whole} samples of which a run failed" in repr(found)
+    assert found.as_dict()["left_out"] == 64 - whole

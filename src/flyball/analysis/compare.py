@@ -324,15 +324,23 @@ def _drifts(plain: Compiled, c: Compiled, result: Result) -> tuple[np.ndarray, n
 
 
 def _difference(own: Compiled, truth: Result, c: Compiled, result: Result) -> float:
-    """How far apart two ends are [m]: ways of mass centres, and turns at the mechanism's length."""
+    """How far apart two motions are at most [m], at output times and at the end: ways of mass centres, and turns at the
+    mechanism's length.
+    """
     there = own.moving(truth.final[0], *_state(own, truth.final[1]))
     here = c.moving(result.final[0], *_state(c, result.final[1]))
-    worst = 0.0
+    length, worst = own.values.length, 0.0
     for name, a in there.items():
-        b = here[name]
-        turn = 2.0 * np.arcsin(min(1.0, np.linalg.norm(a.R - b.R) / np.sqrt(8.0)))
-        worst = max(worst, float(np.linalg.norm(a.p - b.p)), float(own.values.length * turn))
+        b, x, y = here[name], truth[name], result[name]
+        on_the_way = _apart(x.position - y.position, x.rotation - y.rotation, length)
+        worst = max(worst, on_the_way, _apart((a.p - b.p)[None], (a.R - b.R)[None], length))
     return worst
+
+
+def _apart(p: np.ndarray, R: np.ndarray, length: float) -> float:
+    """The largest of ways [m], and of turns at that length, by differences of positions and of rotation matrices."""
+    turn = 2.0 * np.arcsin(np.minimum(1.0, np.linalg.norm(R, axis=(1, 2)) / np.sqrt(8.0)))
+    return float(np.maximum(np.linalg.norm(p, axis=1), length * turn).max(initial=0.0))
 
 
 def _costs(job: _Task, rows: list[Formulation], starts: Mapping[str, Start], tell: Tell) -> None:

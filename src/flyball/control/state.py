@@ -14,7 +14,10 @@ from ..model.element import Law, Number, Unit, element
 class State(Controller):
     """A number x with a differential equation, x' = rate; or sampled, x = next from each instant on.
 
-    Laws name it by its own name; `State` and others may depend on each other in any way.
+    Laws name it by its own name; `State` and others may depend on each other in any way. At an instant all sampled
+    states step at once: another controller that is sampled there too reads what it was before, and the new value at its
+    own next instant, a period later. What has to be known at once is a signal, such as the output of a `StateSpace`
+    with ``D``.
 
     Parameters
     ----------

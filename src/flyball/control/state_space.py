@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator
 
 from ..errors import ModelError
-from ..model.controller import OUTPUT, Controller, ControlState, numbered
+from ..model.controller import OUTPUT, Controller, ControlState, numbered, refuse_equal
 from ..model.element import Laws, Numbers, Unit, element, plain
 from ..model.expressions import number
 from .systems import matrices, output_names
@@ -137,6 +137,7 @@ class StateSpace(Controller):
                         number(x, {}, None, f"{self.called(f'{name}_{i}_{j}')} of {self.title}")
         if self.outputs and len(self.outputs) != outputs:
             raise ModelError(f"{self.title}: it has {outputs} outputs, and {len(self.outputs)} names for them")
+        refuse_equal(self, (*self.outputs, *numbered("input", inputs), *self._x))
         if self.initial and len(self.initial) != states:
             raise ModelError(f"{self.title}: it has {states} states, and {len(self.initial)} initial values")
 

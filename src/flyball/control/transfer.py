@@ -36,7 +36,9 @@ class Transfer(Controller):
     def check(self, n: SimpleNamespace) -> None:
         """Refuse what is not proper."""
         super().check(n)
-        if not n.den or n.den[0] == 0.0:
+        if not n.den:
+            raise ModelError(f"{self.title}: den has no coefficients; den=[1] makes num=[k] a gain")
+        if n.den[0] == 0.0:
             raise ModelError(f"{self.title}: the first coefficient of den is zero; leave leading zeros out")
         if not self.num:
             raise ModelError(f"{self.title}: num has no coefficients; num=[0] says nothing")
@@ -58,7 +60,11 @@ class Transfer(Controller):
     def called(self, given: str) -> str:
         """Which coefficient."""
         name, _, k = given.partition("_")
-        return f"coefficient {int(k) - (len(self.den) - len(self.num)) * (name == 'num') + 1} of {name}" if k else given
+        return (
+            f"coefficient {int(k) - (len(self.den) - len(self.num)) * (name == 'num') + 1} of {name}"
+            if k
+            else super().called(given)
+        )
 
     def signals(self) -> dict[str, str]:
         """Output and input."""

@@ -9,15 +9,9 @@ from ..numerics.integrators.implicit.even import refuse
 from ..numerics.integrators.implicit.generalised_alpha import attempt, enter
 from ..numerics.integrators.implicit.hermite import between
 from .asking import inspect
-from .implicit import PLAN, TURNS, arrive, compose, land, linearise, missed, perform, powers, turned
+from .implicit import PLAN, TURNS, arrive, compose, land, linearise, missed, perform, powers
 
 SMALL = 1e-3  # half a turn [rad] below which arctan(x) / x is its series
-
-
-@formula
-def turned_rates(d, w, A):
-    """Velocities w into rates of increments, in place."""
-    turned(A[PLAN], d, w)
 
 
 @formula
@@ -58,7 +52,7 @@ def slopes(t, k, A, K, c):
 @formula
 def by_alpha(S, W, M, own, going, task):
     """The generalised-alpha method."""
-    callbacks = (residual, slopes, compose, land, inspect, turned_rates, straight, arrive)
+    callbacks = (residual, slopes, compose, land, inspect, straight, arrive)
     return perform((attempt, between, enter, refuse), callbacks, S, W, M, own, going, task)
 
 

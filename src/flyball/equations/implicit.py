@@ -12,6 +12,7 @@ import numpy as np
 
 from ..compiler.door import door, enter
 from ..compiler.jit import formula
+from ..math.cayley import rate
 from ..numerics.integrators.clock import ASIDE, NOW, STARTED, TRIED, T
 from ..numerics.integrators.implicit.asked import answer, rates_at_begin
 from ..numerics.integrators.implicit.desk import INDEX_3, JACOBIANS, SOFT, START, Desk
@@ -155,15 +156,12 @@ def far(P, d):
 
 @formula
 def turned(P, d, w):
-    """Velocities w into rates of increments, in place: of turns by d' = w + d x w / 2 + d (d . w) / 4."""
+    """Velocities w into rates of increments, in place."""
     for n in range(P.turns.shape[0]):
         i = P.turns[n]
-        x, y, z = d[i], d[i + 1], d[i + 2]
-        p, q, r = w[i], w[i + 1], w[i + 2]
-        s = 0.25 * (x * p + y * q + z * r)
-        w[i] += 0.5 * (y * r - z * q) + s * x
-        w[i + 1] += 0.5 * (z * p - x * r) + s * y
-        w[i + 2] += 0.5 * (x * q - y * p) + s * z
+        out = rate((d[i], d[i + 1], d[i + 2]), (w[i], w[i + 1], w[i + 2]))
+        for k in range(3):
+            w[i + k] = out[k]
 
 
 @formula

@@ -12,6 +12,7 @@ A tree joint must say: its ``pose`` and ``motion``, its world twist columns (``c
 from __future__ import annotations
 
 from ..compiler.jit import formula
+from ..math.cayley import quaternion
 from ..math.scalar import cos, divide, sin, sqrt
 from ..math.vec import (
     add,
@@ -292,9 +293,7 @@ def retract(S, q, d):
             q[q0 + i] += d[v0 + i]
         k, w = quaternion_at(S, b)
         if k >= 0:
-            x = (0.5 * d[w], 0.5 * d[w + 1], 0.5 * d[w + 2])
-            r = divide(1.0, sqrt(1.0 + dot(x, x)))  # the Cayley step: a unit quaternion for any d
-            e = quaternion_product((q[k], q[k + 1], q[k + 2], q[k + 3]), (r, r * x[0], r * x[1], r * x[2]))
+            e = quaternion_product((q[k], q[k + 1], q[k + 2], q[k + 3]), quaternion((d[w], d[w + 1], d[w + 2])))
             for i in range(4):
                 q[k + i] = e[i]
 

@@ -5,12 +5,9 @@ In absolute coordinates: masses are constant, bodies are coupled by rows and for
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
 from ..compiler.door import door
 from ..compiler.jit import formula
+from ..math.cayley import bent
 from ..math.scalar import sqrt, tan
 from ..math.vec import add, cross, dot, load9, mv, scale, sub
 from ..numerics.integrators.clock import T
@@ -18,7 +15,7 @@ from ..numerics.integrators.implicit.hermite import between
 from ..numerics.integrators.implicit.variational import answer
 from ..tables.system import COORDINATES, G_VALUE, INERTIA, MASS, NV, V0
 from .asking import OWN, S_, SHEET, W_, inspect, through
-from .implicit import PLAN, compose, land, turned
+from .implicit import compose, land
 from .solve import inverse_mass
 from .tasks import POSITION, RESIDUAL, SOLVE
 from .tree import quaternion_at
@@ -27,12 +24,6 @@ MOST = 20  # iterations for a turn
 ENOUGH = 1e-15  # part of a turn's momentum that its equation may miss
 ROUNDED = 1e-12  # what it misses that does not fall
 SMALL = 0.02  # turn [rad] below which functions of it are series
-
-
-class Turns(NamedTuple):
-    """Where turns are."""
-
-    turns: np.ndarray  # first angular velocity of each quaternion
 
 
 @formula
@@ -111,9 +102,7 @@ def arrived(p, x, d, p1, i):
 
     Written as what it changes: what is equal in all steps must not round the same way ten million times.
     """
-    y = scale(-0.5, x)
-    bend = cross(y, (p[i], p[i + 1], p[i + 2]))
-    more = scale(2.0 / (1.0 + dot(y, y)), add(bend, cross(y, bend)))
+    more = bent(x, (p[i], p[i + 1], p[i + 2]))
     for k in range(3):
         d[i + k] = x[k]
         p1[i + k] = p[i + k] + more[k]
@@ -223,21 +212,15 @@ def rows_to(G, A):
 
 
 @formula
-def turned_rates(d, w, A):
-    """Velocities w into rates of increments, in place."""
-    turned(A[PLAN], d, w)
-
-
-@formula
 def by_variation(S, W, M, own, going, task):
     """The variational method; places in A are those of `implicit`."""
     A = (
         own.doors[0], S, W, own.R, own.clock, own.sheet, going.group, 0, 0, 0, 0, 0, 0, M.turns, going, between,
     )  # fmt: skip
     callbacks = (
-        compose, land, inspect, turned_rates, weigh, speed, fly, push, place, relax, pull, rows_to,
+        compose, land, inspect, weigh, speed, fly, push, place, relax, pull, rows_to,
     )  # fmt: skip
-    return answer(callbacks, A, M.desk, going.clock, task)
+    return answer(callbacks, A, M, going.clock, task)
 
 
 @door

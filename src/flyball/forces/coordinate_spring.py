@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import field
 from types import SimpleNamespace
-from typing import Annotated, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from ..compiler.jit import formula
+from ..errors import ModelError
 from ..model.element import Law, LawOf, Number, Unit, element, nonnegative
 from ..model.force import CoordinateForce
 
@@ -63,6 +64,7 @@ class CoordinateSpring(CoordinateForce):
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness and damping must not be negative."""
         nonnegative(self, n, "stiffness", "damping")
+        refuse_idle(self, "rest", 0.0)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""
@@ -114,3 +116,15 @@ class Actuator(CoordinateForce):
 def pushing(name: str, coordinate: str, force: str) -> Actuator:
     """A force along a coordinate by a law."""
     return Actuator(name, coordinate, force=force)
+
+
+def refuse_idle(e: Any, name: str, usual: float | None) -> None:
+    """Refuse where a spring carries nothing if it has no stiffness.
+
+    Raises
+    ------
+    ModelError
+        Naming the field.
+    """
+    if getattr(e, name) != usual and e.stiffness == 0.0:
+        raise ModelError(f"{e.title}: {name} has no effect without stiffness; give stiffness, or leave {name} out")

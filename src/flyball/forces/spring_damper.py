@@ -10,6 +10,7 @@ from ..math.scalar import divide
 from ..math.vec import dot, neg, norm, scale, sub
 from ..model.element import Damping, Law, LawOf, Length, Stiffness, element, nonnegative
 from ..model.force import TwoPointForce
+from .coordinate_spring import refuse_idle
 
 KIND = 0
 
@@ -76,6 +77,7 @@ class SpringDamper(TwoPointForce):
     def check(self, n: SimpleNamespace) -> None:
         """Stiffness, damping and free length must not be negative."""
         nonnegative(self, n, "stiffness", "damping", "length")
+        refuse_idle(self, "length", None)
 
     def parameters(self, n: SimpleNamespace, separation: float) -> tuple[float, ...]:
         """Numbers that the formulas see."""

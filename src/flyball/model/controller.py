@@ -97,7 +97,7 @@ class Controller(Element, ABC):
 
     def called(self, given: str) -> str:
         """What messages call something that it is given."""
-        return given
+        return "input" if given == "of" else given
 
     @abstractmethod
     def signals(self) -> dict[str, str]:

@@ -38,8 +38,9 @@ class Formulation:
         rows of all joints and drivers in absolute coordinates, whatever coordinates it was computed in; deviation from
         the energy balance [J].
     difference : float
-        How far the end is from that of the reference: of any body the way of its mass centre [m] and its turn at the
-        mechanism's length, whichever is more; nan if there is no end or no reference.
+        How far the motion is from the reference at any output time, or at the end: of any body the way of its mass
+        centre [m] and its turn at the mechanism's length, whichever is more; nan if the end was not reached, or without
+        a reference.
     steps, rejected, evaluations, factorisations : int
         Of the motion without outputs on the way; evaluations of the constraints and of the kinematics behind them.
     exchanges : int
@@ -99,7 +100,7 @@ class Comparison:
     t_end : float [s]
     formulations : tuple of Formulation
     reference : str
-        What the ends are compared with.
+        What the motions are compared with.
     energy : float [J]
         Largest kinetic energy of the reference, nan if there is none: what drifts of energy are to be seen against.
     options : dict

@@ -14,6 +14,7 @@ from ..tables.system import FORCE_F
 from .energy import gained
 from .lag import late, perhaps_late
 from .ledger import Ledger, apart, whole
+from .overturned import overturned, perhaps_overturned
 from .residue import missed
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def warnings(result: Result) -> tuple[str, ...]:
 def doubtful(result: Result) -> tuple[str, ...]:
     """Reasons to think that a motion is not what its tolerance asks for; none for a sound one."""
     balance = _balance(result) or late(whole(result))
-    return tuple(text for text in (balance, missed(result), _violation(result)) if text)
+    return tuple(text for text in (balance, overturned(result), missed(result), _violation(result)) if text)
 
 
 def balanced(result: Result) -> Any:
@@ -94,6 +95,7 @@ def suspected(result: Result, runs: int) -> np.ndarray:
     rtol = result.health.options.get("rtol")
     ledgers = [whole(result), *(apart(result) if rtol is not None else [])]
     found = np.full(runs, rtol is not None and rtol > LOOSE) | perhaps_late(ledgers[0].of_runs(runs))
+    found |= perhaps_overturned(result, runs)
     for x in ledgers:
         for _, _, lost, _, allowed in _excesses(x.of_runs(runs), len(result.t) // runs):
             found |= ~(lost <= NEARLY * allowed)

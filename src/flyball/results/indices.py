@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..errors import AnalysisError
 from .numbers import plain
 
 WITHIN = 0.95  # confidence
@@ -22,6 +23,9 @@ class Indices:
     ----------
     of, parameters : tuple of str
     samples : int
+        How many they are found from: a power of two.
+    left_out : int
+        How many more there are of which one run failed.
     first : ndarray (of, parameters) [1]
         By itself: how much smaller the variance would be on average if the parameter were known.
     total : ndarray (of, parameters) [1]
@@ -37,13 +41,21 @@ class Indices:
     total: np.ndarray
     first_range: np.ndarray
     total_range: np.ndarray
+    left_out: int = 0
 
     @classmethod
     def of_runs(cls, of: tuple[str, ...], parameters: tuple[str, ...], y: np.ndarray) -> Indices:
-        """From y (of, 2 + parameters, samples): the samples A, B, and A with one column of B each."""
+        """From y (of, 2 + parameters, samples): the samples A, B, and A with one column of B each; nan where a run
+        failed. SciPy's estimators take a power of two of samples: of those that are whole as many as that.
+        """
+        whole = np.isfinite(y).all(axis=(0, 1))
+        left = int(whole.sum())
+        if left < 2:
+            raise AnalysisError(f"{left} of {len(whole)} samples have all their runs: no variances are known")
+        y = y[:, :, whole][:, :, : 1 << (left.bit_length() - 1)]
         found = [_estimated(x) for x in y]
         first, total, first_range, total_range = (np.array(x) for x in zip(*found, strict=True))
-        return cls(of, parameters, y.shape[2], first, total, first_range, total_range)
+        return cls(of, parameters, y.shape[2], first, total, first_range, total_range, len(whole) - left)
 
     def __getitem__(self, of: str) -> dict[str, tuple[float, float]]:
         """Parameter -> (first, total) of a quantity."""
@@ -54,6 +66,9 @@ class Indices:
     def lines(self) -> list[tuple[str, str]]:
         """A table for people."""
         out = [("samples", f"{self.samples}; in brackets what 95 % of resamplings stay within")]
+        if self.left_out:
+            text = f"{self.left_out} samples of which a run failed: where that is so is missing from the indices"
+            out.append(("left out", text))
         for i, name in enumerate(self.of):
             for k in np.argsort(-self.total[i], kind="stable"):
                 parts = [
@@ -67,6 +82,7 @@ class Indices:
         """Everything as plain numbers and names."""
         return {
             "samples": self.samples,
+            "left_out": self.left_out,
             "of": {
                 name: {
                     p: {
@@ -92,9 +108,7 @@ class Indices:
 
 
 def _estimated(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Indices of one quantity, and their ranges. SciPy's estimators; they are told a power of two of samples, which is
-    not looked at where functions are given by their values.
-    """
+    """Indices of one quantity, and their ranges, by SciPy's estimators; of a power of two of samples."""
     import warnings
 
     from scipy.stats import sobol_indices
@@ -102,9 +116,7 @@ def _estimated(y: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nd
     d, n = len(y) - 2, y.shape[1]
     if not np.ptp(y) > 0.0:
         return np.zeros(d), np.zeros(d), np.full((d, 2), np.nan), np.full((d, 2), np.nan)
-    even = 1 << (n.bit_length() - 1)  # of other numbers of samples (some failed) as many as SciPy takes
-    y = y[:, :even]
-    found = sobol_indices(func={"f_A": y[:1], "f_B": y[1:2], "f_AB": y[2:, None, :]}, n=even)
+    found = sobol_indices(func={"f_A": y[:1], "f_B": y[1:2], "f_AB": y[2:, None, :]}, n=n)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of a parameter that changes nothing the bounds are not defined
         spread = found.bootstrap(confidence_level=WITHIN, n_resamples=RESAMPLED)

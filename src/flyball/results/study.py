@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import AnalysisError, ModelError, cannot_write
+from ..errors import ModelError, cannot_write
 from ..model.words import listing, suggest
 from .indices import Indices
 from .numbers import plain, span
@@ -166,7 +166,8 @@ class Study:
         """Sobol' indices: which part of the variance of each quantity each parameter accounts for.
 
         By SciPy's ``sobol_indices``: first-order and total indices (Saltelli et al., Computer Physics Communications
-        181, 2010). A sample of which one run failed is left out with all its runs.
+        181, 2010). A sample of which one run failed is left out with all its runs, and `Indices.left_out` counts
+        them.
 
         Parameters
         ----------
@@ -191,12 +192,7 @@ class Study:
             raise ModelError(f"{curves[0]} is a curve; ask for end({curves[0]}), or max, min, mean, rms of it")
         d = len(self.parameters)
         y = np.array([self.values[name] for name in names]).reshape(len(names), d + 2, -1)
-        whole = np.isfinite(y).all(axis=(0, 1))
-        if whole.sum() < 2:
-            raise AnalysisError(
-                f"{int(whole.sum())} of {y.shape[2]} samples have all their runs: no variances are known"
-            )
-        return Indices.of_runs(names, self.parameters, y[:, :, whole])
+        return Indices.of_runs(names, self.parameters, y)
 
     def lines(self) -> list[tuple[str, str]]:
         """A table for people: what was varied, how the quantities spread, and what failed."""

@@ -18,6 +18,7 @@ from ...results.health import Health
 from ...results.result import Owed, Result
 from ...results.touched import contacts
 from ...tables.system import EVALUATIONS, FACTORISATIONS, WORST_G, WORST_V
+from ..assembly.start import Assembly
 from ..compile_time import compiled_since
 from ..mobility import mobility
 from .crossed import crossed
@@ -25,7 +26,7 @@ from .events.carried import carried
 from .events.here import Here
 from .options import Integration
 from .part import KEPT
-from .reasons import reason, remarks
+from .reasons import of_drivers, reason, remarks
 from .residual import acceleration_violation
 from .samples import never
 from .start import Start, begun
@@ -58,7 +59,7 @@ def outcome(
     elif here.start.part.paused:
         message = KEPT.format(t)
     elif here.failed is not None:
-        broken = f"at t = {t:.6g} s, {text}" if status == ex.STUCK and (text := crossed(a.compiled, t)) else ""
+        broken = _behind(a, clock) if status == ex.STUCK else ""
         message = (
             f"{model.name!r}: {broken or here.failed}. The motion up to t = {t:.6g} s is kept in the error's result"
         )
@@ -95,6 +96,13 @@ def outcome(
     if here.failed is not None or status not in (ex.DONE, ex.RUNNING):
         raise SimulationError(message, result, t) from cause
     return result
+
+
+def _behind(a: Assembly, clock: ex.Clock) -> str:
+    """What is behind a step of fixed width that has no solution, if it is known; else nothing."""
+    t = float(clock.real[ex.T])
+    text = crossed(a.compiled, t)
+    return f"at t = {t:.6g} s, {text}" if text else of_drivers(a, clock)
 
 
 def _for_the_next(here: Here, followed: bool) -> dict[str, Any]:

@@ -75,6 +75,11 @@ def _values(model: Model, name: str, given: Any) -> np.ndarray:
             f"vary {name!r}: a grid takes a list of values, not {given!r}; ranges and distributions go with "
             f"design='random', 'latin', 'sobol' or 'saltelli', and samples="
         )
+    if isinstance(given, tuple) and len(given) == 2:
+        raise ModelError(
+            f"vary {name!r}: {given!r} is a range (low, high), which goes with design='random', 'latin', 'sobol' or "
+            f"'saltelli', and samples=; of two values give a list, {list(given)!r}"
+        )
     texts = [x for x in given if isinstance(x, str)]
     for text in texts[1:]:
         same_kind(texts[0], text, f"vary {name!r}: the first of its values")
@@ -101,6 +106,8 @@ def _law(model: Model, name: str, given: Any) -> Any:
     from scipy import stats
 
     if hasattr(given, "ppf"):
+        if (size := np.size(given.ppf(0.5))) != 1:
+            raise ModelError(f"vary {name!r}: {size} distributions are given in place of one; its numbers are arrays")
         return given
     if isinstance(given, str) and (found := WRITTEN.fullmatch(given)):
         kind, texts = found[1], found[2].split(",")

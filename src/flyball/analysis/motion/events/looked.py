@@ -15,7 +15,8 @@ def told(loop: Loop) -> str:
     count = loop.desk.count
     guards, steps = len(loop.desk.way), max(int(count[STEPS]), 1)
     what = "1 guard" if guards == 1 else f"{guards} guards"
+    most = max(count[LOOKS] / steps + 1, PLACES)  # its end, where they are known, stands for one place more
     return (
-        f"{what} at {count[LOOKS] / steps:.0f} places a step on average, {PLACES} at least: what passes zero and comes "
+        f"{what} at {most:.0f} places a step on average, {PLACES} at least: what passes zero and comes "
         f"back between two of them is not seen"
     )

@@ -46,7 +46,8 @@ class Desk(NamedTuple):
     real_Y: np.ndarray
     P: Rows
     past: np.ndarray  # (4, nv + nx): accelerations that the method remembers, and rates of x
-    ends: np.ndarray  # (3, nv): rates at the ends of the step
+    ends: np.ndarray  # (2, nv): accelerations at the ends of the step
+    turns: np.ndarray  # first angular velocity of each quaternion
 
 
 class Alpha(Implicit):
@@ -77,5 +78,6 @@ class Alpha(Implicit):
     def _desk(self, nz: int, springy: np.ndarray) -> Desk:  # type: ignore[override]
         w = super()._desk(nz, springy)
         nv, nx = self.layout.nv, self.layout.nx
-        kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends")}
-        return Desk(**kept, rho=np.zeros(1), past=np.zeros((4, nv + nx)), ends=np.zeros((3, nv)))
+        kept = {name: getattr(w, name) for name in Desk._fields if name not in ("rho", "past", "ends", "turns")}
+        past, ends = np.zeros((4, nv + nx)), np.zeros((2, nv))
+        return Desk(**kept, rho=np.zeros(1), past=past, ends=ends, turns=self.layout.turns)

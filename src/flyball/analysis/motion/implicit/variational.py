@@ -9,7 +9,7 @@ import numpy as np
 from ....compiler.bound import Bound, Written
 from ....equations.callbacks import Going, Own
 from ....equations.tree import quaternion_at
-from ....equations.variational import Turns, variational_steps
+from ....equations.variational import variational_steps
 from ....errors import ModelError, SimulationError
 from ....numerics.integrators import clock as ex
 from ....numerics.integrators.implicit import desk as ds
@@ -37,20 +37,14 @@ class Desk(NamedTuple):
     found: np.ndarray
     z: np.ndarray
     rate: np.ndarray
-    ends: np.ndarray  # (3, nv): rates at the ends of the step
+    ends: np.ndarray  # (2, nv): accelerations at the ends of the step
+    turns: np.ndarray  # first angular velocity of each quaternion
     p: np.ndarray  # (4, nv): momenta of the free way, on arrival, at the begin of the step and at its end
     f: np.ndarray  # (3, nv): forces at its begin, at its end, and as they were thought to be there
     g: np.ndarray  # (nr,): violations
     rows: np.ndarray  # (2, nG): G at the begin and at the end
     steps: np.ndarray  # (KEPT, nr): of the iteration for positions
     pushes: np.ndarray  # (KEPT, nv): and of that for forces
-
-
-class Means(NamedTuple):
-    """What its steps work with."""
-
-    turns: Turns
-    desk: Desk
 
 
 class Variational:
@@ -75,15 +69,14 @@ class Variational:
         real, count = np.zeros(ds.REALS), np.zeros(ds.COUNTS, np.int64)
         real[ds.NEWTON], real[ds.ROUGH] = TIGHT * S.glob[LENGTH], CLOSED * S.glob[LENGTH]
         n, z = int(S.row_p[nr]), np.zeros
-        desk = Desk(
-            count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((3, nv)),
-            z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
+        self.desk = Desk(
+            count, real, z((4, nv)), z((4, nv)), z((4, nv)), z((4, nr)), z(nr), z((4, nz)), z((4, nz)), z((2, nv)),
+            np.array(turns, np.int64), z((4, nv)), z((3, nv)), z(nr), z((2, n)), z((KEPT, nr)), z((KEPT, nv)),
         )  # fmt: skip
-        self.means = Means(Turns(np.array(turns, np.int64)), desk)
 
     def bind(self, S: System, W: Work, own: Own, going: Going, *known: Written) -> Bound:
         """The door with these tuples bound to it."""
-        return Bound(variational_steps, *(Written(x, *known) for x in (S, W, self.means, own, going)))
+        return Bound(variational_steps, *(Written(x, *known) for x in (S, W, self.desk, own, going)))
 
     @property
     def failed(self) -> SimulationError | None:

@@ -10,9 +10,9 @@ States of the first order, x' = f, go as velocities do (Bruels and Golinval 2006
 mechatronic applications"); of `past` they are the last columns.
 
 a is the acceleration at t + (am - af) h. The spectral radius at infinite frequency, rho, sets am, af, beta and gamma.
-Knows nothing of bodies: given (residual, linearise, compose, arrive, inspect) as `radau` is, and ``turned(d, w, S)``,
-which makes velocities rates of increments in place, ``straight(d, out, S)``, increments those of constant velocity, and
-an ``arrive`` of what is no end of a step.
+Knows nothing of bodies: given (residual, linearise, compose, arrive, inspect) as `radau` is, and
+``straight(d, out, S)``, which makes increments those of constant velocity, and an ``arrive`` of what is no end of a
+step.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ from .desk import (
 )
 from .even import account
 from .even import enter as enter_step
-from .hermite import D_RATE, END, V_RATE, V_RATE_END
+from .hermite import END, V_RATE, V_RATE_END
 from .newton import solve
 from .step import begin as tolerances
 
@@ -63,7 +63,7 @@ def coefficients(rho):
 @formula
 def begin(callbacks, S, K, c):
     """What the method remembers of steps, where it begins anew: accelerations, and their rate."""
-    compose, arrive = callbacks[2], callbacks[7]
+    compose, arrive = callbacks[2], callbacks[6]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
     ahead = AHEAD * c.real[STEP]
@@ -100,7 +100,7 @@ def place(K, h):
 def ends(callbacks, S, K, h):
     """Rates at the end of the step, by the values there."""
     am, af, beta, gamma = coefficients(K.rho[0])
-    straight = callbacks[6]
+    straight = callbacks[5]
     straight(K.d[END], K.dd[END], S)
     for i in range(K.v.shape[1]):
         v0, a0 = K.v[START, i], K.a[START, i]
@@ -252,7 +252,7 @@ def attempt(callbacks, S, K, c, h):
     if status != 0:
         return status, 0.0, 1.0
     ends(callbacks, S, K, h)
-    conclude(callbacks, S, K)
+    conclude(K)
     compose(c.y[NOW], K.d[END], K.v[END], K.z[END], c.y[NEW], S)
     status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
     account(c, h)
@@ -260,14 +260,11 @@ def attempt(callbacks, S, K, c, h):
 
 
 @formula
-def conclude(callbacks, S, K):
+def conclude(K):
     """What is asked for within the step, found."""
-    turned = callbacks[5]
     for i in range(K.v.shape[1]):
-        K.ends[D_RATE, i] = K.v[END, i]
         K.ends[V_RATE, i] = K.past[TRUE, i]
         K.ends[V_RATE_END, i] = K.a[END, i]
-    turned(K.d[END], K.ends[D_RATE], S)
 
 
 @formula

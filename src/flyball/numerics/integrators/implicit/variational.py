@@ -10,7 +10,6 @@ velocities on the constraints at the ends of steps, as in RATTLE (Andersen 1983;
 It is symplectic, keeps momenta that symmetries keep, and its energy stays within bounds that do not grow. Forces that
 depend on velocities are iterated. Knows nothing of bodies: given compose, arrive, inspect, as `asked` is, and
 
-    turned(d, w, S)                 velocities into rates of increments, in place
     weigh(v, p, S), speed(p, v, S)  momenta of velocities, and back
     fly(p, h, d, p1, S) -> status   the way of momenta p, and those on arrival
     push(t, y, lam, f, S)           forces
@@ -30,7 +29,7 @@ from .asked import begin, within
 from .desk import BEFORE, ITERATIONS, NEWTON, ROUGH, START
 from .even import account
 from .even import enter as enter_step
-from .hermite import D_RATE, END, V_RATE, V_RATE_END, between
+from .hermite import END, V_RATE, V_RATE_END, between
 
 FREE, ARRIVING, CARRIED, CARRIED_ON = range(4)  # rows of p
 HERE, THERE, TRIAL = range(3)  # rows of f, and of rows: at the begin of the step, at its end
@@ -44,7 +43,7 @@ NOT_CLOSED, NOT_SETTLED = 1, 2
 @formula
 def prepare(callbacks, S, K, c):
     """Forces and rows where the method begins anew."""
-    weigh, push, rows_to = callbacks[4], callbacks[7], callbacks[11]
+    weigh, push, rows_to = callbacks[3], callbacks[6], callbacks[10]
     weigh(K.v[START], K.p[CARRIED], S)
     push(c.real[T], c.y[NOW], K.lam[START], K.f[HERE], S)
     rows_to(K.rows[HERE], S)
@@ -68,31 +67,29 @@ def attempt(callbacks, S, K, c, h):
     if status != 0:
         return status
     account(c, h)
-    seen(callbacks, S, K, c, 1)
+    seen(K, c, 1)
     for i in range(nz):
         K.z[END, i] = c.y[NEW, at + nv + i]
     return 0
 
 
 @formula
-def seen(callbacks, S, K, c, end):
+def seen(K, c, end):
     """What is asked for within the step, by the velocities in c.y[NEW] and the rates in row ``end`` of c.K."""
-    turned = callbacks[3]
     nv, nz = K.v.shape[1], K.z.shape[1]
     at = c.y.shape[1] - nz - nv
     for i in range(nv):
-        K.v[END, i] = K.ends[D_RATE, i] = c.y[NEW, at + i]
+        K.v[END, i] = c.y[NEW, at + i]
         K.ends[V_RATE, i], K.ends[V_RATE_END, i] = c.K[0, at + i], c.K[end, at + i]
     for i in range(nz):
         K.rate[START, i], K.rate[END, i] = c.K[0, at + nv + i], c.K[end, at + nv + i]
-    turned(K.d[END], K.ends[D_RATE], S)
 
 
 @formula
 def go(callbacks, S, K, c, h):
     """To the positions at the end of the step, on the constraints, and the momenta on arrival. Returns a status."""
-    compose, fly = callbacks[0], callbacks[6]
-    place, relax, pull = callbacks[8], callbacks[9], callbacks[10]
+    compose, fly = callbacks[0], callbacks[5]
+    place, relax, pull = callbacks[7], callbacks[8], callbacks[9]
     nr = K.lam.shape[1]
     for i in range(K.v.shape[1]):
         K.p[FREE, i] = K.p[CARRIED, i] + 0.5 * h * K.f[HERE, i]
@@ -149,7 +146,7 @@ def better(steps, n):
 @formula
 def land(callbacks, S, K, c, h):
     """Velocities at the end of the step, with forces that may depend on them. Returns a status."""
-    arrive, weigh, speed, push, rows_to = callbacks[1], callbacks[4], callbacks[5], callbacks[7], callbacks[11]
+    arrive, weigh, speed, push, rows_to = callbacks[1], callbacks[3], callbacks[4], callbacks[6], callbacks[10]
     nv = K.v.shape[1]
     at = c.y.shape[1] - K.z.shape[1] - nv
     speed(K.p[ARRIVING], c.y[NEW, at : at + nv], S)
@@ -161,7 +158,7 @@ def land(callbacks, S, K, c, h):
             K.p[FREE, i] = K.p[ARRIVING, i] + 0.5 * h * K.f[TRIAL, i]
             size = max(size, abs(K.p[FREE, i]), 0.5 * h * abs(K.f[TRIAL, i]))
         speed(K.p[FREE], c.y[NEW, at : at + nv], S)
-        seen(callbacks, S, K, c, 0 if n == 0 else 1)
+        seen(K, c, 0 if n == 0 else 1)
         status, _ = arrive(c.real[T] + h, c.y[NEW], c.K[1], S, K)
         if status != 0:
             return status
